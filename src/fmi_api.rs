@@ -99,12 +99,7 @@ impl Journal {
             },
             // SAFETY: as above.
             Some(Logger::Three(logger)) => unsafe {
-                logger(
-                    self.env,
-                    status as c_int,
-                    category.as_ptr(),
-                    text.as_ptr(),
-                );
+                logger(self.env, status as c_int, category.as_ptr(), text.as_ptr());
             },
         }
     }
@@ -201,7 +196,12 @@ fn pin() {
 }
 
 /// Makes an instance; null if that fails, which the tool is told why.
-fn instantiate(version: Version, named: Option<&Path>, token: &str, journal: Journal) -> *mut c_void {
+fn instantiate(
+    version: Version,
+    named: Option<&Path>,
+    token: &str,
+    journal: Journal,
+) -> *mut c_void {
     let made = catch_unwind(AssertUnwindSafe(|| {
         pin();
         let place = INSTANCES.reserve().map_err(|refusal| refusal.to_string())?;
@@ -217,7 +217,8 @@ fn instantiate(version: Version, named: Option<&Path>, token: &str, journal: Jou
         };
         Ok(place.fill(tenant) as *mut c_void)
     }));
-    let made = made.unwrap_or_else(|payload| Err(format!("a defect of tickbus: {}", panic_message(payload))));
+    let made = made
+        .unwrap_or_else(|payload| Err(format!("a defect of tickbus: {}", panic_message(payload))));
     journal.pass_on_log();
     made.unwrap_or_else(|text: String| {
         journal.fail(&text);

@@ -1,12 +1,15 @@
 //! FMUs of tickbus in tools that others wrote, and FMUs that others made as machines of tickbus.
 #![allow(missing_docs, reason = "a test")]
 
+#[path = "fmi/fixture.rs"]
+mod fixture;
 mod foreign;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::sync::OnceLock;
 
+use fixture::library;
 use foreign::Absent;
 use tempfile::TempDir;
 use tickbus::driver::Driver;
@@ -31,9 +34,19 @@ fn main() -> ExitCode {
 /// A Python with the tools.
 fn python() -> Result<Command, Absent> {
     if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
-        return Err(Absent("the tools' own libraries are for Linux on x86-64".to_owned()));
+        return Err(Absent(
+            "the tools' own libraries are for Linux on x86-64".to_owned(),
+        ));
     }
-    foreign::python_with("fmi", &["fmpy", "libcosimpy", "pythonfmu", "fmu_manipulation_toolbox"])
+    foreign::python_with(
+        "fmi",
+        &[
+            "fmpy",
+            "libcosimpy",
+            "pythonfmu",
+            "fmu_manipulation_toolbox",
+        ],
+    )
 }
 
 fn text(bytes: &[u8]) -> String {
@@ -44,27 +57,17 @@ fn text(bytes: &[u8]) -> String {
 fn tool(arguments: &[&str]) -> Result<(), Absent> {
     let mut python = python()?;
     let script = Path::new(ROOT).join("tests/peers/fmi_tools.py");
-    let output = python.arg(script).args(arguments).output().expect("it starts");
+    let output = python
+        .arg(script)
+        .args(arguments)
+        .output()
+        .expect("it starts");
     let (told, complaint) = (text(&output.stdout), text(&output.stderr));
-    assert!(output.status.success() && told.contains("fmi_tools: ok"), "{arguments:?}\n{told}\n{complaint}");
+    assert!(
+        output.status.success() && told.contains("fmi_tools: ok"),
+        "{arguments:?}\n{told}\n{complaint}"
+    );
     Ok(())
-}
-
-/// The native library without its debug tables, where there is `strip`: FMUs of it are unpacked many times.
-fn library() -> &'static Path {
-    static LIBRARY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, library) = LIBRARY.get_or_init(|| {
-        let name = libloading::library_filename("tickbus");
-        let test = std::env::current_exe().expect("a test has a path");
-        let mut places = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name));
-        let built = places.find(|place| place.exists()).expect("cargo has built it");
-        let folder = tempfile::tempdir().expect("a folder");
-        let small = folder.path().join(&name);
-        let stripped = Command::new("strip").arg("-o").arg(&small).arg(&built).status();
-        let library = if stripped.is_ok_and(|status| status.success()) { small } else { built };
-        (folder, library)
-    });
-    library
 }
 
 /// The FMU of a driver.cfg, in a folder of its own.
@@ -100,12 +103,16 @@ fn in_fmpy() -> Result<(), Absent> {
 
 fn misuse() -> Result<(), Absent> {
     python()?;
-    types().into_iter().try_for_each(|fmu| tool(&["misuse", fmu]))
+    types()
+        .into_iter()
+        .try_for_each(|fmu| tool(&["misuse", fmu]))
 }
 
 fn in_toolbox() -> Result<(), Absent> {
     python()?;
-    types().into_iter().try_for_each(|fmu| tool(&["toolbox", fmu]))
+    types()
+        .into_iter()
+        .try_for_each(|fmu| tool(&["toolbox", fmu]))
 }
 
 fn in_libcosim() -> Result<(), Absent> {
@@ -117,7 +124,8 @@ fn in_libcosim() -> Result<(), Absent> {
 fn rig() -> Result<(), Absent> {
     python()?;
     let folder = tempfile::tempdir().expect("a folder");
-    let rig = std::fs::read_to_string(Path::new(ROOT).join("driver.cfg")).expect("the rig's driver.cfg");
+    let rig =
+        std::fs::read_to_string(Path::new(ROOT).join("driver.cfg")).expect("the rig's driver.cfg");
     let signals = &rig[rig.find("[[signal]]").expect("signals")..];
     let config = folder.path().join("driver.cfg");
     let text = format!(
@@ -131,9 +139,16 @@ fn rig() -> Result<(), Absent> {
         let (_folder, fmu) = export(&config, version);
         let record = folder.path().join(format!("{version}.vcd"));
         tool(&["rig", &fmu, record.to_str().expect("UTF-8")])?;
-        assert!(std::fs::read(record).expect("a recording") == own, "{version}: the recordings differ");
+        assert!(
+            std::fs::read(record).expect("a recording") == own,
+            "{version}: the recordings differ"
+        );
     }
-    assert!(own.len() > 100_000, "much has happened: {} bytes", own.len());
+    assert!(
+        own.len() > 100_000,
+        "much has happened: {} bytes",
+        own.len()
+    );
     Ok(())
 }
 
@@ -147,7 +162,9 @@ fn record(config: &Path, file: &Path) {
     let table = driver.config().table.clone();
     let mut random = 1_u64;
     for tick in 1..=2000_i64 {
-        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         let word = u32::try_from(random >> 32).expect("32 bits");
         let (mut bits, mut reals) = (0, 0);
         for (slot, signal) in slots.iter_mut().zip(&table.signals) {
@@ -200,7 +217,12 @@ fn by_pythonfmu() -> Result<(), Absent> {
         .arg(folder.path())
         .output()
         .expect("it starts");
-    assert!(built.status.success(), "{}{}", text(&built.stdout), text(&built.stderr));
+    assert!(
+        built.status.success(),
+        "{}{}",
+        text(&built.stdout),
+        text(&built.stderr)
+    );
     // Its library is Python's, which it expects to be loaded already.
     let mut python = self::python()?;
     let asked = python
@@ -209,17 +231,36 @@ fn by_pythonfmu() -> Result<(), Absent> {
         .expect("it starts");
     let shared = text(&asked.stdout);
     if !shared.contains(".so") || !Path::new(&shared).exists() {
-        return Err(Absent(format!("this Python has no shared library ({shared}), which FMUs of PythonFMU need")));
+        return Err(Absent(format!(
+            "this Python has no shared library ({shared}), which FMUs of PythonFMU need"
+        )));
     }
     for file in ["tank.cfg", "tank.toml"] {
         let from = Path::new(ROOT).join("examples/fmu-tank").join(file);
         let text = std::fs::read_to_string(from).expect("a file");
         // It has no such parameter.
-        let text = text.split("[parameters]").next().expect("a part").to_owned();
+        let text = text
+            .split("[parameters]")
+            .next()
+            .expect("a part")
+            .to_owned();
         std::fs::write(folder.path().join(file), text).expect("a file");
     }
     let ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .args(["run", "Machine.fmu", "--config", "tank.cfg", "--map", "tank.toml", "--step", "10ms", "--duration", "20s", "--record", "run.csv"])
+        .args([
+            "run",
+            "Machine.fmu",
+            "--config",
+            "tank.cfg",
+            "--map",
+            "tank.toml",
+            "--step",
+            "10ms",
+            "--duration",
+            "20s",
+            "--record",
+            "run.csv",
+        ])
         .args(["--isolated"])
         .env("LD_PRELOAD", &shared)
         .current_dir(folder.path())
@@ -227,9 +268,17 @@ fn by_pythonfmu() -> Result<(), Absent> {
         .expect("it runs");
     let told = text(&ran.stdout);
     assert!(ran.status.success(), "{told}\n{}", text(&ran.stderr));
-    assert!(told.ends_with("run: ok ticks=2000 time=20s stale=0"), "{told}");
+    assert!(
+        told.ends_with("run: ok ticks=2000 time=20s stale=0"),
+        "{told}"
+    );
     let record = std::fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
-    let level: f64 = record.lines().last().and_then(|line| line.rsplit(',').next()).and_then(|value| value.parse().ok()).expect("a level");
+    let level: f64 = record
+        .lines()
+        .last()
+        .and_then(|line| line.rsplit(',').next())
+        .and_then(|value| value.parse().ok())
+        .expect("a level");
     assert!((395.0..=405.0).contains(&level), "{level}");
     Ok(())
 }

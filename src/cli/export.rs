@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
-use tickbus_driver_cfg::Config;
 use tickbus_base::Mistake;
+use tickbus_driver_cfg::Config;
 use tickbus_export::{Export, Target, export};
 use tickbus_fmi::{Version, made};
 
@@ -102,7 +102,10 @@ fn run_fmu(arguments: &Arguments, version: Version) -> Outcome {
 }
 
 /// Writes an FMU; else what is wrong, and how often.
-fn make_fmu(arguments: &Arguments, version: Version) -> Result<(PathBuf, made::Package), (String, usize)> {
+fn make_fmu(
+    arguments: &Arguments,
+    version: Version,
+) -> Result<(PathBuf, made::Package), (String, usize)> {
     let one = |mistake: Mistake| (mistake.to_string(), 1);
     // First what the user can see, then what this computer lacks.
     Config::load(&arguments.file).map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
@@ -111,9 +114,10 @@ fn make_fmu(arguments: &Arguments, version: Version) -> Result<(PathBuf, made::P
     let libraries = made::find_libraries(&arguments.library, beside).map_err(one)?;
     let package = made::export(&arguments.file, version, &libraries)
         .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
-    let file = arguments.out.clone().unwrap_or_else(|| {
-        folder_beside(arguments).with_extension("fmu")
-    });
+    let file = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| folder_beside(arguments).with_extension("fmu"));
     let path = file.display();
     if file.extension().is_none_or(|ending| ending != "fmu") {
         return Err(one(Mistake::new(
@@ -141,7 +145,10 @@ fn make_fmu(arguments: &Arguments, version: Version) -> Result<(PathBuf, made::P
 
 fn run_sources(arguments: &Arguments, target: Target) -> Outcome {
     if !arguments.library.is_empty() {
-        eprintln!("--library is for fmi2 and fmi3; leave it out for {}", target.name());
+        eprintln!(
+            "--library is for fmi2 and fmi3; leave it out for {}",
+            target.name()
+        );
         return Outcome::Usage;
     }
     let made = Config::load(&arguments.file).and_then(|config| export(&config, target));

@@ -337,11 +337,17 @@ fn tick(
         say(&format!("{statistics}\n"));
     }
     if by_itself {
-        say(&format!("run: the FMU has ended its simulation at {time}\n"));
+        say(&format!(
+            "run: the FMU has ended its simulation at {time}\n"
+        ));
     }
     match &failure {
-        None => say(&format!("run: ok ticks={ticks} time={time} stale={stale}\n")),
-        Some(why) => say(&format!("run: failed ticks={ticks} time={time} reason={why}\n")),
+        None => say(&format!(
+            "run: ok ticks={ticks} time={time} stale={stale}\n"
+        )),
+        Some(why) => say(&format!(
+            "run: failed ticks={ticks} time={time} reason={why}\n"
+        )),
     }
     if failure.is_some() {
         Outcome::BusFailed

@@ -204,13 +204,22 @@ unsafe extern "C" fn fmi2SetString(
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn fmi2DoStep(instance: *mut c_void, from: f64, length: f64, _no_set_prior: c_int) -> c_int {
+extern "C" fn fmi2DoStep(
+    instance: *mut c_void,
+    from: f64,
+    length: f64,
+    _no_set_prior: c_int,
+) -> c_int {
     call(instance, |instance| instance.step(from, length))
 }
 
 /// No step is ever pending, and none was discarded.
 #[unsafe(no_mangle)]
-unsafe extern "C" fn fmi2GetBooleanStatus(_instance: *mut c_void, _kind: c_int, value: *mut c_int) -> c_int {
+unsafe extern "C" fn fmi2GetBooleanStatus(
+    _instance: *mut c_void,
+    _kind: c_int,
+    value: *mut c_int,
+) -> c_int {
     if value.is_null() {
         return ERROR;
     }

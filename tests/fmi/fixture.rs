@@ -1,4 +1,5 @@
 //! FMUs for the tests, and the command that runs them.
+#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::fs::File;
 use std::io::Write as _;
@@ -31,12 +32,32 @@ pub(crate) fn err(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The native library that cargo has built for this test, beside or above its program.
-pub(crate) fn library() -> PathBuf {
-    let name = libloading::library_filename("tickbus");
-    let test = std::env::current_exe().expect("a test has a path");
-    let mut places = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name));
-    places.find(|place| place.exists()).expect("cargo has built it")
+/// The native library that cargo has built for this test, beside or above its program; without its debug tables, where there is
+/// `strip`.
+pub(crate) fn library() -> &'static Path {
+    static LIBRARY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
+    let (_, library) = LIBRARY.get_or_init(|| {
+        let name = libloading::library_filename("tickbus");
+        let test = std::env::current_exe().expect("a test has a path");
+        let mut places = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name));
+        let built = places
+            .find(|place| place.exists())
+            .expect("cargo has built it");
+        let folder = tempfile::tempdir().expect("a folder");
+        let small = folder.path().join(&name);
+        let stripped = Command::new("strip")
+            .arg("-o")
+            .arg(&small)
+            .arg(&built)
+            .status();
+        let library = if stripped.is_ok_and(|status| status.success()) {
+            small
+        } else {
+            built
+        };
+        (folder, library)
+    });
+    library
 }
 
 /// The example's two FMUs, built once: the folder with tank2.fmu and tank3.fmu.

@@ -12,7 +12,10 @@ use std::sync::Arc;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing, Moved, OpenError, Port, Role, Vendor, Verdict, NamedFile};
+use tickbus_fieldbus::{
+    Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
+    Moved, NamedFile, OpenError, Port, Role, Vendor, Verdict,
+};
 use tickbus_image::signal::SignalTable;
 
 use crate::answer::Answer;

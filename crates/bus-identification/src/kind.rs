@@ -3,7 +3,7 @@
 use tickbus_axis::Axis;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role, NamedFile};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::heads::meaning;

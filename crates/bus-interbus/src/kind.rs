@@ -2,7 +2,9 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, OpenError, Role, NamedFile};
+use tickbus_fieldbus::{
+    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, NamedFile, OpenError, Role,
+};
 use tickbus_image::signal::SignalTable;
 
 use super::card::Ddi;

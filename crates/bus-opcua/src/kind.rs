@@ -3,7 +3,7 @@
 use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role, NamedFile};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, ServerOptions};

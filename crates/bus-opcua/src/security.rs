@@ -124,7 +124,10 @@ impl Credentials {
             Secret::Environment(_) | Secret::Clear(_) => None,
         });
         let pki = protected.then(|| self.pki.clone());
-        pki.into_iter().chain(password).map(NamedFile::Secret).collect()
+        pki.into_iter()
+            .chain(password)
+            .map(NamedFile::Secret)
+            .collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, shown};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role, NamedFile};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::Options;

@@ -11,7 +11,9 @@ use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial, NamedFile};
+use tickbus_fieldbus::{
+    At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role, serial,
+};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role, NamedFile};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL};
 use tickbus_programs::{self as programs, PROGRAMS};

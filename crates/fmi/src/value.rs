@@ -295,9 +295,15 @@ mod tests {
         assert_eq!(u64::of(Value::of(slot, SlotKind::Unsigned)), large);
         let slot = Value::Signed(i64::MIN + 1).slot(SlotKind::Signed);
         assert_eq!(i64::of(Value::of(slot, SlotKind::Signed)), i64::MIN + 1);
-        assert_eq!(Value::Real(2.5e30).slot(SlotKind::Signed).signed(), i64::MAX);
+        assert_eq!(
+            Value::Real(2.5e30).slot(SlotKind::Signed).signed(),
+            i64::MAX
+        );
         assert_eq!(Value::Real(-1.0).slot(SlotKind::Unsigned).unsigned(), 0);
-        assert_eq!(Value::Unsigned(u64::MAX).slot(SlotKind::Signed).signed(), i64::MAX);
+        assert_eq!(
+            Value::Unsigned(u64::MAX).slot(SlotKind::Signed).signed(),
+            i64::MAX
+        );
         assert_eq!(i8::of(Value::Real(-300.0)), -128);
         assert_eq!(u16::of(Value::Real(f64::NAN)), 0);
         assert_eq!(i32::of(Value::Real(2.5)), 3);

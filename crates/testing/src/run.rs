@@ -100,7 +100,9 @@ impl Suite {
         };
         let failure = failure.or_else(|| {
             let ended = stand.fmu.take()?.end();
-            ended.err().map(|why| stand.broken(test.place, &why.to_string()))
+            ended
+                .err()
+                .map(|why| stand.broken(test.place, &why.to_string()))
         });
         let ran = Ran {
             ticks: stand.ticks,

@@ -182,14 +182,19 @@ fn library(archive: &ZipArchive<File>, model: &Model) -> Result<PathBuf, Mistake
     there.sort_unstable();
     there.dedup();
     let wanted = folder.unwrap_or("this platform, which FMI 2.0 has no name for");
-    let has_sources = archive.file_names().any(|name| name.starts_with("sources/"));
+    let has_sources = archive
+        .file_names()
+        .any(|name| name.starts_with("sources/"));
     let what = match &there[..] {
         [] if has_sources => format!("it has sources, and no library for {wanted}"),
         [] => format!("it has no library at all, and needs one for {wanted}"),
         all if folder.is_some_and(|folder| all.contains(&folder)) => {
             format!("it has no binaries/{wanted}/{}.{ending}", model.identifier)
         }
-        all => format!("it has libraries for {}, and none for {wanted}", all.join(", ")),
+        all => format!(
+            "it has libraries for {}, and none for {wanted}",
+            all.join(", ")
+        ),
     };
     let right = match model.version {
         Version::Two | Version::Three if has_sources => {

@@ -77,7 +77,10 @@ impl Model {
                 format!("this is no XML: {error}"),
                 "get the FMU anew; it may be cut",
             );
-            Mistakes::of_list(file, vec![tickbus_base::toml_text::PlacedMistake { place, mistake }])
+            Mistakes::of_list(
+                file,
+                vec![tickbus_base::toml_text::PlacedMistake { place, mistake }],
+            )
         })?;
         let collector = Collector::new(file, text);
         let model = read(document.root_element(), &collector);
@@ -89,7 +92,12 @@ impl Model {
     }
 }
 
-fn wrong(collector: &Collector<'_>, node: Node<'_, '_>, what: impl Into<String>, right: impl Into<String>) {
+fn wrong(
+    collector: &Collector<'_>,
+    node: Node<'_, '_>,
+    what: impl Into<String>,
+    right: impl Into<String>,
+) {
     collector.report(node.range().start, what, right);
 }
 
@@ -146,11 +154,20 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         let others = ["ModelExchange", "ScheduledExecution"];
         let other = others.into_iter().find(|name| child(root, name).is_some());
         let what = match other {
-            Some("ModelExchange") => "this FMU is for model exchange alone: it needs a solver for its states and events",
-            Some(_) => "this FMU is for scheduled execution alone: it needs a scheduler for its clocks",
+            Some("ModelExchange") => {
+                "this FMU is for model exchange alone: it needs a solver for its states and events"
+            }
+            Some(_) => {
+                "this FMU is for scheduled execution alone: it needs a scheduler for its clocks"
+            }
             None => "this FMU has no <CoSimulation>",
         };
-        wrong(collector, root, what, "export it for co-simulation, with its solver inside");
+        wrong(
+            collector,
+            root,
+            what,
+            "export it for co-simulation, with its solver inside",
+        );
         return None;
     };
     let identifier = required(collector, kind, "modelIdentifier");
@@ -165,7 +182,8 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         );
     }
     let experiment = child(root, "DefaultExperiment");
-    let seconds = |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
+    let seconds =
+        |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
     let variables = child(root, "ModelVariables");
     let variables = variables.into_iter().flat_map(|node| node.children());
     let variables: Vec<_> = variables
@@ -181,7 +199,9 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         identifier: identifier?.to_owned(),
         token: token?.to_owned(),
         step: seconds("stepSize").filter(|step| *step > 0.0 && step.is_finite()),
-        start: seconds("startTime").filter(|start| start.is_finite()).unwrap_or(0.0),
+        start: seconds("startTime")
+            .filter(|start| start.is_finite())
+            .unwrap_or(0.0),
         needs_tool: kind.attribute("needsExecutionTool") == Some("true"),
         variables,
     })
@@ -226,7 +246,10 @@ fn unknown_type(collector: &Collector<'_>, node: Node<'_, '_>, name: &str) {
     wrong(
         collector,
         node,
-        format!("there is no type \"{}\" in this version of FMI", shown(name)),
+        format!(
+            "there is no type \"{}\" in this version of FMI",
+            shown(name)
+        ),
         "export the FMU again, or tell the maker of the tool that has made it",
     );
 }
@@ -245,7 +268,12 @@ fn variable_of_two(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<Fore
     let types = ["Real", "Integer", "Enumeration", "Boolean", "String"];
     let inner = node.children().find(Node::is_element);
     let Some(inner) = inner else {
-        wrong(collector, node, "a variable without a type", "expected <Real>, <Integer>, <Boolean>, <Enumeration> or <String> inside");
+        wrong(
+            collector,
+            node,
+            "a variable without a type",
+            "expected <Real>, <Integer>, <Boolean>, <Enumeration> or <String> inside",
+        );
         return None;
     };
     let name = inner.tag_name().name();
@@ -309,22 +337,44 @@ mod tests {
         let told = told(text);
         let lines: Vec<&str> = told.lines().collect();
         assert_eq!(lines.len(), 4, "{told}");
-        assert!(lines[0].starts_with("m.xml:2:1: <CoSimulation> has no \"modelIdentifier\""), "{told}");
-        assert!(lines[1].starts_with("m.xml:4:3: there is no type \"Float128\""), "{told}");
-        assert!(lines[2].starts_with("m.xml:5:1: the valueReference is \"-1\""), "{told}");
-        assert!(lines[3].starts_with("m.xml:6:2: <Boolean> has no \"name\""), "{told}");
+        assert!(
+            lines[0].starts_with("m.xml:2:1: <CoSimulation> has no \"modelIdentifier\""),
+            "{told}"
+        );
+        assert!(
+            lines[1].starts_with("m.xml:4:3: there is no type \"Float128\""),
+            "{told}"
+        );
+        assert!(
+            lines[2].starts_with("m.xml:5:1: the valueReference is \"-1\""),
+            "{told}"
+        );
+        assert!(
+            lines[3].starts_with("m.xml:6:2: <Boolean> has no \"name\""),
+            "{told}"
+        );
     }
 
     #[test]
     fn what_needs_a_solver_or_another_version_says_so() {
         let head = |version: &str, inside: &str| {
-            format!("<fmiModelDescription fmiVersion=\"{version}\" modelName=\"x\" guid=\"1\">{inside}</fmiModelDescription>")
+            format!(
+                "<fmiModelDescription fmiVersion=\"{version}\" modelName=\"x\" guid=\"1\">{inside}</fmiModelDescription>"
+            )
         };
         let exchange = told(&head("2.0", "<ModelExchange modelIdentifier=\"x\"/>"));
-        assert!(exchange.contains("needs a solver for its states and events; export it for co-simulation"), "{exchange}");
-        assert!(told(&head("1.0", "")).contains("this is FMI 1.0; export the FMU for FMI 2.0 or 3.0"));
+        assert!(
+            exchange
+                .contains("needs a solver for its states and events; export it for co-simulation"),
+            "{exchange}"
+        );
+        assert!(
+            told(&head("1.0", "")).contains("this is FMI 1.0; export the FMU for FMI 2.0 or 3.0")
+        );
         assert!(told("<a/>").contains("the root is <a>; expected <fmiModelDescription>"));
-        assert!(told(&head("2.0", "<CoSimulation modelIdentifier=\"../x\"/>")).contains("is a path"));
+        assert!(
+            told(&head("2.0", "<CoSimulation modelIdentifier=\"../x\"/>")).contains("is a path")
+        );
         assert!(told("<fmiModelDescription").contains("m.xml:1:"));
     }
 
@@ -338,7 +388,10 @@ mod tests {
         let model = Model::parse("m.xml", two).expect("right");
         assert_eq!((model.step, model.variables.len()), (Some(0.5), 2));
         let first = &model.variables[0];
-        assert_eq!((first.value_type, first.unit.as_deref()), (Some(ValueType::Float64), Some("m")));
+        assert_eq!(
+            (first.value_type, first.unit.as_deref()),
+            (Some(ValueType::Float64), Some("m"))
+        );
         assert_eq!(model.variables[1].value_type, None);
         let three = "<fmiModelDescription fmiVersion=\"3.0.1\" modelName=\"x\" instantiationToken=\"g\">\
                      <CoSimulation modelIdentifier=\"x\"/><ModelVariables>\

@@ -20,7 +20,9 @@ pub fn serve() -> io::Result<()> {
     let line = io::stdin().as_fd().try_clone_to_owned()?;
     let mut line = UnixStream::from(line);
     line.peer_addr().map_err(|_| {
-        io::Error::other("this command is for tickbus itself, which starts it for `tickbus run --isolated`")
+        io::Error::other(
+            "this command is for tickbus itself, which starts it for `tickbus run --isolated`",
+        )
     })?;
     // An FMU that reads from stdin finds nothing.
     rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
@@ -44,15 +46,17 @@ pub fn serve() -> io::Result<()> {
     loop {
         tell(&mut line, &answer)?;
         answer = match next(&mut line, &mut inbox)? {
-            Some(Request::Step { inputs, from, length }) => {
-                match slave.step(&inputs, from, length, &mut outputs) {
-                    Ok(stepped) => Answer::Outputs {
-                        outputs: outputs.clone(),
-                        stepped,
-                    },
-                    Err(failure) => Answer::Failed(failure),
-                }
-            }
+            Some(Request::Step {
+                inputs,
+                from,
+                length,
+            }) => match slave.step(&inputs, from, length, &mut outputs) {
+                Ok(stepped) => Answer::Outputs {
+                    outputs: outputs.clone(),
+                    stepped,
+                },
+                Err(failure) => Answer::Failed(failure),
+            },
             Some(Request::End) => match slave.end() {
                 Ok(()) => Answer::Ended,
                 Err(failure) => Answer::Failed(failure),

@@ -29,7 +29,11 @@ pub(super) struct Isolated {
 
 impl Isolated {
     /// Begins a run in a new helper, and reads the outputs as they are then.
-    pub(super) fn open(setup: &Setup, inputs: &[Value], outputs: &mut [Value]) -> Result<Self, Failure> {
+    pub(super) fn open(
+        setup: &Setup,
+        inputs: &[Value],
+        outputs: &mut [Value],
+    ) -> Result<Self, Failure> {
         let cannot = |error: io::Error| {
             Failure(format!(
                 "{}: no helper process can be started for it: {error}; leave out --isolated, or isolated = true",
@@ -37,7 +41,8 @@ impl Isolated {
             ))
         };
         let (line, theirs) = UnixStream::pair().map_err(cannot)?;
-        line.set_read_timeout(Some(PATIENCE.to_duration())).map_err(cannot)?;
+        line.set_read_timeout(Some(PATIENCE.to_duration()))
+            .map_err(cannot)?;
         // What an FMU prints goes to stderr: stdout is this command's.
         let stderr: OwnedFd = io::stderr().as_fd().try_clone_to_owned().map_err(cannot)?;
         let child = std::env::current_exe().and_then(|program| {
@@ -62,11 +67,19 @@ impl Isolated {
         Ok(slave)
     }
 
-    fn ask(&mut self, request: &Request, what: &str, outputs: &mut [Value]) -> Result<Stepped, Failure> {
+    fn ask(
+        &mut self,
+        request: &Request,
+        what: &str,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure> {
         // If it has gone, that shows when its answer is read.
         let _ = self.line.write_all(&request.write());
         match next(&mut self.line, &mut self.inbox) {
-            Ok(Some(Answer::Outputs { outputs: new, stepped })) if new.len() == outputs.len() => {
+            Ok(Some(Answer::Outputs {
+                outputs: new,
+                stepped,
+            })) if new.len() == outputs.len() => {
                 outputs.copy_from_slice(&new);
                 Ok(stepped)
             }
@@ -75,14 +88,20 @@ impl Isolated {
                 self.is_over = true;
                 Err(failure)
             }
-            Ok(Some(Answer::Outputs { .. })) => Err(self.failed("it has damaged its helper process: tell its maker")),
+            Ok(Some(Answer::Outputs { .. })) => {
+                Err(self.failed("it has damaged its helper process: tell its maker"))
+            }
             Ok(None) => Err(self.gone(what)),
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
-                let why = format!("{what} took longer than {PATIENCE}; its helper process was ended: tell its maker");
+                let why = format!(
+                    "{what} took longer than {PATIENCE}; its helper process was ended: tell its maker"
+                );
                 Err(self.failed(&why))
             }
             Err(error) if error.kind() == ErrorKind::ConnectionReset => Err(self.gone(what)),
-            Err(error) => Err(self.failed(&format!("its helper process answered with {error}; it has damaged it: tell its maker"))),
+            Err(error) => Err(self.failed(&format!(
+                "its helper process answered with {error}; it has damaged it: tell its maker"
+            ))),
         }
     }
 
@@ -97,7 +116,9 @@ impl Isolated {
             Ok(status) => ending(status),
             Err(error) => format!("has gone ({error})"),
         };
-        self.failed(&format!("its process {how} in {what}; this command goes on without it: tell its maker"))
+        self.failed(&format!(
+            "its process {how} in {what}; this command goes on without it: tell its maker"
+        ))
     }
 }
 
@@ -114,7 +135,13 @@ fn ending(status: ExitStatus) -> String {
 }
 
 impl Slave for Isolated {
-    fn step(&mut self, inputs: &[Value], from: f64, length: f64, outputs: &mut [Value]) -> Result<Stepped, Failure> {
+    fn step(
+        &mut self,
+        inputs: &[Value],
+        from: f64,
+        length: f64,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure> {
         if self.is_over {
             return Err(Failure(format!("{}: it has ended", self.file)));
         }
@@ -123,7 +150,11 @@ impl Slave for Isolated {
             from,
             length,
         };
-        self.ask(&request, &format!("the step of {length} s at {from} s"), outputs)
+        self.ask(
+            &request,
+            &format!("the step of {length} s at {from} s"),
+            outputs,
+        )
     }
 
     fn end(&mut self) -> Result<(), Failure> {

@@ -51,7 +51,11 @@ impl Join {
         let mut left = Vec::new();
         for (index, signal) in config.table.signals.iter().enumerate() {
             let is_from_fmu = signal.area == writes;
-            let wanted = if is_from_fmu { Causality::Output } else { Causality::Input };
+            let wanted = if is_from_fmu {
+                Causality::Output
+            } else {
+                Causality::Input
+            };
             let fits = |one: &&ForeignVariable| one.causality == wanted && one.value_type.is_some();
             let by_map = map.joined.iter().find(|joined| joined.signal == index);
             let by_name = || {
@@ -70,13 +74,23 @@ impl Join {
                     ("is read by nobody", "input")
                 };
                 let same = model.position(&signal.name).map(|at| &model.variables[at]);
-                let near = nearest(&signal.name, model.variables.iter().filter(fits).map(|one| &*one.name));
+                let near = nearest(
+                    &signal.name,
+                    model.variables.iter().filter(fits).map(|one| &*one.name),
+                );
                 let hint = match (same, near) {
-                    (Some(same), _) => format!("the FMU's variable of that name is no {kind} that can be a signal ({})", same.type_name),
+                    (Some(same), _) => format!(
+                        "the FMU's variable of that name is no {kind} that can be a signal ({})",
+                        same.type_name
+                    ),
                     (None, Some(near)) => format!("the FMU's nearest {kind} is \"{near}\""),
                     (None, None) => format!("the FMU has no {kind} like it"),
                 };
-                left.push(Unjoined(format!("signal \"{}\" ({}) {what}: {hint}", signal.name, signal.address())));
+                left.push(Unjoined(format!(
+                    "signal \"{}\" ({}) {what}: {hint}",
+                    signal.name,
+                    signal.address()
+                )));
                 continue;
             };
             if is_from_fmu {
@@ -86,16 +100,29 @@ impl Join {
             }
         }
         for (index, variable) in model.variables.iter().enumerate() {
-            let used = inputs.iter().chain(&outputs).any(|joined| joined.variable == index);
+            let used = inputs
+                .iter()
+                .chain(&outputs)
+                .any(|joined| joined.variable == index);
             if !used && variable.causality == Causality::Input {
-                left.push(Unjoined(format!("input \"{}\" of the FMU keeps its start value", variable.name)));
+                left.push(Unjoined(format!(
+                    "input \"{}\" of the FMU keeps its start value",
+                    variable.name
+                )));
             }
         }
         if inputs.is_empty() && outputs.is_empty() {
             let names = |wanted: Causality| {
                 let names = model.variables.iter().filter(|one| one.causality == wanted);
-                let names: Vec<_> = names.take(5).map(|one| format!("\"{}\"", one.name)).collect();
-                if names.is_empty() { "none".to_owned() } else { names.join(", ") }
+                let names: Vec<_> = names
+                    .take(5)
+                    .map(|one| format!("\"{}\"", one.name))
+                    .collect();
+                if names.is_empty() {
+                    "none".to_owned()
+                } else {
+                    names.join(", ")
+                }
             };
             return Err(Mistake::new(
                 format!(

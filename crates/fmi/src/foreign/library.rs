@@ -30,7 +30,14 @@ unsafe extern "C" {
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
 struct Callbacks {
-    logger: unsafe extern "C" fn(Handle, *const c_char, c_int, *const c_char, *const c_char, *const c_char),
+    logger: unsafe extern "C" fn(
+        Handle,
+        *const c_char,
+        c_int,
+        *const c_char,
+        *const c_char,
+        *const c_char,
+    ),
     allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
     release: unsafe extern "C" fn(*mut c_void),
     step_finished: *const c_void,
@@ -65,8 +72,16 @@ type InstantiateThree = unsafe extern "C" fn(
 ) -> Handle;
 
 /// `fmi3DoStep`.
-type StepThree =
-    unsafe extern "C" fn(Handle, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64) -> c_int;
+type StepThree = unsafe extern "C" fn(
+    Handle,
+    f64,
+    f64,
+    bool,
+    *mut bool,
+    *mut bool,
+    *mut bool,
+    *mut f64,
+) -> c_int;
 
 /// How a step has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +131,12 @@ unsafe fn words<'a>(text: *const c_char) -> std::borrow::Cow<'a, str> {
 }
 
 /// The logger of FMI 3.0.
-unsafe extern "C" fn log_of_three(env: Handle, status: c_int, _: *const c_char, message: *const c_char) {
+unsafe extern "C" fn log_of_three(
+    env: Handle,
+    status: c_int,
+    _: *const c_char,
+    message: *const c_char,
+) {
     // SAFETY: `env` is the journal that the instance was made with and that outlives it; the message is the FMU's C string.
     let (journal, text) = unsafe { (&*env.cast::<Journal>(), words(message)) };
     journal.take(status, &text);
@@ -333,7 +353,11 @@ impl Instance {
 
     /// A sentence, with what the FMU has said last.
     pub(super) fn said(&self, what: &str) -> String {
-        let last = self.journal.last.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = self
+            .journal
+            .last
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         if last.is_empty() {
             format!("{what}, and does not say why; ask whoever made it")
         } else {
@@ -360,7 +384,9 @@ impl Instance {
                 }
             },
             // SAFETY: as above.
-            Functions::Three(three) => unsafe { (three.enter)(self.handle, false, 0.0, start, false, 0.0) },
+            Functions::Three(three) => unsafe {
+                (three.enter)(self.handle, false, 0.0, start, false, 0.0)
+            },
         };
         self.noted(status)
     }
@@ -439,13 +465,17 @@ impl Instance {
         debug_assert_eq!(references.len(), values.len());
         let status = match &self.functions {
             Functions::Two(two) => match kind {
-                ValueType::Boolean => self.set_two(two.set_boolean, references, values, |value| bool::of(value).into()),
+                ValueType::Boolean => self.set_two(two.set_boolean, references, values, |value| {
+                    bool::of(value).into()
+                }),
                 ValueType::Int32 => self.set_two(two.set_integer, references, values, i32::of),
                 _ => self.set_two(two.set_real, references, values, f64::of),
             },
             Functions::Three(three) => match kind {
                 ValueType::Float32 => self.set_three(three.set_f32, references, values, f32::of),
-                ValueType::Float64 | ValueType::String => self.set_three(three.set_f64, references, values, f64::of),
+                ValueType::Float64 | ValueType::String => {
+                    self.set_three(three.set_f64, references, values, f64::of)
+                }
                 ValueType::Int8 => self.set_three(three.set_i8, references, values, i8::of),
                 ValueType::UInt8 => self.set_three(three.set_u8, references, values, u8::of),
                 ValueType::Int16 => self.set_three(three.set_i16, references, values, i16::of),
@@ -454,64 +484,151 @@ impl Instance {
                 ValueType::UInt32 => self.set_three(three.set_u32, references, values, u32::of),
                 ValueType::Int64 => self.set_three(three.set_i64, references, values, i64::of),
                 ValueType::UInt64 => self.set_three(three.set_u64, references, values, u64::of),
-                ValueType::Boolean => self.set_three(three.set_boolean, references, values, |value| bool::of(value).into()),
+                ValueType::Boolean => {
+                    self.set_three(three.set_boolean, references, values, |value| {
+                        bool::of(value).into()
+                    })
+                }
             },
         };
         self.noted(status)
     }
 
-    fn set_two<T>(&self, function: SetTwo<T>, references: &[u32], values: &[Value], of: fn(Value) -> T) -> c_int {
+    fn set_two<T>(
+        &self,
+        function: SetTwo<T>,
+        references: &[u32],
+        values: &[Value],
+        of: fn(Value) -> T,
+    ) -> c_int {
         let values: Vec<T> = values.iter().map(|value| of(*value)).collect();
         // SAFETY: as in `enter`; both lists have as many values as the call says, and outlive it.
-        unsafe { function(self.handle, references.as_ptr(), references.len(), values.as_ptr()) }
+        unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+            )
+        }
     }
 
-    fn set_three<T>(&self, function: SetThree<T>, references: &[u32], values: &[Value], of: fn(Value) -> T) -> c_int {
+    fn set_three<T>(
+        &self,
+        function: SetThree<T>,
+        references: &[u32],
+        values: &[Value],
+        of: fn(Value) -> T,
+    ) -> c_int {
         let values: Vec<T> = values.iter().map(|value| of(*value)).collect();
         // SAFETY: as above.
-        unsafe { function(self.handle, references.as_ptr(), references.len(), values.as_ptr(), values.len()) }
+        unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+                values.len(),
+            )
+        }
     }
 
     /// Gets variables of one type.
-    pub(super) fn get(&mut self, kind: ValueType, references: &[u32], values: &mut [Value]) -> Status {
+    pub(super) fn get(
+        &mut self,
+        kind: ValueType,
+        references: &[u32],
+        values: &mut [Value],
+    ) -> Status {
         debug_assert_eq!(references.len(), values.len());
         let status = match &self.functions {
             Functions::Two(two) => match kind {
-                ValueType::Boolean => self.get_two(two.get_boolean, references, values, |value| Value::Boolean(value != 0)),
-                ValueType::Int32 => self.get_two(two.get_integer, references, values, Number::value),
+                ValueType::Boolean => self.get_two(two.get_boolean, references, values, |value| {
+                    Value::Boolean(value != 0)
+                }),
+                ValueType::Int32 => {
+                    self.get_two(two.get_integer, references, values, Number::value)
+                }
                 _ => self.get_two(two.get_real, references, values, Number::value),
             },
             Functions::Three(three) => match kind {
-                ValueType::Float32 => self.get_three(three.get_f32, references, values, Number::value),
-                ValueType::Float64 | ValueType::String => self.get_three(three.get_f64, references, values, Number::value),
+                ValueType::Float32 => {
+                    self.get_three(three.get_f32, references, values, Number::value)
+                }
+                ValueType::Float64 | ValueType::String => {
+                    self.get_three(three.get_f64, references, values, Number::value)
+                }
                 ValueType::Int8 => self.get_three(three.get_i8, references, values, Number::value),
                 ValueType::UInt8 => self.get_three(three.get_u8, references, values, Number::value),
-                ValueType::Int16 => self.get_three(three.get_i16, references, values, Number::value),
-                ValueType::UInt16 => self.get_three(three.get_u16, references, values, Number::value),
-                ValueType::Int32 => self.get_three(three.get_i32, references, values, Number::value),
-                ValueType::UInt32 => self.get_three(three.get_u32, references, values, Number::value),
-                ValueType::Int64 => self.get_three(three.get_i64, references, values, Number::value),
-                ValueType::UInt64 => self.get_three(three.get_u64, references, values, Number::value),
-                ValueType::Boolean => self.get_three(three.get_boolean, references, values, |value| Value::Boolean(value != 0)),
+                ValueType::Int16 => {
+                    self.get_three(three.get_i16, references, values, Number::value)
+                }
+                ValueType::UInt16 => {
+                    self.get_three(three.get_u16, references, values, Number::value)
+                }
+                ValueType::Int32 => {
+                    self.get_three(three.get_i32, references, values, Number::value)
+                }
+                ValueType::UInt32 => {
+                    self.get_three(three.get_u32, references, values, Number::value)
+                }
+                ValueType::Int64 => {
+                    self.get_three(three.get_i64, references, values, Number::value)
+                }
+                ValueType::UInt64 => {
+                    self.get_three(three.get_u64, references, values, Number::value)
+                }
+                ValueType::Boolean => {
+                    self.get_three(three.get_boolean, references, values, |value| {
+                        Value::Boolean(value != 0)
+                    })
+                }
             },
         };
         self.noted(status)
     }
 
-    fn get_two<T: Copy + Default>(&self, function: GetTwo<T>, references: &[u32], values: &mut [Value], to: fn(T) -> Value) -> c_int {
+    fn get_two<T: Copy + Default>(
+        &self,
+        function: GetTwo<T>,
+        references: &[u32],
+        values: &mut [Value],
+        to: fn(T) -> Value,
+    ) -> c_int {
         let mut got = vec![T::default(); references.len()];
         // SAFETY: as in `set_two`.
-        let status = unsafe { function(self.handle, references.as_ptr(), references.len(), got.as_mut_ptr()) };
+        let status = unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                got.as_mut_ptr(),
+            )
+        };
         for (value, got) in values.iter_mut().zip(got) {
             *value = to(got);
         }
         status
     }
 
-    fn get_three<T: Copy + Default>(&self, function: GetThree<T>, references: &[u32], values: &mut [Value], to: fn(T) -> Value) -> c_int {
+    fn get_three<T: Copy + Default>(
+        &self,
+        function: GetThree<T>,
+        references: &[u32],
+        values: &mut [Value],
+        to: fn(T) -> Value,
+    ) -> c_int {
         let mut got = vec![T::default(); references.len()];
         // SAFETY: as above.
-        let status = unsafe { function(self.handle, references.as_ptr(), references.len(), got.as_mut_ptr(), got.len()) };
+        let status = unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                got.as_mut_ptr(),
+                got.len(),
+            )
+        };
         for (value, got) in values.iter_mut().zip(got) {
             *value = to(got);
         }
@@ -538,7 +655,11 @@ impl Drop for Instance {
 /// The URI of a folder, as FMI 2.0 wants it.
 fn uri_of(folder: &Path) -> String {
     let path = folder.to_string_lossy().replace('\\', "/");
-    let mut uri = String::from(if path.starts_with('/') { "file://" } else { "file:///" });
+    let mut uri = String::from(if path.starts_with('/') {
+        "file://"
+    } else {
+        "file:///"
+    });
     for byte in path.bytes() {
         if byte.is_ascii_alphanumeric() || b"/-_.~:".contains(&byte) {
             uri.push(byte.into());

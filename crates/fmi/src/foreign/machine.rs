@@ -134,12 +134,19 @@ impl Machine {
     /// # Errors
     ///
     /// The FMU does not go on: why.
-    pub fn step(&mut self, from: Nanos, length: Nanos, slots: &mut [Slot]) -> Result<Stepped, Failure> {
+    pub fn step(
+        &mut self,
+        from: Nanos,
+        length: Nanos,
+        slots: &mut [Slot],
+    ) -> Result<Stepped, Failure> {
         for (value, way) in self.sent.iter_mut().zip(&self.inputs) {
             *value = way.variable(slots);
         }
         let from = self.start + seconds(from);
-        let stepped = self.slave.step(&self.sent, from, seconds(length), &mut self.got)?;
+        let stepped = self
+            .slave
+            .step(&self.sent, from, seconds(length), &mut self.got)?;
         self.show(slots);
         Ok(stepped)
     }
@@ -165,12 +172,19 @@ fn seconds(time: Nanos) -> f64 {
     time.0 as f64 / 1e9
 }
 
-fn open(setup: &Setup, options: MachineOptions, inputs: &[Value], outputs: &mut [Value]) -> Result<Box<dyn Slave>, Failure> {
+fn open(
+    setup: &Setup,
+    options: MachineOptions,
+    inputs: &[Value],
+    outputs: &mut [Value],
+) -> Result<Box<dyn Slave>, Failure> {
     if !options.isolated {
         return Ok(Box::new(Direct::open(setup, inputs, outputs)?));
     }
     #[cfg(unix)]
-    return Ok(Box::new(super::isolated::Isolated::open(setup, inputs, outputs)?));
+    return Ok(Box::new(super::isolated::Isolated::open(
+        setup, inputs, outputs,
+    )?));
     #[cfg(not(unix))]
     Err(Failure(format!(
         "{}: there are no helper processes on this system; leave out --isolated, or isolated = true",

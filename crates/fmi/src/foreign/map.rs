@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use tickbus_base::toml_text::{Collector, Mistakes, Table, Value as TomlValue, load_text, nearest, read_text, shown};
+use tickbus_base::toml_text::{
+    Collector, Mistakes, Table, Value as TomlValue, load_text, nearest, read_text, shown,
+};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
 
@@ -60,12 +62,16 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Option<Map> {
 pub(super) fn read_parameters(value: &TomlValue<'_>, model: &Model) -> Vec<(usize, Value)> {
     let table = value.table("parameters", "write lines such as \"tank.area\" = 2.5");
     let all = table.iter().flat_map(Table::all);
-    all.filter_map(|(name, value)| parameter(name, &value, model)).collect()
+    all.filter_map(|(name, value)| parameter(name, &value, model))
+        .collect()
 }
 
 fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Value)> {
     let Some(at) = model.position(name) else {
-        let names = model.variables.iter().filter(|one| one.causality != Causality::Output);
+        let names = model
+            .variables
+            .iter()
+            .filter(|one| one.causality != Causality::Output);
         let near = nearest(name, names.map(|one| &*one.name));
         value.wrong(
             format!("the FMU has no variable \"{}\"", shown(name)),
@@ -114,7 +120,10 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
             && value.written() != ""
             && value.number("write a number") == Some(0.0)
         {
-            value.wrong("a scale of 0 says nothing of the variable", "write how many units of the signal one of the variable is");
+            value.wrong(
+                "a scale of 0 says nothing of the variable",
+                "write how many units of the signal one of the variable is",
+            );
             return None;
         }
         (variable?, number(scale, 1.0)?, number(offset, 0.0)?)
@@ -137,7 +146,12 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
         variable.wrong(
             format!("the FMU has no variable \"{}\"", shown(wanted)),
             near.map_or_else(
-                || format!("name one of its {}s", if is_from_fmu { "output" } else { "input" }),
+                || {
+                    format!(
+                        "name one of its {}s",
+                        if is_from_fmu { "output" } else { "input" }
+                    )
+                },
                 |near| format!("did you mean \"{near}\"?"),
             ),
         );
@@ -154,9 +168,15 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
     if !fits(found.causality) {
         let address = config.table.signals[signal].address();
         let (what, right) = if is_from_fmu {
-            ("an input", "which the FMU has to write: name one of its outputs")
+            (
+                "an input",
+                "which the FMU has to write: name one of its outputs",
+            )
         } else {
-            ("not an input", "which the FMU has to read: name one of its inputs")
+            (
+                "not an input",
+                "which the FMU has to read: name one of its inputs",
+            )
         };
         variable.wrong(
             format!("\"{}\" is {what} of the FMU", shown(wanted)),

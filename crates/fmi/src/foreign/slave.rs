@@ -53,7 +53,13 @@ pub(super) trait Slave: std::fmt::Debug {
     /// # Errors
     ///
     /// The FMU does not go on.
-    fn step(&mut self, inputs: &[Value], from: f64, length: f64, outputs: &mut [Value]) -> Result<Stepped, Failure>;
+    fn step(
+        &mut self,
+        inputs: &[Value],
+        from: f64,
+        length: f64,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure>;
 
     /// Ends the run properly.
     ///
@@ -107,8 +113,16 @@ pub(super) struct Direct {
 
 impl Direct {
     /// Begins a run, and reads the outputs as they are then.
-    pub(super) fn open(setup: &Setup, inputs: &[Value], outputs: &mut [Value]) -> Result<Self, Failure> {
-        let version = if setup.is_three { Version::Three } else { Version::Two };
+    pub(super) fn open(
+        setup: &Setup,
+        inputs: &[Value],
+        outputs: &mut [Value],
+    ) -> Result<Self, Failure> {
+        let version = if setup.is_three {
+            Version::Three
+        } else {
+            Version::Two
+        };
         let names = (&*setup.file, &*setup.name, &*setup.token);
         let instance = Instance::new(names, version, &setup.library, &setup.resources);
         let instance = instance.map_err(|why| Failure(format!("{}: {why}", setup.file)))?;
@@ -153,7 +167,9 @@ impl Direct {
             for (value, at) in group.values.iter_mut().zip(&group.at) {
                 *value = values[*at];
             }
-            let status = self.instance.set(group.kind, &group.references, &group.values);
+            let status = self
+                .instance
+                .set(group.kind, &group.references, &group.values);
             self.check(status, "setting its inputs")?;
         }
         Ok(())
@@ -162,7 +178,9 @@ impl Direct {
     fn get(&mut self, values: &mut [Value]) -> Result<(), Failure> {
         for index in 0..self.outputs.len() {
             let group = &mut self.outputs[index];
-            let status = self.instance.get(group.kind, &group.references, &mut group.values);
+            let status = self
+                .instance
+                .get(group.kind, &group.references, &mut group.values);
             for (value, at) in group.values.iter().zip(&group.at) {
                 values[*at] = *value;
             }
@@ -173,14 +191,23 @@ impl Direct {
 }
 
 impl Slave for Direct {
-    fn step(&mut self, inputs: &[Value], from: f64, length: f64, outputs: &mut [Value]) -> Result<Stepped, Failure> {
+    fn step(
+        &mut self,
+        inputs: &[Value],
+        from: f64,
+        length: f64,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure> {
         self.set(inputs)?;
         let end = self.instance.step(from, length);
         // FMI 2.0 asks for its end so, which is no failure.
-        let has_ended = end.terminate && matches!(end.status, Status::Ok | Status::Warning | Status::Discard);
+        let has_ended =
+            end.terminate && matches!(end.status, Status::Ok | Status::Warning | Status::Discard);
         if !has_ended {
             if end.status == Status::Discard {
-                let reached = end.reached.map_or(String::new(), |time| format!(", and got to {time} s"));
+                let reached = end
+                    .reached
+                    .map_or(String::new(), |time| format!(", and got to {time} s"));
                 let what = format!(
                     "it discards the step of {length} s at {from} s{reached}: give it shorter ones (--step, or step in a test file)"
                 );
@@ -189,7 +216,11 @@ impl Slave for Direct {
             self.check(end.status, &format!("the step of {length} s at {from} s"))?;
         }
         self.get(outputs)?;
-        Ok(if has_ended { Stepped::Ended } else { Stepped::Done })
+        Ok(if has_ended {
+            Stepped::Ended
+        } else {
+            Stepped::Done
+        })
     }
 
     fn end(&mut self) -> Result<(), Failure> {

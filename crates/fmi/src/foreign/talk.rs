@@ -13,9 +13,16 @@ const MOST: usize = 64 << 20;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request {
     /// Load the library and begin a run. Sent first.
-    Open { setup: Box<Setup>, inputs: Vec<Value> },
+    Open {
+        setup: Box<Setup>,
+        inputs: Vec<Value>,
+    },
     /// One step.
-    Step { inputs: Vec<Value>, from: f64, length: f64 },
+    Step {
+        inputs: Vec<Value>,
+        from: f64,
+        length: f64,
+    },
     /// End the run.
     End,
 }
@@ -24,7 +31,10 @@ pub(super) enum Request {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Answer {
     /// The run has begun, or the step is done: the outputs.
-    Outputs { outputs: Vec<Value>, stepped: Stepped },
+    Outputs {
+        outputs: Vec<Value>,
+        stepped: Stepped,
+    },
     /// The run has ended.
     Ended,
     /// The FMU does not go on.

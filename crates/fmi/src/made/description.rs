@@ -43,7 +43,11 @@ pub fn model_description(config: &Config, version: Version, token: &str) -> Stri
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let is_two = version == Version::Two;
     let token_name = if is_two { "guid" } else { "instantiationToken" };
-    let description = format!("Driver {} of tickbus, on its bus \"{}\"", config.id, config.bus.kind());
+    let description = format!(
+        "Driver {} of tickbus, on its bus \"{}\"",
+        config.id,
+        config.bus.kind()
+    );
     // Writing to a string cannot fail, here and below.
     let _ = writeln!(
         text,
@@ -62,7 +66,10 @@ pub fn model_description(config: &Config, version: Version, token: &str) -> Stri
     units(&mut text, &exposed);
     text.push_str("  <LogCategories>\n");
     for (name, about) in CATEGORIES {
-        let _ = writeln!(text, "    <Category name=\"{name}\" description=\"{about}\"/>");
+        let _ = writeln!(
+            text,
+            "    <Category name=\"{name}\" description=\"{about}\"/>"
+        );
     }
     text.push_str("  </LogCategories>\n");
     let step = config.timing.cycle.or(config.bus.cycle()).unwrap_or(STEP);
@@ -119,7 +126,10 @@ fn start(variable: &Variable) -> Option<String> {
         Start::Text(text) => escape(text.as_str()).into_owned(),
         Start::Number(value) => match (variable.value_type, *value) {
             (ValueType::Boolean, value) => (value.real() != 0.0).to_string(),
-            #[expect(clippy::cast_possible_truncation, reason = "the value as the variable has it")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "the value as the variable has it"
+            )]
             (ValueType::Float32, value) => format!("{:?}", value.real() as f32),
             (ValueType::Float64, value) => format!("{:?}", value.real()),
             (_, Value::Signed(value)) => value.to_string(),

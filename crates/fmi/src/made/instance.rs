@@ -218,7 +218,11 @@ impl Instance {
     ///
     /// One does not exist, is of another type, or cannot be set now; those before it are set.
     #[inline]
-    pub fn set<T: Number>(&mut self, references: &[u32], values: impl Iterator<Item = T>) -> Result<(), String> {
+    pub fn set<T: Number>(
+        &mut self,
+        references: &[u32],
+        values: impl Iterator<Item = T>,
+    ) -> Result<(), String> {
         for (&reference, value) in references.iter().zip(values) {
             if let Some(Place::Slot(slot)) = Place::of(reference)
                 && let Some(cell) = self.exposed.cells.get(slot)
@@ -237,7 +241,9 @@ impl Instance {
     fn set_other(&mut self, reference: u32, given: ValueType, value: Value) -> Result<(), String> {
         let place = self.number(reference, given)?;
         match place {
-            Place::Slot(slot) if self.exposed.cells[slot].is_input || self.phase == Phase::Before => {
+            Place::Slot(slot)
+                if self.exposed.cells[slot].is_input || self.phase == Phase::Before =>
+            {
                 self.slots[slot] = value.slot(self.exposed.cells[slot].kind);
                 Ok(())
             }
@@ -261,10 +267,16 @@ impl Instance {
     ///
     /// One does not exist, or is of another type.
     #[inline]
-    pub fn get<T: Number>(&self, references: &[u32], mut put: impl FnMut(usize, T)) -> Result<(), String> {
+    pub fn get<T: Number>(
+        &self,
+        references: &[u32],
+        mut put: impl FnMut(usize, T),
+    ) -> Result<(), String> {
         for (at, &reference) in references.iter().enumerate() {
             if let Some(Place::Slot(slot)) = Place::of(reference)
-                && let Some(&Cell { value_type, kind, .. }) = self.exposed.cells.get(slot)
+                && let Some(&Cell {
+                    value_type, kind, ..
+                }) = self.exposed.cells.get(slot)
                 && value_type == T::TYPE
             {
                 put(at, T::of(Value::of(self.slots[slot], kind)));
@@ -297,7 +309,8 @@ impl Instance {
         if self.phase != Phase::Before {
             return Err(self.read_only(reference));
         }
-        text.to_str().map_err(|why| format!("a text that is not UTF-8: {why}"))?;
+        text.to_str()
+            .map_err(|why| format!("a text that is not UTF-8: {why}"))?;
         match place {
             Place::Address => self.address = text,
             _ => self.record = text,
@@ -323,7 +336,9 @@ impl Instance {
         let is_text = |one: &Variable| one.value_type == ValueType::String;
         match (Place::of(reference), self.exposed.variable(reference)) {
             (Some(place), Some(variable))
-                if self.version == Version::Two && asked == ValueType::Float64 && !is_text(variable) =>
+                if self.version == Version::Two
+                    && asked == ValueType::Float64
+                    && !is_text(variable) =>
             {
                 Ok(place)
             }
@@ -384,7 +399,10 @@ fn not_next(time: f64, from: f64, length: f64) -> String {
 #[cold]
 fn failed(code: Code, reason: &str) -> String {
     let (name, remedy) = (code.name(), code.remedy());
-    let what = if reason.is_empty() { code.text() } else { reason };
+    let what = if reason.is_empty() {
+        code.text()
+    } else {
+        reason
+    };
     format!("{name}: {what}; {remedy}")
 }
-

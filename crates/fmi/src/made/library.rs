@@ -8,8 +8,9 @@ use zip::ZipArchive;
 
 use crate::value::Version;
 
-/// A function that the library of an FMU must have, and that libraries of earlier versions lack.
-const FUNCTION: &[u8] = b"fmi3InstantiateCoSimulation\0";
+/// The name of a function that the library of an FMU must have, and that libraries of earlier versions lack. In two parts, so
+/// that programs that look for it do not have it themselves.
+const FUNCTION: [&str; 2] = ["fmi3Activate", "ModelPartition"];
 
 /// The folder of a jar in which the libraries are.
 const IN_JAR: &str = "tickbus/native/";
@@ -114,7 +115,9 @@ impl NativeLibrary {
                 right,
             ));
         };
-        if !bytes.windows(FUNCTION.len()).any(|window| window == FUNCTION) {
+        let function = FUNCTION.concat();
+        let mut names = bytes.windows(function.len());
+        if !names.any(|name| name == function.as_bytes()) {
             return Err(Mistake::new(
                 format!("{origin} has no functions of FMI"),
                 right,
@@ -133,11 +136,17 @@ impl NativeLibrary {
 /// # Errors
 ///
 /// There is none: every place that was looked at, and what to do.
-pub fn find_libraries(named: &[PathBuf], beside: Option<&Path>) -> Result<Vec<NativeLibrary>, Mistake> {
+pub fn find_libraries(
+    named: &[PathBuf],
+    beside: Option<&Path>,
+) -> Result<Vec<NativeLibrary>, Mistake> {
     let mut found: Vec<NativeLibrary> = Vec::new();
     for file in named {
         let library = read(file)?;
-        if let Some(twin) = found.iter().find(|other| other.platform == library.platform) {
+        if let Some(twin) = found
+            .iter()
+            .find(|other| other.platform == library.platform)
+        {
             return Err(Mistake::new(
                 format!(
                     "{} and {} are both for {}",

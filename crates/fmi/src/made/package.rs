@@ -34,7 +34,11 @@ pub struct Package {
 ///
 /// With every mistake in the driver.cfg; or a file that it names cannot be packed; or the version has no name for the platform
 /// of any library.
-pub fn export(path: &Path, version: Version, libraries: &[NativeLibrary]) -> Result<Package, Mistakes> {
+pub fn export(
+    path: &Path,
+    version: Version,
+    libraries: &[NativeLibrary],
+) -> Result<Package, Mistakes> {
     let file = path.display().to_string();
     let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
     let config = Config::load(path)?;
@@ -72,7 +76,10 @@ pub fn export(path: &Path, version: Version, libraries: &[NativeLibrary]) -> Res
                 continue;
             };
             let (name, ending) = (identifier(&config), library.platform.ending);
-            archive.add(&format!("binaries/{folder}/{name}.{ending}"), &library.bytes)?;
+            archive.add(
+                &format!("binaries/{folder}/{name}.{ending}"),
+                &library.bytes,
+            )?;
             platforms.push(folder);
         }
         archive.add("resources/driver.cfg", &driver_cfg)?;
@@ -84,15 +91,24 @@ pub fn export(path: &Path, version: Version, libraries: &[NativeLibrary]) -> Res
                 )
             })?;
             let name = file.to_string_lossy().replace('\\', "/");
-            archive.add(&format!("resources/{}", name.trim_start_matches("./")), &bytes)?;
+            archive.add(
+                &format!("resources/{}", name.trim_start_matches("./")),
+                &bytes,
+            )?;
         }
-        archive.add("documentation/externalDependencies.txt", DEPENDENCIES.as_bytes())?;
+        archive.add(
+            "documentation/externalDependencies.txt",
+            DEPENDENCIES.as_bytes(),
+        )?;
         Ok((archive.finish()?, platforms))
     })();
     let (bytes, platforms) = packed.map_err(refused)?;
     if platforms.is_empty() {
         return Err(refused(Mistake::new(
-            format!("FMI {} has no name for any platform of these libraries", version.number()),
+            format!(
+                "FMI {} has no name for any platform of these libraries",
+                version.number()
+            ),
             "export for fmi3, or name a --library for x86-64",
         )));
     }

@@ -208,7 +208,11 @@ impl Exposed {
                 name: signal.name.clone(),
                 reference: Place::Slot(slot).reference(),
                 value_type: cell.value_type,
-                usage: if cell.is_input { Use::Input } else { Use::Output },
+                usage: if cell.is_input {
+                    Use::Input
+                } else {
+                    Use::Output
+                },
                 unit,
                 start: Start::Number(Value::of(signal.fail_safe, cell.kind)),
                 description: format!("{} {}{station}", signal.address(), signal.data_type),
@@ -225,7 +229,11 @@ impl Exposed {
         };
         for (signal, slot) in table.signals.iter().zip(&map.edges) {
             let Some(slot) = slot else { continue };
-            debug_assert_eq!(*slot, cells.len(), "edges follow in the order of the signals");
+            debug_assert_eq!(
+                *slot,
+                cells.len(),
+                "edges follow in the order of the signals"
+            );
             variables.push(Variable {
                 name: format!("{}.edges", signal.name),
                 reference: Place::Slot(*slot).reference(),
@@ -250,19 +258,20 @@ impl Exposed {
 
 /// The variables that are not signals.
 fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
-    let variable = |name: &str, place: Place, value_type, usage, start, description: &str| Variable {
-        name: if name.starts_with("bus.") {
-            name.to_owned()
-        } else {
-            free_name(name, &config.table)
-        },
-        reference: place.reference(),
-        value_type,
-        usage,
-        unit: matches!(place, Place::Time | Place::Age).then(|| "s".to_owned()),
-        start,
-        description: description.to_owned(),
-    };
+    let variable =
+        |name: &str, place: Place, value_type, usage, start, description: &str| Variable {
+            name: if name.starts_with("bus.") {
+                name.to_owned()
+            } else {
+                free_name(name, &config.table)
+            },
+            reference: place.reference(),
+            value_type,
+            usage,
+            unit: matches!(place, Place::Time | Place::Age).then(|| "s".to_owned()),
+            start,
+            description: description.to_owned(),
+        };
     let number = Start::Number;
     let real = ValueType::Float64;
     let record = config.record.as_ref();

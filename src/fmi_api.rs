@@ -17,7 +17,7 @@ use std::path::Path;
 use std::sync::Once;
 
 use log::Level;
-use tickbus_base::os::{collect_log, has_log, own_file, take_log};
+use tickbus_base::os::{Library, collect_log, has_log, own_file, take_log};
 use tickbus_binding::{Handles, closing, panic_message};
 use tickbus_driver::Code;
 use tickbus_fmi::made::{Instance, folder_of};
@@ -187,9 +187,7 @@ fn pin() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         collect_log();
-        if let Ok(file) = own_file() {
-            // SAFETY: it is this library, which is loaded: nothing of it runs again.
-            let library = unsafe { libloading::Library::new(file) };
+        if let Ok(library) = own_file().map(|file| Library::load(&file)) {
             std::mem::forget(library);
         }
     });
@@ -200,7 +198,7 @@ fn instantiate(
     version: Version,
     named: Option<&Path>,
     token: &str,
-    journal: Journal,
+    journal: &Journal,
 ) -> *mut c_void {
     let made = catch_unwind(AssertUnwindSafe(|| {
         pin();

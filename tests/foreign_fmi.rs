@@ -9,7 +9,7 @@ use std::path::Path;
 use std::process::{Command, ExitCode};
 use std::sync::OnceLock;
 
-use fixture::library;
+use fixture::{library, tanks};
 use foreign::Absent;
 use tempfile::TempDir;
 use tickbus::driver::Driver;
@@ -25,8 +25,9 @@ fn main() -> ExitCode {
         ("fmpy_validates_and_runs_both_versions", in_fmpy),
         ("every_misuse_of_the_functions_has_an_answer", misuse),
         ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
+        ("the_example_s_tank_is_one_for_others_too", tank),
         ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
-        ("the_rig_records_the_same_in_an_fmu_and_in_rust", rig),
+        ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
         ("an_fmu_by_pythonfmu_is_the_machine", by_pythonfmu),
     ])
 }
@@ -53,7 +54,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).trim().to_owned()
 }
 
-/// Runs tests/peers/fmi_tools.py; its one line says ok.
+/// Runs `tests/peers/fmi_tools.py`; its one line says ok.
 fn tool(arguments: &[&str]) -> Result<(), Absent> {
     let mut python = python()?;
     let script = Path::new(ROOT).join("tests/peers/fmi_tools.py");
@@ -115,12 +116,20 @@ fn in_toolbox() -> Result<(), Absent> {
         .try_for_each(|fmu| tool(&["toolbox", fmu]))
 }
 
+fn tank() -> Result<(), Absent> {
+    python()?;
+    for fmu in ["tank2.fmu", "tank3.fmu"] {
+        tool(&["tank", tanks().join(fmu).to_str().expect("UTF-8")])?;
+    }
+    Ok(())
+}
+
 fn in_libcosim() -> Result<(), Absent> {
     python()?;
     tool(&["cosim", types()[0]])
 }
 
-/// The rig's signals with its program stepped: 2000 ticks with the same inputs, in an FMU under FMPy and in Rust.
+/// The rig's signals with its program stepped: 2000 ticks with the same inputs, in an FMU under `FMPy`, in C and in Rust.
 fn rig() -> Result<(), Absent> {
     python()?;
     let folder = tempfile::tempdir().expect("a folder");
@@ -144,6 +153,15 @@ fn rig() -> Result<(), Absent> {
             "{version}: the recordings differ"
         );
     }
+    // And by the functions in C.
+    let record = folder.path().join("c.vcd");
+    let [library, config, file] =
+        [library(), &config, &record].map(|path| path.to_str().expect("UTF-8"));
+    tool(&["rig_in_c", library, config, file])?;
+    assert!(
+        std::fs::read(record).expect("a recording") == own,
+        "C: the recordings differ"
+    );
     assert!(
         own.len() > 100_000,
         "much has happened: {} bytes",
@@ -152,7 +170,7 @@ fn rig() -> Result<(), Absent> {
     Ok(())
 }
 
-/// The same as `rig` in tests/peers/fmi_tools.py.
+/// The same as `rig` in `tests/peers/fmi_tools.py`.
 fn record(config: &Path, file: &Path) {
     let mut config = Config::load(config).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     config.record = Some(tickbus::record::Options::to(file).expect("a name"));
@@ -184,7 +202,7 @@ fn record(config: &Path, file: &Path) {
     driver.close();
 }
 
-/// A machine in Python, made an FMU by PythonFMU.
+/// A machine in Python, made an FMU by `PythonFMU`.
 const MACHINE: &str = "\
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 

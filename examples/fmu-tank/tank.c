@@ -90,6 +90,10 @@ static int set_bool(Tank *tank, uint32_t reference, bool value) {
     return OK;
 }
 
+/* What this model is without; many tools look for the functions all the same. */
+#define NONE(name)                                                                                                                  \
+    EXPORT int name(void *tank) { return (void)tank, FAILED; }
+
 #ifdef FMI3
 
 EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
@@ -146,13 +150,24 @@ EXPORT int fmi3DoStep(void *tank, double from, double length, bool no_set_prior,
     return OK;
 }
 
-/* Variables of other types there are none; a master looks for the functions all the same. */
-#define NONE(name)                                                                                                                  \
-    EXPORT int name(void *tank) { return (void)tank, FAILED; }
+EXPORT void *fmi3InstantiateModelExchange(void) { return NULL; }
+EXPORT void *fmi3InstantiateScheduledExecution(void) { return NULL; }
 
 NONE(fmi3GetFloat32) NONE(fmi3SetFloat32) NONE(fmi3GetInt8) NONE(fmi3SetInt8) NONE(fmi3GetUInt8) NONE(fmi3SetUInt8)
 NONE(fmi3GetInt16) NONE(fmi3SetInt16) NONE(fmi3GetUInt16) NONE(fmi3SetUInt16) NONE(fmi3SetInt32) NONE(fmi3GetUInt32)
-NONE(fmi3SetUInt32) NONE(fmi3GetInt64) NONE(fmi3SetInt64) NONE(fmi3GetUInt64) NONE(fmi3SetUInt64)
+NONE(fmi3SetUInt32) NONE(fmi3GetInt64) NONE(fmi3SetInt64) NONE(fmi3GetUInt64) NONE(fmi3SetUInt64) NONE(fmi3GetString)
+NONE(fmi3SetString) NONE(fmi3GetBinary) NONE(fmi3SetBinary) NONE(fmi3GetClock) NONE(fmi3SetClock) NONE(fmi3SetDebugLogging)
+NONE(fmi3Reset) NONE(fmi3GetFMUState) NONE(fmi3SetFMUState) NONE(fmi3FreeFMUState) NONE(fmi3SerializedFMUStateSize)
+NONE(fmi3SerializeFMUState) NONE(fmi3DeserializeFMUState) NONE(fmi3GetVariableDependencies)
+NONE(fmi3GetNumberOfVariableDependencies) NONE(fmi3GetDirectionalDerivative) NONE(fmi3GetAdjointDerivative)
+NONE(fmi3GetIntervalDecimal) NONE(fmi3GetIntervalFraction) NONE(fmi3GetShiftDecimal) NONE(fmi3GetShiftFraction)
+NONE(fmi3SetIntervalDecimal) NONE(fmi3SetIntervalFraction) NONE(fmi3SetShiftDecimal) NONE(fmi3SetShiftFraction)
+NONE(fmi3EvaluateDiscreteStates) NONE(fmi3UpdateDiscreteStates) NONE(fmi3EnterEventMode) NONE(fmi3EnterStepMode)
+NONE(fmi3EnterConfigurationMode) NONE(fmi3ExitConfigurationMode) NONE(fmi3EnterContinuousTimeMode)
+NONE(fmi3CompletedIntegratorStep) NONE(fmi3SetTime) NONE(fmi3SetContinuousStates) NONE(fmi3GetContinuousStateDerivatives)
+NONE(fmi3GetEventIndicators) NONE(fmi3GetContinuousStates) NONE(fmi3GetNominalsOfContinuousStates)
+NONE(fmi3GetNumberOfEventIndicators) NONE(fmi3GetNumberOfContinuousStates) NONE(fmi3GetOutputDerivatives)
+NONE(fmi3ActivateModelPartition)
 
 #else
 
@@ -216,5 +231,12 @@ EXPORT int fmi2DoStep(void *tank, double from, double length, int no_set_prior) 
 
 EXPORT int fmi2GetBooleanStatus(void *tank, int kind, int *value) { return (void)tank, (void)kind, *value = 0, OK; }
 EXPORT int fmi2GetRealStatus(void *tank, int kind, double *value) { return (void)tank, (void)kind, (void)value, DISCARD; }
+
+EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
+
+NONE(fmi2GetString) NONE(fmi2SetString) NONE(fmi2SetDebugLogging) NONE(fmi2Reset) NONE(fmi2GetFMUstate) NONE(fmi2SetFMUstate)
+NONE(fmi2FreeFMUstate) NONE(fmi2SerializedFMUstateSize) NONE(fmi2SerializeFMUstate) NONE(fmi2DeSerializeFMUstate)
+NONE(fmi2GetDirectionalDerivative) NONE(fmi2SetRealInputDerivatives) NONE(fmi2GetRealOutputDerivatives) NONE(fmi2CancelStep)
+NONE(fmi2GetStatus) NONE(fmi2GetIntegerStatus) NONE(fmi2GetStringStatus)
 
 #endif

@@ -218,27 +218,31 @@ fn proposed(seconds: Option<f64>) -> Option<Nanos> {
 /// What is joined, and what is not.
 fn told(fmu: &Unpacked, join: &Join, step: Nanos, pace: f64) -> String {
     let model = &fmu.model;
-    let mut text = format!(
-        "run: \"{}\", FMI {}: {} inputs and {} outputs joined, steps of {step}, ",
+    let pace = match pace {
+        0.0 => "as fast as possible".to_owned(),
+        pace => format!("pace {pace}"),
+    };
+    let mut lines = vec![format!(
+        "\"{}\", FMI {}: {} and {} joined, steps of {step}, {pace}",
         model.name,
         model.version.number(),
-        join.inputs.len(),
-        join.outputs.len()
-    );
-    text += &match pace {
-        0.0 => "as fast as possible\n".to_owned(),
-        pace => format!("pace {pace}\n"),
-    };
-    for left in join.left.iter().take(LISTED) {
-        text += &format!("run: not joined: {}\n", left.0);
-    }
+        counted(join.inputs.len(), "input"),
+        counted(join.outputs.len(), "output")
+    )];
+    let left = join.left.iter().take(LISTED);
+    lines.extend(left.map(|left| format!("not joined: {}", left.0)));
     if join.left.len() > LISTED {
-        text += &format!("run: not joined: {} more\n", join.left.len() - LISTED);
+        lines.push(format!("not joined: {} more", join.left.len() - LISTED));
     }
     if model.needs_tool {
-        text += "run: this FMU needs the tool that has made it, on this computer\n";
+        lines.push("this FMU needs the tool that has made it, on this computer".to_owned());
     }
-    text
+    lines.iter().map(|line| format!("run: {line}\n")).collect()
+}
+
+/// `1 input`, `2 inputs`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
 /// Prints; if the reader of stdout is gone (`| head`), the line keeps running.

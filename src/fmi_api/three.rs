@@ -56,7 +56,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
         Version::Three,
         folder.as_deref(),
         token.unwrap_or_default(),
-        journal,
+        &journal,
     )
 }
 

@@ -68,7 +68,7 @@ unsafe extern "C" fn fmi2Instantiate(
         Version::Two,
         folder.as_deref(),
         guid.unwrap_or_default(),
-        journal,
+        &journal,
     )
 }
 

@@ -16,7 +16,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/bus-interbus/src/library.rs",
     "crates/bus-plugin/src/library.rs",
     "crates/conformance/src/resources.rs",
-    "crates/fmi/src/foreign/library.rs",
+    "crates/fmi/src/foreign/library",
     "crates/image/src/triple.rs",
     "crates/plc/src/hosted/table.rs",
 ];

@@ -45,7 +45,7 @@ fn a_tank_of_both_versions_in_both_ways_is_the_same_run() {
             "{told}"
         );
         assert!(
-            told.contains("1 inputs and 2 outputs joined, steps of 10ms, as fast as possible"),
+            told.contains("1 input and 2 outputs joined, steps of 10ms, as fast as possible"),
             "{told}"
         );
         records.push(fs::read_to_string(file).expect("a recording"));

@@ -142,6 +142,18 @@ def fmpy(path):
     return f"version={description.fmiVersion} variables={len(named)}"
 
 
+def tank(path):
+    """The FMU of examples/fmu-tank, which this project's import is tested with, is one for others, too."""
+    import fmpy
+    from fmpy.validation import validate_fmu
+
+    problems = validate_fmu(path)
+    assert not problems, problems
+    result = fmpy.simulate_fmu(path, stop_time=1, start_values={"valve": True})
+    assert abs(result["level"][-1] - 0.52) < 1e-9, result[-1]
+    return "level=0.52"
+
+
 def toolbox(path):
     import subprocess
 
@@ -177,17 +189,22 @@ def cosim(path):
 
 
 def pathsim(path):
+    """By hand alone: pip install pathsim-fmi==0.1.1, which brings more than a test is worth."""
+    from fmpy import read_model_description
     from pathsim import Connection, Simulation
     from pathsim.blocks import Constant, Scope
     from pathsim_fmi import CoSimulationFMU
 
-    unit = CoSimulationFMU(path, dt=STEP)
-    source, scope = Constant(2.5), Scope()
-    names = {name: port for port, name in enumerate(unit.input_port_labels)} if hasattr(unit, "input_port_labels") else {}
-    simulation = Simulation([source, unit, scope], [Connection(source, unit["lreal <in>"]), Connection(unit["lreal <out>"], scope)], dt=STEP)
-    simulation.run(10 * STEP)
+    variables = read_model_description(path).modelVariables
+    port = lambda name, causality: [one.name for one in variables if one.causality == causality].index(name)
+    unit, source, scope = CoSimulationFMU(path, dt=STEP), Constant(2.5), Scope()
+    wires = [
+        Connection(source, unit[port("lreal <in>", "input")]),
+        Connection(unit[port("lreal <out>", "output")], scope),
+    ]
+    Simulation([source, unit, scope], wires, dt=STEP).run(10 * STEP)
     _, values = scope.read()
-    assert values[0][-1] == 2.5, (names, values)
+    assert values[0][-1] == 2.5, values
     return "steps=10"
 
 
@@ -271,6 +288,43 @@ def rig(path, record):
     return "steps=2000"
 
 
+def rig_in_c(library, config, record):
+    """The same by the functions of include/tickbus.h."""
+    native = ctypes.CDLL(library)
+    native.tb_buffer_of.restype = ctypes.POINTER(ctypes.c_uint64)
+    native.tb_last_error.restype = ctypes.c_char_p
+    driver = ctypes.c_int64()
+    tables = f'[record]\nfile = "{record}"'.encode()
+    assert native.tb_open(config.encode(), tables, ctypes.byref(driver)) == 0, native.tb_last_error()
+
+    class Signal(ctypes.Structure):
+        _fields_ = [(name, ctypes.c_char_p) for name in ("name", "address", "data_type", "unit", "station")]
+        _fields_ += [(name, ctypes.c_int32) for name in ("slot", "edges", "is_written", "kind")]
+
+    signals = [Signal() for _ in range(native.tb_signal_count(driver))]
+    for at, signal in enumerate(signals):
+        assert native.tb_signal_at(driver, at, ctypes.byref(signal)) == 0, native.tb_last_error()
+    written = [signal for signal in signals if signal.is_written]
+    bits = [8 + signal.slot for signal in written if signal.data_type == b"BOOL"]
+    reals = [8 + signal.slot for signal in written if signal.data_type != b"BOOL"]
+    words = native.tb_buffer_of(driver)
+    numbers = ctypes.cast(words, ctypes.POINTER(ctypes.c_double))
+    random = 1
+    for tick in range(2000):
+        random = (random * 6364136223846793005 + 1442695040888963407) % 2**64
+        word = random >> 32
+        for at, slot in enumerate(bits):
+            numbers[slot] = float(word >> (at % 31) & 1)
+        for at, slot in enumerate(reals):
+            numbers[slot] = (word >> (3 * at)) % 1000 / 4
+        words[4] = (tick + 1) * 2_000_000
+        assert native.tb_exchange(driver) >= 0, native.tb_last_error()
+    assert native.tb_close(driver) == 0
+    return "steps=2000"
+
+
+TOOLS = [fmpy, tank, toolbox, cosim, pathsim, misuse, rig, rig_in_c]
+
 if __name__ == "__main__":
     tool, *arguments = sys.argv[1:]
-    print("fmi_tools: ok", {"fmpy": fmpy, "toolbox": toolbox, "cosim": cosim, "pathsim": pathsim, "misuse": misuse, "rig": rig}[tool](*arguments))
+    print("fmi_tools: ok", {one.__name__: one for one in TOOLS}[tool](*arguments))

@@ -208,8 +208,8 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
 }
 
 /// What both versions write in the same way.
-fn common<'a>(
-    node: Node<'a, '_>,
+fn common(
+    node: Node<'_, '_>,
     collector: &Collector<'_>,
     (value_type, type_name): (Option<ValueType>, &str),
     unit: Option<&str>,

@@ -3,7 +3,7 @@
 use std::io::{self, ErrorKind, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
 use std::os::unix::net::UnixStream;
-use std::os::unix::process::ExitStatusExt as _;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
 use tickbus_base::time::Nanos;
@@ -50,6 +50,8 @@ impl Isolated {
                 .arg("fmu-helper")
                 .stdin(OwnedFd::from(theirs))
                 .stdout(Stdio::from(stderr))
+                // Ctrl-C is for the host, which ends it.
+                .process_group(0)
                 .spawn()
         });
         let mut slave = Self {
@@ -116,9 +118,7 @@ impl Isolated {
             Ok(status) => ending(status),
             Err(error) => format!("has gone ({error})"),
         };
-        self.failed(&format!(
-            "its process {how} in {what}; this command goes on without it: tell its maker"
-        ))
+        self.failed(&format!("its process {how} in {what}: tell its maker"))
     }
 }
 

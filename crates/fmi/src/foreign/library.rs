@@ -3,85 +3,25 @@
 
 #![allow(unsafe_code, reason = "foreign functions are called")]
 
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
+mod functions;
+mod journal;
+
+use std::ffi::{CString, c_int, c_void};
 use std::path::Path;
 use std::ptr::{null, null_mut};
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::PoisonError;
 
-use libloading::Library;
-use tickbus_base::os::is_told;
+use tickbus_base::os::Library;
 
 use crate::value::{Number, Status, Value, ValueType, Version};
-
-type Handle = *mut c_void;
-type Plain = unsafe extern "C" fn(Handle) -> c_int;
-type SetTwo<T> = unsafe extern "C" fn(Handle, *const u32, usize, *const T) -> c_int;
-type GetTwo<T> = unsafe extern "C" fn(Handle, *const u32, usize, *mut T) -> c_int;
-type SetThree<T> = unsafe extern "C" fn(Handle, *const u32, usize, *const T, usize) -> c_int;
-type GetThree<T> = unsafe extern "C" fn(Handle, *const u32, usize, *mut T, usize) -> c_int;
+use functions::{Callbacks, Functions, GetThree, GetTwo, Handle, SetThree, SetTwo, Three, Two};
+use journal::{Journal, log_of_three, log_of_two};
 
 unsafe extern "C" {
     // What `fmi2CallbackFunctions` has to have.
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(memory: *mut c_void);
 }
-
-/// `fmi2CallbackFunctions`.
-#[repr(C)]
-struct Callbacks {
-    logger: unsafe extern "C" fn(
-        Handle,
-        *const c_char,
-        c_int,
-        *const c_char,
-        *const c_char,
-        *const c_char,
-    ),
-    allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
-    release: unsafe extern "C" fn(*mut c_void),
-    step_finished: *const c_void,
-    env: Handle,
-}
-
-/// `fmi2Instantiate`.
-type InstantiateTwo = unsafe extern "C" fn(
-    *const c_char,
-    c_int,
-    *const c_char,
-    *const c_char,
-    *const Callbacks,
-    c_int,
-    c_int,
-) -> Handle;
-
-/// `fmi3InstantiateCoSimulation`.
-type InstantiateThree = unsafe extern "C" fn(
-    *const c_char,
-    *const c_char,
-    *const c_char,
-    bool,
-    bool,
-    bool,
-    bool,
-    *const u32,
-    usize,
-    Handle,
-    unsafe extern "C" fn(Handle, c_int, *const c_char, *const c_char),
-    *const c_void,
-) -> Handle;
-
-/// `fmi3DoStep`.
-type StepThree = unsafe extern "C" fn(
-    Handle,
-    f64,
-    f64,
-    bool,
-    *mut bool,
-    *mut bool,
-    *mut bool,
-    *mut f64,
-) -> c_int;
 
 /// How a step has ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,156 +31,6 @@ pub(super) struct StepEnd {
     pub(super) terminate: bool,
     /// How far it got, in seconds, if it says so.
     pub(super) reached: Option<f64>,
-}
-
-/// What the FMU has said.
-#[derive(Debug, Default)]
-struct Journal {
-    file: String,
-    lines: AtomicU64,
-    last: Mutex<String>,
-}
-
-impl Journal {
-    fn take(&self, status: c_int, text: &str) {
-        let text = text.trim();
-        if status > Status::Ok as c_int {
-            *self.last.lock().unwrap_or_else(PoisonError::into_inner) = text.to_owned();
-        }
-        let times = self.lines.fetch_add(1, Ordering::Relaxed) + 1;
-        if is_told(times) {
-            match Status::of(status) {
-                Status::Ok => log::info!("{} says: {text}", self.file),
-                _ => log::warn!("{} says: {text}", self.file),
-            }
-        }
-    }
-}
-
-/// A text of the FMU's, for the length of a call.
-///
-/// # Safety
-///
-/// Null, or a C string that stays while it is used.
-unsafe fn words<'a>(text: *const c_char) -> std::borrow::Cow<'a, str> {
-    if text.is_null() {
-        return "".into();
-    }
-    // SAFETY: the caller's promise.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy()
-}
-
-/// The logger of FMI 3.0.
-unsafe extern "C" fn log_of_three(
-    env: Handle,
-    status: c_int,
-    _: *const c_char,
-    message: *const c_char,
-) {
-    // SAFETY: `env` is the journal that the instance was made with and that outlives it; the message is the FMU's C string.
-    let (journal, text) = unsafe { (&*env.cast::<Journal>(), words(message)) };
-    journal.take(status, &text);
-}
-
-/// The logger of FMI 2.0, which by the standard has any number of further arguments. Rust cannot write such a function; where the
-/// first of them is passed as that of a plain function is, it is taken for the one format that consists of it.
-unsafe extern "C" fn log_of_two(
-    env: Handle,
-    _: *const c_char,
-    status: c_int,
-    _: *const c_char,
-    format: *const c_char,
-    first: *const c_char,
-) {
-    // SAFETY: as above.
-    let (journal, format) = unsafe { (&*env.cast::<Journal>(), words(format)) };
-    // On Apple's arm64 further arguments are on the stack.
-    let has_first = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
-    if has_first && matches!(format.trim_end(), "%s") {
-        // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 (System V and
-        // Windows) and of arm64 Linux pass it where they pass the sixth parameter of a plain function.
-        journal.take(status, &unsafe { words(first) });
-    } else {
-        journal.take(status, &format);
-    }
-}
-
-macro_rules! functions {
-    ($name:ident, $prefix:literal: $($field:ident: $own:ty = $function:literal;)+) => {
-        #[derive(Debug)]
-        struct $name {
-            $($field: $own,)+
-        }
-
-        impl $name {
-            fn load(library: &Library) -> Result<Self, String> {
-                Ok(Self {$(
-                    $field: {
-                        let name = concat!($prefix, $function);
-                        // SAFETY: the types are those of the standard's headers, which a library that has these names follows.
-                        // The pointer is used only as long as the library, which is beside it in `Loaded`.
-                        let found = unsafe { library.get::<$own>(name) };
-                        *found.map_err(|_| format!("its library has no function {name}; export it again, or tell its maker"))?
-                    },
-                )+})
-            }
-        }
-    };
-}
-
-functions! { Two, "fmi2":
-    instantiate: InstantiateTwo = "Instantiate";
-    free: unsafe extern "C" fn(Handle) = "FreeInstance";
-    setup: unsafe extern "C" fn(Handle, c_int, f64, f64, c_int, f64) -> c_int = "SetupExperiment";
-    enter: Plain = "EnterInitializationMode";
-    exit: Plain = "ExitInitializationMode";
-    terminate: Plain = "Terminate";
-    set_real: SetTwo<f64> = "SetReal";
-    set_integer: SetTwo<i32> = "SetInteger";
-    set_boolean: SetTwo<c_int> = "SetBoolean";
-    get_real: GetTwo<f64> = "GetReal";
-    get_integer: GetTwo<i32> = "GetInteger";
-    get_boolean: GetTwo<c_int> = "GetBoolean";
-    step: unsafe extern "C" fn(Handle, f64, f64, c_int) -> c_int = "DoStep";
-    boolean_status: unsafe extern "C" fn(Handle, c_int, *mut c_int) -> c_int = "GetBooleanStatus";
-    real_status: unsafe extern "C" fn(Handle, c_int, *mut f64) -> c_int = "GetRealStatus";
-}
-
-functions! { Three, "fmi3":
-    instantiate: InstantiateThree = "InstantiateCoSimulation";
-    free: unsafe extern "C" fn(Handle) = "FreeInstance";
-    enter: unsafe extern "C" fn(Handle, bool, f64, f64, bool, f64) -> c_int = "EnterInitializationMode";
-    exit: Plain = "ExitInitializationMode";
-    terminate: Plain = "Terminate";
-    set_f32: SetThree<f32> = "SetFloat32";
-    set_f64: SetThree<f64> = "SetFloat64";
-    set_i8: SetThree<i8> = "SetInt8";
-    set_u8: SetThree<u8> = "SetUInt8";
-    set_i16: SetThree<i16> = "SetInt16";
-    set_u16: SetThree<u16> = "SetUInt16";
-    set_i32: SetThree<i32> = "SetInt32";
-    set_u32: SetThree<u32> = "SetUInt32";
-    set_i64: SetThree<i64> = "SetInt64";
-    set_u64: SetThree<u64> = "SetUInt64";
-    set_boolean: SetThree<u8> = "SetBoolean";
-    get_f32: GetThree<f32> = "GetFloat32";
-    get_f64: GetThree<f64> = "GetFloat64";
-    get_i8: GetThree<i8> = "GetInt8";
-    get_u8: GetThree<u8> = "GetUInt8";
-    get_i16: GetThree<i16> = "GetInt16";
-    get_u16: GetThree<u16> = "GetUInt16";
-    get_i32: GetThree<i32> = "GetInt32";
-    get_u32: GetThree<u32> = "GetUInt32";
-    get_i64: GetThree<i64> = "GetInt64";
-    get_u64: GetThree<u64> = "GetUInt64";
-    get_boolean: GetThree<u8> = "GetBoolean";
-    step: StepThree = "DoStep";
-}
-
-#[derive(Debug)]
-enum Functions {
-    Two(Two),
-    Three(Box<Three>),
 }
 
 /// One instance of an FMU, with its library.
@@ -257,12 +47,6 @@ pub(super) struct Instance {
     _library: Library,
 }
 
-impl std::fmt::Debug for Callbacks {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Callbacks")
-    }
-}
-
 impl Instance {
     /// Loads the library and makes an instance. `file` is the FMU's name in messages.
     pub(super) fn new(
@@ -271,20 +55,14 @@ impl Instance {
         library: &Path,
         resources: &Path,
     ) -> Result<Self, String> {
-        // SAFETY: the user has named this FMU to be run; its initialisers are a part of it.
-        let loaded = unsafe { Library::new(library) };
-        let loaded = loaded.map_err(|error| {
-            let error = tickbus_base::os::one_line(&error.to_string());
+        let loaded = Library::load(library).map_err(|error| {
             format!("its library cannot be loaded: {error}; install what it needs, which its documentation should tell")
         })?;
         let functions = match version {
             Version::Two => Functions::Two(Two::load(&loaded)?),
             Version::Three => Functions::Three(Box::new(Three::load(&loaded)?)),
         };
-        let journal = Box::new(Journal {
-            file: file.to_owned(),
-            ..Journal::default()
-        });
+        let journal = Box::new(Journal::of(file));
         let env = std::ptr::from_ref(&*journal).cast_mut().cast::<c_void>();
         let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
         let (name, token) = (c(name), c(token));
@@ -373,8 +151,8 @@ impl Instance {
 
     /// Enters the initialisation, for a run that begins at `start` seconds.
     pub(super) fn enter(&mut self, start: f64) -> Status {
-        // SAFETY: the handle is of this library, and alive, here and below.
         let status = match &self.functions {
+            // SAFETY: the handle is of this library, and alive, here and below.
             Functions::Two(two) => unsafe {
                 let status = (two.setup)(self.handle, 0, 0.0, start, 0, 0.0);
                 if status > Status::Warning as c_int {
@@ -393,8 +171,8 @@ impl Instance {
 
     /// Leaves the initialisation.
     pub(super) fn exit(&mut self) -> Status {
-        // SAFETY: as in `enter`.
         let status = match &self.functions {
+            // SAFETY: as in `enter`.
             Functions::Two(two) => unsafe { (two.exit)(self.handle) },
             // SAFETY: as above.
             Functions::Three(three) => unsafe { (three.exit)(self.handle) },
@@ -404,8 +182,8 @@ impl Instance {
 
     /// Ends the run.
     pub(super) fn terminate(&mut self) -> Status {
-        // SAFETY: as in `enter`.
         let status = match &self.functions {
+            // SAFETY: as in `enter`.
             Functions::Two(two) => unsafe { (two.terminate)(self.handle) },
             // SAFETY: as above.
             Functions::Three(three) => unsafe { (three.terminate)(self.handle) },

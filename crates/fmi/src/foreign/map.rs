@@ -31,7 +31,9 @@ impl Map {
     pub fn load(path: &Path, model: &Model, config: &Config) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let mut collector = Collector::new(&path.display().to_string(), &text);
-        let map = read_text(&mut collector, &text, |root| read(root, model, config));
+        let map = read_text(&mut collector, &text, |root| {
+            Some(read(root, model, config))
+        });
         match collector.finish() {
             Some(mistakes) => Err(mistakes),
             None => Ok(map.expect("what is not read has a mistake")),
@@ -39,7 +41,7 @@ impl Map {
     }
 }
 
-fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Option<Map> {
+fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
     let signals = root.take("signals");
     let parameters = root.take("parameters");
     root.require_one_of(
@@ -51,15 +53,27 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Option<Map> {
     let signals = signals.and_then(|value| value.table("[signals]", "write a [signals] table"));
     for (name, value) in signals.iter().flat_map(Table::all) {
         if let Some(joined) = joined(name, &value, model, config) {
+            let twin = map
+                .joined
+                .iter()
+                .find(|other| other.variable == joined.variable);
+            let is_input = model.variables[joined.variable].causality == Causality::Input;
+            if let (Some(twin), true) = (twin, is_input) {
+                let twin = &config.table.signals[twin.signal].name;
+                value.wrong(
+                    format!("\"{twin}\" is joined with this input already"),
+                    "an input of the FMU has one source: remove one of the two lines",
+                );
+            }
             map.joined.push(joined);
         }
     }
     map.parameters = parameters.map_or_else(Vec::new, |value| read_parameters(&value, model));
-    Some(map)
+    map
 }
 
 /// Reads a table of parameters and their values.
-pub(super) fn read_parameters(value: &TomlValue<'_>, model: &Model) -> Vec<(usize, Value)> {
+fn read_parameters(value: &TomlValue<'_>, model: &Model) -> Vec<(usize, Value)> {
     let table = value.table("parameters", "write lines such as \"tank.area\" = 2.5");
     let all = table.iter().flat_map(Table::all);
     all.filter_map(|(name, value)| parameter(name, &value, model))
@@ -117,7 +131,6 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
             Some(value) => value.number("write a number"),
         };
         if let Some(value) = &scale
-            && value.written() != ""
             && value.number("write a number") == Some(0.0)
         {
             value.wrong(

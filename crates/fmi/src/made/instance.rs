@@ -15,7 +15,7 @@ use super::variables::{Cell, Exposed, Place, Variable, default_pace, initial_slo
 use crate::real_time::RealTime;
 use crate::value::{Number, Value, ValueType, Version};
 
-/// How far the beginning of a step may be from the end of the last one, in seconds, and in its parts.
+/// How far the beginning of a step may be from the end of the last one, in seconds; beyond that, what doubles are rounded to.
 const TOLERANCE: f64 = 1e-9;
 
 /// Where an instance stands.
@@ -176,7 +176,7 @@ impl Instance {
             .to_owned());
         };
         let to = from + length;
-        let is_next = (from - self.time).abs() <= TOLERANCE * self.time.abs().max(1.0);
+        let is_next = (from - self.time).abs() <= TOLERANCE + 8.0 * f64::EPSILON * self.time.abs();
         if !is_next || length <= 0.0 || !to.is_finite() {
             return Err(not_next(self.time, from, length));
         }
@@ -207,7 +207,7 @@ impl Instance {
     pub fn terminate(&mut self) {
         self.phase = Phase::Over;
         if let Some(mut driver) = self.driver.take() {
-            driver.end_tick(&mut self.slots);
+            driver.end_tick(&self.slots);
             driver.close();
         }
     }

@@ -1,5 +1,6 @@
 //! The native libraries that go into an FMU: one for each platform.
 
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
@@ -162,7 +163,7 @@ pub fn find_libraries(
     }
     let mut tried = Vec::new();
     if let Some(folder) = beside {
-        let file = folder.join(libloading::library_filename("tickbus"));
+        let file = folder.join(format!("{DLL_PREFIX}tickbus{DLL_SUFFIX}"));
         if file.is_file() {
             return Ok(vec![read(&file)?]);
         }

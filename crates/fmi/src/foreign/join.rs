@@ -5,21 +5,8 @@ use tickbus_base::toml_text::nearest;
 use tickbus_driver_cfg::Config;
 
 use super::description::{Causality, ForeignVariable, Model};
-use super::map::Map;
+use super::map::{Joined, Map};
 use crate::value::Value;
-
-/// A signal and its variable: signal = `scale` × variable + `offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Joined {
-    /// The signal, by its place in the table.
-    pub signal: usize,
-    /// The variable, by its place in the model description.
-    pub variable: usize,
-    /// How many units of the signal one of the variable is. Not 0.
-    pub scale: f64,
-    /// The signal where the variable is 0.
-    pub offset: f64,
-}
 
 /// Something that is joined with nothing: a line for people.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,7 +5,8 @@ use tickbus_binding::SlotKind;
 use tickbus_image::signal::{DataType, SignalTable, Slot};
 
 use super::archive::Unpacked;
-use super::join::{Join, Joined};
+use super::join::Join;
+use super::map::Joined;
 use super::slave::{Direct, Failure, Setup, Slave, Stepped};
 use crate::made::kind_of;
 use crate::value::{Value, Version};

@@ -9,8 +9,20 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
 
 use super::description::{Causality, Model};
-use super::join::Joined;
 use crate::value::{Value, ValueType};
+
+/// A signal and its variable: signal = `scale` × variable + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joined {
+    /// The signal, by its place in the table.
+    pub signal: usize,
+    /// The variable, by its place in the model description.
+    pub variable: usize,
+    /// How many units of the signal one of the variable is. Not 0.
+    pub scale: f64,
+    /// The signal where the variable is 0.
+    pub offset: f64,
+}
 
 /// A map, read for one FMU and one driver.cfg.
 #[derive(Clone, Debug, Default, PartialEq)]

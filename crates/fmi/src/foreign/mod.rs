@@ -18,7 +18,7 @@ pub use archive::Unpacked;
 pub use description::{Causality, ForeignVariable, Model};
 #[cfg(unix)]
 pub use helper::serve;
-pub use join::{Join, Joined, Unjoined};
+pub use join::{Join, Unjoined};
 pub use machine::{Machine, MachineOptions};
-pub use map::Map;
+pub use map::{Joined, Map};
 pub use slave::{Failure, Stepped};

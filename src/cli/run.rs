@@ -237,7 +237,7 @@ fn told(fmu: &Unpacked, join: &Join, step: Nanos, pace: f64) -> String {
     if model.needs_tool {
         lines.push("this FMU needs the tool that has made it, on this computer".to_owned());
     }
-    lines.iter().map(|line| format!("run: {line}\n")).collect()
+    format!("run: {}\n", lines.join("\nrun: "))
 }
 
 /// `1 input`, `2 inputs`.

@@ -24,7 +24,7 @@ use tickbus_fmi::made::{Instance, folder_of};
 use tickbus_fmi::{Status, Version};
 
 /// Every instance of FMUs that this library is in.
-static INSTANCES: Handles<Tenant> = Handles::new();
+static INSTANCES: Handles<Box<Tenant>> = Handles::new();
 
 /// `fmi2CallbackLogger`. Its further arguments, which would be those of the format, are never there.
 type LoggerOfTwo = unsafe extern "C" fn(
@@ -131,6 +131,19 @@ type Told = (Result<(), String>, Journal);
 /// Calls `work` with an instance, and answers with a status.
 #[inline]
 fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), String>) -> c_int {
+    let mut work = Some(work);
+    call_once(handle, &mut |instance| match work.take() {
+        Some(work) => work(instance),
+        None => Ok(()),
+    })
+}
+
+/// The same, once for all of the functions: there are more than a hundred.
+#[inline(never)]
+fn call_once(
+    handle: *mut c_void,
+    work: &mut dyn FnMut(&mut Instance) -> Result<(), String>,
+) -> c_int {
     let done = INSTANCES.with(handle as i64, |tenant| tenant.work(work));
     match done {
         Ok(None) => Status::Ok as c_int,
@@ -208,11 +221,11 @@ fn instantiate(
             "the importing tool names no folder of resources; an FMU of tickbus has its driver.cfg there",
         )?;
         let instance = Instance::new(version, &folder, token)?;
-        let tenant = Tenant {
+        let tenant = Box::new(Tenant {
             instance,
             journal: journal.clone(),
             broken: None,
-        };
+        });
         Ok(place.fill(tenant) as *mut c_void)
     }));
     let made = made

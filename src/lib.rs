@@ -26,12 +26,14 @@
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
 //! | [`bridge`] | bridges to it: serial lines, MQTT |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
+//! | [`fmi`] | FMI both ways: a driver.cfg as an FMU, foreign FMUs as machines |
 //! | [`function_blocks`] | a small controller whose program is a plan of function blocks |
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | `c_api` | the functions of `include/tickbus.h` |
+//! | `fmi_api` | the functions of FMI, for the FMU that a driver.cfg becomes |
 //! | [`cli`] | the `tickbus` command |
 //!
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the
@@ -40,6 +42,7 @@
 mod c_api;
 pub mod cli;
 pub mod fieldbus;
+mod fmi_api;
 mod jni;
 
 pub use tickbus_axis as axis;
@@ -50,6 +53,7 @@ pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;
 pub use tickbus_export as export;
 pub use tickbus_fieldbus::faults;
+pub use tickbus_fmi as fmi;
 pub use tickbus_function_blocks as function_blocks;
 pub use tickbus_image as image;
 pub use tickbus_image::signal;

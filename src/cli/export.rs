@@ -1,4 +1,4 @@
-//! `tickbus export FILE --for EDITOR`: writes the PLC's half of a driver.cfg.
+//! `tickbus export FILE --for EDITOR`: writes the PLC's half of a driver.cfg, or an FMU of the whole.
 
 use std::fs;
 use std::io::Write as _;
@@ -7,41 +7,151 @@ use std::path::{Path, PathBuf};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
+use tickbus_base::Mistake;
 use tickbus_driver_cfg::Config;
 use tickbus_export::{Export, Target, export};
+use tickbus_fmi::{Version, made};
 
-/// Write the PLC's half of a driver.cfg: sources for the editor of the PLC, and a symbol table.
+/// Write the PLC's half of a driver.cfg: sources for the editor of the PLC, and a symbol table. For fmi2 and fmi3, write an FMU:
+/// the driver for simulators that import co-simulation models.
 ///
-/// docs/which-bus.md tells which bus suits which PLC, and what is to be set there.
+/// docs/which-bus.md tells which bus suits which PLC, and what is to be set there; docs/fmi.md tells of FMUs.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the simulated machine.
     file: PathBuf,
 
-    /// The editor that the sources are for.
-    #[arg(long = "for", value_name = "EDITOR", value_parser = targets())]
-    target: Target,
+    /// The editor that the sources are for, or the version of FMI.
+    #[arg(long = "for", value_name = "EDITOR", value_parser = formats())]
+    format: Format,
 
-    /// Folder for the files [default: beside FILE, called like it and the editor].
+    /// Folder for the files [default: beside FILE, called like it and the editor]; of an FMU, the file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
+
+    /// For an FMU: the native library to put inside, one for each platform [default: beside this command, or in the jar there].
+    #[arg(long, value_name = "FILE")]
+    library: Vec<PathBuf>,
 
     /// Overwrite files that are there.
     #[arg(long)]
     force: bool,
 }
 
-/// Reads the name of an editor.
-fn targets() -> impl TypedValueParser<Value = Target> {
-    PossibleValuesParser::new(Target::ALL.map(Target::name)).map(|name| {
-        let mut all = Target::ALL.into_iter();
-        all.find(|target| target.name() == name)
+/// What is made of a driver.cfg.
+#[derive(Clone, Copy, Debug)]
+enum Format {
+    /// The PLC's half, for an editor.
+    Sources(Target),
+    /// An FMU.
+    Fmu(Version),
+}
+
+impl Format {
+    fn all() -> impl Iterator<Item = Self> {
+        let sources = Target::ALL.map(Self::Sources);
+        sources.into_iter().chain(Version::ALL.map(Self::Fmu))
+    }
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Sources(target) => target.name(),
+            Self::Fmu(version) => version.name(),
+        }
+    }
+}
+
+/// Reads the name of an editor or of a version of FMI.
+fn formats() -> impl TypedValueParser<Value = Format> {
+    PossibleValuesParser::new(Format::all().map(Format::name)).map(|name| {
+        let mut all = Format::all();
+        all.find(|format| format.name() == name)
             .expect("a possible value")
     })
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let made = Config::load(&arguments.file).and_then(|config| export(&config, arguments.target));
+    match arguments.format {
+        Format::Sources(target) => run_sources(arguments, target),
+        Format::Fmu(version) => run_fmu(arguments, version),
+    }
+}
+
+fn run_fmu(arguments: &Arguments, version: Version) -> Outcome {
+    let written = make_fmu(arguments, version);
+    let mut stderr = std::io::stderr().lock();
+    match written {
+        Ok((file, package)) => {
+            for note in &package.notes {
+                let _ = writeln!(stderr, "note: {note}");
+            }
+            println!("{}", file.display());
+            println!(
+                "export: ok for={} files=1 variables={} platforms={}",
+                version.name(),
+                package.variables,
+                package.platforms.join(",")
+            );
+            Outcome::Done
+        }
+        Err((text, mistakes)) => {
+            let _ = writeln!(stderr, "{text}\nexport: failed mistakes={mistakes}");
+            Outcome::WrongInput
+        }
+    }
+}
+
+/// Writes an FMU; else what is wrong, and how often.
+fn make_fmu(
+    arguments: &Arguments,
+    version: Version,
+) -> Result<(PathBuf, made::Package), (String, usize)> {
+    let one = |mistake: Mistake| (mistake.to_string(), 1);
+    // First what the user can see, then what this computer lacks.
+    Config::load(&arguments.file).map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
+    let own = std::env::current_exe().ok();
+    let beside = own.as_deref().and_then(Path::parent);
+    let libraries = made::find_libraries(&arguments.library, beside).map_err(one)?;
+    let package = made::export(&arguments.file, version, &libraries)
+        .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
+    let file = arguments
+        .out
+        .clone()
+        .unwrap_or_else(|| folder_beside(arguments).with_extension("fmu"));
+    let path = file.display();
+    if file.extension().is_none_or(|ending| ending != "fmu") {
+        return Err(one(Mistake::new(
+            format!("{path}: importing tools look for files ending in .fmu"),
+            format!("write --out {path}.fmu"),
+        )));
+    }
+    if file.symlink_metadata().is_ok() && !arguments.force {
+        return Err(one(Mistake::new(
+            format!("{path}: this file is there already"),
+            "name another --out, or add --force",
+        )));
+    }
+    // Whole or not at all: an importing tool may look at the folder.
+    let part = file.with_extension("fmu.part");
+    let written = fs::write(&part, &package.bytes).and_then(|()| fs::rename(&part, &file));
+    written.map_err(|error| {
+        one(Mistake::new(
+            format!("{path}: this file cannot be written: {error}"),
+            "check the folder",
+        ))
+    })?;
+    Ok((file, package))
+}
+
+fn run_sources(arguments: &Arguments, target: Target) -> Outcome {
+    if !arguments.library.is_empty() {
+        eprintln!(
+            "--library is for fmi2 and fmi3; leave it out for {}",
+            target.name()
+        );
+        return Outcome::Usage;
+    }
+    let made = Config::load(&arguments.file).and_then(|config| export(&config, target));
     let mut stderr = std::io::stderr().lock();
     let made = match made {
         Ok(made) => made,
@@ -68,7 +178,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             }
             println!(
                 "export: ok for={} files={}",
-                arguments.target.name(),
+                target.name(),
                 made.files.len()
             );
             Outcome::Done
@@ -91,7 +201,7 @@ fn folder_beside(arguments: &Arguments) -> PathBuf {
         .to_string_lossy();
     arguments
         .file
-        .with_file_name(format!("{stem}-{}", arguments.target.name()))
+        .with_file_name(format!("{stem}-{}", arguments.format.name()))
 }
 
 /// Writes all files, or none if any of them would overwrite another one.

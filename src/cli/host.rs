@@ -165,7 +165,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
 
 /// The recording asked for on the command line: relative to the current folder, not to that of the
 /// driver.cfg.
-fn recording(file: &Path) -> Result<record::Options, String> {
+pub(super) fn recording(file: &Path) -> Result<record::Options, String> {
     let path = std::path::absolute(file)
         .map_err(|error| format!("\"{}\" is no path: {error}", file.display()))?;
     record::Options::to(&path).map_err(|mistake| mistake.to_string())
@@ -220,11 +220,11 @@ fn watch(
 
 /// The injected faults as last reported: how often each had begun, and its state.
 #[derive(Debug, Default)]
-struct ToldFaults(Vec<(u64, Phase)>);
+pub(super) struct ToldFaults(Vec<(u64, Phase)>);
 
 impl ToldFaults {
     /// Reports every fault that has begun or ended since the last call.
-    fn tell(&mut self, title: &str, faults: Vec<FaultStatus>, text: &mut String) {
+    pub(super) fn tell(&mut self, title: &str, faults: Vec<FaultStatus>, text: &mut String) {
         self.0.resize(faults.len(), (0, Phase::Waiting));
         for (told, fault) in self.0.iter_mut().zip(faults) {
             let is = (fault.begun, fault.phase);
@@ -242,7 +242,7 @@ impl ToldFaults {
 }
 
 /// Whether to report a line's state: it has changed, or what it waits for has.
-fn is_news(told: Option<&Link>, link: &Link) -> bool {
+pub(super) fn is_news(told: Option<&Link>, link: &Link) -> bool {
     let Some(told) = told else {
         // At the very beginning every line is closed.
         return link.state != LinkState::Closed;

@@ -7,6 +7,8 @@ mod bridge;
 mod check;
 mod dispatch;
 mod export;
+#[cfg(unix)]
+mod fmu_helper;
 mod gsd;
 mod host;
 mod import;
@@ -19,6 +21,7 @@ mod plugin_helper;
 #[cfg(unix)]
 mod profibus;
 mod report;
+mod run;
 mod sync;
 mod test;
 
@@ -51,12 +54,17 @@ enum Command {
     #[cfg(unix)]
     Profibus(profibus::Arguments),
     Report(report::Arguments),
+    Run(run::Arguments),
     Sync(sync::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
     #[cfg(unix)]
     #[command(hide = true)]
     PluginHelper,
+    /// Run an FMU for the process that starts this; not for people.
+    #[cfg(unix)]
+    #[command(hide = true)]
+    FmuHelper,
 }
 
 /// How a command ended, for its exit code.
@@ -105,10 +113,13 @@ pub fn main() -> ExitCode {
         #[cfg(unix)]
         Command::Profibus(arguments) => profibus::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments),
         Command::Sync(arguments) => sync::run(&arguments),
         Command::Test(arguments) => test::run(&arguments),
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
+        #[cfg(unix)]
+        Command::FmuHelper => fmu_helper::run(),
     };
     tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
     outcome.into()

@@ -5,6 +5,7 @@ use super::source::{Token, texts, tokens};
 /// Where `unsafe` is allowed: files that start like this.
 const UNSAFE_HOMES: &[&str] = &[
     "src/c_api.rs",
+    "src/fmi_api",
     "src/jni.rs",
     "src/jni/",
     "crates/base/src/os/",
@@ -15,6 +16,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/bus-interbus/src/library.rs",
     "crates/bus-plugin/src/library.rs",
     "crates/conformance/src/resources.rs",
+    "crates/fmi/src/foreign/library",
     "crates/image/src/triple.rs",
     "crates/plc/src/hosted/table.rs",
     "python/src/view.rs",

@@ -14,7 +14,7 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
 use tickbus_fieldbus::{
     Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
-    Moved, OpenError, Port, Role, Vendor, Verdict,
+    Moved, NamedFile, OpenError, Port, Role, Vendor, Verdict,
 };
 use tickbus_image::signal::SignalTable;
 
@@ -77,6 +77,10 @@ impl BusOptions for Options {
         let mut parts = vec![format!("board {} channel {}", self.board, self.channel)];
         parts.extend(self.card.summary());
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

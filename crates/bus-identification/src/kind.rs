@@ -3,7 +3,7 @@
 use tickbus_axis::Axis;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::heads::meaning;
@@ -30,6 +30,10 @@ impl BusOptions for ClientOptions {
             self.heads.shown(table),
             format!("carriers {}", self.line.carriers.name()),
         ]
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
@@ -82,6 +86,10 @@ impl BusOptions for ReaderOptions {
             self.heads.shown(table),
             format!("carriers {}", self.line.carriers.name()),
         ]
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

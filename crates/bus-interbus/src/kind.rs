@@ -2,7 +2,9 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, OpenError, Role};
+use tickbus_fieldbus::{
+    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, NamedFile, OpenError, Role,
+};
 use tickbus_image::signal::SignalTable;
 
 use super::card::Ddi;
@@ -23,6 +25,10 @@ impl BusOptions for Options {
         let service = self.activate;
         parts.extend(service.map(|service| format!("activates by service {service:04X}")));
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

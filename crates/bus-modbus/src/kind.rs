@@ -5,7 +5,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::tcp::Address;
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
@@ -22,6 +22,10 @@ impl BusKind for ServerOptions {
 impl BusOptions for ServerOptions {
     fn summary(&self, _role: Role, table: &SignalTable) -> Vec<String> {
         self.shown(table)
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
@@ -57,6 +61,10 @@ impl BusKind for ClientOptions {
 impl BusOptions for ClientOptions {
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String> {
         self.shown(role, table)
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

@@ -3,7 +3,7 @@
 use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, ServerOptions};
@@ -19,6 +19,10 @@ impl BusKind for ClientOptions {
 impl BusOptions for ClientOptions {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         self.summary()
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        self.credentials.files(&[self.security])
     }
 
     #[cfg(feature = "opcua")]
@@ -65,6 +69,10 @@ impl BusKind for ServerOptions {
 impl BusOptions for ServerOptions {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         self.summary()
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        self.credentials.files(&self.security)
     }
 
     #[cfg(feature = "opcua")]

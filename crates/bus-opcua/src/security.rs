@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::NamedFile;
 
 /// The longest path, name or password, in characters.
 const TEXT_LIMIT: usize = 1000;
@@ -111,6 +112,22 @@ impl std::fmt::Debug for Secret {
             Self::Environment(name) => f.debug_tuple("Environment").field(name).finish(),
             Self::Clear(_) => f.write_str("Clear"),
         }
+    }
+}
+
+impl Credentials {
+    /// The files that are named: certificates and keys, if messages are protected by one of `policies`, and passwords.
+    pub(super) fn files(&self, policies: &[Policy]) -> Vec<NamedFile> {
+        let protected = policies.iter().any(|policy| *policy != Policy::None);
+        let password = self.login.as_ref().and_then(|login| match &login.password {
+            Secret::File(file) => Some(file.clone()),
+            Secret::Environment(_) | Secret::Clear(_) => None,
+        });
+        let pki = protected.then(|| self.pki.clone());
+        pki.into_iter()
+            .chain(password)
+            .map(NamedFile::Secret)
+            .collect()
     }
 }
 

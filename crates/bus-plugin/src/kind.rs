@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, shown};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::Options;
@@ -25,6 +25,12 @@ impl BusOptions for Options {
         let given = self.options.iter();
         parts.extend(given.map(|(key, value)| format!("{} {}", shown(key), shown(value))));
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        let helper = self.helper.iter().cloned();
+        let files = std::iter::once(self.library.clone()).chain(helper);
+        files.map(NamedFile::Plain).collect()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

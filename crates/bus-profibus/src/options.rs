@@ -11,7 +11,9 @@ use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role, serial};
+use tickbus_fieldbus::{
+    At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role, serial,
+};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
@@ -122,6 +124,14 @@ impl BusOptions for Options {
             }
         });
         line.into_iter().chain(stations).collect()
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        let file = |station: &StationOptions| match &station.device {
+            Device::Gsd { file, .. } => Some(NamedFile::Plain(file.clone())),
+            Device::Plain { .. } => None,
+        };
+        self.stations().filter_map(file).collect()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

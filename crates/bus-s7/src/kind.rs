@@ -4,7 +4,7 @@ use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, shown};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, S7Client, S7Server, ServerOptions};
@@ -32,6 +32,10 @@ impl BusOptions for ServerOptions {
             ));
         }
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
@@ -77,6 +81,10 @@ impl BusOptions for ClientOptions {
             None => "writes nothing".to_owned(),
         });
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

@@ -2,7 +2,7 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{Every, Options, Sdsp};
@@ -29,6 +29,10 @@ impl BusOptions for Options {
             Every::Steps(multiple) => format!("in one of {multiple} steps"),
         });
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

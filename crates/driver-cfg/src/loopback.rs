@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL};
 use tickbus_programs::{self as programs, PROGRAMS};
@@ -162,6 +162,16 @@ impl BusOptions for Options {
             }
         }
         parts
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        match &self.peer {
+            Peer::Program { name, .. } if HostedProgram::is_path(name) => {
+                vec![NamedFile::Plain(name.into())]
+            }
+            Peer::Replay(file) => vec![NamedFile::Plain(file.clone())],
+            Peer::Program { .. } | Peer::Link(_) => Vec::new(),
+        }
     }
 
     /// Opens one end of a named link. A hosted program and a replayed recording are the driver's to start.

@@ -14,7 +14,8 @@ pub struct SlotMap {
 }
 
 impl SlotMap {
-    pub(super) fn new(table: &SignalTable, role: Role) -> Self {
+    /// The arrangement for the end with `role`.
+    pub fn new(table: &SignalTable, role: Role) -> Self {
         let (_, rx) = role.areas();
         let mut count = table.signals.len();
         let edges = table

@@ -20,7 +20,7 @@ pub struct Exchange {
 
 impl Exchange {
     /// The state before the first exchange.
-    pub(super) const NONE: Self = Self {
+    pub const NONE: Self = Self {
         code: Code::Stale,
         sequence: 0,
         age: Nanos::MAX,

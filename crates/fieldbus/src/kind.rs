@@ -1,7 +1,7 @@
 //! A kind of bus, as the list of kinds in `driver-cfg` knows it: the options that a driver.cfg gives it, and all that
 //! others ask of a bus before it runs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use tickbus_axis::Axis;
 use tickbus_base::Mistake;
@@ -54,12 +54,25 @@ pub enum OpenError {
     Unsupported(String),
 }
 
+/// A file or folder that a driver.cfg names, as written there: relative to its folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum NamedFile {
+    /// One that may go where the driver.cfg goes.
+    Plain(PathBuf),
+    /// Keys or passwords, which stay where they are.
+    Secret(PathBuf),
+}
+
 /// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.
 ///
 /// Methods with a body are for buses that have something to say there.
 pub trait BusOptions {
     /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
+
+    /// The files that the options name, which a driver.cfg needs wherever it goes; of a vendor's driver, which the system finds
+    /// by its name, nothing.
+    fn files(&self) -> Vec<NamedFile>;
 
     /// Makes the bus. It connects to nothing yet.
     ///

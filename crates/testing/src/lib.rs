@@ -9,6 +9,7 @@
 mod condition;
 mod junit;
 mod machine;
+mod plant;
 mod playback;
 mod run;
 mod sections;

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_driver::{Code, Driver, DriverError};
+use tickbus_fmi::foreign::{Machine, Stepped};
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record as record;
 
@@ -68,12 +69,15 @@ impl Suite {
             slots[*signal] = *value;
         }
         let signals = &bench.config.table.signals;
+        let fmu = bench.fmu.as_ref();
+        let started = fmu.map(|fmu| fmu.start(table, &mut slots)).transpose();
         let watch = |(signal, slot): (&Signal, &Slot)| Watch::new(*slot, signal);
         let watches: Vec<Watch> = signals.iter().zip(&slots).map(watch).collect();
         let mut stand = Stand {
             stub: Stub::new(&bench.rules, &watches),
             playback,
             tape: bench.tape.as_ref(),
+            fmu: None,
             driver,
             signals,
             slots,
@@ -84,7 +88,22 @@ impl Suite {
             faults: Vec::new(),
             standing: Vec::new(),
         };
-        let failure = test.steps.iter().find_map(|step| stand.run(step).err());
+        let failure = match started {
+            Ok(started) => {
+                stand.fmu = started;
+                test.steps.iter().find_map(|step| stand.run(step).err())
+            }
+            Err(why) => {
+                let place = fmu.map_or(test.place, |fmu| fmu.place);
+                Some(stand.broken(place, &why))
+            }
+        };
+        let failure = failure.or_else(|| {
+            let ended = stand.fmu.take()?.end();
+            ended
+                .err()
+                .map(|why| stand.broken(test.place, &why.to_string()))
+        });
         let ran = Ran {
             ticks: stand.ticks,
             time: stand.time(),
@@ -120,6 +139,7 @@ struct Stand<'a> {
     stub: Stub<'a>,
     playback: Option<Playback<'a>>,
     tape: Option<&'a MachineRecording>,
+    fmu: Option<Machine>,
     step: Nanos,
     ticks: u64,
     forced: Vec<(usize, Slot)>,
@@ -206,6 +226,16 @@ impl Stand<'_> {
     /// One tick: the machine moves, then the PLC is scanned if due.
     fn tick(&mut self, place: TextPosition) -> Result<(), Failure> {
         let now = self.time() + self.step;
+        if let Some(fmu) = &mut self.fmu {
+            match fmu.step(now - self.step, self.step, &mut self.slots) {
+                Ok(Stepped::Done) => {}
+                Ok(Stepped::Ended) => {
+                    let what = "the FMU has ended its simulation; let the test end before";
+                    return Err(self.broken(place, what));
+                }
+                Err(why) => return Err(self.broken(place, &why.to_string())),
+            }
+        }
         if let Some(playback) = &mut self.playback
             && let Err(error) = playback.step(now, &mut self.slots)
         {

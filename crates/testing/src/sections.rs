@@ -3,13 +3,15 @@
 use std::path::Path;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, shown};
+use tickbus_base::toml_text::{Mistakes, Table, Value, shown};
+use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_fieldbus::faults::{self, Fault, unknown};
 use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::condition::{Condition, Demand};
+use super::plant::{FmuKeys, Plant};
 use super::playback::MachineRecording;
 use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition};
 
@@ -28,6 +30,7 @@ pub(super) struct Reader<'a> {
     pub(super) role: Role,
     pub(super) step: Nanos,
     pub(super) folder: &'a Path,
+    pub(super) config: &'a Config,
 }
 
 /// The machine in a test file.
@@ -36,6 +39,9 @@ pub(super) struct Machine {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
     pub(super) tape: Option<MachineRecording>,
+    pub(super) fmu: Option<Plant>,
+    /// Mistakes in files that it names.
+    pub(super) elsewhere: Option<Mistakes>,
 }
 
 impl Reader<'_> {
@@ -43,6 +49,7 @@ impl Reader<'_> {
         let set = table.take("set");
         let recording = table.take("recording");
         let compare = table.take("compare");
+        let fmu = FmuKeys::take(&mut table);
         let rules = table.take("rule");
         table.finish();
         if let (Some(value), None) = (&compare, &recording) {
@@ -51,6 +58,7 @@ impl Reader<'_> {
                 "name the recording that the PLC is compared with, or remove it",
             );
         }
+        let (fmu, elsewhere) = fmu.read(self.config, self.folder);
         let initial = self.assignments(set.as_ref());
         let rules = rules.map(|value| value.tables("[[machine.rule]]"));
         let rules = rules.into_iter().flatten();
@@ -58,6 +66,8 @@ impl Reader<'_> {
             initial: initial.unwrap_or_default(),
             rules: rules.filter_map(|table| self.rule(table)).collect(),
             tape: recording.and_then(|value| self.tape(&value, compare.as_ref())),
+            fmu,
+            elsewhere,
         }
     }
 

@@ -12,6 +12,7 @@ use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
+use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
 use super::test::{Rule, Test};
@@ -37,6 +38,7 @@ pub(super) struct Bench {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
     pub(super) tape: Option<MachineRecording>,
+    pub(super) fmu: Option<Plant>,
 }
 
 impl Suite {
@@ -76,7 +78,7 @@ impl Suite {
     }
 }
 
-/// Reads the file; mistakes in its driver.cfg go to `of_config`.
+/// Reads the file; mistakes in its driver.cfg, or in a file that its machine needs, go to `of_config`.
 fn read(
     mut root: Table<'_>,
     folder: &Path,
@@ -118,22 +120,30 @@ fn read(
         role: config.role,
         step,
         folder,
+        config: &config,
     };
-    let machine = match machine {
+    let mut machine = match machine {
         None => Machine::default(),
         Some(value) => reader.machine(value.table("[machine]", "write a [machine] table")?),
     };
+    if let Some(mistakes) = machine.elsewhere.take() {
+        *of_config = Some(mistakes);
+    }
     let tables = tests?.tables("[[test]]");
     check_twins(&tables);
     let tests: Vec<Option<Test>> = tables.into_iter().map(|table| reader.test(table)).collect();
     let tests: Option<Vec<Test>> = tests.into_iter().collect();
     let tests = tests?;
+    if of_config.is_some() {
+        return None;
+    }
     let bench = Bench {
         config,
         step,
         initial: machine.initial,
         rules: machine.rules,
         tape: machine.tape,
+        fmu: machine.fmu,
     };
     Some((bench, tests))
 }

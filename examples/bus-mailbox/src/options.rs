@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
 use super::Mailbox;
@@ -36,6 +36,10 @@ impl BusKind for Options {
 impl BusOptions for Options {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         vec![format!("files in {}", self.folder.display())]
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

@@ -1,5 +1,6 @@
 //! Log messages on stderr.
 
+mod lines;
 mod queue;
 
 use std::io::{self, Write};
@@ -9,6 +10,7 @@ use env_logger::{Builder, Target};
 use log::LevelFilter;
 
 use crate::time::Nanos;
+pub use lines::{collect_log, has_log, take_log};
 use queue::Queue;
 
 /// The queue before stderr; one per process, because there is one stderr.

@@ -24,7 +24,10 @@ mod timer_slack;
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;
-pub use log::{dropped_log_lines, flush_log, is_rarely_logged, is_told, log_to_stderr};
+pub use log::{
+    collect_log, dropped_log_lines, flush_log, has_log, is_rarely_logged, is_told, log_to_stderr,
+    take_log,
+};
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
 pub use open_files::raise_open_files;

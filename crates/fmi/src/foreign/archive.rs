@@ -1,0 +1,263 @@
+//! The archive of an FMU, unpacked to a folder that goes away with it.
+//!
+//! What it has is checked before a byte is written: nothing leaves the folder, nothing is a link, and it is not larger than a
+//! computer can bear.
+
+use std::fs::{self, File};
+use std::io::{self, Read as _};
+use std::path::{Component, Path, PathBuf};
+
+use tempfile::TempDir;
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::{Mistakes, shown};
+use zip::ZipArchive;
+use zip::read::ZipFile;
+
+use super::description::Model;
+use crate::made::Platform;
+use crate::value::Version;
+
+/// The most bytes that an FMU may have when it is unpacked.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// The most bytes of a model description.
+const MOST_DESCRIPTION: u64 = 64 << 20;
+
+/// The most files in an FMU.
+const MOST_FILES: usize = 20_000;
+
+/// The name of the model description.
+const DESCRIPTION: &str = "modelDescription.xml";
+
+/// An FMU that was found right, with the library for this platform.
+#[derive(Debug)]
+pub struct Unpacked {
+    /// Its path, as messages name it.
+    pub file: String,
+    /// What its model description says.
+    pub model: Model,
+    folder: TempDir,
+    library: PathBuf,
+}
+
+impl Unpacked {
+    /// Opens the FMU at `path`: reads its model description and unpacks what it needs to run.
+    ///
+    /// # Errors
+    ///
+    /// What is wrong with the archive, with every mistake of the model description at its line and column; or it is not for
+    /// this platform.
+    pub fn open(path: &Path) -> Result<Self, Mistakes> {
+        let file = path.display().to_string();
+        let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
+        let mut archive = open(path).map_err(refused)?;
+        check(&mut archive).map_err(refused)?;
+        let text = description(&mut archive).map_err(refused)?;
+        let model = Model::parse(&format!("{file}/{DESCRIPTION}"), &text)?;
+        let library = library(&archive, &model).map_err(refused)?;
+        let folder = tempfile::Builder::new().prefix("tickbus-fmu-").tempdir();
+        let folder = folder.map_err(|error| {
+            refused(Mistake::new(
+                format!("it cannot be unpacked: {error}"),
+                "make room in the folder for temporary files, which TMPDIR names",
+            ))
+        })?;
+        unpack(&mut archive, folder.path()).map_err(refused)?;
+        let library = folder.path().join(library);
+        Ok(Self {
+            file,
+            model,
+            folder,
+            library,
+        })
+    }
+
+    /// The library with its functions.
+    pub fn library(&self) -> &Path {
+        &self.library
+    }
+
+    /// The folder of its resources, which need not be there.
+    pub fn resources(&self) -> PathBuf {
+        self.folder.path().join("resources")
+    }
+}
+
+fn damaged(error: impl std::fmt::Display) -> Mistake {
+    Mistake::new(
+        format!("this is no whole archive: {error}"),
+        "get the FMU anew; it may be cut",
+    )
+}
+
+fn open(path: &Path) -> Result<ZipArchive<File>, Mistake> {
+    let file = File::open(path).map_err(|error| {
+        let what = format!("it cannot be opened: {error}");
+        Mistake::new(what, "name an FMU, a file ending in .fmu")
+    })?;
+    ZipArchive::new(file).map_err(damaged)
+}
+
+/// Refuses an archive that would harm.
+fn check(archive: &mut ZipArchive<File>) -> Result<(), Mistake> {
+    let hostile = |what: String| Mistake::new(what, "do not use this FMU; ask whoever made it");
+    if archive.len() > MOST_FILES {
+        return Err(hostile(format!(
+            "it has {} files, and the most is {MOST_FILES}",
+            archive.len()
+        )));
+    }
+    let mut bytes = 0_u64;
+    for index in 0..archive.len() {
+        let entry = archive.by_index_raw(index).map_err(damaged)?;
+        if !is_inside(entry.name()) {
+            return Err(hostile(format!(
+                "\"{}\" would be unpacked outside of its folder",
+                shown(entry.name())
+            )));
+        }
+        if entry.is_symlink() {
+            return Err(hostile(format!("\"{}\" is a link", shown(entry.name()))));
+        }
+        bytes = bytes.saturating_add(entry.size());
+    }
+    if bytes > MOST_BYTES {
+        return Err(hostile(format!(
+            "it has {} MB when it is unpacked, and the most is {} MB",
+            bytes >> 20,
+            MOST_BYTES >> 20
+        )));
+    }
+    Ok(())
+}
+
+/// Whether a name stays in the folder on every system.
+fn is_inside(name: &str) -> bool {
+    let parts = Path::new(name).components();
+    let plain = |part| matches!(part, Component::Normal(_) | Component::CurDir);
+    // "C:" is a drive on Windows, and a backslash separates there.
+    !name.is_empty() && !name.contains(['\\', ':', '\0']) && parts.into_iter().all(plain)
+}
+
+fn description(archive: &mut ZipArchive<File>) -> Result<String, Mistake> {
+    let entry = archive.by_name(DESCRIPTION).map_err(|_| {
+        Mistake::new(
+            format!("there is no {DESCRIPTION} at the top of the archive"),
+            "name an FMU; if it was packed by hand, pack its contents and not its folder",
+        )
+    })?;
+    let mut bytes = Vec::new();
+    let read = entry.take(MOST_DESCRIPTION + 1).read_to_end(&mut bytes);
+    read.map_err(damaged)?;
+    if bytes.len() as u64 > MOST_DESCRIPTION {
+        return Err(Mistake::new(
+            format!("{DESCRIPTION} is larger than {} MB", MOST_DESCRIPTION >> 20),
+            "export an FMU with fewer variables",
+        ));
+    }
+    String::from_utf8(bytes).map_err(|error| {
+        Mistake::new(
+            format!("{DESCRIPTION} is not UTF-8: {error}"),
+            "save it as UTF-8, as the standard says",
+        )
+    })
+}
+
+/// The path of the library for this platform.
+fn library(archive: &ZipArchive<File>, model: &Model) -> Result<PathBuf, Mistake> {
+    let own = Platform::own();
+    let folder = own.and_then(|own| own.folder(model.version));
+    let ending = own.map_or("so", |own| own.ending);
+    if let Some(folder) = folder {
+        let name = format!("binaries/{folder}/{}.{ending}", model.identifier);
+        if archive.index_for_name(&name).is_some() {
+            return Ok(name.into());
+        }
+    }
+    let mut there: Vec<&str> = archive
+        .file_names()
+        .filter_map(|name| name.strip_prefix("binaries/")?.split('/').next())
+        .filter(|name| !name.is_empty())
+        .collect();
+    there.sort_unstable();
+    there.dedup();
+    let wanted = folder.unwrap_or("this platform, which FMI 2.0 has no name for");
+    let has_sources = archive
+        .file_names()
+        .any(|name| name.starts_with("sources/"));
+    let what = match &there[..] {
+        [] if has_sources => format!("it has sources, and no library for {wanted}"),
+        [] => format!("it has no library at all, and needs one for {wanted}"),
+        all if folder.is_some_and(|folder| all.contains(&folder)) => {
+            format!("it has no binaries/{wanted}/{}.{ending}", model.identifier)
+        }
+        all => format!(
+            "it has libraries for {}, and none for {wanted}",
+            all.join(", ")
+        ),
+    };
+    let right = match model.version {
+        Version::Two | Version::Three if has_sources => {
+            "compile it (fmpy compile), or export it with a library for this platform"
+        }
+        _ => "export it for this platform, or run it where it is for",
+    };
+    Err(Mistake::new(what, right))
+}
+
+/// Unpacks what a run needs: all but documentation and sources. The sizes that the archive states were checked; those that it
+/// has are checked here.
+fn unpack(archive: &mut ZipArchive<File>, folder: &Path) -> Result<(), Mistake> {
+    let mut room = MOST_BYTES;
+    let unwritable = |name: &str, error: &io::Error| {
+        Mistake::new(
+            format!("\"{}\" cannot be unpacked: {error}", shown(name)),
+            "make room in the folder for temporary files, which TMPDIR names; or get the FMU anew, it may be cut",
+        )
+    };
+    for index in 0..archive.len() {
+        let mut entry = archive.by_index(index).map_err(damaged)?;
+        let name = entry.name().to_owned();
+        if entry.is_dir() || !(name.starts_with("binaries/") || name.starts_with("resources/")) {
+            continue;
+        }
+        let to = folder.join(&name);
+        let written = write(&mut entry, &to, room).map_err(|error| unwritable(&name, &error))?;
+        room -= written;
+    }
+    Ok(())
+}
+
+fn write(entry: &mut ZipFile<'_, File>, to: &Path, room: u64) -> io::Result<u64> {
+    if let Some(folder) = to.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let mut file = File::create_new(to)?;
+    let written = io::copy(&mut entry.take(room + 1), &mut file)?;
+    if written > room {
+        return Err(io::Error::other("it is larger than the archive says"));
+    }
+    Ok(written)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_that_leave_the_folder_are_told_apart() {
+        for (name, inside) in [
+            ("modelDescription.xml", true),
+            ("resources/./a", true),
+            ("resources/a b/ä.txt", true),
+            ("/etc/passwd", false),
+            ("../x", false),
+            ("resources/../../x", false),
+            ("C:/x", false),
+            ("resources\\..\\x", false),
+            ("", false),
+        ] {
+            assert_eq!(is_inside(name), inside, "{name}");
+        }
+    }
+}

@@ -1,0 +1,180 @@
+//! An FMU in a helper process, which may crash and hang as it likes.
+
+use std::io::{self, ErrorKind, Write as _};
+use std::os::fd::{AsFd as _, OwnedFd};
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
+use std::process::{Child, Command, ExitStatus, Stdio};
+
+use tickbus_base::time::Nanos;
+use tickbus_bus_plugin::{Inbox, Message as _};
+
+use super::helper::next;
+use super::slave::{Failure, Setup, Slave, Stepped};
+use super::talk::{Answer, Request};
+use crate::value::Value;
+
+/// How long an FMU may take to begin, or for a step.
+const PATIENCE: Nanos = Nanos::from_secs(60);
+
+/// An FMU in a process of its own.
+#[derive(Debug)]
+pub(super) struct Isolated {
+    child: Child,
+    line: UnixStream,
+    inbox: Inbox,
+    file: String,
+    is_over: bool,
+}
+
+impl Isolated {
+    /// Begins a run in a new helper, and reads the outputs as they are then.
+    pub(super) fn open(
+        setup: &Setup,
+        inputs: &[Value],
+        outputs: &mut [Value],
+    ) -> Result<Self, Failure> {
+        let cannot = |error: io::Error| {
+            Failure(format!(
+                "{}: no helper process can be started for it: {error}; leave out --isolated, or isolated = true",
+                setup.file
+            ))
+        };
+        let (line, theirs) = UnixStream::pair().map_err(cannot)?;
+        line.set_read_timeout(Some(PATIENCE.to_duration()))
+            .map_err(cannot)?;
+        // What an FMU prints goes to stderr: stdout is this command's.
+        let stderr: OwnedFd = io::stderr().as_fd().try_clone_to_owned().map_err(cannot)?;
+        let child = std::env::current_exe().and_then(|program| {
+            Command::new(program)
+                .arg("fmu-helper")
+                .stdin(OwnedFd::from(theirs))
+                .stdout(Stdio::from(stderr))
+                // Ctrl-C is for the host, which ends it.
+                .process_group(0)
+                .spawn()
+        });
+        let mut slave = Self {
+            child: child.map_err(cannot)?,
+            line,
+            inbox: Inbox::new(),
+            file: setup.file.clone(),
+            is_over: false,
+        };
+        let open = Request::Open {
+            setup: Box::new(setup.clone()),
+            inputs: inputs.to_vec(),
+        };
+        slave.ask(&open, "its beginning", outputs)?;
+        Ok(slave)
+    }
+
+    fn ask(
+        &mut self,
+        request: &Request,
+        what: &str,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure> {
+        // If it has gone, that shows when its answer is read.
+        let _ = self.line.write_all(&request.write());
+        match next(&mut self.line, &mut self.inbox) {
+            Ok(Some(Answer::Outputs {
+                outputs: new,
+                stepped,
+            })) if new.len() == outputs.len() => {
+                outputs.copy_from_slice(&new);
+                Ok(stepped)
+            }
+            Ok(Some(Answer::Ended)) => Ok(Stepped::Ended),
+            Ok(Some(Answer::Failed(failure))) => {
+                self.is_over = true;
+                Err(failure)
+            }
+            Ok(Some(Answer::Outputs { .. })) => {
+                Err(self.failed("it has damaged its helper process: tell its maker"))
+            }
+            Ok(None) => Err(self.gone(what)),
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                let why = format!(
+                    "{what} took longer than {PATIENCE}; its helper process was ended: tell its maker"
+                );
+                Err(self.failed(&why))
+            }
+            Err(error) if error.kind() == ErrorKind::ConnectionReset => Err(self.gone(what)),
+            Err(error) => Err(self.failed(&format!(
+                "its helper process answered with {error}; it has damaged it: tell its maker"
+            ))),
+        }
+    }
+
+    fn failed(&mut self, why: &str) -> Failure {
+        self.is_over = true;
+        Failure(format!("{}: {why}", self.file))
+    }
+
+    /// The helper has ended by itself.
+    fn gone(&mut self, what: &str) -> Failure {
+        let how = match self.child.wait() {
+            Ok(status) => ending(status),
+            Err(error) => format!("has gone ({error})"),
+        };
+        self.failed(&format!("its process {how} in {what}: tell its maker"))
+    }
+}
+
+/// How a process has ended, as a part of a sentence.
+fn ending(status: ExitStatus) -> String {
+    match (status.signal(), status.code()) {
+        (Some(11), _) => "crashed (SIGSEGV, an access to memory that is not its own)".to_owned(),
+        (Some(6), _) => "aborted (SIGABRT)".to_owned(),
+        (Some(8), _) => "crashed (SIGFPE, a division by zero)".to_owned(),
+        (Some(signal), _) => format!("was killed by signal {signal}"),
+        (None, Some(code)) => format!("ended by itself, with exit code {code},"),
+        (None, None) => "ended".to_owned(),
+    }
+}
+
+impl Slave for Isolated {
+    fn step(
+        &mut self,
+        inputs: &[Value],
+        from: f64,
+        length: f64,
+        outputs: &mut [Value],
+    ) -> Result<Stepped, Failure> {
+        if self.is_over {
+            return Err(Failure(format!("{}: it has ended", self.file)));
+        }
+        let request = Request::Step {
+            inputs: inputs.to_vec(),
+            from,
+            length,
+        };
+        self.ask(
+            &request,
+            &format!("the step of {length} s at {from} s"),
+            outputs,
+        )
+    }
+
+    fn end(&mut self) -> Result<(), Failure> {
+        if std::mem::replace(&mut self.is_over, true) {
+            return Ok(());
+        }
+        let ended = self.ask(&Request::End, "its end", &mut []).map(|_| ());
+        self.is_over = true;
+        ended
+    }
+}
+
+impl Drop for Isolated {
+    fn drop(&mut self) {
+        if !self.is_over {
+            // Why it cannot be ended is of no use any more.
+            let _ = self.end();
+        }
+        // It may hang, and has nothing to lose.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,131 @@
+//! Which variables of an FMU are which signals.
+
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::nearest;
+use tickbus_driver_cfg::Config;
+
+use super::description::{Causality, ForeignVariable, Model};
+use super::map::{Joined, Map};
+use crate::value::Value;
+
+/// Something that is joined with nothing: a line for people.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Unjoined(pub String);
+
+/// All that is joined.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Join {
+    /// What the FMU gets before each step.
+    pub inputs: Vec<Joined>,
+    /// What it gives after each step.
+    pub outputs: Vec<Joined>,
+    /// Parameters and their values.
+    pub parameters: Vec<(usize, Value)>,
+    /// What is left over: signals that nobody writes, inputs that keep their start values, outputs that nobody reads.
+    pub left: Vec<Unjoined>,
+}
+
+impl Join {
+    /// Joins the signals of `config`, as the end that it is, with the variables of an FMU: by the map, and all others by their
+    /// names.
+    ///
+    /// # Errors
+    ///
+    /// Nothing at all is joined.
+    pub fn of(config: &Config, model: &Model, map: &Map) -> Result<Self, Mistake> {
+        let (writes, _) = config.role.areas();
+        let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
+        let mut left = Vec::new();
+        for (index, signal) in config.table.signals.iter().enumerate() {
+            let is_from_fmu = signal.area == writes;
+            let wanted = if is_from_fmu {
+                Causality::Output
+            } else {
+                Causality::Input
+            };
+            let fits = |one: &&ForeignVariable| one.causality == wanted && one.value_type.is_some();
+            let by_map = map.joined.iter().find(|joined| joined.signal == index);
+            let by_name = || {
+                let variable = model.position(&signal.name)?;
+                fits(&&model.variables[variable]).then_some(Joined {
+                    signal: index,
+                    variable,
+                    scale: 1.0,
+                    offset: 0.0,
+                })
+            };
+            let Some(joined) = by_map.copied().or_else(by_name) else {
+                let (what, kind) = if is_from_fmu {
+                    ("keeps its fail-safe value", "output")
+                } else {
+                    ("is read by nobody", "input")
+                };
+                let same = model.position(&signal.name).map(|at| &model.variables[at]);
+                let near = nearest(
+                    &signal.name,
+                    model.variables.iter().filter(fits).map(|one| &*one.name),
+                );
+                let hint = match (same, near) {
+                    (Some(same), _) => format!(
+                        "the FMU's variable of that name is no {kind} that can be a signal ({})",
+                        same.type_name
+                    ),
+                    (None, Some(near)) => format!("the FMU's nearest {kind} is \"{near}\""),
+                    (None, None) => format!("the FMU has no {kind} like it"),
+                };
+                left.push(Unjoined(format!(
+                    "signal \"{}\" ({}) {what}: {hint}",
+                    signal.name,
+                    signal.address()
+                )));
+                continue;
+            };
+            if is_from_fmu {
+                outputs.push(joined);
+            } else {
+                inputs.push(joined);
+            }
+        }
+        for (index, variable) in model.variables.iter().enumerate() {
+            let used = inputs
+                .iter()
+                .chain(&outputs)
+                .any(|joined| joined.variable == index);
+            if !used && variable.causality == Causality::Input {
+                left.push(Unjoined(format!(
+                    "input \"{}\" of the FMU keeps its start value",
+                    variable.name
+                )));
+            }
+        }
+        if inputs.is_empty() && outputs.is_empty() {
+            let names = |wanted: Causality| {
+                let names = model.variables.iter().filter(|one| one.causality == wanted);
+                let names: Vec<_> = names
+                    .take(5)
+                    .map(|one| format!("\"{}\"", one.name))
+                    .collect();
+                if names.is_empty() {
+                    "none".to_owned()
+                } else {
+                    names.join(", ")
+                }
+            };
+            return Err(Mistake::new(
+                format!(
+                    "no signal of {} has the name of a variable (inputs: {}; outputs: {})",
+                    config.path.display(),
+                    names(Causality::Input),
+                    names(Causality::Output)
+                ),
+                "write a map: --map map.toml, with [signals] and lines such as \"Level\" = \"tank.level\"",
+            ));
+        }
+        Ok(Self {
+            inputs,
+            outputs,
+            parameters: map.parameters.clone(),
+            left,
+        })
+    }
+}

@@ -1,0 +1,464 @@
+//! The library of somebody else's FMU: its functions, and the calls of them. What can be done with an instance is safe to call in
+//! any order; whether the FMU bears it is its own affair, and a helper process keeps what it does to itself.
+
+#![allow(unsafe_code, reason = "foreign functions are called")]
+
+mod functions;
+mod journal;
+
+use std::ffi::{CString, c_int, c_void};
+use std::path::Path;
+use std::ptr::{null, null_mut};
+use std::sync::PoisonError;
+
+use tickbus_base::os::Library;
+
+use crate::value::{Number, Status, Value, ValueType, Version};
+use functions::{Callbacks, Functions, GetThree, GetTwo, Handle, SetThree, SetTwo, Three, Two};
+use journal::{Journal, log_of_three, log_of_two};
+
+unsafe extern "C" {
+    // What `fmi2CallbackFunctions` has to have.
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    fn free(memory: *mut c_void);
+}
+
+/// How a step has ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StepEnd {
+    pub(super) status: Status,
+    /// Whether the FMU wants the run to end.
+    pub(super) terminate: bool,
+    /// How far it got, in seconds, if it says so.
+    pub(super) reached: Option<f64>,
+}
+
+/// One instance of an FMU, with its library.
+#[derive(Debug)]
+pub(super) struct Instance {
+    handle: Handle,
+    functions: Functions,
+    journal: Box<Journal>,
+    /// Kept where it is: the FMU may keep its address.
+    _callbacks: Option<Box<Callbacks>>,
+    /// After a fatal answer, nothing of it may be called.
+    is_dead: bool,
+    /// Dropped last.
+    _library: Library,
+}
+
+impl Instance {
+    /// Loads the library and makes an instance. `file` is the FMU's name in messages.
+    pub(super) fn new(
+        (file, name, token): (&str, &str, &str),
+        version: Version,
+        library: &Path,
+        resources: &Path,
+    ) -> Result<Self, String> {
+        let loaded = Library::load(library).map_err(|error| {
+            format!("its library cannot be loaded: {error}; install what it needs, which its documentation should tell")
+        })?;
+        let functions = match version {
+            Version::Two => Functions::Two(Two::load(&loaded)?),
+            Version::Three => Functions::Three(Box::new(Three::load(&loaded)?)),
+        };
+        let journal = Box::new(Journal::of(file));
+        let env = std::ptr::from_ref(&*journal).cast_mut().cast::<c_void>();
+        let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
+        let (name, token) = (c(name), c(token));
+        let has_resources = resources.is_dir();
+        let mut callbacks = None;
+        let handle = match &functions {
+            Functions::Two(two) => {
+                let uri = c(&uri_of(resources));
+                let callbacks = callbacks.insert(Box::new(Callbacks {
+                    logger: log_of_two,
+                    allocate: calloc,
+                    release: free,
+                    step_finished: null(),
+                    env,
+                }));
+                // SAFETY: by the standard; all texts outlive the call, callbacks and journal the instance.
+                unsafe {
+                    (two.instantiate)(
+                        name.as_ptr(),
+                        1,
+                        token.as_ptr(),
+                        uri.as_ptr(),
+                        &raw const **callbacks,
+                        0,
+                        0,
+                    )
+                }
+            }
+            Functions::Three(three) => {
+                // With a separator at its end, as the standard says.
+                let path = resources.join("");
+                let path = c(&path.to_string_lossy());
+                let path = if has_resources { path.as_ptr() } else { null() };
+                // SAFETY: as above.
+                unsafe {
+                    (three.instantiate)(
+                        name.as_ptr(),
+                        token.as_ptr(),
+                        path,
+                        false,
+                        false,
+                        false,
+                        false,
+                        null(),
+                        0,
+                        env,
+                        log_of_three,
+                        null(),
+                    )
+                }
+            }
+        };
+        let instance = Self {
+            handle,
+            functions,
+            journal,
+            _callbacks: callbacks,
+            is_dead: false,
+            _library: loaded,
+        };
+        if handle.is_null() {
+            return Err(instance.said("it makes no instance of itself"));
+        }
+        Ok(instance)
+    }
+
+    /// A sentence, with what the FMU has said last.
+    pub(super) fn said(&self, what: &str) -> String {
+        let last = self
+            .journal
+            .last
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        if last.is_empty() {
+            format!("{what}, and does not say why; ask whoever made it")
+        } else {
+            format!("{what}; it says: {last}")
+        }
+    }
+
+    fn noted(&mut self, status: c_int) -> Status {
+        let status = Status::of(status);
+        self.is_dead |= status == Status::Fatal;
+        status
+    }
+
+    /// Enters the initialisation, for a run that begins at `start` seconds.
+    pub(super) fn enter(&mut self, start: f64) -> Status {
+        let status = match &self.functions {
+            // SAFETY: the handle is of this library, and alive, here and below.
+            Functions::Two(two) => unsafe {
+                let status = (two.setup)(self.handle, 0, 0.0, start, 0, 0.0);
+                if status > Status::Warning as c_int {
+                    status
+                } else {
+                    (two.enter)(self.handle)
+                }
+            },
+            // SAFETY: as above.
+            Functions::Three(three) => unsafe {
+                (three.enter)(self.handle, false, 0.0, start, false, 0.0)
+            },
+        };
+        self.noted(status)
+    }
+
+    /// Leaves the initialisation.
+    pub(super) fn exit(&mut self) -> Status {
+        let status = match &self.functions {
+            // SAFETY: as in `enter`.
+            Functions::Two(two) => unsafe { (two.exit)(self.handle) },
+            // SAFETY: as above.
+            Functions::Three(three) => unsafe { (three.exit)(self.handle) },
+        };
+        self.noted(status)
+    }
+
+    /// Ends the run.
+    pub(super) fn terminate(&mut self) -> Status {
+        let status = match &self.functions {
+            // SAFETY: as in `enter`.
+            Functions::Two(two) => unsafe { (two.terminate)(self.handle) },
+            // SAFETY: as above.
+            Functions::Three(three) => unsafe { (three.terminate)(self.handle) },
+        };
+        self.noted(status)
+    }
+
+    /// One step.
+    pub(super) fn step(&mut self, from: f64, length: f64) -> StepEnd {
+        let (mut terminate, mut reached) = (false, None);
+        let status = match &self.functions {
+            Functions::Two(two) => {
+                // SAFETY: as in `enter`.
+                let status = unsafe { (two.step)(self.handle, from, length, 1) };
+                if status == Status::Discard as c_int {
+                    let (mut ended, mut last) = (0, from);
+                    // SAFETY: as above; 3 is fmi2Terminated, 2 fmi2LastSuccessfulTime.
+                    unsafe {
+                        let known = (two.boolean_status)(self.handle, 3, &raw mut ended);
+                        terminate = known == 0 && ended != 0;
+                        let known = (two.real_status)(self.handle, 2, &raw mut last);
+                        reached = (known == 0).then_some(last);
+                    }
+                }
+                status
+            }
+            Functions::Three(three) => {
+                let (mut event, mut early, mut last) = (0_u8, 0_u8, from);
+                let mut ends = 0_u8;
+                // SAFETY: as in `enter`. What comes back need not be 0 or 1, as a `bool` of Rust has to be: it is read as a byte.
+                let status = unsafe {
+                    (three.step)(
+                        self.handle,
+                        from,
+                        length,
+                        true,
+                        (&raw mut event).cast(),
+                        (&raw mut ends).cast(),
+                        (&raw mut early).cast(),
+                        &raw mut last,
+                    )
+                };
+                terminate = ends != 0;
+                reached = (status == Status::Discard as c_int || early != 0).then_some(last);
+                status
+            }
+        };
+        StepEnd {
+            status: self.noted(status),
+            terminate,
+            reached,
+        }
+    }
+
+    /// Sets variables of one type.
+    pub(super) fn set(&mut self, kind: ValueType, references: &[u32], values: &[Value]) -> Status {
+        debug_assert_eq!(references.len(), values.len());
+        let status = match &self.functions {
+            Functions::Two(two) => match kind {
+                ValueType::Boolean => self.set_two(two.set_boolean, references, values, |value| {
+                    bool::of(value).into()
+                }),
+                ValueType::Int32 => self.set_two(two.set_integer, references, values, i32::of),
+                _ => self.set_two(two.set_real, references, values, f64::of),
+            },
+            Functions::Three(three) => match kind {
+                ValueType::Float32 => self.set_three(three.set_f32, references, values, f32::of),
+                ValueType::Float64 | ValueType::String => {
+                    self.set_three(three.set_f64, references, values, f64::of)
+                }
+                ValueType::Int8 => self.set_three(three.set_i8, references, values, i8::of),
+                ValueType::UInt8 => self.set_three(three.set_u8, references, values, u8::of),
+                ValueType::Int16 => self.set_three(three.set_i16, references, values, i16::of),
+                ValueType::UInt16 => self.set_three(three.set_u16, references, values, u16::of),
+                ValueType::Int32 => self.set_three(three.set_i32, references, values, i32::of),
+                ValueType::UInt32 => self.set_three(three.set_u32, references, values, u32::of),
+                ValueType::Int64 => self.set_three(three.set_i64, references, values, i64::of),
+                ValueType::UInt64 => self.set_three(three.set_u64, references, values, u64::of),
+                ValueType::Boolean => {
+                    self.set_three(three.set_boolean, references, values, |value| {
+                        bool::of(value).into()
+                    })
+                }
+            },
+        };
+        self.noted(status)
+    }
+
+    fn set_two<T>(
+        &self,
+        function: SetTwo<T>,
+        references: &[u32],
+        values: &[Value],
+        of: fn(Value) -> T,
+    ) -> c_int {
+        let values: Vec<T> = values.iter().map(|value| of(*value)).collect();
+        // SAFETY: as in `enter`; both lists have as many values as the call says, and outlive it.
+        unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+            )
+        }
+    }
+
+    fn set_three<T>(
+        &self,
+        function: SetThree<T>,
+        references: &[u32],
+        values: &[Value],
+        of: fn(Value) -> T,
+    ) -> c_int {
+        let values: Vec<T> = values.iter().map(|value| of(*value)).collect();
+        // SAFETY: as above.
+        unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                values.as_ptr(),
+                values.len(),
+            )
+        }
+    }
+
+    /// Gets variables of one type.
+    pub(super) fn get(
+        &mut self,
+        kind: ValueType,
+        references: &[u32],
+        values: &mut [Value],
+    ) -> Status {
+        debug_assert_eq!(references.len(), values.len());
+        let status = match &self.functions {
+            Functions::Two(two) => match kind {
+                ValueType::Boolean => self.get_two(two.get_boolean, references, values, |value| {
+                    Value::Boolean(value != 0)
+                }),
+                ValueType::Int32 => {
+                    self.get_two(two.get_integer, references, values, Number::value)
+                }
+                _ => self.get_two(two.get_real, references, values, Number::value),
+            },
+            Functions::Three(three) => match kind {
+                ValueType::Float32 => {
+                    self.get_three(three.get_f32, references, values, Number::value)
+                }
+                ValueType::Float64 | ValueType::String => {
+                    self.get_three(three.get_f64, references, values, Number::value)
+                }
+                ValueType::Int8 => self.get_three(three.get_i8, references, values, Number::value),
+                ValueType::UInt8 => self.get_three(three.get_u8, references, values, Number::value),
+                ValueType::Int16 => {
+                    self.get_three(three.get_i16, references, values, Number::value)
+                }
+                ValueType::UInt16 => {
+                    self.get_three(three.get_u16, references, values, Number::value)
+                }
+                ValueType::Int32 => {
+                    self.get_three(three.get_i32, references, values, Number::value)
+                }
+                ValueType::UInt32 => {
+                    self.get_three(three.get_u32, references, values, Number::value)
+                }
+                ValueType::Int64 => {
+                    self.get_three(three.get_i64, references, values, Number::value)
+                }
+                ValueType::UInt64 => {
+                    self.get_three(three.get_u64, references, values, Number::value)
+                }
+                ValueType::Boolean => {
+                    self.get_three(three.get_boolean, references, values, |value| {
+                        Value::Boolean(value != 0)
+                    })
+                }
+            },
+        };
+        self.noted(status)
+    }
+
+    fn get_two<T: Copy + Default>(
+        &self,
+        function: GetTwo<T>,
+        references: &[u32],
+        values: &mut [Value],
+        to: fn(T) -> Value,
+    ) -> c_int {
+        let mut got = vec![T::default(); references.len()];
+        // SAFETY: as in `set_two`.
+        let status = unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                got.as_mut_ptr(),
+            )
+        };
+        for (value, got) in values.iter_mut().zip(got) {
+            *value = to(got);
+        }
+        status
+    }
+
+    fn get_three<T: Copy + Default>(
+        &self,
+        function: GetThree<T>,
+        references: &[u32],
+        values: &mut [Value],
+        to: fn(T) -> Value,
+    ) -> c_int {
+        let mut got = vec![T::default(); references.len()];
+        // SAFETY: as above.
+        let status = unsafe {
+            function(
+                self.handle,
+                references.as_ptr(),
+                references.len(),
+                got.as_mut_ptr(),
+                got.len(),
+            )
+        };
+        for (value, got) in values.iter_mut().zip(got) {
+            *value = to(got);
+        }
+        status
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        if self.is_dead || self.handle.is_null() {
+            return;
+        }
+        // SAFETY: the handle is of this library, alive, and used no more.
+        unsafe {
+            match &self.functions {
+                Functions::Two(two) => (two.free)(self.handle),
+                Functions::Three(three) => (three.free)(self.handle),
+            }
+        }
+        self.handle = null_mut();
+    }
+}
+
+/// The URI of a folder, as FMI 2.0 wants it.
+fn uri_of(folder: &Path) -> String {
+    let path = folder.to_string_lossy().replace('\\', "/");
+    let mut uri = String::from(if path.starts_with('/') {
+        "file://"
+    } else {
+        "file:///"
+    });
+    for byte in path.bytes() {
+        if byte.is_ascii_alphanumeric() || b"/-_.~:".contains(&byte) {
+            uri.push(byte.into());
+        } else {
+            // Writing to a string cannot fail.
+            let _ = std::fmt::Write::write_fmt(&mut uri, format_args!("%{byte:02X}"));
+        }
+    }
+    uri
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::made::folder_of_uri;
+
+    #[test]
+    fn a_uri_leads_back_to_its_folder() {
+        for folder in ["/tmp/a b/100%/ä#?", "/tmp/x"] {
+            assert_eq!(folder_of_uri(&uri_of(Path::new(folder))), Path::new(folder));
+        }
+        assert_eq!(uri_of(Path::new("/tmp/a b")), "file:///tmp/a%20b");
+    }
+}

@@ -1,0 +1,194 @@
+//! A foreign FMU at work: values between its variables and the slots of a driver.
+
+use tickbus_base::time::Nanos;
+use tickbus_binding::SlotKind;
+use tickbus_image::signal::{DataType, SignalTable, Slot};
+
+use super::archive::Unpacked;
+use super::join::Join;
+use super::map::Joined;
+use super::slave::{Direct, Failure, Setup, Slave, Stepped};
+use crate::made::kind_of;
+use crate::value::{Value, Version};
+
+/// How an FMU is run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct MachineOptions {
+    /// In a helper process, which it may crash.
+    pub isolated: bool,
+}
+
+/// A signal's slot, and its way to the variable.
+#[derive(Clone, Copy, Debug)]
+struct Way {
+    slot: usize,
+    kind: SlotKind,
+    is_bool: bool,
+    scale: f64,
+    offset: f64,
+}
+
+impl Way {
+    fn of(joined: &Joined, table: &SignalTable) -> Self {
+        let signal = &table.signals[joined.signal];
+        Self {
+            slot: joined.signal,
+            kind: kind_of(signal),
+            is_bool: signal.data_type == DataType::Bool,
+            scale: joined.scale,
+            offset: joined.offset,
+        }
+    }
+
+    /// What the signal says, as the variable has it. Integers pass as they are where nothing is to be computed.
+    #[expect(clippy::float_cmp, reason = "exactly as written, or not at all")]
+    fn variable(self, slots: &[Slot]) -> Value {
+        let value = Value::of(slots[self.slot], self.kind);
+        if self.scale == 1.0 && self.offset == 0.0 {
+            return value;
+        }
+        Value::Real((value.real() - self.offset) / self.scale)
+    }
+
+    #[expect(clippy::float_cmp, reason = "as above")]
+    fn signal(self, value: Value, slots: &mut [Slot]) {
+        let value = if self.scale == 1.0 && self.offset == 0.0 {
+            value
+        } else {
+            Value::Real(value.real() * self.scale + self.offset)
+        };
+        slots[self.slot] = if self.is_bool {
+            Slot::from_real(f64::from(u8::from(value.real() != 0.0)))
+        } else {
+            value.slot(self.kind)
+        };
+    }
+}
+
+/// An FMU that runs.
+#[derive(Debug)]
+pub struct Machine {
+    slave: Box<dyn Slave>,
+    start: f64,
+    inputs: Vec<Way>,
+    outputs: Vec<Way>,
+    sent: Vec<Value>,
+    got: Vec<Value>,
+}
+
+impl Machine {
+    /// Begins a run of the FMU: `slots` have the values before it, and get those that the FMU gives then.
+    ///
+    /// # Errors
+    ///
+    /// The FMU does not begin: why.
+    pub fn open(
+        fmu: &Unpacked,
+        join: &Join,
+        table: &SignalTable,
+        options: MachineOptions,
+        slots: &mut [Slot],
+    ) -> Result<Self, Failure> {
+        let model = &fmu.model;
+        let variable = |joined: &Joined| {
+            let found = &model.variables[joined.variable];
+            let kind = found.value_type.expect("what is joined can be a signal");
+            (kind, found.reference)
+        };
+        let parameters = join.parameters.iter().filter_map(|(at, value)| {
+            let found = &model.variables[*at];
+            Some((found.value_type?, found.reference, *value))
+        });
+        let setup = Setup {
+            file: fmu.file.clone(),
+            name: model.name.clone(),
+            token: model.token.clone(),
+            is_three: model.version == Version::Three,
+            library: fmu.library().to_owned(),
+            resources: fmu.resources(),
+            start: model.start,
+            parameters: parameters.collect(),
+            inputs: join.inputs.iter().map(variable).collect(),
+            outputs: join.outputs.iter().map(variable).collect(),
+        };
+        let way = |joined: &Joined| Way::of(joined, table);
+        let inputs: Vec<Way> = join.inputs.iter().map(way).collect();
+        let outputs: Vec<Way> = join.outputs.iter().map(way).collect();
+        let sent: Vec<Value> = inputs.iter().map(|way| way.variable(slots)).collect();
+        let mut got = vec![Value::Real(0.0); outputs.len()];
+        let slave = open(&setup, options, &sent, &mut got)?;
+        let mut machine = Self {
+            slave,
+            start: model.start,
+            inputs,
+            outputs,
+            sent,
+            got,
+        };
+        machine.show(slots);
+        Ok(machine)
+    }
+
+    /// One step: takes what the PLC commands from `slots`, lets time pass from `from` on, and puts what the sensors show then
+    /// there. As the PLC, the other way round.
+    ///
+    /// # Errors
+    ///
+    /// The FMU does not go on: why.
+    pub fn step(
+        &mut self,
+        from: Nanos,
+        length: Nanos,
+        slots: &mut [Slot],
+    ) -> Result<Stepped, Failure> {
+        for (value, way) in self.sent.iter_mut().zip(&self.inputs) {
+            *value = way.variable(slots);
+        }
+        let from = self.start + seconds(from);
+        let stepped = self
+            .slave
+            .step(&self.sent, from, seconds(length), &mut self.got)?;
+        self.show(slots);
+        Ok(stepped)
+    }
+
+    fn show(&mut self, slots: &mut [Slot]) {
+        for (value, way) in self.got.iter().zip(&self.outputs) {
+            way.signal(*value, slots);
+        }
+    }
+
+    /// Ends the run properly.
+    ///
+    /// # Errors
+    ///
+    /// The FMU fails in doing so.
+    pub fn end(mut self) -> Result<(), Failure> {
+        self.slave.end()
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "exact for 100 days")]
+fn seconds(time: Nanos) -> f64 {
+    time.0 as f64 / 1e9
+}
+
+fn open(
+    setup: &Setup,
+    options: MachineOptions,
+    inputs: &[Value],
+    outputs: &mut [Value],
+) -> Result<Box<dyn Slave>, Failure> {
+    if !options.isolated {
+        return Ok(Box::new(Direct::open(setup, inputs, outputs)?));
+    }
+    #[cfg(unix)]
+    return Ok(Box::new(super::isolated::Isolated::open(
+        setup, inputs, outputs,
+    )?));
+    #[cfg(not(unix))]
+    Err(Failure(format!(
+        "{}: there are no helper processes on this system; leave out --isolated, or isolated = true",
+        setup.file
+    )))
+}

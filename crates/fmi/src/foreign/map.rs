@@ -1,0 +1,218 @@
+//! The map: which variable of an FMU is which signal, where their names differ; and what its parameters are.
+
+use std::path::Path;
+
+use tickbus_base::toml_text::{
+    Collector, Mistakes, Table, Value as TomlValue, load_text, nearest, read_text, shown,
+};
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::faults::unknown;
+
+use super::description::{Causality, Model};
+use crate::value::{Value, ValueType};
+
+/// A signal and its variable: signal = `scale` × variable + `offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Joined {
+    /// The signal, by its place in the table.
+    pub signal: usize,
+    /// The variable, by its place in the model description.
+    pub variable: usize,
+    /// How many units of the signal one of the variable is. Not 0.
+    pub scale: f64,
+    /// The signal where the variable is 0.
+    pub offset: f64,
+}
+
+/// A map, read for one FMU and one driver.cfg.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Map {
+    /// Signals and their variables.
+    pub joined: Vec<Joined>,
+    /// Parameters, by their places in the model description, and their values.
+    pub parameters: Vec<(usize, Value)>,
+}
+
+impl Map {
+    /// Reads the map at `path`.
+    ///
+    /// # Errors
+    ///
+    /// With every mistake in it: names that neither the FMU nor the driver.cfg has, with the nearest ones; variables that cannot
+    /// be signals; directions that do not meet.
+    pub fn load(path: &Path, model: &Model, config: &Config) -> Result<Self, Mistakes> {
+        let text = load_text(path)?;
+        let mut collector = Collector::new(&path.display().to_string(), &text);
+        let map = read_text(&mut collector, &text, |root| {
+            Some(read(root, model, config))
+        });
+        match collector.finish() {
+            Some(mistakes) => Err(mistakes),
+            None => Ok(map.expect("what is not read has a mistake")),
+        }
+    }
+}
+
+fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
+    let signals = root.take("signals");
+    let parameters = root.take("parameters");
+    root.require_one_of(
+        &["signals", "parameters"],
+        "write [signals] with lines such as \"Level\" = \"tank.level\"",
+    );
+    root.finish();
+    let mut map = Map::default();
+    let signals = signals.and_then(|value| value.table("[signals]", "write a [signals] table"));
+    for (name, value) in signals.iter().flat_map(Table::all) {
+        if let Some(joined) = joined(name, &value, model, config) {
+            let twin = map
+                .joined
+                .iter()
+                .find(|other| other.variable == joined.variable);
+            let is_input = model.variables[joined.variable].causality == Causality::Input;
+            if let (Some(twin), true) = (twin, is_input) {
+                let twin = &config.table.signals[twin.signal].name;
+                value.wrong(
+                    format!("\"{twin}\" is joined with this input already"),
+                    "an input of the FMU has one source: remove one of the two lines",
+                );
+            }
+            map.joined.push(joined);
+        }
+    }
+    map.parameters = parameters.map_or_else(Vec::new, |value| read_parameters(&value, model));
+    map
+}
+
+/// Reads a table of parameters and their values.
+fn read_parameters(value: &TomlValue<'_>, model: &Model) -> Vec<(usize, Value)> {
+    let table = value.table("parameters", "write lines such as \"tank.area\" = 2.5");
+    let all = table.iter().flat_map(Table::all);
+    all.filter_map(|(name, value)| parameter(name, &value, model))
+        .collect()
+}
+
+fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Value)> {
+    let Some(at) = model.position(name) else {
+        let names = model
+            .variables
+            .iter()
+            .filter(|one| one.causality != Causality::Output);
+        let near = nearest(name, names.map(|one| &*one.name));
+        value.wrong(
+            format!("the FMU has no variable \"{}\"", shown(name)),
+            near.map_or_else(
+                || "name one of its parameters, as its modelDescription.xml has them".to_owned(),
+                |near| format!("did you mean \"{near}\"?"),
+            ),
+        );
+        return None;
+    };
+    let variable = &model.variables[at];
+    let Some(kind) = variable.value_type else {
+        value.wrong(
+            format!("\"{}\" is of type {}", shown(name), variable.type_name),
+            "only numbers and Booleans can be set",
+        );
+        return None;
+    };
+    if kind == ValueType::Boolean && value.is_boolean() {
+        return Some((at, Value::Boolean(value.boolean()?)));
+    }
+    let number = value.number(if kind == ValueType::Boolean {
+        "write true or false"
+    } else {
+        "write a number"
+    })?;
+    Some((at, Value::Real(number)))
+}
+
+fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> Option<Joined> {
+    const SHAPE: &str = "write the variable's name in quotes, or { variable = \"h\", scale = 1000.0, offset = 0.0 }";
+    let Some(signal) = config.table.position(name) else {
+        value.refuse(unknown(name, &config.table));
+        return None;
+    };
+    let (variable, scale, offset) = if value.is_table() {
+        let mut table = value.table("the variable", SHAPE)?;
+        let variable = table.require("variable", SHAPE);
+        let (scale, offset) = (table.take("scale"), table.take("offset"));
+        table.finish();
+        let number = |value: Option<TomlValue<'_>>, default| match value {
+            None => Some(default),
+            Some(value) => value.number("write a number"),
+        };
+        if let Some(value) = &scale
+            && value.number("write a number") == Some(0.0)
+        {
+            value.wrong(
+                "a scale of 0 says nothing of the variable",
+                "write how many units of the signal one of the variable is",
+            );
+            return None;
+        }
+        (variable?, number(scale, 1.0)?, number(offset, 0.0)?)
+    } else {
+        (value.clone(), 1.0, 0.0)
+    };
+    let wanted = variable.text(SHAPE)?;
+    let (writes, _) = config.role.areas();
+    let is_from_fmu = config.table.signals[signal].area == writes;
+    let fits = |causality| {
+        if is_from_fmu {
+            matches!(causality, Causality::Output | Causality::Local)
+        } else {
+            causality == Causality::Input
+        }
+    };
+    let Some(at) = model.position(wanted) else {
+        let names = model.variables.iter().filter(|one| fits(one.causality));
+        let near = nearest(wanted, names.map(|one| &*one.name));
+        variable.wrong(
+            format!("the FMU has no variable \"{}\"", shown(wanted)),
+            near.map_or_else(
+                || {
+                    format!(
+                        "name one of its {}s",
+                        if is_from_fmu { "output" } else { "input" }
+                    )
+                },
+                |near| format!("did you mean \"{near}\"?"),
+            ),
+        );
+        return None;
+    };
+    let found = &model.variables[at];
+    if found.value_type.is_none() {
+        variable.wrong(
+            format!("\"{}\" is of type {}", shown(wanted), found.type_name),
+            "only numbers and Booleans can be signals",
+        );
+        return None;
+    }
+    if !fits(found.causality) {
+        let address = config.table.signals[signal].address();
+        let (what, right) = if is_from_fmu {
+            (
+                "an input",
+                "which the FMU has to write: name one of its outputs",
+            )
+        } else {
+            (
+                "not an input",
+                "which the FMU has to read: name one of its inputs",
+            )
+        };
+        variable.wrong(
+            format!("\"{}\" is {what} of the FMU", shown(wanted)),
+            format!("\"{name}\" is {address}, {right}; or run it in the other --role"),
+        );
+        return None;
+    }
+    Some(Joined {
+        signal,
+        variable: at,
+        scale,
+        offset,
+    })
+}

@@ -1,0 +1,50 @@
+//! What host and helper say to each other, in the frames of isolated plug-ins.
+
+use serde::{Deserialize, Serialize};
+use tickbus_bus_plugin::Message;
+
+use super::slave::{Failure, Setup, Stepped};
+use crate::value::Value;
+
+/// The most bytes of a message: a hundred thousand variables and their names' worth.
+const MOST: usize = 64 << 20;
+
+/// From the host.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum Request {
+    /// Load the library and begin a run. Sent first.
+    Open {
+        setup: Box<Setup>,
+        inputs: Vec<Value>,
+    },
+    /// One step.
+    Step {
+        inputs: Vec<Value>,
+        from: f64,
+        length: f64,
+    },
+    /// End the run.
+    End,
+}
+
+/// From the helper.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) enum Answer {
+    /// The run has begun, or the step is done: the outputs.
+    Outputs {
+        outputs: Vec<Value>,
+        stepped: Stepped,
+    },
+    /// The run has ended.
+    Ended,
+    /// The FMU does not go on.
+    Failed(Failure),
+}
+
+impl Message for Request {
+    const MOST: usize = MOST;
+}
+
+impl Message for Answer {
+    const MOST: usize = MOST;
+}

@@ -1,0 +1,55 @@
+//! The files that go into an FMU beside its driver.cfg.
+
+use std::path::{Component, Path, PathBuf};
+
+use tickbus_base::Mistake;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::NamedFile;
+
+/// What a driver.cfg names: what goes with it, and what its users should know.
+#[derive(Debug, Default)]
+pub(super) struct Named {
+    /// The files that go with it, relative to its folder.
+    pub(super) files: Vec<PathBuf>,
+    /// Files that stay where they are.
+    pub(super) notes: Vec<String>,
+}
+
+/// The files that `config` names. Those in its folder, or below, go with it; what is named by an absolute path stays, and
+/// has to be there wherever the FMU runs.
+pub(super) fn named(config: &Config, faults: Option<&Path>) -> Result<Named, Mistake> {
+    let mut named = Named::default();
+    let faults = faults.map(|file| NamedFile::Plain(file.to_owned()));
+    for file in config.bus.files().into_iter().chain(faults) {
+        let (path, is_secret) = match &file {
+            NamedFile::Plain(path) => (path, false),
+            NamedFile::Secret(path) => (path, true),
+        };
+        if path.is_absolute() {
+            named.notes.push(format!(
+                "{} stays where it is: it has to be there on every computer that runs the FMU",
+                path.display()
+            ));
+            continue;
+        }
+        if is_secret {
+            return Err(Mistake::new(
+                format!(
+                    "{} has keys or passwords, and an FMU goes through many hands",
+                    path.display()
+                ),
+                "name it by an absolute path, and put it there on the computer that runs the FMU",
+            ));
+        }
+        if path.components().any(|part| part == Component::ParentDir) {
+            return Err(Mistake::new(
+                format!("{} is outside of the folder of driver.cfg", path.display()),
+                "copy it beside driver.cfg, or name it by an absolute path",
+            ));
+        }
+        if !named.files.contains(path) {
+            named.files.push(path.clone());
+        }
+    }
+    Ok(named)
+}

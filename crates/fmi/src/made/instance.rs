@@ -1,0 +1,408 @@
+//! What runs inside of the FMU: a driver, and the values of its variables.
+
+use std::ffi::CString;
+use std::path::Path;
+use std::sync::Arc;
+
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
+use tickbus_driver::{Code, Driver, Exchange};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Slot;
+use tickbus_record as record;
+
+use super::resources::token;
+use super::variables::{Cell, Exposed, Place, Variable, default_pace, initial_slots, seconds};
+use crate::real_time::RealTime;
+use crate::value::{Number, Value, ValueType, Version};
+
+/// How far the beginning of a step may be from the end of the last one, in seconds; beyond that, what doubles are rounded to.
+const TOLERANCE: f64 = 1e-9;
+
+/// Where an instance stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// It was made, or reset: everything can be set.
+    Before,
+    /// Its driver is open.
+    Running,
+    /// It has ended, or has failed.
+    Over,
+}
+
+/// One instance of an FMU.
+#[derive(Debug)]
+pub struct Instance {
+    version: Version,
+    config: Config,
+    exposed: Exposed,
+    slots: Vec<Slot>,
+    found: Exchange,
+    phase: Phase,
+    driver: Option<Driver>,
+    /// The end of the last step, in seconds.
+    time: f64,
+    real_time: RealTime,
+    address: CString,
+    record: CString,
+    clock: Arc<Monotonic>,
+    stop: Stop,
+}
+
+impl Instance {
+    /// An instance of the FMU whose resources are in `folder`; its model description has the token `given`. No bus is open yet.
+    ///
+    /// # Errors
+    ///
+    /// There is no driver.cfg, it is another one than that of the export, or it is wrong: with every mistake in it.
+    pub fn new(version: Version, folder: &Path, given: &str) -> Result<Self, String> {
+        let path = folder.join("driver.cfg");
+        let bytes = std::fs::read(&path).map_err(|error| {
+            format!(
+                "{}: {error}; an FMU of tickbus has its driver.cfg among its resources: unpack all of it, or export it again",
+                path.display()
+            )
+        })?;
+        let own = token(&bytes);
+        if own != given {
+            return Err(format!(
+                "{} is not the one that this FMU was made of (token {own}, and modelDescription.xml has {given}); export it again",
+                path.display()
+            ));
+        }
+        let config = Config::load(&path).map_err(|mistakes| mistakes.to_string())?;
+        let exposed = Exposed::of(&config, version);
+        let mut new = Self {
+            version,
+            exposed,
+            slots: Vec::new(),
+            found: Exchange::NONE,
+            phase: Phase::Before,
+            driver: None,
+            time: 0.0,
+            real_time: RealTime::new(0.0),
+            address: CString::default(),
+            record: CString::default(),
+            clock: Monotonic::shared(),
+            stop: Stop::new(),
+            config,
+        };
+        new.reset();
+        Ok(new)
+    }
+
+    /// The name of its driver.
+    pub fn name(&self) -> &str {
+        &self.config.name
+    }
+
+    /// Ends the run and gives every variable its start value.
+    pub fn reset(&mut self) {
+        self.terminate();
+        self.slots = initial_slots(&self.config);
+        self.found = Exchange::NONE;
+        self.phase = Phase::Before;
+        self.time = 0.0;
+        self.real_time = RealTime::new(default_pace(&self.config));
+        let file = self.config.record.as_ref().map(|record| &record.file);
+        let file = file.map(|file| file.to_string_lossy().into_owned());
+        self.address = CString::default();
+        self.record = CString::new(file.unwrap_or_default()).unwrap_or_default();
+    }
+
+    /// The simulation will begin at `start` seconds.
+    ///
+    /// # Errors
+    ///
+    /// The run has begun already, or this is no time.
+    pub fn begin_at(&mut self, start: f64) -> Result<(), String> {
+        if self.phase != Phase::Before {
+            return Err("the run has begun already; reset the instance first".to_owned());
+        }
+        if !start.is_finite() {
+            return Err(format!("the start time is {start}; hand in seconds"));
+        }
+        self.time = start;
+        Ok(())
+    }
+
+    /// Opens the bus. A free one comes up in the background, and is not waited for.
+    ///
+    /// # Errors
+    ///
+    /// It is open, or cannot be opened: why.
+    pub fn open(&mut self) -> Result<(), String> {
+        if self.phase != Phase::Before {
+            return Err("the run has begun already; reset the instance first".to_owned());
+        }
+        // Whatever happens now, nothing can be set any more.
+        self.phase = Phase::Over;
+        let mut config = self.config.clone();
+        if let Ok(address) = self.address.to_str()
+            && !address.is_empty()
+        {
+            let set = config.bus.set_address(address);
+            set.map_err(|mistake| format!("address: {mistake}"))?;
+        }
+        let file = self.record.to_str().unwrap_or_default();
+        if file.is_empty() {
+            config.record = None;
+        } else {
+            // Not beside driver.cfg: the FMU is unpacked to a folder that goes away.
+            let file = std::path::absolute(file).map_err(|why| format!("record: {why}"))?;
+            let to = record::Options::to(&file);
+            let to = to.map_err(|mistake| format!("record: {mistake}"))?;
+            config.record = Some(match config.record.take() {
+                Some(own) if file.ends_with(&own.file) => record::Options { file, ..own },
+                _ => to,
+            });
+        }
+        let driver = Driver::open(config, Monotonic::shared()).map_err(|why| why.to_string())?;
+        self.driver = Some(driver);
+        self.phase = Phase::Running;
+        Ok(())
+    }
+
+    /// One step, from `from` to `from` + `length` seconds: sends the inputs, and receives the outputs as they are at its end.
+    ///
+    /// # Errors
+    ///
+    /// No bus is open, the step does not follow the last one, or the line has failed.
+    pub fn step(&mut self, from: f64, length: f64) -> Result<(), String> {
+        let Some(driver) = &mut self.driver else {
+            return Err(match self.phase {
+                Phase::Before => "a step before the initialisation has ended; leave the initialisation mode first",
+                _ => "a step after the end of the run; reset the instance, or make another one",
+            }
+            .to_owned());
+        };
+        let to = from + length;
+        let is_next = (from - self.time).abs() <= TOLERANCE + 8.0 * f64::EPSILON * self.time.abs();
+        if !is_next || length <= 0.0 || !to.is_finite() {
+            return Err(not_next(self.time, from, length));
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "it saturates")]
+        let at = Nanos((to * 1e9).round() as i64);
+        self.found = driver.exchange(at, &mut self.slots);
+        self.time = to;
+        if self.found.code.code() < 0 {
+            let reason = driver.link().reason;
+            return Err(failed(self.found.code, &reason));
+        }
+        if self.real_time.pace > 0.0 {
+            self.wait(at);
+        }
+        Ok(())
+    }
+
+    /// Waits until the clock on the wall is where the simulation is.
+    fn wait(&mut self, time: Nanos) {
+        if let Some(due) = self.real_time.due(time, self.clock.now()) {
+            while self.clock.now() < due {
+                self.clock.wait_until(due, &self.stop);
+            }
+        }
+    }
+
+    /// Closes the bus. The variables keep their values.
+    pub fn terminate(&mut self) {
+        self.phase = Phase::Over;
+        if let Some(mut driver) = self.driver.take() {
+            driver.end_tick(&self.slots);
+            driver.close();
+        }
+    }
+
+    /// Sets variables of one type.
+    ///
+    /// # Errors
+    ///
+    /// One does not exist, is of another type, or cannot be set now; those before it are set.
+    #[inline]
+    pub fn set<T: Number>(
+        &mut self,
+        references: &[u32],
+        values: impl Iterator<Item = T>,
+    ) -> Result<(), String> {
+        for (&reference, value) in references.iter().zip(values) {
+            if let Some(Place::Slot(slot)) = Place::of(reference)
+                && let Some(cell) = self.exposed.cells.get(slot)
+                && cell.value_type == T::TYPE
+                && (cell.is_input || self.phase == Phase::Before)
+            {
+                self.slots[slot] = value.value().slot(cell.kind);
+            } else {
+                self.set_other(reference, T::TYPE, value.value())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets a variable that is no input.
+    fn set_other(&mut self, reference: u32, given: ValueType, value: Value) -> Result<(), String> {
+        let place = self.number(reference, given)?;
+        match place {
+            Place::Slot(slot)
+                if self.exposed.cells[slot].is_input || self.phase == Phase::Before =>
+            {
+                self.slots[slot] = value.slot(self.exposed.cells[slot].kind);
+                Ok(())
+            }
+            Place::Pace if value.real().is_finite() && value.real() >= 0.0 => {
+                self.real_time = RealTime::new(value.real());
+                Ok(())
+            }
+            Place::Pace => Err(format!(
+                "the pace is {}; write 1 for real time, or 0 for as fast as possible",
+                value.real()
+            )),
+            // They have their start values, and nothing was exchanged yet.
+            Place::Status | Place::Age | Place::Sequence if self.phase == Phase::Before => Ok(()),
+            _ => Err(self.read_only(reference)),
+        }
+    }
+
+    /// Gets variables of one type.
+    ///
+    /// # Errors
+    ///
+    /// One does not exist, or is of another type.
+    #[inline]
+    pub fn get<T: Number>(
+        &self,
+        references: &[u32],
+        mut put: impl FnMut(usize, T),
+    ) -> Result<(), String> {
+        for (at, &reference) in references.iter().enumerate() {
+            if let Some(Place::Slot(slot)) = Place::of(reference)
+                && let Some(&Cell {
+                    value_type, kind, ..
+                }) = self.exposed.cells.get(slot)
+                && value_type == T::TYPE
+            {
+                put(at, T::of(Value::of(self.slots[slot], kind)));
+            } else {
+                put(at, T::of(self.other(reference, T::TYPE)?));
+            }
+        }
+        Ok(())
+    }
+
+    fn other(&self, reference: u32, asked: ValueType) -> Result<Value, String> {
+        Ok(match self.number(reference, asked)? {
+            Place::Time => Value::Real(self.time),
+            Place::Pace => Value::Real(self.real_time.pace),
+            Place::Status => Value::Signed(self.found.code.code().into()),
+            Place::Age => Value::Real(seconds(&self.found)),
+            Place::Sequence => Value::Unsigned(self.found.sequence),
+            Place::Slot(slot) => Value::of(self.slots[slot], self.exposed.cells[slot].kind),
+            Place::Address | Place::Record => return Err(self.mistyped(reference, asked)),
+        })
+    }
+
+    /// Sets a text.
+    ///
+    /// # Errors
+    ///
+    /// There is no such text, or the run has begun.
+    pub fn set_text(&mut self, reference: u32, text: CString) -> Result<(), String> {
+        let place = self.checked(reference, ValueType::String)?;
+        if self.phase != Phase::Before {
+            return Err(self.read_only(reference));
+        }
+        text.to_str()
+            .map_err(|why| format!("a text that is not UTF-8: {why}"))?;
+        match place {
+            Place::Address => self.address = text,
+            _ => self.record = text,
+        }
+        Ok(())
+    }
+
+    /// Gets a text, which stays until it is set again or the instance ends.
+    ///
+    /// # Errors
+    ///
+    /// There is no such text.
+    pub fn text(&self, reference: u32) -> Result<&CString, String> {
+        Ok(match self.checked(reference, ValueType::String)? {
+            Place::Address => &self.address,
+            _ => &self.record,
+        })
+    }
+
+    /// As [`checked`](Self::checked), for numbers. In FMI 2.0 some tools get and set every variable as a Real, and that is answered,
+    /// too: nothing is lost.
+    fn number(&self, reference: u32, asked: ValueType) -> Result<Place, String> {
+        let is_text = |one: &Variable| one.value_type == ValueType::String;
+        match (Place::of(reference), self.exposed.variable(reference)) {
+            (Some(place), Some(variable))
+                if self.version == Version::Two
+                    && asked == ValueType::Float64
+                    && !is_text(variable) =>
+            {
+                Ok(place)
+            }
+            _ => self.checked(reference, asked),
+        }
+    }
+
+    /// What a reference stands for, if that is of this type.
+    fn checked(&self, reference: u32, asked: ValueType) -> Result<Place, String> {
+        let variable = self.exposed.variable(reference);
+        match (Place::of(reference), variable) {
+            (Some(place), Some(variable)) if variable.value_type == asked => Ok(place),
+            (Some(_), Some(_)) => Err(self.mistyped(reference, asked)),
+            _ => Err(format!(
+                "there is no variable with the value reference {reference}; take those of modelDescription.xml"
+            )),
+        }
+    }
+
+    fn mistyped(&self, reference: u32, asked: ValueType) -> String {
+        match self.exposed.variable(reference) {
+            Some(variable) => format!(
+                "\"{}\" (value reference {reference}) is of type {}, not {}; call the functions of its own type",
+                variable.name,
+                variable.value_type.name(),
+                asked.name()
+            ),
+            None => format!("there is no variable with the value reference {reference}"),
+        }
+    }
+
+    fn read_only(&self, reference: u32) -> String {
+        let name = self.exposed.variable(reference);
+        let name = name.map_or_else(String::new, |variable| variable.name.clone());
+        format!(
+            "\"{name}\" cannot be set now: outputs and fixed parameters have the values that they got before the initialisation"
+        )
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        self.terminate();
+    }
+}
+
+#[cold]
+fn not_next(time: f64, from: f64, length: f64) -> String {
+    if length <= 0.0 || !(from + length).is_finite() {
+        return format!("a step of {length} s at {from} s; hand in seconds above 0");
+    }
+    format!(
+        "a step from {from} s, but the last one has ended at {time} s; time cannot go back, and a bus cannot be set back: \
+         begin each step where the last one has ended"
+    )
+}
+
+#[cold]
+fn failed(code: Code, reason: &str) -> String {
+    let (name, remedy) = (code.name(), code.remedy());
+    let what = if reason.is_empty() {
+        code.text()
+    } else {
+        reason
+    };
+    format!("{name}: {what}; {remedy}")
+}

@@ -1,0 +1,237 @@
+//! The native libraries that go into an FMU: one for each platform.
+
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+
+use tickbus_base::Mistake;
+use zip::ZipArchive;
+
+use crate::value::Version;
+
+/// The name of a function that the library of an FMU must have, and that libraries of earlier versions lack. In two parts, so
+/// that programs that look for it do not have it themselves.
+const FUNCTION: [&str; 2] = ["fmi3Activate", "ModelPartition"];
+
+/// The folder of a jar in which the libraries are.
+const IN_JAR: &str = "tickbus/native/";
+
+/// An operating system with a processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Platform {
+    /// By its name in FMI 3.0.
+    pub tuple: &'static str,
+    /// By its name in FMI 2.0, if that has one.
+    pub two: Option<&'static str>,
+    /// The ending of libraries.
+    pub ending: &'static str,
+}
+
+/// The platforms: by the beginning of the file, and the number of the processor.
+const PLATFORMS: [Platform; 6] = [
+    platform("x86_64-linux", Some("linux64"), "so"),
+    platform("aarch64-linux", None, "so"),
+    platform("x86_64-windows", Some("win64"), "dll"),
+    platform("aarch64-windows", None, "dll"),
+    platform("x86_64-darwin", Some("darwin64"), "dylib"),
+    platform("aarch64-darwin", None, "dylib"),
+];
+
+const fn platform(
+    tuple: &'static str,
+    two: Option<&'static str>,
+    ending: &'static str,
+) -> Platform {
+    Platform { tuple, two, ending }
+}
+
+impl Platform {
+    /// That of a library: by its own head.
+    pub fn of(library: &[u8]) -> Option<Self> {
+        let word = |at: usize| {
+            let bytes = library.get(at..at + 2)?;
+            Some(u16::from_le_bytes([bytes[0], bytes[1]]))
+        };
+        let tuple = if library.starts_with(b"\x7fELF") {
+            match word(18)? {
+                62 => "x86_64-linux",
+                183 => "aarch64-linux",
+                _ => return None,
+            }
+        } else if library.starts_with(b"MZ") {
+            let head = usize::from(word(60)?);
+            match word(head + 4)? {
+                0x8664 => "x86_64-windows",
+                0xAA64 => "aarch64-windows",
+                _ => return None,
+            }
+        } else if library.starts_with(&[0xCF, 0xFA, 0xED, 0xFE]) {
+            match word(4)? {
+                7 => "x86_64-darwin",
+                12 => "aarch64-darwin",
+                _ => return None,
+            }
+        } else {
+            return None;
+        };
+        PLATFORMS.into_iter().find(|one| one.tuple == tuple)
+    }
+
+    /// The one that this program was built for.
+    pub fn own() -> Option<Self> {
+        let system = match std::env::consts::OS {
+            "macos" => "darwin",
+            other => other,
+        };
+        let tuple = format!("{}-{system}", std::env::consts::ARCH);
+        PLATFORMS.into_iter().find(|one| one.tuple == tuple)
+    }
+
+    /// Its folder in an FMU of a version.
+    pub const fn folder(self, version: Version) -> Option<&'static str> {
+        match version {
+            Version::Two => self.two,
+            Version::Three => Some(self.tuple),
+        }
+    }
+}
+
+/// A native library of tickbus for one platform.
+#[derive(Clone, Debug)]
+pub struct NativeLibrary {
+    /// Where it runs.
+    pub platform: Platform,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Where it came from, for people.
+    pub origin: String,
+}
+
+impl NativeLibrary {
+    fn of(bytes: Vec<u8>, origin: String) -> Result<Self, Mistake> {
+        let right = "name the libtickbus.so, tickbus.dll or libtickbus.dylib of this version";
+        let Some(platform) = Platform::of(&bytes) else {
+            return Err(Mistake::new(
+                format!("{origin} is no library for Linux, Windows or macOS on x86-64 or arm64"),
+                right,
+            ));
+        };
+        let function = FUNCTION.concat();
+        let mut names = bytes.windows(function.len());
+        if !names.any(|name| name == function.as_bytes()) {
+            return Err(Mistake::new(
+                format!("{origin} has no functions of FMI"),
+                right,
+            ));
+        }
+        Ok(Self {
+            platform,
+            bytes,
+            origin,
+        })
+    }
+}
+
+/// The libraries for an FMU: those that are `named`, or else the one in the folder `beside` the command, or all in a jar there.
+///
+/// # Errors
+///
+/// There is none: every place that was looked at, and what to do.
+pub fn find_libraries(
+    named: &[PathBuf],
+    beside: Option<&Path>,
+) -> Result<Vec<NativeLibrary>, Mistake> {
+    let mut found: Vec<NativeLibrary> = Vec::new();
+    for file in named {
+        let library = read(file)?;
+        if let Some(twin) = found
+            .iter()
+            .find(|other| other.platform == library.platform)
+        {
+            return Err(Mistake::new(
+                format!(
+                    "{} and {} are both for {}",
+                    twin.origin, library.origin, library.platform.tuple
+                ),
+                "name one --library for each platform",
+            ));
+        }
+        found.push(library);
+    }
+    if !found.is_empty() {
+        return Ok(found);
+    }
+    let mut tried = Vec::new();
+    if let Some(folder) = beside {
+        let file = folder.join(format!("{DLL_PREFIX}tickbus{DLL_SUFFIX}"));
+        if file.is_file() {
+            return Ok(vec![read(&file)?]);
+        }
+        tried.push(format!("no {}", file.display()));
+        for jar in jars(folder) {
+            let found = in_jar(&jar)?;
+            if !found.is_empty() {
+                return Ok(found);
+            }
+            tried.push(format!("none in {}", jar.display()));
+        }
+    }
+    Err(Mistake::new(
+        format!(
+            "the native library that goes into the FMU was not found beside this command: {}",
+            tried.join(", ")
+        ),
+        "name it: --library libtickbus.so",
+    ))
+}
+
+fn read(file: &Path) -> Result<NativeLibrary, Mistake> {
+    let origin = file.display().to_string();
+    let bytes = std::fs::read(file).map_err(|error| {
+        Mistake::new(
+            format!("{origin} cannot be read: {error}"),
+            "name the native library of tickbus",
+        )
+    })?;
+    NativeLibrary::of(bytes, origin)
+}
+
+/// The jars in a folder, in the order of their names.
+fn jars(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut jars: Vec<PathBuf> = files
+        .filter(|path| path.extension().is_some_and(|ending| ending == "jar"))
+        .collect();
+    jars.sort();
+    jars
+}
+
+/// The libraries in a jar, which may be another one than tickbus'.
+fn in_jar(jar: &Path) -> Result<Vec<NativeLibrary>, Mistake> {
+    let unreadable = |error: String| {
+        Mistake::new(
+            format!("{} cannot be read: {error}", jar.display()),
+            "name the native library: --library libtickbus.so",
+        )
+    };
+    let file = std::fs::File::open(jar).map_err(|error| unreadable(error.to_string()))?;
+    let mut archive = ZipArchive::new(file).map_err(|error| unreadable(error.to_string()))?;
+    let names: Vec<String> = archive.file_names().map(str::to_owned).collect();
+    let mut found = Vec::new();
+    for name in names {
+        if !name.starts_with(IN_JAR) || name.ends_with('/') {
+            continue;
+        }
+        let mut bytes = Vec::new();
+        let entry = archive.by_name(&name);
+        let mut entry = entry.map_err(|error| unreadable(error.to_string()))?;
+        entry
+            .read_to_end(&mut bytes)
+            .map_err(|error| unreadable(error.to_string()))?;
+        let origin = format!("{} in {}", name, jar.display());
+        found.push(NativeLibrary::of(bytes, origin)?);
+    }
+    found.sort_by_key(|library| library.platform);
+    Ok(found)
+}

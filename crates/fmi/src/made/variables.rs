@@ -1,0 +1,379 @@
+//! The variables of the FMU that a driver.cfg becomes.
+
+use std::ops::DerefMut as _;
+
+use tickbus_binding::SlotKind;
+use tickbus_driver::{Exchange, SlotMap};
+use tickbus_driver_cfg::loopback::{Mode, Peer};
+use tickbus_driver_cfg::{Config, Options};
+use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
+
+use crate::value::{Value, ValueType, Version};
+
+/// The value reference of the first slot; those before it are not signals.
+const FIRST_SLOT: u32 = 16;
+
+/// What a variable stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// The simulation's time.
+    Time,
+    /// How many seconds of simulation pass in one of the clock on the wall; 0 for as many as can.
+    Pace,
+    /// The address of the line, in place of that in the driver.cfg.
+    Address,
+    /// The file of the recording.
+    Record,
+    /// How fresh the data are: 0 fresh, 1 unchanged, 2 stale.
+    Status,
+    /// Their age in seconds.
+    Age,
+    /// How many bus cycles have come.
+    Sequence,
+    /// A slot of the driver: a signal, or the count of its edges.
+    Slot(usize),
+}
+
+/// How the importing tool uses a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// It is the time.
+    Independent,
+    /// It is set before the run.
+    Parameter,
+    /// It is set before every step.
+    Input,
+    /// It is read after every step.
+    Output,
+}
+
+/// The value of a variable before the first step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Start {
+    /// None: the time has one of its own.
+    None,
+    /// A number.
+    Number(Value),
+    /// A text.
+    Text(String),
+}
+
+/// One variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Its name, of which there is one.
+    pub name: String,
+    /// What stands for it in the calls.
+    pub reference: u32,
+    /// Its type in the FMU's version.
+    pub value_type: ValueType,
+    /// How it is used.
+    pub usage: Use,
+    /// Its unit, on floating point numbers only.
+    pub unit: Option<String>,
+    /// Its value before the first step.
+    pub start: Start,
+    /// A line for people.
+    pub description: String,
+}
+
+/// One slot, as the functions of FMI see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Cell {
+    /// Its type.
+    pub value_type: ValueType,
+    /// What the slot holds.
+    pub kind: SlotKind,
+    /// Whether the importing tool sets it.
+    pub is_input: bool,
+}
+
+/// All variables of a driver.cfg, in the order of the model description.
+#[derive(Clone, Debug)]
+pub struct Exposed {
+    /// The variables.
+    pub variables: Vec<Variable>,
+    /// What the slots are, one by one.
+    pub cells: Vec<Cell>,
+}
+
+impl Place {
+    /// What a value reference stands for.
+    #[inline]
+    pub fn of(reference: u32) -> Option<Self> {
+        Some(match reference {
+            0 => Self::Time,
+            1 => Self::Pace,
+            2 => Self::Address,
+            3 => Self::Record,
+            4 => Self::Status,
+            5 => Self::Age,
+            6 => Self::Sequence,
+            FIRST_SLOT.. => Self::Slot((reference - FIRST_SLOT) as usize),
+            _ => return None,
+        })
+    }
+
+    fn reference(self) -> u32 {
+        match self {
+            Self::Time => 0,
+            Self::Pace => 1,
+            Self::Address => 2,
+            Self::Record => 3,
+            Self::Status => 4,
+            Self::Age => 5,
+            Self::Sequence => 6,
+            Self::Slot(slot) => FIRST_SLOT + u32::try_from(slot).unwrap_or(u32::MAX - FIRST_SLOT),
+        }
+    }
+}
+
+/// The age of data in seconds, as a variable shows it.
+#[expect(clippy::cast_precision_loss, reason = "for people")]
+pub(super) fn seconds(found: &Exchange) -> f64 {
+    found.age.0 as f64 * 1e-9
+}
+
+/// The type of a counter, which FMI 2.0 has no unsigned one for.
+const fn counter(version: Version) -> ValueType {
+    match version {
+        Version::Two => ValueType::Float64,
+        Version::Three => ValueType::UInt64,
+    }
+}
+
+/// The type of a signal in a version: the one that holds all its values.
+pub(super) fn type_of(signal: &Signal, version: Version) -> ValueType {
+    if signal.scale.is_some() {
+        return ValueType::Float64;
+    }
+    let (two, three) = match signal.data_type {
+        DataType::Bool => (ValueType::Boolean, ValueType::Boolean),
+        DataType::Byte | DataType::Usint => (ValueType::Int32, ValueType::UInt8),
+        DataType::Sint => (ValueType::Int32, ValueType::Int8),
+        DataType::Word | DataType::Uint => (ValueType::Int32, ValueType::UInt16),
+        DataType::Int => (ValueType::Int32, ValueType::Int16),
+        DataType::Dint => (ValueType::Int32, ValueType::Int32),
+        DataType::Dword | DataType::Udint => (ValueType::Float64, ValueType::UInt32),
+        DataType::Lint => (ValueType::Float64, ValueType::Int64),
+        DataType::Lword | DataType::Ulint => (ValueType::Float64, ValueType::UInt64),
+        DataType::Real => (ValueType::Float64, ValueType::Float32),
+        DataType::Lreal => (ValueType::Float64, ValueType::Float64),
+    };
+    match version {
+        Version::Two => two,
+        Version::Three => three,
+    }
+}
+
+/// What the slot of a signal holds.
+pub fn kind_of(signal: &Signal) -> SlotKind {
+    match signal.data_type {
+        _ if !signal.is_integer_slot() => SlotKind::Real,
+        DataType::Lint => SlotKind::Signed,
+        _ => SlotKind::Unsigned,
+    }
+}
+
+/// The name of a variable that is no signal: `name`, unless a signal has it.
+fn free_name(name: &str, table: &SignalTable) -> String {
+    // Names that begin so are reserved.
+    match table.position(name) {
+        None => name.to_owned(),
+        Some(_) => format!("bus.{name}"),
+    }
+}
+
+impl Exposed {
+    /// The variables of `config` in a version.
+    pub fn of(config: &Config, version: Version) -> Self {
+        let (table, (writes, _)) = (&config.table, config.role.areas());
+        let map = SlotMap::new(table, config.role);
+        let mut variables = own_variables(config, version);
+        let mut cells = Vec::with_capacity(map.count);
+        for (slot, signal) in table.signals.iter().enumerate() {
+            let cell = Cell {
+                value_type: type_of(signal, version),
+                kind: kind_of(signal),
+                is_input: signal.area == writes,
+            };
+            let unit = signal.unit.clone().filter(|_| cell.value_type.is_float());
+            let station = &table.stations[signal.station].name;
+            let station = if station.is_empty() {
+                String::new()
+            } else {
+                format!(" of {station}")
+            };
+            variables.push(Variable {
+                name: signal.name.clone(),
+                reference: Place::Slot(slot).reference(),
+                value_type: cell.value_type,
+                usage: if cell.is_input {
+                    Use::Input
+                } else {
+                    Use::Output
+                },
+                unit,
+                start: Start::Number(Value::of(signal.fail_safe, cell.kind)),
+                description: format!("{} {}{station}", signal.address(), signal.data_type),
+            });
+            cells.push(cell);
+        }
+        let edges = Cell {
+            value_type: match version {
+                Version::Two => ValueType::Int32,
+                Version::Three => ValueType::UInt32,
+            },
+            kind: SlotKind::Real,
+            is_input: false,
+        };
+        for (signal, slot) in table.signals.iter().zip(&map.edges) {
+            let Some(slot) = slot else { continue };
+            debug_assert_eq!(
+                *slot,
+                cells.len(),
+                "edges follow in the order of the signals"
+            );
+            variables.push(Variable {
+                name: format!("{}.edges", signal.name),
+                reference: Place::Slot(*slot).reference(),
+                value_type: edges.value_type,
+                usage: Use::Output,
+                unit: None,
+                start: Start::Number(Value::Unsigned(0)),
+                description: format!("edges of {} since the last step", signal.address()),
+            });
+            cells.push(edges);
+        }
+        Self { variables, cells }
+    }
+
+    /// The variable that a reference stands for.
+    pub fn variable(&self, reference: u32) -> Option<&Variable> {
+        self.variables
+            .iter()
+            .find(|variable| variable.reference == reference)
+    }
+}
+
+/// The variables that are not signals.
+fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
+    let variable =
+        |name: &str, place: Place, value_type, usage, start, description: &str| Variable {
+            name: if name.starts_with("bus.") {
+                name.to_owned()
+            } else {
+                free_name(name, &config.table)
+            },
+            reference: place.reference(),
+            value_type,
+            usage,
+            unit: matches!(place, Place::Time | Place::Age).then(|| "s".to_owned()),
+            start,
+            description: description.to_owned(),
+        };
+    let number = Start::Number;
+    let real = ValueType::Float64;
+    let record = config.record.as_ref();
+    let record = record.map(|record| record.file.to_string_lossy().into_owned());
+    let mut all = Vec::new();
+    // FMI 2.0 can do without, and a library of some of its tools complains of it.
+    if version == Version::Three {
+        let time = variable(
+            "time",
+            Place::Time,
+            real,
+            Use::Independent,
+            Start::None,
+            "Simulation time",
+        );
+        all.push(time);
+    }
+    all.push(
+        variable(
+            "pace",
+            Place::Pace,
+            real,
+            Use::Parameter,
+            number(Value::Real(default_pace(config))),
+            "Seconds of simulation in one of the clock on the wall: 1 for real time, 0 for as fast as possible",
+        ),
+    );
+    if has_address(config) {
+        all.push(variable(
+            "address",
+            Place::Address,
+            ValueType::String,
+            Use::Parameter,
+            Start::Text(String::new()),
+            "Address of the line, in place of the one in driver.cfg; empty for that one",
+        ));
+    }
+    all.extend([
+        variable(
+            "record",
+            Place::Record,
+            ValueType::String,
+            Use::Parameter,
+            Start::Text(record.unwrap_or_default()),
+            "File that every step is recorded to, ending in .vcd or .csv, from the current folder on; empty for none",
+        ),
+        variable(
+            "bus.status",
+            Place::Status,
+            ValueType::Int32,
+            Use::Output,
+            number(Value::Signed(2)),
+            "0 fresh, 1 unchanged, 2 stale",
+        ),
+        variable(
+            "bus.age",
+            Place::Age,
+            real,
+            Use::Output,
+            number(Value::Real(seconds(&Exchange::NONE))),
+            "Age of the oldest station's data",
+        ),
+        variable(
+            "bus.sequence",
+            Place::Sequence,
+            counter(version),
+            Use::Output,
+            number(Value::Unsigned(0)),
+            "Bus cycles so far",
+        ),
+    ]);
+    all
+}
+
+/// Whether the bus has an address that can be replaced.
+fn has_address(config: &Config) -> bool {
+    // Whether a text is a right address is another question.
+    config.bus.clone().deref_mut().set_address("").is_some()
+}
+
+/// Whether the bus runs in the steps of the simulation.
+pub fn is_stepped(config: &Config) -> bool {
+    match &config.bus {
+        Options::Loopback(options) => {
+            options.mode == Mode::Stepped || matches!(options.peer, Peer::Replay(_))
+        }
+        Options::Sdsp(_) => true,
+        _ => false,
+    }
+}
+
+/// A bus that runs by itself is a PLC in real time, behind which a simulation that hurries sees few of its cycles.
+pub(super) fn default_pace(config: &Config) -> f64 {
+    if is_stepped(config) { 0.0 } else { 1.0 }
+}
+
+/// The slots before the first step.
+pub(super) fn initial_slots(config: &Config) -> Vec<Slot> {
+    let map = SlotMap::new(&config.table, config.role);
+    let mut slots = vec![Slot::default(); map.count];
+    for (slot, signal) in slots.iter_mut().zip(&config.table.signals) {
+        *slot = signal.fail_safe;
+    }
+    slots
+}

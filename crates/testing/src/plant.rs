@@ -1,0 +1,96 @@
+//! An FMU in place of the machine.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use tickbus_base::toml_text::{Mistakes, Table, Value};
+use tickbus_driver_cfg::Config;
+use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Unpacked};
+use tickbus_image::signal::{SignalTable, Slot};
+
+use super::test::TextPosition;
+
+/// An FMU, and which of its variables are which signals.
+#[derive(Clone, Debug)]
+pub(super) struct Plant {
+    /// Unpacked once for all tests of a file.
+    fmu: Arc<Unpacked>,
+    join: Join,
+    options: MachineOptions,
+    /// Its position in the test file.
+    pub(super) place: TextPosition,
+}
+
+impl Plant {
+    /// Begins a run of it; `slots` get what its sensors show then.
+    pub(super) fn start(&self, table: &SignalTable, slots: &mut [Slot]) -> Result<Machine, String> {
+        let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
+        machine.map_err(|failure| failure.to_string())
+    }
+}
+
+/// The keys of `[machine]` that tell of an FMU, as written.
+pub(super) struct FmuKeys<'a> {
+    fmu: Option<Value<'a>>,
+    map: Option<Value<'a>>,
+    isolated: Option<Value<'a>>,
+}
+
+impl<'a> FmuKeys<'a> {
+    pub(super) fn take(table: &mut Table<'a>) -> Self {
+        Self {
+            fmu: table.take("fmu"),
+            map: table.take("map"),
+            isolated: table.take("isolated"),
+        }
+    }
+
+    /// Reads them, and the files that they name; the mistakes in those come second.
+    pub(super) fn read(self, config: &Config, folder: &Path) -> (Option<Plant>, Option<Mistakes>) {
+        let Some(value) = &self.fmu else {
+            for (key, value) in [("map", &self.map), ("isolated", &self.isolated)] {
+                if let Some(value) = value {
+                    let what = format!("\"{key}\" stands without \"fmu\"");
+                    value.wrong(what, "name the FMU, or remove it");
+                }
+            }
+            return (None, None);
+        };
+        let isolated = self.isolated.as_ref().and_then(Value::boolean);
+        let path = |value: &Value<'_>, right: &str| Some(folder.join(value.text(right)?));
+        let Some(file) = path(value, "write the path of an FMU, as seen from this file") else {
+            return (None, None);
+        };
+        let map = self.map.as_ref();
+        let map = map.map(|value| path(value, "write the path of a map, as seen from this file"));
+        let fmu = match Unpacked::open(&file) {
+            Ok(fmu) => fmu,
+            Err(mistakes) => return (None, Some(mistakes)),
+        };
+        let map = match map {
+            None => Map::default(),
+            Some(None) => return (None, None),
+            Some(Some(file)) => match Map::load(&file, &fmu.model, config) {
+                Ok(map) => map,
+                Err(mistakes) => return (None, Some(mistakes)),
+            },
+        };
+        match Join::of(config, &fmu.model, &map) {
+            Ok(join) => {
+                let plant = Plant {
+                    fmu: Arc::new(fmu),
+                    join,
+                    options: MachineOptions {
+                        isolated: isolated.unwrap_or_default(),
+                    },
+                    place: value.place(),
+                };
+                (Some(plant), None)
+            }
+            Err(mistake) => {
+                value.refuse(mistake);
+                (None, None)
+            }
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! `tickbus run MODEL.fmu --config FILE`: a foreign FMU as the machine, or as the PLC.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::Outcome;
+use super::host::{ToldFaults, is_news, recording, span};
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_driver::{Code, Driver};
+use tickbus_driver_cfg::{CommandLineEnd, Config};
+use tickbus_fieldbus::{Link, Role};
+use tickbus_fmi::RealTime;
+use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Stepped, Unpacked};
+use tickbus_fmi::made::is_stepped;
+use tickbus_image::signal::Slot;
+
+/// How often the command checks its line.
+const LOOK: Nanos = Nanos::from_millis(20);
+
+/// The step where neither the command line nor the FMU names one.
+const STEP: Nanos = Nanos::from_millis(10);
+
+/// How much that is joined with nothing is listed.
+const LISTED: usize = 20;
+
+/// Run an FMU (FMI 2.0 or 3.0, co-simulation) as the machine on a bus, or as the PLC.
+///
+/// Its variables are the signals of the same names; --map joins the others. docs/fmi.md tells more.
+#[derive(Debug, clap::Args)]
+pub(super) struct Arguments {
+    /// The FMU.
+    #[arg(value_name = "MODEL.fmu")]
+    model: PathBuf,
+
+    /// The driver.cfg of the line; one that states no role serves both ends.
+    #[arg(long, value_name = "FILE")]
+    config: PathBuf,
+
+    /// Which variables are which signals, where their names differ, and parameters: a TOML file.
+    #[arg(long, value_name = "FILE")]
+    map: Option<PathBuf>,
+
+    /// What the FMU is.
+    #[arg(long, value_enum, default_value = "machine")]
+    role: FmuRole,
+
+    /// Simulation time of one step [default: as the FMU proposes, or 10ms].
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    step: Option<Nanos>,
+
+    /// Seconds of simulation in one of the clock on the wall: 1 for real time, 0 for as fast as possible [default: 1; 0 on a
+    /// stepped bus].
+    #[arg(long, value_name = "NUMBER", value_parser = pace)]
+    pace: Option<f64>,
+
+    /// Stop after this much simulation time; without it, on Ctrl-C.
+    #[arg(long, value_name = "TIME", value_parser = span)]
+    duration: Option<Nanos>,
+
+    /// Run the FMU in a process of its own, which it may crash.
+    #[arg(long)]
+    isolated: bool,
+
+    /// Use this address instead of the one in FILE.
+    #[arg(long, value_name = "HOST:PORT")]
+    address: Option<String>,
+
+    /// Inject the faults of this file, its `[[fault]]` sections.
+    #[arg(long, value_name = "FILE")]
+    faults: Option<PathBuf>,
+
+    /// Record every step to this file: a name ending in .vcd or .csv.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+
+    /// Print statistics at the end.
+    #[arg(long)]
+    stats: bool,
+}
+
+/// What an FMU is on the bus.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum FmuRole {
+    /// It writes %I and reads %Q.
+    Machine,
+    /// It reads %I and writes %Q.
+    Plc,
+}
+
+fn pace(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(pace) if pace.is_finite() && pace >= 0.0 => Ok(pace),
+        _ => Err("write a number: 1 for real time, 0 for as fast as possible".to_owned()),
+    }
+}
+
+/// Why the command ends early: all lines, and how.
+struct Refused(String, Outcome);
+
+fn wrong(text: impl std::fmt::Display) -> Refused {
+    Refused(text.to_string(), Outcome::WrongInput)
+}
+
+pub(super) fn run(arguments: &Arguments) -> Outcome {
+    match try_run(arguments) {
+        Ok(outcome) => outcome,
+        Err(Refused(text, outcome)) => {
+            let mistakes = text.lines().count();
+            eprintln!("{text}\nrun: failed mistakes={mistakes}");
+            outcome
+        }
+    }
+}
+
+fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
+    let config = configured(arguments)?;
+    let fmu = Unpacked::open(&arguments.model).map_err(wrong)?;
+    let map = match &arguments.map {
+        None => Map::default(),
+        Some(file) => Map::load(file, &fmu.model, &config).map_err(wrong)?,
+    };
+    let join = Join::of(&config, &fmu.model, &map)
+        .map_err(|mistake| wrong(format!("{}: {mistake}", fmu.file)))?;
+    let stop = Stop::new();
+    let on_interrupt = stop.clone();
+    if let Err(error) = ctrlc::set_handler(move || on_interrupt.stop()) {
+        return Err(Refused(
+            format!("Ctrl-C cannot be caught: {error}"),
+            Outcome::BusFailed,
+        ));
+    }
+    let step = arguments.step.or(proposed(fmu.model.step)).unwrap_or(STEP);
+    let default = if is_stepped(&config) { 0.0 } else { 1.0 };
+    let pace = arguments.pace.unwrap_or(default);
+    say(&told(&fmu, &join, step, pace));
+    let table = config.table.clone();
+    let clock = Monotonic::shared();
+    let driver = Driver::open(config, Arc::clone(&clock) as _).map_err(|error| {
+        let outcome = if error.is_wrong_input() {
+            Outcome::WrongInput
+        } else {
+            Outcome::BusFailed
+        };
+        Refused(error.to_string(), outcome)
+    })?;
+    let mut slots = driver.initial_slots();
+    let options = MachineOptions {
+        isolated: arguments.isolated,
+    };
+    let machine = Machine::open(&fmu, &join, &table, options, &mut slots);
+    let machine = machine.map_err(|failure| Refused(failure.to_string(), Outcome::BusFailed))?;
+    let line = Line {
+        driver,
+        slots,
+        told: None,
+        faults: ToldFaults::default(),
+        looked: Nanos::ZERO - LOOK,
+    };
+    let times = Times {
+        step,
+        pace,
+        end: arguments.duration,
+    };
+    Ok(tick(line, machine, times, arguments.stats, &*clock, &stop))
+}
+
+/// The driver.cfg as this command's end has it.
+fn configured(arguments: &Arguments) -> Result<Config, Refused> {
+    let mut config = match arguments.role {
+        FmuRole::Machine => {
+            let config = Config::load(&arguments.config).map_err(wrong)?;
+            if config.role == Role::Controller {
+                return Err(wrong(format!(
+                    "{}: role = \"controller\" is the PLC's end; remove it, or run the FMU with --role plc",
+                    arguments.config.display()
+                )));
+            }
+            config
+        }
+        FmuRole::Plc => {
+            let asked = CommandLineEnd {
+                role: Role::Controller,
+                moved: arguments.address.is_some(),
+            };
+            let mut config = Config::load_as(&arguments.config, Some(asked)).map_err(wrong)?;
+            // The [record] table is the simulation's, which may run at the other end of the same line.
+            config.record = None;
+            config
+        }
+    };
+    if let Some(address) = &arguments.address {
+        let set = config.bus.set_address(address);
+        set.map_err(|error| {
+            wrong(format!(
+                "--address: {error} (the bus is \"{}\")",
+                config.bus.kind()
+            ))
+        })?;
+    }
+    if let Some(file) = &arguments.faults {
+        config.add_faults(file).map_err(wrong)?;
+    }
+    if let Some(file) = &arguments.record {
+        let options = recording(file).map_err(|error| wrong(format!("--record: {error}")))?;
+        config.record = Some(options);
+    }
+    Ok(config)
+}
+
+/// The step that an FMU proposes.
+#[expect(clippy::cast_possible_truncation, reason = "it saturates")]
+fn proposed(seconds: Option<f64>) -> Option<Nanos> {
+    let step = Nanos((seconds? * 1e9).round() as i64);
+    (step > Nanos::ZERO).then_some(step)
+}
+
+/// What is joined, and what is not.
+fn told(fmu: &Unpacked, join: &Join, step: Nanos, pace: f64) -> String {
+    let model = &fmu.model;
+    let pace = match pace {
+        0.0 => "as fast as possible".to_owned(),
+        pace => format!("pace {pace}"),
+    };
+    let mut lines = vec![format!(
+        "\"{}\", FMI {}: {} and {} joined, steps of {step}, {pace}",
+        model.name,
+        model.version.number(),
+        counted(join.inputs.len(), "input"),
+        counted(join.outputs.len(), "output")
+    )];
+    let left = join.left.iter().take(LISTED);
+    lines.extend(left.map(|left| format!("not joined: {}", left.0)));
+    if join.left.len() > LISTED {
+        lines.push(format!("not joined: {} more", join.left.len() - LISTED));
+    }
+    if model.needs_tool {
+        lines.push("this FMU needs the tool that has made it, on this computer".to_owned());
+    }
+    format!("run: {}\n", lines.join("\nrun: "))
+}
+
+/// `1 input`, `2 inputs`.
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Prints; if the reader of stdout is gone (`| head`), the line keeps running.
+fn say(text: &str) {
+    let mut out = io::stdout().lock();
+    let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+}
+
+/// How time passes.
+#[derive(Clone, Copy)]
+struct Times {
+    step: Nanos,
+    pace: f64,
+    end: Option<Nanos>,
+}
+
+/// The driver, and what was told of it.
+struct Line {
+    driver: Driver,
+    slots: Vec<Slot>,
+    told: Option<Link>,
+    faults: ToldFaults,
+    looked: Nanos,
+}
+
+impl Line {
+    /// Tells what has changed, now and then.
+    fn look(&mut self, now: Nanos) {
+        if now < self.looked + LOOK {
+            return;
+        }
+        self.looked = now;
+        let link = self.driver.link();
+        let mut text = String::new();
+        if is_news(self.told.as_ref(), &link) {
+            text = format!("run: {}: {}\n", link.state.name(), link.reason);
+            self.told = Some(link);
+        }
+        let faults = self.driver.injected_faults();
+        self.faults.tell("run", faults, &mut text);
+        if !text.is_empty() {
+            say(&text);
+        }
+    }
+}
+
+/// Ticks until the end of the time, of the FMU, or of patience.
+fn tick(
+    mut line: Line,
+    mut machine: Machine,
+    times: Times,
+    stats: bool,
+    clock: &dyn Clock,
+    stop: &Stop,
+) -> Outcome {
+    let Times { step, pace, end } = times;
+    let (mut time, mut ticks, mut stale) = (Nanos::ZERO, 0_u64, 0_u64);
+    let mut real_time = RealTime::new(pace);
+    let mut failure = None;
+    let mut by_itself = false;
+    while !stop.is_stopped() && !by_itself && end.is_none_or(|end| time + step <= end) {
+        // As in a test: the machine moves on, then the PLC sees it.
+        match machine.step(time, step, &mut line.slots) {
+            Ok(stepped) => by_itself = stepped == Stepped::Ended,
+            Err(why) => {
+                failure = Some(why.to_string());
+                break;
+            }
+        }
+        time += step;
+        let done = line.driver.exchange(time, &mut line.slots);
+        ticks += 1;
+        stale += u64::from(done.code == Code::Stale);
+        if done.code.code() < 0 {
+            let reason = line.driver.link().reason;
+            failure = Some(format!("the line failed: {reason}"));
+            break;
+        }
+        let now = clock.now();
+        line.look(now);
+        if let Some(due) = real_time.due(time, now) {
+            while clock.now() < due && !stop.is_stopped() {
+                clock.wait_until(due, stop);
+            }
+        }
+    }
+    // What happened in the last steps.
+    line.looked = Nanos::ZERO - LOOK;
+    line.look(clock.now());
+    let ended = machine.end();
+    let failure = failure.or(ended.err().map(|why| why.to_string()));
+    let statistics = stats.then(|| line.driver.statistics());
+    line.driver.end_tick(&line.slots);
+    line.driver.close();
+    if let Some(statistics) = statistics {
+        say(&format!("{statistics}\n"));
+    }
+    if by_itself {
+        say(&format!(
+            "run: the FMU has ended its simulation at {time}\n"
+        ));
+    }
+    match &failure {
+        None => say(&format!(
+            "run: ok ticks={ticks} time={time} stale={stale}\n"
+        )),
+        Some(why) => say(&format!(
+            "run: failed ticks={ticks} time={time} reason={why}\n"
+        )),
+    }
+    if failure.is_some() {
+        Outcome::BusFailed
+    } else {
+        Outcome::Done
+    }
+}

@@ -1,0 +1,375 @@
+//! The functions of FMI 2.0 and 3.0: what an importing tool calls in the FMU that `tickbus export --for fmi2` or `fmi3` makes.
+//!
+//! An instance is [`tickbus_fmi::made::Instance`]; here are the handles, the pointers of the caller, and the way of messages into
+//! the tool's own log. A function never unwinds into its caller, and never calls back while it has the instance.
+
+#![allow(
+    unsafe_code,
+    reason = "exported names and the pointers that an importing tool hands in"
+)]
+
+mod three;
+mod two;
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+use std::sync::Once;
+
+use log::Level;
+use tickbus_base::os::{Library, collect_log, has_log, own_file, take_log};
+use tickbus_binding::{Handles, closing, panic_message};
+use tickbus_driver::Code;
+use tickbus_fmi::made::{Instance, folder_of};
+use tickbus_fmi::{Status, Version};
+
+/// Every instance of FMUs that this library is in.
+static INSTANCES: Handles<Box<Tenant>> = Handles::new();
+
+/// `fmi2CallbackLogger`. Its further arguments, which would be those of the format, are never there.
+type LoggerOfTwo = unsafe extern "C" fn(
+    env: *mut c_void,
+    name: *const c_char,
+    status: c_int,
+    category: *const c_char,
+    format: *const c_char,
+    ...
+);
+
+/// `fmi3LogMessageCallback`.
+type LoggerOfThree = unsafe extern "C" fn(
+    env: *mut c_void,
+    status: c_int,
+    category: *const c_char,
+    message: *const c_char,
+);
+
+/// The tool's function for messages.
+#[derive(Clone, Copy)]
+enum Logger {
+    Two(LoggerOfTwo),
+    Three(LoggerOfThree),
+}
+
+/// The tool's log, as one instance has it.
+#[derive(Clone)]
+struct Journal {
+    logger: Option<Logger>,
+    env: *mut c_void,
+    name: CString,
+    /// Whether the tool wants every change of the line.
+    all: bool,
+}
+
+// SAFETY: `env` is a number to this library, which hands it back to the tool's own function in calls that the tool has made. Both
+// standards let a tool call an instance from one thread after the other.
+unsafe impl Send for Journal {}
+
+/// An instance, and the log of the tool that has made it.
+struct Tenant {
+    instance: Instance,
+    journal: Journal,
+    /// The message of the panic that it has ended by.
+    broken: Option<String>,
+}
+
+impl Journal {
+    /// Tells the tool one message.
+    fn tell(&self, status: Status, category: &CStr, text: &str) {
+        let text = text.replace('\0', " ");
+        // The text is the format itself: tools that do not format would show "%s".
+        let text = match self.logger {
+            None => return eprintln!("tickbus: {text}"),
+            Some(Logger::Two(_)) => text.replace('%', "%%"),
+            Some(Logger::Three(_)) => text,
+        };
+        let text = CString::new(text).unwrap_or_default();
+        match self.logger {
+            None => {}
+            // SAFETY: the tool has handed in this function with this `env`, to be called during its calls; all texts outlive the
+            // call, and the format asks for no further argument.
+            Some(Logger::Two(logger)) => unsafe {
+                logger(
+                    self.env,
+                    self.name.as_ptr(),
+                    status as c_int,
+                    category.as_ptr(),
+                    text.as_ptr(),
+                );
+            },
+            // SAFETY: as above.
+            Some(Logger::Three(logger)) => unsafe {
+                logger(self.env, status as c_int, category.as_ptr(), text.as_ptr());
+            },
+        }
+    }
+
+    fn fail(&self, text: &str) {
+        self.tell(Status::Error, c"logStatusError", text);
+    }
+
+    /// Tells what tickbus has logged meanwhile, on whichever thread.
+    fn pass_on_log(&self) {
+        if !has_log() {
+            return;
+        }
+        for (level, text) in take_log() {
+            match level {
+                Level::Error | Level::Warn => {
+                    self.tell(Status::Warning, c"logStatusWarning", &text);
+                }
+                _ if self.all => self.tell(Status::Ok, c"logEvents", &text),
+                _ => {}
+            }
+        }
+    }
+}
+
+/// What a call has to tell when the instance is released.
+type Told = (Result<(), String>, Journal);
+
+/// Calls `work` with an instance, and answers with a status.
+#[inline]
+fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), String>) -> c_int {
+    let mut work = Some(work);
+    call_once(handle, &mut |instance| match work.take() {
+        Some(work) => work(instance),
+        None => Ok(()),
+    })
+}
+
+/// The same, once for all of the functions: there are more than a hundred.
+#[inline(never)]
+fn call_once(
+    handle: *mut c_void,
+    work: &mut dyn FnMut(&mut Instance) -> Result<(), String>,
+) -> c_int {
+    let done = INSTANCES.with(handle as i64, |tenant| tenant.work(work));
+    match done {
+        Ok(None) => Status::Ok as c_int,
+        Ok(Some(told)) => tell(told),
+        Err(code) => unknown(code),
+    }
+}
+
+impl Tenant {
+    #[inline]
+    fn work(&mut self, work: impl FnOnce(&mut Instance) -> Result<(), String>) -> Option<Told> {
+        if let Some(text) = &self.broken {
+            return Some((Err(text.clone()), self.journal.clone()));
+        }
+        match catch_unwind(AssertUnwindSafe(|| work(&mut self.instance))) {
+            Ok(Ok(())) if !has_log() => None,
+            Ok(result) => Some((result, self.journal.clone())),
+            Err(payload) => {
+                let text = panic_message(payload);
+                let text = format!("a defect of tickbus: {text}; please report it");
+                self.broken = Some(text.clone());
+                Some((Err(text), self.journal.clone()))
+            }
+        }
+    }
+}
+
+#[cold]
+fn tell((result, journal): Told) -> c_int {
+    journal.pass_on_log();
+    match result {
+        Ok(()) => Status::Ok as c_int,
+        Err(text) => {
+            journal.fail(&text);
+            Status::Error as c_int
+        }
+    }
+}
+
+/// There is no instance whose log could be told.
+#[cold]
+fn unknown(code: Code) -> c_int {
+    let what = match code {
+        Code::Busy => "two threads call one instance at once; let one follow the other",
+        Code::Closed => "this instance was freed before",
+        _ => "there is no such instance",
+    };
+    eprintln!("tickbus: {what}");
+    Status::Error as c_int
+}
+
+/// Keeps this library in the process for good: threads of it may outlast an instance.
+fn pin() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        collect_log();
+        if let Ok(library) = own_file().map(|file| Library::load(&file)) {
+            std::mem::forget(library);
+        }
+    });
+}
+
+/// Makes an instance; null if that fails, which the tool is told why.
+fn instantiate(
+    version: Version,
+    named: Option<&Path>,
+    token: &str,
+    journal: &Journal,
+) -> *mut c_void {
+    let made = catch_unwind(AssertUnwindSafe(|| {
+        pin();
+        let place = INSTANCES.reserve().map_err(|refusal| refusal.to_string())?;
+        let own = own_file().ok();
+        let folder = folder_of(named, own.as_deref()).ok_or(
+            "the importing tool names no folder of resources; an FMU of tickbus has its driver.cfg there",
+        )?;
+        let instance = Instance::new(version, &folder, token)?;
+        let tenant = Box::new(Tenant {
+            instance,
+            journal: journal.clone(),
+            broken: None,
+        });
+        Ok(place.fill(tenant) as *mut c_void)
+    }));
+    let made = made
+        .unwrap_or_else(|payload| Err(format!("a defect of tickbus: {}", panic_message(payload))));
+    journal.pass_on_log();
+    made.unwrap_or_else(|text: String| {
+        journal.fail(&text);
+        std::ptr::null_mut()
+    })
+}
+
+/// Ends an instance.
+fn free(handle: *mut c_void) {
+    if handle.is_null() {
+        return;
+    }
+    // Closing may panic, as all can that runs a bus.
+    let freed = catch_unwind(AssertUnwindSafe(|| {
+        closing(|| {
+            INSTANCES.close(handle as i64, |mut tenant| {
+                tenant.instance.terminate();
+                tenant.journal.clone()
+            })
+        })
+    }));
+    match freed {
+        Ok(Ok(journal)) => journal.pass_on_log(),
+        Ok(Err(code)) => _ = unknown(code),
+        Err(payload) => eprintln!("tickbus: {}", panic_message(payload)),
+    }
+}
+
+/// Whether the tool wants every change of the line.
+fn set_logging(handle: *mut c_void, all: bool) -> c_int {
+    let done = INSTANCES.with(handle as i64, |tenant| tenant.journal.all = all);
+    done.map_or_else(unknown, |()| Status::Ok as c_int)
+}
+
+/// Answers a call of a function that this FMU says it has not.
+fn lacking(handle: *mut c_void, name: &str) -> c_int {
+    call(handle, |_| {
+        Err(format!(
+            "{name} is not in this FMU, as its modelDescription.xml says; choose another master algorithm"
+        ))
+    })
+}
+
+/// The text behind a pointer; `None` for NULL and what is not UTF-8.
+///
+/// # Safety
+///
+/// `text` must be null or point to a C string that stays while it is used.
+unsafe fn text<'a>(text: *const c_char) -> Option<&'a str> {
+    if text.is_null() {
+        return None;
+    }
+    // SAFETY: the caller's promise.
+    unsafe { CStr::from_ptr(text) }.to_str().ok()
+}
+
+/// What a pointer and a length hand in; empty for NULL.
+///
+/// # Safety
+///
+/// `first` must be null or point to `count` initialised values, which nobody changes meanwhile.
+#[inline]
+unsafe fn list<'a, T>(first: *const T, count: usize) -> &'a [T] {
+    if first.is_null() || count == 0 {
+        return &[];
+    }
+    // SAFETY: the caller's promise.
+    unsafe { std::slice::from_raw_parts(first, count) }
+}
+
+/// The same to write into.
+///
+/// # Safety
+///
+/// As [`list`]; and nobody reads there meanwhile.
+#[inline]
+unsafe fn room<'a, T>(first: *mut T, count: usize) -> &'a mut [T] {
+    if first.is_null() || count == 0 {
+        return &mut [];
+    }
+    // SAFETY: the caller's promise.
+    unsafe { std::slice::from_raw_parts_mut(first, count) }
+}
+
+/// Refuses lists of different lengths.
+#[inline]
+fn same(references: usize, asked: usize, values: usize) -> Result<(), String> {
+    if references == asked && values == asked {
+        return Ok(());
+    }
+    Err(format!(
+        "{asked} variables with {references} value references and {values} values: each has one, and no pointer may be NULL"
+    ))
+}
+
+/// Sets texts.
+///
+/// # Safety
+///
+/// `references` and `values` must be null or point to `count` of them, each value null or a C string.
+unsafe fn set_texts(
+    handle: *mut c_void,
+    references: *const u32,
+    count: usize,
+    values: *const *const c_char,
+) -> c_int {
+    // SAFETY: the caller's promise, here and below.
+    let (references, values) = unsafe { (list(references, count), list(values, count)) };
+    call(handle, |instance| {
+        same(references.len(), count, values.len())?;
+        for (&reference, &value) in references.iter().zip(values) {
+            if value.is_null() {
+                return Err("a text is NULL; hand in an empty one".to_owned());
+            }
+            // SAFETY: as above.
+            let value = unsafe { CStr::from_ptr(value) };
+            instance.set_text(reference, value.to_owned())?;
+        }
+        Ok(())
+    })
+}
+
+/// Gets texts, which stay until they are set again.
+///
+/// # Safety
+///
+/// `references` and `values` must be null or point to `count` of them.
+unsafe fn get_texts(
+    handle: *mut c_void,
+    references: *const u32,
+    count: usize,
+    values: *mut *const c_char,
+) -> c_int {
+    // SAFETY: the caller's promise.
+    let (references, values) = unsafe { (list(references, count), room(values, count)) };
+    call(handle, |instance| {
+        same(references.len(), count, values.len())?;
+        for (&reference, value) in references.iter().zip(values) {
+            *value = instance.text(reference)?.as_ptr();
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,257 @@
+//! The functions of FMI 2.0, `fmi2Functions.h`.
+#![allow(non_snake_case, reason = "the names are the standard's")]
+
+use std::ffi::{CString, c_char, c_int, c_uint, c_void};
+use std::ptr::null_mut;
+
+use tickbus_fmi::made::folder_of_uri;
+use tickbus_fmi::{Status, Version};
+
+use super::{
+    Journal, Logger, LoggerOfTwo, call, free, get_texts, instantiate, lacking, list, room, same,
+    set_logging, set_texts, text,
+};
+
+/// `fmi2Error`.
+const ERROR: c_int = Status::Error as c_int;
+
+/// `fmi2CallbackFunctions`; what this library does not call is not typed.
+#[repr(C)]
+struct Callbacks {
+    logger: Option<LoggerOfTwo>,
+    allocate: *const c_void,
+    release: *const c_void,
+    step_finished: *const c_void,
+    env: *mut c_void,
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+    c"default".as_ptr()
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2GetVersion() -> *const c_char {
+    c"2.0".as_ptr()
+}
+
+/// # Safety
+///
+/// As `fmi2Functions.h` says, as for all functions here: texts are C strings or null, lists have as many values as the call says,
+/// and `callbacks` stays as long as the instance.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2Instantiate(
+    name: *const c_char,
+    kind: c_int,
+    guid: *const c_char,
+    resources: *const c_char,
+    callbacks: *const Callbacks,
+    _visible: c_int,
+    logging: c_int,
+) -> *mut c_void {
+    // SAFETY: the caller's promises, here and below.
+    let (name, guid, resources) = unsafe { (text(name), text(guid), text(resources)) };
+    // SAFETY: as above.
+    let callbacks = unsafe { callbacks.as_ref() };
+    let journal = Journal {
+        logger: callbacks.and_then(|all| all.logger).map(Logger::Two),
+        env: callbacks.map_or(null_mut(), |all| all.env),
+        name: CString::new(name.unwrap_or("tickbus")).unwrap_or_default(),
+        all: logging != 0,
+    };
+    if kind != 1 {
+        journal.fail("this FMU is for co-simulation alone; choose that in the importing tool");
+        return null_mut();
+    }
+    let folder = resources.map(folder_of_uri);
+    instantiate(
+        Version::Two,
+        folder.as_deref(),
+        guid.unwrap_or_default(),
+        &journal,
+    )
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2FreeInstance(instance: *mut c_void) {
+    free(instance);
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetDebugLogging(
+    instance: *mut c_void,
+    logging: c_int,
+    _count: usize,
+    _categories: *const *const c_char,
+) -> c_int {
+    set_logging(instance, logging != 0)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2SetupExperiment(
+    instance: *mut c_void,
+    _has_tolerance: c_int,
+    _tolerance: f64,
+    start: f64,
+    _has_stop: c_int,
+    _stop: f64,
+) -> c_int {
+    call(instance, |instance| instance.begin_at(start))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2EnterInitializationMode(instance: *mut c_void) -> c_int {
+    call(instance, |_| Ok(()))
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2ExitInitializationMode(instance: *mut c_void) -> c_int {
+    call(instance, tickbus_fmi::made::Instance::open)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Terminate(instance: *mut c_void) -> c_int {
+    call(instance, |instance| {
+        instance.terminate();
+        Ok(())
+    })
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2Reset(instance: *mut c_void) -> c_int {
+    call(instance, |instance| {
+        instance.reset();
+        Ok(())
+    })
+}
+
+macro_rules! numbers {
+    ($($get:ident, $set:ident: $own:ty as $outer:ty;)+) => {$(
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $get(instance: *mut c_void, references: *const c_uint, count: usize, values: *mut $outer) -> c_int {
+            // SAFETY: the caller's promises, as for `fmi2Instantiate`.
+            let (references, values) = unsafe { (list(references, count), room(values, count)) };
+            call(instance, |instance| {
+                same(references.len(), count, values.len())?;
+                instance.get(references, |at, value: $own| values[at] = value.into())
+            })
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $set(instance: *mut c_void, references: *const c_uint, count: usize, values: *const $outer) -> c_int {
+            // SAFETY: as above.
+            let (references, values) = unsafe { (list(references, count), list(values, count)) };
+            call(instance, |instance| {
+                same(references.len(), count, values.len())?;
+                instance.set(references, values.iter().map(|&value| <$own as Inner<$outer>>::inner(value)))
+            })
+        }
+    )+};
+}
+
+/// A value as the standard's type has it.
+trait Inner<O> {
+    fn inner(outer: O) -> Self;
+}
+
+impl Inner<f64> for f64 {
+    #[inline]
+    fn inner(outer: f64) -> Self {
+        outer
+    }
+}
+
+impl Inner<c_int> for i32 {
+    #[inline]
+    fn inner(outer: c_int) -> Self {
+        outer
+    }
+}
+
+impl Inner<c_int> for bool {
+    #[inline]
+    fn inner(outer: c_int) -> Self {
+        outer != 0
+    }
+}
+
+numbers! {
+    fmi2GetReal, fmi2SetReal: f64 as f64;
+    fmi2GetInteger, fmi2SetInteger: i32 as c_int;
+    fmi2GetBoolean, fmi2SetBoolean: bool as c_int;
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetString(
+    instance: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *mut *const c_char,
+) -> c_int {
+    // SAFETY: the caller's promises, as for `fmi2Instantiate`.
+    unsafe { get_texts(instance, references, count, values) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2SetString(
+    instance: *mut c_void,
+    references: *const c_uint,
+    count: usize,
+    values: *const *const c_char,
+) -> c_int {
+    // SAFETY: the caller's promises, as for `fmi2Instantiate`.
+    unsafe { set_texts(instance, references, count, values) }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn fmi2DoStep(
+    instance: *mut c_void,
+    from: f64,
+    length: f64,
+    _no_set_prior: c_int,
+) -> c_int {
+    call(instance, |instance| instance.step(from, length))
+}
+
+/// No step is ever pending, and none was discarded.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetBooleanStatus(
+    _instance: *mut c_void,
+    _kind: c_int,
+    value: *mut c_int,
+) -> c_int {
+    if value.is_null() {
+        return ERROR;
+    }
+    // SAFETY: the caller's promise, as for `fmi2Instantiate`.
+    unsafe { value.write(0) };
+    Status::Ok as c_int
+}
+
+/// Functions that the model description does without. Those of C that have more parameters than this one are called all the
+/// same: the caller removes them.
+macro_rules! lacking {
+    ($($name:ident,)+) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(instance: *mut c_void) -> c_int {
+            lacking(instance, stringify!($name))
+        }
+    )+};
+}
+
+lacking! {
+    fmi2GetFMUstate,
+    fmi2SetFMUstate,
+    fmi2FreeFMUstate,
+    fmi2SerializedFMUstateSize,
+    fmi2SerializeFMUstate,
+    fmi2DeSerializeFMUstate,
+    fmi2GetDirectionalDerivative,
+    fmi2SetRealInputDerivatives,
+    fmi2GetRealOutputDerivatives,
+    fmi2CancelStep,
+    fmi2GetStatus,
+    fmi2GetRealStatus,
+    fmi2GetIntegerStatus,
+    fmi2GetStringStatus,
+}

@@ -1,0 +1,8 @@
+//! FMI, without foreign programs: FMUs in C as machine and as PLC, wrong and hostile FMUs, and what the export writes.
+#![cfg(not(no_cc))]
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+mod export;
+mod fixture;
+mod run;
+mod wrong;

@@ -1,0 +1,86 @@
+/* An FMU of FMI 2.0 that misbehaves as its token says. Value reference 0 is its one input, 1 its one output. */
+
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef void (*Logger)(void *env, const char *name, int status, const char *category, const char *format, ...);
+
+typedef struct {
+    Logger logger;
+    void *allocate, *release, *finished, *env;
+} Callbacks;
+
+static const Callbacks *callbacks;
+static char how[40];
+static double now;
+
+static int is(const char *what) { return strcmp(how, what) == 0; }
+
+static void say(int status, const char *text) { callbacks->logger(callbacks->env, "it", status, "logAll", "%s", text); }
+
+void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *resources, const Callbacks *with, int visible,
+                      int logging) {
+    (void)name, (void)kind, (void)resources, (void)visible, (void)logging;
+    callbacks = with;
+    strncpy(how, guid, sizeof how - 1);
+    now = 0.0;
+    if (is("null")) {
+        say(3, "no licence on this computer");
+        return NULL;
+    }
+    return how;
+}
+
+void fmi2FreeInstance(void *it) { (void)it; }
+
+int fmi2SetupExperiment(void *it, int a, double b, double c, int d, double e) { return (void)it, (void)a, (void)b, (void)c, (void)d, (void)e, 0; }
+int fmi2EnterInitializationMode(void *it) { return (void)it, 0; }
+int fmi2ExitInitializationMode(void *it) { return (void)it, is("refuses") ? 3 : 0; }
+int fmi2Terminate(void *it) { return (void)it, 0; }
+
+int fmi2GetReal(void *it, const uint32_t *vr, size_t n, double *values) {
+    (void)it, (void)vr;
+    for (size_t i = 0; i < n; i++) {
+        values[i] = now;
+    }
+    return 0;
+}
+
+int fmi2SetReal(void *it, const uint32_t *vr, size_t n, const double *values) { return (void)it, (void)vr, (void)n, (void)values, 0; }
+int fmi2GetInteger(void *it, const uint32_t *vr, size_t n, int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
+int fmi2SetInteger(void *it, const uint32_t *vr, size_t n, const int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
+int fmi2GetBoolean(void *it, const uint32_t *vr, size_t n, int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
+int fmi2SetBoolean(void *it, const uint32_t *vr, size_t n, const int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
+
+int fmi2DoStep(void *it, double from, double length, int prior) {
+    (void)it, (void)prior;
+    /* The third step, whatever the rounding. */
+    if (from < 2.5 * length) {
+        now = from + length;
+        return 0;
+    }
+    if (is("crash")) {
+        *(volatile int *)0 = 1;
+    } else if (is("abort")) {
+        abort();
+    } else if (is("exit")) {
+        exit(7);
+    } else if (is("discard") || is("ended")) {
+        return 2;
+    } else if (is("fatal")) {
+        say(4, "the solver has lost its matrix");
+        return 4;
+    } else if (is("error")) {
+        return 3;
+    } else if (is("print")) {
+        write(1, "hello\n", 6);
+    }
+    now = from + length;
+    return 0;
+}
+
+int fmi2GetBooleanStatus(void *it, int kind, int *value) { return (void)it, (void)kind, *value = is("ended"), 0; }
+int fmi2GetRealStatus(void *it, int kind, double *value) { return (void)it, (void)kind, *value = now, 0; }

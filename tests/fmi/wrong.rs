@@ -1,0 +1,265 @@
+//! FMUs that are cut, hostile, for something else, or that misbehave: each is a sentence that says what to do.
+
+use std::fs::{self, File};
+use std::path::Path;
+
+use zip::{ZipArchive, ZipWriter};
+
+use crate::fixture::{
+    CONFIG, Entry, archive, description, err, misbehaving, misbehaving_as, out, tickbus,
+};
+
+const RUN: [&str; 6] = ["run", "it.fmu", "--config", "it.cfg", "--duration", "1s"];
+
+/// What `tickbus run` says of an archive with these entries.
+fn told(entries: &[Entry<'_>]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    archive(&folder.path().join("it.fmu"), entries);
+    told_in(folder.path())
+}
+
+fn told_in(folder: &Path) -> String {
+    fs::write(folder.join("it.cfg"), CONFIG).expect("a file");
+    let output = tickbus(folder, &RUN);
+    assert_eq!(output.status.code(), Some(1), "{}", out(&output));
+    assert_eq!(out(&output), "");
+    let told = err(&output);
+    assert!(told.ends_with("\nrun: failed mistakes=1\n"), "{told}");
+    told
+}
+
+#[test]
+fn archives_that_are_cut_or_none_say_so() {
+    let folder = misbehaving_as("ok");
+    let file = folder.path().join("it.fmu");
+    let whole = fs::read(&file).expect("the FMU");
+    for length in [0, 1, 100, whole.len() / 2, whole.len() - 1] {
+        fs::write(&file, &whole[..length]).expect("a file");
+        let told = told_in(folder.path());
+        assert!(
+            told.starts_with("it.fmu: this is no whole archive: "),
+            "{length}: {told}"
+        );
+        assert!(told.contains("; get the FMU anew; it may be cut"), "{told}");
+    }
+    // A byte within the library: its checksum tells.
+    let mut bent = whole;
+    bent[2000] ^= 0x55;
+    fs::write(&file, bent).expect("a file");
+    let told = told_in(folder.path());
+    assert!(told.contains("get the FMU anew"), "{told}");
+}
+
+#[test]
+fn archives_that_would_harm_are_refused_before_a_byte_is_written() {
+    let right = description("ok");
+    let right = Entry::File("modelDescription.xml", right.as_bytes());
+    for name in [
+        "/tmp/tickbus-was-here",
+        "../tickbus-was-here",
+        "resources/../../tickbus-was-here",
+        "resources\\..\\x",
+        "C:/x",
+    ] {
+        let told = told(&[
+            Entry::File("modelDescription.xml", description("ok").as_bytes()),
+            Entry::File(name, b"x"),
+        ]);
+        assert!(
+            told.contains("\" would be unpacked outside of its folder; do not use this FMU"),
+            "{told}"
+        );
+    }
+    assert!(!Path::new("/tmp/tickbus-was-here").exists());
+    let link = told(&[right, Entry::Link("resources/x", "/etc/passwd")]);
+    assert!(
+        link.contains("\"resources/x\" is a link; do not use this FMU"),
+        "{link}"
+    );
+}
+
+#[test]
+fn bombs_are_refused_by_what_they_state_and_by_what_they_are() {
+    // 1.2 GB of nothing: one entry, and 29 copies of what it was compressed to.
+    let folder = tempfile::tempdir().expect("a folder");
+    let one = folder.path().join("one.zip");
+    archive(&one, &[Entry::File("resources/0", &vec![0; 40 << 20])]);
+    let mut one = ZipArchive::new(File::open(&one).expect("a file")).expect("an archive");
+    let mut bomb = ZipWriter::new(File::create(folder.path().join("it.fmu")).expect("a file"));
+    for number in 0..30 {
+        let entry = one.by_index_raw(0).expect("it is there");
+        bomb.raw_copy_file_rename(entry, format!("resources/{number}"))
+            .expect("room");
+    }
+    bomb.finish().expect("room");
+    let told = told_in(folder.path());
+    assert!(
+        told.contains(
+            "it has 1200 MB when it is unpacked, and the most is 1024 MB; do not use this FMU"
+        ),
+        "{told}"
+    );
+    let laughs = "<?xml version=\"1.0\"?><!DOCTYPE a [<!ENTITY b \"ha\"><!ENTITY c \"&b;&b;&b;\">]><fmiModelDescription>&c;</fmiModelDescription>";
+    let told = self::told(&[Entry::File("modelDescription.xml", laughs.as_bytes())]);
+    assert!(told.contains("this is no XML: "), "{told}");
+}
+
+#[test]
+fn what_is_for_something_else_says_for_what() {
+    let two = description("ok");
+    let file = |text: &'static str| [Entry::File("modelDescription.xml", text.as_bytes())];
+    let told_of = |entries: &[Entry<'_>], words: &str| {
+        let told = told(entries);
+        assert!(told.contains(words), "{words}\n{told}");
+    };
+    told_of(
+        &[Entry::File("readme", b"")],
+        "there is no modelDescription.xml at the top of the archive",
+    );
+    told_of(
+        &file("<fmiModelDescription fmiVersion=\"1.0\"/>"),
+        "it.fmu/modelDescription.xml:1:1: this is FMI 1.0; export the FMU for FMI 2.0 or 3.0, co-simulation",
+    );
+    told_of(
+        &file(
+            "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"x\"><ModelExchange modelIdentifier=\"x\"/></fmiModelDescription>",
+        ),
+        "this FMU is for model exchange alone: it needs a solver for its states and events; export it for co-simulation",
+    );
+    told_of(
+        &[Entry::File("modelDescription.xml", two.as_bytes())],
+        "it has no library at all, and needs one for linux64",
+    );
+    told_of(
+        &[
+            Entry::File("modelDescription.xml", two.as_bytes()),
+            Entry::File("binaries/win64/it.dll", b"x"),
+        ],
+        "it has libraries for win64, and none for linux64; export it for this platform, or run it where it is for",
+    );
+    told_of(
+        &[
+            Entry::File("modelDescription.xml", two.as_bytes()),
+            Entry::File("sources/it.c", b"x"),
+        ],
+        "it has sources, and no library for linux64; compile it",
+    );
+    told_of(
+        &[
+            Entry::File("modelDescription.xml", two.as_bytes()),
+            Entry::File("binaries/linux64/other.so", b"x"),
+        ],
+        "it has no binaries/linux64/it.so",
+    );
+    let odd = two.replace("<Real/>", "<Complex/>");
+    told_of(
+        &[Entry::File("modelDescription.xml", odd.as_bytes())],
+        "it.fmu/modelDescription.xml:6:68: there is no type \"Complex\" in this version of FMI",
+    );
+}
+
+#[test]
+fn a_library_that_is_none_or_lacks_functions_says_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("it.cfg"), CONFIG).expect("a file");
+    let tank = fs::read(misbehaving()).expect("a library");
+    let three = "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"x\"><CoSimulation modelIdentifier=\"it\"/>\
+                 <ModelVariables><Float64 name=\"Level\" valueReference=\"1\" causality=\"output\"/></ModelVariables></fmiModelDescription>";
+    let two = description("ok");
+    for (text, library, words) in [
+        (
+            &*two,
+            ("binaries/linux64/it.so", &b"no library"[..]),
+            "it.fmu: its library cannot be loaded: ",
+        ),
+        (
+            three,
+            ("binaries/x86_64-linux/it.so", &tank),
+            "it.fmu: its library has no function fmi3InstantiateCoSimulation; export it again",
+        ),
+    ] {
+        let entries = [
+            Entry::File("modelDescription.xml", text.as_bytes()),
+            Entry::File(library.0, library.1),
+        ];
+        archive(&folder.path().join("it.fmu"), &entries);
+        let output = tickbus(folder.path(), &RUN);
+        assert_eq!(output.status.code(), Some(3), "{}", out(&output));
+        assert!(err(&output).contains(words), "{words}\n{}", err(&output));
+    }
+}
+
+/// How the FMU misbehaves in its third step, and what is said of it; in this process and in a helper.
+#[test]
+fn discard_error_fatal_and_a_refused_beginning_are_told() {
+    for (how, words) in [
+        (
+            "discard",
+            "it.fmu: it discards the step of 0.01 s at 0.03 s, and got to 0.03 s: give it shorter ones",
+        ),
+        (
+            "error",
+            "it.fmu: the step of 0.01 s at 0.03 s failed, and does not say why; ask whoever made it",
+        ),
+        (
+            "fatal",
+            "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal); it says: the solver has lost its matrix",
+        ),
+        (
+            "null",
+            "it.fmu: it makes no instance of itself; it says: no licence on this computer",
+        ),
+        ("refuses", "it.fmu: its initialisation failed"),
+    ] {
+        let folder = misbehaving_as(how);
+        for isolated in [&[][..], &["--isolated"]] {
+            let output = tickbus(folder.path(), &[&RUN, isolated].concat());
+            let told = out(&output) + &err(&output);
+            assert_eq!(output.status.code(), Some(3), "{told}");
+            assert!(told.contains(words), "{how} {isolated:?}: {told}");
+        }
+    }
+}
+
+#[test]
+fn an_fmu_that_ends_its_simulation_has_not_failed() {
+    let folder = misbehaving_as("ended");
+    let output = tickbus(folder.path(), &RUN);
+    let told = out(&output);
+    assert_eq!(output.status.code(), Some(0), "{told}");
+    assert!(
+        told.contains("run: the FMU has ended its simulation at 40ms\nrun: ok ticks=4 "),
+        "{told}"
+    );
+}
+
+#[test]
+fn a_crash_in_a_helper_is_a_sentence_and_the_recording_is_whole() {
+    for (how, words) in [
+        (
+            "crash",
+            "it.fmu: its process crashed (SIGSEGV, an access to memory that is not its own) in the step of 0.01 s at 0.03 s",
+        ),
+        ("abort", "it.fmu: its process aborted (SIGABRT)"),
+        (
+            "exit",
+            "it.fmu: its process ended by itself, with exit code 7,",
+        ),
+    ] {
+        let folder = misbehaving_as(how);
+        let output = tickbus(
+            folder.path(),
+            &[&RUN[..], &["--isolated", "--record", "run.csv"]].concat(),
+        );
+        let told = out(&output);
+        assert_eq!(output.status.code(), Some(3), "{told}");
+        assert!(told.contains(words), "{how}: {told}");
+        let record = fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
+        assert_eq!(record.lines().count(), 1 + 3, "{record}");
+    }
+    // What it prints does not disturb the talk.
+    let folder = misbehaving_as("print");
+    let output = tickbus(folder.path(), &[&RUN[..], &["--isolated"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{}", out(&output));
+    assert!(err(&output).contains("hello"), "{}", err(&output));
+}

@@ -1,0 +1,302 @@
+//! FMUs of tickbus in tools that others wrote, and FMUs that others made as machines of tickbus.
+#![allow(missing_docs, reason = "a test")]
+
+#[path = "fmi/fixture.rs"]
+mod fixture;
+mod foreign;
+
+use std::path::Path;
+use std::process::{Command, ExitCode};
+use std::sync::OnceLock;
+
+use fixture::{library, tanks};
+use foreign::Absent;
+use tempfile::TempDir;
+use tickbus::driver::Driver;
+use tickbus::driver_cfg::Config;
+use tickbus::signal::{Area, DataType, Slot};
+use tickbus::time::{Manual, Nanos};
+use tickbus_test_log as logged;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+fn main() -> ExitCode {
+    foreign::main(&[
+        ("fmpy_validates_and_runs_both_versions", in_fmpy),
+        ("every_misuse_of_the_functions_has_an_answer", misuse),
+        ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
+        ("the_example_s_tank_is_one_for_others_too", tank),
+        ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
+        ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
+        ("an_fmu_by_pythonfmu_is_the_machine", by_pythonfmu),
+    ])
+}
+
+/// A Python with the tools.
+fn python() -> Result<Command, Absent> {
+    if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
+        return Err(Absent(
+            "the tools' own libraries are for Linux on x86-64".to_owned(),
+        ));
+    }
+    foreign::python_with(
+        "fmi",
+        &[
+            "fmpy",
+            "libcosimpy",
+            "pythonfmu",
+            "fmu_manipulation_toolbox",
+        ],
+    )
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).trim().to_owned()
+}
+
+/// Runs `tests/peers/fmi_tools.py`; its one line says ok.
+fn tool(arguments: &[&str]) -> Result<(), Absent> {
+    let mut python = python()?;
+    let script = Path::new(ROOT).join("tests/peers/fmi_tools.py");
+    let output = python
+        .arg(script)
+        .args(arguments)
+        .output()
+        .expect("it starts");
+    let (told, complaint) = (text(&output.stdout), text(&output.stderr));
+    assert!(
+        output.status.success() && told.contains("fmi_tools: ok"),
+        "{arguments:?}\n{told}\n{complaint}"
+    );
+    Ok(())
+}
+
+/// The FMU of a driver.cfg, in a folder of its own.
+fn export(config: &Path, version: &str) -> (TempDir, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let fmu = folder.path().join("driver.fmu");
+    let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .arg("export")
+        .arg(config)
+        .args(["--for", version, "--library"])
+        .arg(library())
+        .arg("--out")
+        .arg(&fmu)
+        .output()
+        .expect("it runs");
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let fmu = fmu.to_str().expect("UTF-8").to_owned();
+    (folder, fmu)
+}
+
+/// The FMUs of tests/fmi/types.cfg, in both versions.
+fn types() -> [&'static str; 2] {
+    static MADE: OnceLock<[(TempDir, String); 2]> = OnceLock::new();
+    let config = Path::new(ROOT).join("tests/fmi/types.cfg");
+    let made = MADE.get_or_init(|| ["fmi2", "fmi3"].map(|version| export(&config, version)));
+    [&made[0].1, &made[1].1]
+}
+
+fn in_fmpy() -> Result<(), Absent> {
+    python()?;
+    types().into_iter().try_for_each(|fmu| tool(&["fmpy", fmu]))
+}
+
+fn misuse() -> Result<(), Absent> {
+    python()?;
+    types()
+        .into_iter()
+        .try_for_each(|fmu| tool(&["misuse", fmu]))
+}
+
+fn in_toolbox() -> Result<(), Absent> {
+    python()?;
+    types()
+        .into_iter()
+        .try_for_each(|fmu| tool(&["toolbox", fmu]))
+}
+
+fn tank() -> Result<(), Absent> {
+    python()?;
+    for fmu in ["tank2.fmu", "tank3.fmu"] {
+        tool(&["tank", tanks().join(fmu).to_str().expect("UTF-8")])?;
+    }
+    Ok(())
+}
+
+fn in_libcosim() -> Result<(), Absent> {
+    python()?;
+    tool(&["cosim", types()[0]])
+}
+
+/// The rig's signals with its program stepped: 2000 ticks with the same inputs, in an FMU under `FMPy`, in C and in Rust.
+fn rig() -> Result<(), Absent> {
+    python()?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let rig =
+        std::fs::read_to_string(Path::new(ROOT).join("driver.cfg")).expect("the rig's driver.cfg");
+    let signals = &rig[rig.find("[[signal]]").expect("signals")..];
+    let config = folder.path().join("driver.cfg");
+    let text = format!(
+        "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"rig\"\nmode = \"stepped\"\n{signals}"
+    );
+    std::fs::write(&config, text).expect("a file");
+    let own = folder.path().join("rust.vcd");
+    record(&config, &own);
+    let own = std::fs::read(own).expect("a recording");
+    for version in ["fmi2", "fmi3"] {
+        let (_folder, fmu) = export(&config, version);
+        let record = folder.path().join(format!("{version}.vcd"));
+        tool(&["rig", &fmu, record.to_str().expect("UTF-8")])?;
+        assert!(
+            std::fs::read(record).expect("a recording") == own,
+            "{version}: the recordings differ"
+        );
+    }
+    // And by the functions in C.
+    let record = folder.path().join("c.vcd");
+    let [library, config, file] =
+        [library(), &config, &record].map(|path| path.to_str().expect("UTF-8"));
+    tool(&["rig_in_c", library, config, file])?;
+    assert!(
+        std::fs::read(record).expect("a recording") == own,
+        "C: the recordings differ"
+    );
+    assert!(
+        own.len() > 100_000,
+        "much has happened: {} bytes",
+        own.len()
+    );
+    Ok(())
+}
+
+/// The same as `rig` in `tests/peers/fmi_tools.py`.
+fn record(config: &Path, file: &Path) {
+    let mut config = Config::load(config).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    config.record = Some(tickbus::record::Options::to(file).expect("a name"));
+    let _logged = logged::Watch::new();
+    let mut driver = Driver::open(config, Manual::new()).expect("opens");
+    let mut slots = driver.initial_slots();
+    let table = driver.config().table.clone();
+    let mut random = 1_u64;
+    for tick in 1..=2000_i64 {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let word = u32::try_from(random >> 32).expect("32 bits");
+        let (mut bits, mut reals) = (0, 0);
+        for (slot, signal) in slots.iter_mut().zip(&table.signals) {
+            if signal.area == Area::Output {
+                continue;
+            }
+            *slot = Slot::from_real(if signal.data_type == DataType::Bool {
+                bits += 1;
+                f64::from(word >> ((bits - 1) % 31) & 1)
+            } else {
+                reals += 1;
+                f64::from((word >> (3 * (reals - 1))) % 1000) / 4.0
+            });
+        }
+        driver.exchange(Nanos::from_millis(2 * tick), &mut slots);
+    }
+    driver.close();
+}
+
+/// A machine in Python, made an FMU by `PythonFMU`.
+const MACHINE: &str = "\
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+
+class Machine(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.level = 0.5
+        self.low = False
+        self.valve = False
+        self.register_variable(Boolean('valve', causality=Fmi2Causality.input, variability=Fmi2Variability.discrete))
+        self.register_variable(Real('level', causality=Fmi2Causality.output))
+        self.register_variable(Boolean('low', causality=Fmi2Causality.output, variability=Fmi2Variability.discrete))
+
+    def do_step(self, current_time, step_size):
+        self.level += (0.04 if self.valve else -0.04) * step_size
+        self.low = self.level < 0.4
+        return True
+";
+
+fn by_pythonfmu() -> Result<(), Absent> {
+    let mut python = python()?;
+    let folder = tempfile::tempdir().expect("a folder");
+    let script = folder.path().join("machine.py");
+    std::fs::write(&script, MACHINE).expect("a file");
+    let built = python
+        .args(["-m", "pythonfmu", "build", "-f"])
+        .arg(&script)
+        .arg("-d")
+        .arg(folder.path())
+        .output()
+        .expect("it starts");
+    assert!(
+        built.status.success(),
+        "{}{}",
+        text(&built.stdout),
+        text(&built.stderr)
+    );
+    // Its library is Python's, which it expects to be loaded already.
+    let mut python = self::python()?;
+    let asked = python
+        .args(["-c", "import sysconfig, os; print(os.path.join(sysconfig.get_config_var('LIBDIR'), sysconfig.get_config_var('INSTSONAME')))"])
+        .output()
+        .expect("it starts");
+    let shared = text(&asked.stdout);
+    if !shared.contains(".so") || !Path::new(&shared).exists() {
+        return Err(Absent(format!(
+            "this Python has no shared library ({shared}), which FMUs of PythonFMU need"
+        )));
+    }
+    for file in ["tank.cfg", "tank.toml"] {
+        let from = Path::new(ROOT).join("examples/fmu-tank").join(file);
+        let text = std::fs::read_to_string(from).expect("a file");
+        // It has no such parameter.
+        let text = text
+            .split("[parameters]")
+            .next()
+            .expect("a part")
+            .to_owned();
+        std::fs::write(folder.path().join(file), text).expect("a file");
+    }
+    let ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args([
+            "run",
+            "Machine.fmu",
+            "--config",
+            "tank.cfg",
+            "--map",
+            "tank.toml",
+            "--step",
+            "10ms",
+            "--duration",
+            "20s",
+            "--record",
+            "run.csv",
+        ])
+        .args(["--isolated"])
+        .env("LD_PRELOAD", &shared)
+        .current_dir(folder.path())
+        .output()
+        .expect("it runs");
+    let told = text(&ran.stdout);
+    assert!(ran.status.success(), "{told}\n{}", text(&ran.stderr));
+    assert!(
+        told.ends_with("run: ok ticks=2000 time=20s stale=0"),
+        "{told}"
+    );
+    let record = std::fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
+    let level: f64 = record
+        .lines()
+        .last()
+        .and_then(|line| line.rsplit(',').next())
+        .and_then(|value| value.parse().ok())
+        .expect("a level");
+    assert!((395.0..=405.0).contains(&level), "{level}");
+    Ok(())
+}

@@ -1,0 +1,330 @@
+"""Imports FMUs of tickbus with tools that others wrote: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
+
+    fmi_tools.py TOOL FMU...
+
+The FMU is that of tests/fmi/types.cfg: a PLC that brings every input back on the output of the same type. Prints one line,
+"fmi_tools: ok ...", or raises.
+"""
+
+import ctypes
+import sys
+import tempfile
+from pathlib import Path
+
+# What is sent in three steps, by the names in types.cfg.
+VALUES = {
+    "bool": [True, False, True],
+    "byte": [255, 0, 7],
+    "sint": [-128, 127, 0],
+    "usint": [255, 1, 2],
+    "word": [65535, 0, 258],
+    "int": [-32768, 32767, 5],
+    "uint": [65535, 0, 6],
+    "dword": [4294967295, 0, 7],
+    "dint": [-2147483648, 2147483647, 8],
+    "udint": [4294967295, 1, 9],
+    "real": [1.5, -0.25, 1e30],
+    "lword": [2**53, 0, 11],
+    "lint": [-(2**53), 2**53, 12],
+    "ulint": [2**53, 1, 13],
+    "lreal": [0.1, -1e300, 14.0],
+    "scaled": [100.0, 0.0, 250.0],
+}
+STEP = 0.01
+
+
+def close(a, b, name):
+    """Equal; a REAL and a scaled INT have fewer digits than a double."""
+    if name == "scaled":
+        return abs(a - b) <= 250.0 / 27648
+    if name == "real":
+        return a == ctypes.c_float(b).value or a == b
+    return a == b
+
+
+def groups(variables):
+    """Variables by type."""
+    by_type = {}
+    for name, (kind, reference) in variables.items():
+        by_type.setdefault(kind, []).append((name, reference))
+    return by_type
+
+
+def fmpy(path):
+    import fmpy
+    from fmpy import extract, read_model_description
+    from fmpy.fmi2 import FMU2Slave
+    from fmpy.fmi3 import FMU3Slave
+    from fmpy.validation import validate_fmu
+
+    problems = validate_fmu(path)
+    assert not problems, problems
+    description = read_model_description(path)
+    folder = extract(path)
+    lines = []
+    arguments = {
+        "guid": description.guid,
+        "modelIdentifier": description.coSimulation.modelIdentifier,
+        "unzipDirectory": folder,
+        "instanceName": "types",
+    }
+    is_two = description.fmiVersion == "2.0"
+    slave = (FMU2Slave if is_two else FMU3Slave)(**arguments)
+    if is_two:
+        # FMPy's own callbacks, but for the log.
+        from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
+
+        def log(_env, _name, status, category, message):
+            lines.append((status, category.decode(), message.decode()))
+
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(log)
+        callbacks.allocateMemory = defaultCallbacks.allocateMemory
+        callbacks.freeMemory = defaultCallbacks.freeMemory
+        slave.instantiate(callbacks=callbacks, loggingOn=True)
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+    else:
+        def log3(_env, status, category, message):
+            lines.append((status, category.decode(), message.decode()))
+
+        slave.instantiate(loggingOn=True, logMessage=log3)
+        slave.enterInitializationMode(startTime=0.0)
+    slave.exitInitializationMode()
+    named = {one.name: (one.type, one.valueReference) for one in description.modelVariables}
+    send = groups({name: named[f"{name} <in>"] for name in VALUES})
+    come = groups({name: named[f"{name} <out>"] for name in VALUES})
+    get = lambda kind, references: getattr(slave, f"get{kind}")(references)
+    # Their start values, which are the fail-safe ones.
+    assert get(*next((kind, [named["lreal <out>"][1]]) for kind in [named["lreal <out>"][0]])) == [-1.5]
+    time = 0.0
+    for turn in range(3):
+        for kind, some in send.items():
+            values = [VALUES[name][turn] for name, _ in some]
+            getattr(slave, f"set{kind}")([reference for _, reference in some], values)
+        # One step is a scan: what is sent in it comes back in the next.
+        for _ in range(2):
+            slave.doStep(time, STEP)
+            time += STEP
+        for kind, some in come.items():
+            found = get(kind, [reference for _, reference in some])
+            for (name, _), value in zip(some, found):
+                wanted = VALUES[name][turn]
+                assert close(value, wanted, name), (name, turn, value, wanted)
+    edges = named["bool <out>.edges"]
+    assert get(edges[0], [edges[1]])[0] in (0, 1)
+    status = named["bus.status"]
+    assert get(status[0], [status[1]]) == [0]
+    assert any("is running" in text for _, category, text in lines if category == "logEvents"), lines
+    # Time cannot go back: an error, and a sentence in the tool's log.
+    lines.clear()
+    try:
+        slave.doStep(0.0, STEP)
+    except Exception:  # noqa: BLE001 - FMPy's own
+        pass
+    else:
+        raise AssertionError("a step back in time was done")
+    assert any("time cannot go back" in text for _, _, text in lines), lines
+    # Again from the start.
+    slave.reset()
+    if is_two:
+        slave.setupExperiment(startTime=5.0)
+        slave.enterInitializationMode()
+    else:
+        slave.enterInitializationMode(startTime=5.0)
+    slave.exitInitializationMode()
+    slave.doStep(5.0, STEP)
+    slave.terminate()
+    slave.freeInstance()
+    # As a user calls it.
+    result = fmpy.simulate_fmu(folder, stop_time=0.5, output_interval=STEP, output=["bus.status"], model_description=description)
+    assert result["bus.status"][-1] in (0, 1), result[-1]
+    return f"version={description.fmiVersion} variables={len(named)}"
+
+
+def tank(path):
+    """The FMU of examples/fmu-tank, which this project's import is tested with, is one for others, too."""
+    import fmpy
+    from fmpy.validation import validate_fmu
+
+    problems = validate_fmu(path)
+    assert not problems, problems
+    result = fmpy.simulate_fmu(path, stop_time=1, start_values={"valve": True})
+    assert abs(result["level"][-1] - 0.52) < 1e-9, result[-1]
+    return "level=0.52"
+
+
+def toolbox(path):
+    import subprocess
+
+    tool = Path(sys.executable).with_name("fmutool")
+    done = subprocess.run([tool, "-input", path, "-check"], capture_output=True, text=True, check=False)
+    told = done.stdout + done.stderr
+    assert done.returncode == 0, told
+    assert "seems to be compliant" in told and "No semantic error" in told, told
+    return "checked"
+
+
+def cosim(path):
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    slave = CosimLocalSlave(fmu_path=path, instance_name="types")
+    execution = CosimExecution.from_step_size(step_size=int(STEP * 1e9))
+    index = execution.add_local_slave(local_slave=slave)
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer=observer)
+    manipulator = CosimManipulator.create_override()
+    execution.add_manipulator(manipulator=manipulator)
+    variables = {one.name.decode(): one.reference for one in execution.slave_variables(index)}
+    manipulator.slave_real_values(slave_index=index, variable_references=[variables["lreal <in>"]], values=[2.5])
+    manipulator.slave_boolean_values(slave_index=index, variable_references=[variables["bool <in>"]], values=[True])
+    for _ in range(4):
+        execution.step()
+    assert observer.last_real_values(slave_index=index, variable_references=[variables["lreal <out>"]])[0] == 2.5
+    assert observer.last_boolean_values(slave_index=index, variable_references=[variables["bool <out>"]])[0]
+    return "steps=4"
+
+
+def pathsim(path):
+    """By hand alone: pip install pathsim-fmi==0.1.1, which brings more than a test is worth."""
+    from fmpy import read_model_description
+    from pathsim import Connection, Simulation
+    from pathsim.blocks import Constant, Scope
+    from pathsim_fmi import CoSimulationFMU
+
+    variables = read_model_description(path).modelVariables
+    port = lambda name, causality: [one.name for one in variables if one.causality == causality].index(name)
+    unit, source, scope = CoSimulationFMU(path, dt=STEP), Constant(2.5), Scope()
+    wires = [
+        Connection(source, unit[port("lreal <in>", "input")]),
+        Connection(unit[port("lreal <out>", "output")], scope),
+    ]
+    Simulation([source, unit, scope], wires, dt=STEP).run(10 * STEP)
+    _, values = scope.read()
+    assert values[0][-1] == 2.5, values
+    return "steps=10"
+
+
+def misuse(path):
+    """The functions called as no tool should: every call has an answer, and the process lives."""
+    from fmpy import extract, read_model_description
+
+    description = read_model_description(path)
+    folder = Path(extract(path))
+    library = ctypes.CDLL(str(next(folder.glob("binaries/*/*.so"))))
+    is_two = description.fmiVersion == "2.0"
+    none, double, size = ctypes.c_void_p(None), ctypes.c_double, ctypes.c_size_t
+    uri = folder.joinpath("resources").as_uri().encode()
+    if is_two:
+        make = library.fmi2Instantiate
+        make.restype = ctypes.c_void_p
+        right = lambda guid, where: make(b"x", 1, guid, where, None, 0, 0)
+        assert make(None, 1, None, None, None, 0, 0) is None
+        assert make(b"x", 0, description.guid.encode(), uri, None, 0, 0) is None, "model exchange"
+        get, step = library.fmi2GetReal, library.fmi2DoStep
+    else:
+        make = library.fmi3InstantiateCoSimulation
+        make.restype = ctypes.c_void_p
+        right = lambda guid, where: make(b"x", guid, where, False, False, False, False, None, size(0), None, None, None)
+        assert right(None, None) is None
+        get, step = library.fmi3GetFloat64, library.fmi3DoStep
+    assert right(b"{another}", uri) is None
+    # Every form in which a folder may come; without any, the library finds its own.
+    plain = str(folder / "resources")
+    for where in [uri, uri + b"/", uri.replace(b"file:///", b"file:/"), plain.encode(), plain.encode() + b"/", b"file:///nowhere", None]:
+        handle = right(description.guid.encode(), where)
+        assert handle, where
+        free = library.fmi2FreeInstance if is_two else library.fmi3FreeInstance
+        free(ctypes.c_void_p(handle))
+        free(ctypes.c_void_p(handle))
+    handle = ctypes.c_void_p(right(description.guid.encode(), uri))
+    value, reference = (double * 1)(), (ctypes.c_uint32 * 1)(4000)
+    more = [] if is_two else [size(1)]
+    for instance in [none, ctypes.c_void_p(12345), handle]:
+        assert get(instance, reference, size(1), value, *more) == 3
+        assert get(instance, None, size(1), None, *more) == 3
+        assert step(instance, double(0), double(STEP), 1, None, None, None, None) == 3, "before the initialisation"
+    lacking = library.fmi2GetFMUstate if is_two else library.fmi3GetFMUState
+    assert lacking(handle, None) == 3
+    (library.fmi2FreeInstance if is_two else library.fmi3FreeInstance)(handle)
+    (library.fmi2FreeInstance if is_two else library.fmi3FreeInstance)(none)
+    return "lives"
+
+
+def rig(path, record):
+    """The rig of driver.cfg, its program stepped: the same inputs as in the test in Rust, recorded by the FMU."""
+    from fmpy import extract, read_model_description
+    from fmpy.fmi2 import FMU2Slave
+    from fmpy.fmi3 import FMU3Slave
+
+    description = read_model_description(path)
+    named = {one.name: one for one in description.modelVariables}
+    is_two = description.fmiVersion == "2.0"
+    slave = (FMU2Slave if is_two else FMU3Slave)(
+        guid=description.guid, modelIdentifier=description.coSimulation.modelIdentifier, unzipDirectory=extract(path), instanceName="rig"
+    )
+    slave.instantiate()
+    slave.setString([named["record"].valueReference], [record])
+    if is_two:
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+    else:
+        slave.enterInitializationMode(startTime=0.0)
+    slave.exitInitializationMode()
+    bits = [one.valueReference for one in description.modelVariables if one.causality == "input" and one.type == "Boolean"]
+    reals = [one.valueReference for one in description.modelVariables if one.causality == "input" and one.type != "Boolean"]
+    random = 1
+    for tick in range(2000):
+        random = (random * 6364136223846793005 + 1442695040888963407) % 2**64
+        word = random >> 32
+        slave.setBoolean(bits, [bool(word >> (at % 31) & 1) for at in range(len(bits))])
+        (slave.setReal if is_two else slave.setFloat64)(reals, [(word >> (3 * at)) % 1000 / 4 for at in range(len(reals))])
+        slave.doStep(tick * 0.002, 0.002)
+    slave.terminate()
+    slave.freeInstance()
+    return "steps=2000"
+
+
+def rig_in_c(library, config, record):
+    """The same by the functions of include/tickbus.h."""
+    native = ctypes.CDLL(library)
+    native.tb_buffer_of.restype = ctypes.POINTER(ctypes.c_uint64)
+    native.tb_last_error.restype = ctypes.c_char_p
+    driver = ctypes.c_int64()
+    tables = f'[record]\nfile = "{record}"'.encode()
+    assert native.tb_open(config.encode(), tables, ctypes.byref(driver)) == 0, native.tb_last_error()
+
+    class Signal(ctypes.Structure):
+        _fields_ = [(name, ctypes.c_char_p) for name in ("name", "address", "data_type", "unit", "station")]
+        _fields_ += [(name, ctypes.c_int32) for name in ("slot", "edges", "is_written", "kind")]
+
+    signals = [Signal() for _ in range(native.tb_signal_count(driver))]
+    for at, signal in enumerate(signals):
+        assert native.tb_signal_at(driver, at, ctypes.byref(signal)) == 0, native.tb_last_error()
+    written = [signal for signal in signals if signal.is_written]
+    bits = [8 + signal.slot for signal in written if signal.data_type == b"BOOL"]
+    reals = [8 + signal.slot for signal in written if signal.data_type != b"BOOL"]
+    words = native.tb_buffer_of(driver)
+    numbers = ctypes.cast(words, ctypes.POINTER(ctypes.c_double))
+    random = 1
+    for tick in range(2000):
+        random = (random * 6364136223846793005 + 1442695040888963407) % 2**64
+        word = random >> 32
+        for at, slot in enumerate(bits):
+            numbers[slot] = float(word >> (at % 31) & 1)
+        for at, slot in enumerate(reals):
+            numbers[slot] = (word >> (3 * at)) % 1000 / 4
+        words[4] = (tick + 1) * 2_000_000
+        assert native.tb_exchange(driver) >= 0, native.tb_last_error()
+    assert native.tb_close(driver) == 0
+    return "steps=2000"
+
+
+TOOLS = [fmpy, tank, toolbox, cosim, pathsim, misuse, rig, rig_in_c]
+
+if __name__ == "__main__":
+    tool, *arguments = sys.argv[1:]
+    print("fmi_tools: ok", {one.__name__: one for one in TOOLS}[tool](*arguments))

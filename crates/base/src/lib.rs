@@ -9,8 +9,10 @@
 
 mod mistake;
 pub mod os;
+mod percent;
 pub mod statistics;
 pub mod time;
 pub mod toml_text;
 
 pub use mistake::Mistake;
+pub use percent::percent_decoded;

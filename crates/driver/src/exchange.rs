@@ -18,8 +18,8 @@ use tickbus_image::Arrival;
 use tickbus_image::signal::Slot;
 
 use super::bus_handle::BusHandle;
-use super::statistics::TickTimes;
 use super::tick::Tick;
+use super::tick_counters::TickTimes;
 use super::{Code, Driver, Exchange};
 
 impl Driver {
@@ -300,6 +300,11 @@ impl Driver {
         }
         if matches!(self.line, BusHandle::Free(_)) && TickTimes::takes(self.counters.ticks) {
             self.samples.add(tick.taken, self.last.age);
+        }
+        if let Some(watched) = &self.watched
+            && watched.is_wanted()
+        {
+            self.serve_watch(tick, found.code, slots);
         }
     }
 

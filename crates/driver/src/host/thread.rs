@@ -6,10 +6,13 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::DriverError;
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
-use tickbus_base::os::wake_on_time;
+use crate::tick_counters::TickTimes;
+use crate::view::View;
+use crate::watch::{Figures, Watch};
+use crate::{DriverError, SlotMap};
+use tickbus_base::os::{dropped_log_lines, wake_on_time};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
@@ -21,6 +24,7 @@ use tickbus_record as record;
 use super::ScanCounters;
 use super::cpu::{Cpu, half};
 use super::faults::FrameFaults;
+use super::watched::WatchedScans;
 
 /// The longest time that a scan may take before it counts as hung. A PLC's own watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -76,6 +80,8 @@ pub(crate) struct HostThread {
     ended: Receiver<()>,
     pub(crate) status: LinkStatus,
     pub(crate) board: Arc<FaultBoard>,
+    /// Looks at the program's image, until somebody takes it.
+    pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<JoinHandle<()>>,
     #[expect(dead_code, reason = "kept for its drop")]
@@ -144,11 +150,18 @@ impl HostThread {
             Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
+        // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
+        // looks at its own end.
+        let mut seen = None;
         if role == config.role {
-            let (faults, board) = (&config.faults, Arc::clone(&board));
-            let inputs = &cpu.units[0].inputs.bytes;
-            cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
+            let (faults, board_of_scans) = (&config.faults, Arc::clone(&board));
+            let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
+            cpu.faults =
+                FrameFaults::of_list(faults, &config.table, cpu.areas, inputs, Arc::clone(&board));
+            let config = Arc::new(config.clone());
+            let (watched, handle) = WatchedScans::new(&config, role, board_of_scans);
+            cpu.watched = Some(watched);
+            seen = Some((config, handle));
         }
         let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
@@ -166,6 +179,21 @@ impl HostThread {
             clock: Arc::clone(&clock),
             wall: Arc::clone(&wall),
         };
+        let watch = seen.map(|(config, handle)| Watch {
+            slots: SlotMap::new(&config.table, role),
+            config,
+            role,
+            handle,
+            status: status.clone(),
+            board: Arc::clone(&board),
+            clock: Arc::clone(&clock),
+            figures: Box::new(HostFigures {
+                counters: counters.clone(),
+                status: status.clone(),
+                board: Arc::clone(&board),
+            }),
+            times: TickTimes::default(),
+        });
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
@@ -227,10 +255,43 @@ impl HostThread {
             ended,
             status,
             board,
+            watch: Mutex::new(watch),
             stop,
             thread: Some(thread),
             bus,
         })
+    }
+}
+
+/// What belongs to the statistics of a program and its line.
+#[derive(Clone, Debug)]
+pub(crate) struct HostFigures {
+    pub(crate) counters: HostCounters,
+    pub(crate) status: LinkStatus,
+    pub(crate) board: Arc<FaultBoard>,
+}
+
+impl HostFigures {
+    /// The statistics at this moment.
+    pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
+        let mut statistics = Statistics::default();
+        self.status.observe_call(now);
+        self.status.write(now, &mut statistics);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut statistics);
+        self.counters.write(&mut statistics);
+        statistics.count("log.dropped", dropped_log_lines());
+        statistics
+    }
+}
+
+impl Figures for HostFigures {
+    fn statistics(&self, now: Nanos, _: &View, _: &TickTimes) -> Statistics {
+        Self::statistics(self, now)
+    }
+
+    fn is_driver(&self) -> bool {
+        false
     }
 }
 
@@ -262,6 +323,15 @@ impl HostCounters {
 }
 
 impl HostThread {
+    /// What its statistics are made of.
+    pub(crate) fn figures(&self) -> HostFigures {
+        HostFigures {
+            counters: self.counters.clone(),
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+        }
+    }
+
     /// Whether the program is scanned no more, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)

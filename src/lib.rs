@@ -41,6 +41,7 @@ mod c_api;
 pub mod cli;
 pub mod fieldbus;
 mod jni;
+mod page;
 
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};

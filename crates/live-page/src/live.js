@@ -69,7 +69,6 @@
     const facts = [signal.address, signal.type, signal.direction === "I" ? "to the PLC" : "from the PLC"];
     if (signal.latch) facts.push(`latch ${signal.latch}`);
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
-    if (signal.isForced) facts.push("forced");
     show(get("chosen-facts"), facts.join(" · "));
     get("chosen-tools").hidden = !mayForce || !signal.isWritable;
     get("force-bool").hidden = !signal.isBool;

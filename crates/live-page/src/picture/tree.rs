@@ -219,6 +219,10 @@ impl Building<'_> {
             line,
         };
         let mut reference = None;
+        if start.attributes().flatten().any(|it| it.key.as_ref() == "data-tb-still") {
+            self.skipped = 1;
+            return Ok(());
+        }
         for attribute in start.attributes() {
             let Ok(attribute) = attribute else {
                 self.notes

@@ -75,7 +75,7 @@ const line = (() => {
     if (age >= 0) shown.push(["Age of data", words.span(age), line.stations.some(({ stale }) => stale) ? "warn" : "good"]);
     if (times.exchange?.count) shown.push(["Exchange, p50", words.fine(times.exchange.p50_us), ""]);
     if (times.bus_cycle?.count) shown.push(["Bus cycle, p50", words.fine(times.bus_cycle.p50_us), ""]);
-    if (line.counters?.ticks !== undefined) shown.push(["Ticks", figures(line.counters.ticks), ""]);
+    if (line.tick) shown.push(["Ticks", figures(line.tick), isSilent(line) ? "bad" : ""]);
     if (card.facts.children.length !== shown.length) {
       card.facts.replaceChildren();
       for (const [title] of shown) {
@@ -101,9 +101,12 @@ const line = (() => {
     for (const fault of list) {
       const it = make("li", "", card.faults);
       make("span", fault.phase === "active" ? "tag fault" : "tag", it, fault.phase);
-      make("span", "", it, ` ${fault.name || fault.kind}${fault.what ? `: ${fault.what}` : ""}`);
+      make("span", "", it, ` ${fault.name.startsWith("forced: ") ? fault.what : `${fault.name || fault.kind}: ${fault.what}`}`);
     }
   }
+
+  /** Whether the simulation stands still. */
+  const isSilent = (line) => line.silence_ms > 1000;
 
   /** The time that has passed since what was heard, for what counts on by itself. */
   const since = (line) => line.since_ms + (performance.now() - line.heard);
@@ -125,7 +128,7 @@ const line = (() => {
       own.state.className = `tag ${colour[state] ?? ""}`;
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
-      say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}`);
+      say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
       faults(own, line.faults ?? []);
       facts(own, line);
       const several = line.stations.length > 1 ? line.stations : [];

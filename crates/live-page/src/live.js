@@ -173,10 +173,12 @@
     get("release-all").hidden = !mayForce;
     const further = now.forced > names.length ? ` and ${now.forced - names.length} more` : "";
     show(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
-    get("failsafe").hidden = now.failSafe === 0;
-    const stale = plant.drivers.filter((driver) => driver.line && (driver.line.status === "stale" || driver.line.state !== "running"));
-    const why = stale.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason)).join("; ");
-    show(get("failsafe-text"), `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}${why ? `: ${why}` : ""}`);
+    const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
+    const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
+    if (now.failSafe) told.unshift(`${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}`);
+    get("failsafe").hidden = told.length === 0;
+    get("show-failsafe").hidden = now.failSafe === 0;
+    show(get("failsafe-text"), told.join(". "));
     const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
     counts = now;
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();

@@ -7,8 +7,12 @@ const room = (() => {
   const PATIENCE = 5000;
   /** Without an answer for this long, nobody waits any more. */
   const LONGEST = 10000;
-  let tell = () => {};
-  let source = null;
+  /** The pause before the next attempt to listen. */
+  const PAUSE = 1000;
+  let tell = {};
+  /** The connection that is listened to; whoever ends it makes it another one. */
+  let line = null;
+  let isOpen = false;
   let heard = 0;
   /** When it was listened for the first time, or again. */
   let begun = 0;
@@ -50,38 +54,63 @@ const room = (() => {
 
   function setAge() {
     const now = performance.now();
-    const isOpen = source?.readyState === EventSource.OPEN;
     // A connection may be lost without a word, as when a computer sleeps or changes its network.
     if (isOpen && now - Math.max(heard, begun) > PATIENCE) connect();
     tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000));
   }
 
-  function connect() {
-    source?.close();
-    source = null;
-    // A browser has few connections to one host for all of its tabs.
-    if (document.hidden) return;
-    begun = performance.now();
-    source = new EventSource("/events");
-    source.onopen = askAccess;
-    source.onmessage = (event) => {
-      heard = performance.now();
-      tell.news(event.data);
-      setAge();
-    };
-    source.addEventListener("beat", () => {
-      heard = performance.now();
-      setAge();
-    });
-    source.onerror = () => {
-      setAge();
-      // A refusal ends the source for good; a broken connection it restores itself.
-      if (source?.readyState === EventSource.CLOSED) setTimeout(connectAgain, 1000);
-    };
+  /** One server-sent event. */
+  function hear(event) {
+    heard = performance.now();
+    const data = /^data: ?([^\n]*)$/m.exec(event);
+    try {
+      if (data && !event.startsWith("event: beat")) tell.news(data[1]);
+    } catch (error) {
+      // A defect of the page does not end the connection.
+      reportError(error);
+    }
+    setAge();
   }
 
-  function connectAgain() {
-    if (source?.readyState === EventSource.CLOSED) connect();
+  /** Reads events until the connection ends. An EventSource would do it, but cannot send a token. */
+  async function read(mine) {
+    const answer = await fetch("/events", { headers: headers(), signal: mine.signal });
+    if (!answer.ok) return;
+    isOpen = true;
+    askAccess();
+    const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
+    let parts = [];
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done || line !== mine) return;
+      // The end of an event may come in two pieces.
+      let text = parts.at(-1)?.endsWith("\n") ? parts.pop() + value : value;
+      for (let end; (end = text.indexOf("\n\n")) >= 0; text = text.slice(end + 2)) {
+        hear(parts.join("") + text.slice(0, end));
+        parts = [];
+      }
+      if (text) parts.push(text);
+    }
+  }
+
+  async function connect() {
+    line?.abort();
+    const mine = new AbortController();
+    line = mine;
+    isOpen = false;
+    // A browser has few connections to one host for all of its tabs. Whoever has the token is still there, though, and what
+    // was forced stays so.
+    if (document.hidden && !sessionStorage.getItem("token")) return;
+    begun = performance.now();
+    try {
+      await read(mine);
+    } catch {
+      // It broke, or was never there: it is tried again.
+    }
+    if (line !== mine) return;
+    isOpen = false;
+    setAge();
+    setTimeout(() => { if (line === mine) connect(); }, PAUSE);
   }
 
   /**
@@ -94,9 +123,11 @@ const room = (() => {
     // Another token that is put into the address of this tab loads nothing.
     window.addEventListener("hashchange", () => {
       takeToken();
-      askAccess();
+      connect();
     });
-    document.addEventListener("visibilitychange", connect);
+    document.addEventListener("visibilitychange", () => {
+      if (!isOpen || !sessionStorage.getItem("token")) connect();
+    });
     connect();
     setInterval(setAge, 500);
   }

@@ -12,8 +12,10 @@ pub(crate) use none::{Place, show, url};
 #[cfg(feature = "page")]
 pub(crate) use open::{Place, show, url};
 
+use std::io::{self, Write as _};
+
 use tickbus_binding::Refusal;
-use tickbus_driver::Code;
+use tickbus_driver::{Code, Driver};
 
 /// Why a driver cannot be shown.
 #[derive(Debug)]
@@ -44,6 +46,17 @@ impl std::fmt::Display for PageError {
             }
         }
     }
+}
+
+/// Shows a simulation's driver on the page, if its driver.cfg asks for one; whoever started the simulation reads the address
+/// on stderr.
+pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
+    let config = std::sync::Arc::clone(driver.config());
+    let announce = |url: &str| {
+        // Without a reader of stderr the simulation runs all the same.
+        let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
+    };
+    Ok(show(&config, || Some(driver.watch()), announce)?)
 }
 
 impl From<PageError> for Refusal {

@@ -53,7 +53,7 @@ pub(super) struct Hosting {
 pub(super) struct PageAddress(Option<Address>);
 
 /// Parses the value of --page.
-fn page_address(text: &str) -> Result<PageAddress, String> {
+pub(super) fn page_address(text: &str) -> Result<PageAddress, String> {
     let stated = (!text.is_empty()).then(|| super::lab::address(text));
     Ok(PageAddress(stated.transpose()?))
 }
@@ -202,18 +202,15 @@ pub(super) fn show(
     config: &Config,
     watch: impl FnOnce() -> Option<Watch>,
 ) -> Result<Option<Place>, Outcome> {
-    let place = page::show(config, watch).map_err(|error| {
+    let announce = |url: &str| super::lab::say(title, &format!("page at {url}"));
+    page::show(config, watch, announce).map_err(|error| {
         eprintln!("{title}: {error}");
         if error.is_wrong_input() {
             Outcome::WrongInput
         } else {
             Outcome::BusFailed
         }
-    })?;
-    if let (Some(_), Some(url)) = (&place, page::url()) {
-        super::lab::say(title, &format!("page at {url}"));
-    }
-    Ok(place)
+    })
 }
 
 /// The recording asked for on the command line: relative to the current folder, not to that of the

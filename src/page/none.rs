@@ -13,6 +13,7 @@ pub(crate) enum Place {}
 pub(crate) fn show(
     config: &Config,
     _watch: impl FnOnce() -> Option<Watch>,
+    _announce: impl FnOnce(&str),
 ) -> Result<Option<Place>, PageError> {
     if config.page.is_none() {
         return Ok(None);

@@ -58,17 +58,19 @@ pub(crate) fn url() -> Option<String> {
     Some(present().upgrade()?.url.clone())
 }
 
-/// Shows what `watch` gives on the page, if the driver.cfg asks for one.
+/// Shows what `watch` gives on the page, if the driver.cfg asks for one. `announce` is given the address of a page that was
+/// not there before.
 pub(crate) fn show(
     config: &Config,
     watch: impl FnOnce() -> Option<Watch>,
+    announce: impl FnOnce(&str),
 ) -> Result<Option<Place>, PageError> {
     let Some(wanted) = &config.page else {
         return Ok(None);
     };
     let picture = wanted.picture.as_deref();
     let picture = picture.map(|file| read_picture(config, file)).transpose()?;
-    let open = open(config, wanted)?;
+    let open = open(config, wanted, announce)?;
     let Some(watch) = watch() else {
         return Ok(None);
     };
@@ -83,7 +85,11 @@ pub(crate) fn show(
 }
 
 /// The page that there is, or a new one.
-fn open(config: &Config, wanted: &PageOptions) -> Result<Arc<Open>, PageError> {
+fn open(
+    config: &Config,
+    wanted: &PageOptions,
+    announce: impl FnOnce(&str),
+) -> Result<Arc<Open>, PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
         if open.asked != wanted.listen {
@@ -115,6 +121,7 @@ fn open(config: &Config, wanted: &PageOptions) -> Result<Arc<Open>, PageError> {
     });
     *present = Arc::downgrade(&open);
     log::info!("the live page is at {}", open.url);
+    announce(&open.url);
     Ok(open)
 }
 

@@ -9,6 +9,7 @@ mod keeper;
 mod line;
 mod metrics;
 mod model;
+mod options;
 mod order;
 mod page;
 pub mod picture;
@@ -17,4 +18,6 @@ mod trend;
 mod value;
 
 pub use order::{Order, order};
-pub use page::{LivePage, Member, Options};
+pub use options::Options;
+pub use page::{LivePage, Member};
+pub use value::parse as parse_value;

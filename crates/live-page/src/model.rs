@@ -8,8 +8,8 @@ use tickbus_base::time::Nanos;
 use tickbus_driver::Watch;
 use tickbus_web::{Differences, Refused};
 
+use crate::options::Options;
 use crate::order::Order;
-use crate::page::Options;
 use crate::shown::Shown;
 
 /// The drivers, and the number of the state that they are in.

@@ -5,23 +5,14 @@ use std::io;
 use std::sync::Arc;
 use std::thread::{self, JoinHandle};
 
-use tickbus_base::time::{Clock, Nanos};
+use tickbus_base::time::Clock;
 use tickbus_driver::Watch;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
 
 use crate::assets::ASSETS;
 use crate::keeper::{Inbox, Keeper, Wish};
 use crate::model::Shared;
-use crate::picture::Picture;
-
-/// How a driver is shown.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// How long its signals stay forced when nobody with the token looks any more; `None` for as long as it runs.
-    pub grace: Option<Nanos>,
-    /// The picture of its machine.
-    pub picture: Option<Picture>,
-}
+use crate::options::Options;
 
 /// A page that drivers join; dropping it stops its thread.
 pub struct LivePage {

@@ -12,7 +12,7 @@ use tickbus_image::signal::{Area, Latch, Plan, RawValues, Signal, Slot};
 use tickbus_web::Refused;
 
 use crate::line::{self, age_now, millis};
-use crate::page::Options;
+use crate::options::Options;
 use crate::picture::Picture;
 use crate::trend::{Point, Trend};
 use crate::value::{Number, parse, raw};

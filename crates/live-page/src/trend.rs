@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn many_signals_take_a_bounded_memory() {
-        let count = 50_000;
+        let count = 5_000;
         let mut trend = Trend::new(Nanos(0), vec![0.0; count]);
         for second in 1..=700_i32 {
             for signal in 0..count {
@@ -203,6 +203,6 @@ mod tests {
             trend.go_on(Nanos(i64::from(second) * SECOND));
         }
         let entries: usize = trend.steps.iter().map(|step| step.changed.len()).sum();
-        assert!(entries <= 1_200_000, "{entries}");
+        assert!((900_000..=1_100_000).contains(&entries), "{entries}");
     }
 }

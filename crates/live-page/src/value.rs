@@ -79,7 +79,7 @@ pub(crate) fn raw(data_type: DataType, bits: u64) -> String {
 /// # Errors
 ///
 /// What does not fit, and what would.
-pub(crate) fn parse(text: &str, signal: &Signal) -> Result<Slot, String> {
+pub fn parse(text: &str, signal: &Signal) -> Result<Slot, String> {
     let refused = |right: &str| {
         let (name, text) = (shown(&signal.name), shown(text));
         Err(if text.is_empty() {
@@ -158,7 +158,7 @@ mod tests {
         assert_eq!(real(DataType::Int, 5.25), "5.25");
         assert_eq!(real(DataType::Real, f64::from(0.1_f32)), "0.1");
         assert_eq!(real(DataType::Lreal, 0.1), "0.1");
-        assert_eq!(real(DataType::Lreal, 1e300), "1e300");
+        assert_eq!(real(DataType::Lreal, 1e300), "1e+300");
         assert_eq!(real(DataType::Real, f64::NAN), "null");
         assert_eq!(real(DataType::Lreal, f64::NEG_INFINITY), "null");
         let lint = json(&signal(DataType::Lint), Slot::from_signed(i64::MIN));
@@ -196,7 +196,8 @@ mod tests {
         assert_eq!(
             parse("300", &scaled),
             Err(
-                "300 does not fit \"s\"; INT with this scale goes from -296.3 to 296.29".to_owned()
+                "300 does not fit \"s\"; INT with this scale goes from -296.2963 to 296.2873"
+                    .to_owned()
             )
         );
     }

@@ -102,11 +102,13 @@ public final class RigPicture {
             svg.text(54, y + 5, "font-size=\"14\" " + (lit[i] ? INK + " font-weight=\"600\"" : PALE)
                     + Svg.bound("fill", "%s: off -> #8fa1b0, on -> #22313f", signal), names[i]);
         }
-        for (int i = 0; i < 2; i++) {
-            String paint = i == 0 ? "fresh" : "treated";
-            svg.rect(155, 64 + 25 * i, 14, 17, 4, "fill=\"url(#" + paint + ")\" stroke=\"#1f4a66\"");
-            svg.text(178, 77 + 25 * i, "font-size=\"14\" " + INK, paint);
-        }
+        svg.group(Svg.STILL, () -> {
+            for (int i = 0; i < 2; i++) {
+                String paint = i == 0 ? "fresh" : "treated";
+                svg.rect(155, 64 + 25 * i, 14, 17, 4, "fill=\"url(#" + paint + ")\" stroke=\"#1f4a66\"");
+                svg.text(178, 77 + 25 * i, "font-size=\"14\" " + INK, paint);
+            }
+        });
     }
 
     private static void bar(Rig rig, Svg svg) {

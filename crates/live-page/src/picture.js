@@ -88,7 +88,8 @@ const pictures = (() => {
       const bindings = JSON.parse(element.dataset.tb);
       const signals = bindings.map(({ signal }) => picture.driver.byName.get(signal) ?? null);
       if (element === picture.root) continue;
-      const base = element.transform?.baseVal.consolidate()?.matrix ?? picture.root.createSVGMatrix();
+      // A copy: the element's own changes with what is done to it.
+      const base = picture.root.createSVGMatrix().multiply(element.transform?.baseVal.consolidate()?.matrix ?? picture.root.createSVGMatrix());
       let area = { x: 0, y: 0, width: 0, height: 0 };
       try {
         area = element.getBBox();
@@ -100,7 +101,6 @@ const pictures = (() => {
         pivot: (element.dataset.tbPivot ?? "").split(" ").filter(Boolean).map(Number),
         smooth: Number(element.dataset.tbSmooth ?? 0) * 1000,
         was: {}, moving: {}, spun: 0,
-        drawn: { fill: element.getAttribute("fill"), stroke: element.getAttribute("stroke"), text: element.textContent },
       });
     }
   }
@@ -134,6 +134,7 @@ const pictures = (() => {
 
   /** A text with the value in place of `{}` (as in the list), or `{0.00}` with so many decimals. */
   const filled = (pattern, signal, value) => pattern.replace(/\{(0(?:\.0*)?)?\}/g, (_, digits) => {
+    if (digits === undefined && !signal) return String(value);
     if (digits === undefined) return signal.unit ? `${words.value(signal)} ${signal.unit}` : words.value(signal);
     return value.toFixed((digits.split(".")[1] ?? "").length).replace("-", "−");
   });
@@ -175,18 +176,18 @@ const pictures = (() => {
         case "show":
         case "hide": {
           const isThere = binding.map ? out !== undefined : value !== 0;
-          set(mover, "display", isThere === (binding.do === "show") ? null : "none");
+          style(mover, "display", isThere === (binding.do === "show") ? "inline" : "none");
           break;
         }
         case "fill":
         case "stroke":
-          set(mover, binding.do, out ?? mover.drawn[binding.do]);
+          style(mover, binding.do, out ?? null);
           break;
         case "opacity":
-          set(mover, "opacity", out === undefined ? null : String(Math.min(1, Math.max(0, out))));
+          style(mover, "opacity", out === undefined ? null : String(Math.min(1, Math.max(0, out))));
           break;
         case "text":
-          say(mover, binding.map === null ? filled("{}", signal, value) : out === undefined ? filled("{}", signal, value) : filled(String(out), signal, value));
+          say(mover, filled(binding.map && out !== undefined ? String(out) : "{}", signal, value));
           break;
         case "spin":
           mover.spun = (mover.spun + (out ?? 0) * passed / 1000) % 360;
@@ -201,7 +202,11 @@ const pictures = (() => {
         }
       }
     });
-    if (isPlaced) set(mover, "transform", matrix(mover, place, root));
+    if (!isPlaced) return;
+    const transform = matrix(mover, place, root);
+    if (mover.was.transform === transform) return;
+    mover.was.transform = transform;
+    mover.element.setAttribute("transform", transform);
   }
 
   /** Where an element is: moved, and turned and scaled about its middle or the point that the drawing says. */
@@ -224,11 +229,12 @@ const pictures = (() => {
     return { fresh: 0, unchanged: 1, stale: 2 }[line.status] ?? NaN;
   }
 
-  function set(mover, name, value) {
+  /** A property, which counts before what the drawing and its style sheet say; null: as they say. */
+  function style(mover, name, value) {
     if (mover.was[name] === value) return;
     mover.was[name] = value;
-    if (value === null) mover.element.removeAttribute(name);
-    else mover.element.setAttribute(name, value);
+    if (value === null) mover.element.style.removeProperty(name);
+    else mover.element.style.setProperty(name, value);
   }
 
   function say(mover, text) {

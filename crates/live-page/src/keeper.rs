@@ -12,6 +12,9 @@ use crate::order::{Order, order};
 /// How often it looks when nobody else does: for the trends.
 const IDLE: Nanos = Nanos::from_millis(500);
 
+/// The shortest time between two copies of a tick: 60 in a second.
+const PERIOD: Nanos = Nanos(16_666_667);
+
 /// How long it waits for a tick that was asked for a copy.
 const PATIENCE: Nanos = Nanos::from_millis(20);
 
@@ -69,6 +72,7 @@ impl Keeper {
     pub(crate) fn run(mut self) {
         let stop = self.inbox.stop.clone();
         let mut due = self.clock.now();
+        let mut looked = due - PERIOD;
         while !stop.is_stopped() {
             self.clock.wait_until(due, &stop);
             let wishes = self.inbox.take();
@@ -79,15 +83,18 @@ impl Keeper {
                 }
             }
             self.let_go(now);
-            let looks = |wish: &Wish| matches!(wish, Wish::Look(_) | Wish::Get(..));
-            let is_watched = wishes.iter().any(looks);
-            if is_watched || now >= due {
-                self.look(is_watched);
+            let (changes, looks): (Vec<_>, Vec<_>) = wishes
+                .into_iter()
+                .partition(|wish| matches!(wish, Wish::Change(..) | Wish::Heard(_)));
+            changes.into_iter().for_each(|wish| self.grant(wish));
+            if !looks.is_empty() || now >= due {
+                // However many ask, a tick makes no more copies.
+                self.clock.wait_until(looked + PERIOD, &Stop::new());
+                looked = self.clock.now();
+                self.look(!looks.is_empty());
                 due = self.clock.now() + IDLE;
             }
-            for wish in wishes {
-                self.grant(wish);
-            }
+            looks.into_iter().for_each(|wish| self.grant(wish));
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Table, Value};
 use tickbus_fieldbus::tcp::Address;
 
 /// The port of a page where none is stated.
@@ -47,9 +47,7 @@ impl PageOptions {
         table.finish();
         let usual = Self::default();
         let listen = listen.map_or(Some(usual.listen), |value| Address::read(&value));
-        let keeps = keep_forced
-            .as_ref()
-            .map_or(Some(false), |value| value.boolean());
+        let keeps = keep_forced.as_ref().map_or(Some(false), Value::boolean);
         let why = "a page that is loaded again is away for a moment";
         let stated = grace
             .as_ref()

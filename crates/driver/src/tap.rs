@@ -25,6 +25,10 @@ const ORDERS_LIMIT: usize = 256;
 
 /// What is to be done at the end of a tick.
 #[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would have to be freed by the tick"
+)]
 enum Order {
     Inject(Prepared),
     End(u32),
@@ -156,6 +160,7 @@ impl Handle {
         self.order(Order::End(id)).map_err(|(_, why)| why)
     }
 
+    #[expect(clippy::result_large_err, reason = "what was not sent is given back")]
     fn order(&self, order: Order) -> Result<(), (Order, Mistake)> {
         self.retired.try_iter().for_each(drop);
         self.orders.try_send(order).map_err(|error| match error {

@@ -1,4 +1,4 @@
-//! The page for Prometheus: OpenMetrics.
+//! What Prometheus and its like read of the page.
 
 use std::fmt::Write as _;
 

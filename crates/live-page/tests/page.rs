@@ -1,5 +1,9 @@
 //! The page over real sockets, with drivers that tick.
-#![allow(missing_docs, reason = "tests")]
+#![allow(
+    missing_docs,
+    clippy::float_cmp,
+    reason = "tests, with small whole numbers"
+)]
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -62,7 +66,7 @@ impl Simulation {
             grace,
             picture: None,
         };
-        let member = page.page.join(driver.watch(), options);
+        let member = page.live.join(driver.watch(), options);
         let is_over = Arc::<AtomicBool>::default();
         let ticks = Arc::<AtomicU64>::default();
         let (writes, written) = channel();
@@ -133,23 +137,23 @@ impl Drop for Simulation {
 
 struct Page {
     _serving: Serving,
-    page: LivePage,
+    live: LivePage,
     address: SocketAddr,
     token: String,
 }
 
 impl Page {
     fn open() -> Self {
-        let page = LivePage::open(Monotonic::shared()).expect("a thread");
+        let live = LivePage::open(Monotonic::shared()).expect("a thread");
         let room = Room::bind(&Address::local(0), Limits::default()).expect("a free port");
         let address = room.address();
         let (_, token) = room.url().split_once("#token=").map(own).expect("a token");
         let serving = room
-            .serve(page.site(), Monotonic::shared())
+            .serve(live.site(), Monotonic::shared())
             .expect("a thread");
         Self {
             _serving: serving,
-            page,
+            live,
             address,
             token,
         }

@@ -385,6 +385,19 @@ fn a_site_that_answers_nothing_has_no_beat() {
 }
 
 #[test]
+fn who_asks_a_site_that_hangs_is_told_so() {
+    let limits = Limits {
+        patience: Duration::from_millis(100),
+        ..Limits::default()
+    };
+    let fixture = serve(limits);
+    fixture.toy.is_hung.store(true, Ordering::SeqCst);
+    let answer = fixture.ask("GET /state", "", "");
+    assert_status(&answer, 504);
+    assert!(answer.contains("does not answer"), "{answer}");
+}
+
+#[test]
 fn nobody_is_asked_while_nobody_looks() {
     let fixture = serve(Limits::default());
     fixture.ask("GET /", "", "");

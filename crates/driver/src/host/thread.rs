@@ -8,6 +8,7 @@ use std::thread::JoinHandle;
 
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
+use crate::tap::Handle;
 use crate::tick_counters::TickTimes;
 use crate::view::View;
 use crate::watch::{Figures, Watch};
@@ -152,17 +153,8 @@ impl HostThread {
         let board = Arc::<FaultBoard>::default();
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
         // looks at its own end.
-        let mut seen = None;
-        if role == config.role {
-            let (faults, board_of_scans) = (&config.faults, Arc::clone(&board));
-            let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
-            cpu.faults =
-                FrameFaults::of_list(faults, &config.table, cpu.areas, inputs, Arc::clone(&board));
-            let config = Arc::new(config.clone());
-            let (watched, handle) = WatchedScans::new(&config, role, board_of_scans);
-            cpu.watched = Some(watched);
-            seen = Some((config, handle));
-        }
+        let is_own = role == config.role;
+        let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
         let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
@@ -179,22 +171,12 @@ impl HostThread {
             clock: Arc::clone(&clock),
             wall: Arc::clone(&wall),
         };
-        let watch = seen.map(|(config, handle)| Watch {
-            // A program works on frames: its faults know no slots that count edges.
-            slots: SlotMap::default(),
-            config,
-            role,
-            handle,
+        let figures = HostFigures {
+            counters: counters.clone(),
             status: status.clone(),
             board: Arc::clone(&board),
-            clock: Arc::clone(&clock),
-            figures: Box::new(HostFigures {
-                counters: counters.clone(),
-                status: status.clone(),
-                board: Arc::clone(&board),
-            }),
-            times: TickTimes::default(),
-        });
+        };
+        let watch = seen.map(|(config, handle)| watch(config, handle, figures));
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
@@ -293,6 +275,37 @@ impl Figures for HostFigures {
 
     fn is_driver(&self) -> bool {
         false
+    }
+}
+
+/// Gives the end that a driver.cfg describes its faults, and lets another thread look at it.
+fn prepare_own_end(
+    cpu: &mut Cpu,
+    config: &Config,
+    board: &Arc<FaultBoard>,
+) -> (Arc<Config>, Handle) {
+    let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
+    let (table, shared) = (&config.table, Arc::clone(board));
+    cpu.faults = FrameFaults::of_list(&config.faults, table, cpu.areas, inputs, shared);
+    let config = Arc::new(config.clone());
+    let (watched, handle) = WatchedScans::new(&config, config.role, Arc::clone(board));
+    cpu.watched = Some(watched);
+    (config, handle)
+}
+
+/// What looks at it.
+fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
+    Watch {
+        role: config.role,
+        config,
+        // A program works on frames: its faults know no slots that count edges.
+        slots: SlotMap::default(),
+        handle,
+        status: figures.status.clone(),
+        board: Arc::clone(&figures.board),
+        clock: Arc::clone(&figures.counters.clock),
+        figures: Box::new(figures),
+        times: TickTimes::default(),
     }
 }
 

@@ -347,7 +347,7 @@ fn the_bottle_in_the_picture_moves_with_the_lift() {
     force(&browser, "SC1", "TRUE");
     browser.wait(&format!("getComputedStyle({bottle}).display !== 'none'"));
     force(&browser, "LA1 position", "0");
-    wait_shown(&browser, "LA1 position", "0.00mm");
+    browser.wait("tickbusPage.value('LA1 position') === 0");
     let top = |browser: &Browser| {
         let top = browser.run(&format!("return {bottle}.getBoundingClientRect().top"));
         top.as_f64().expect("a place")
@@ -510,7 +510,7 @@ fn ten_thousand_signals_are_scrolled_filtered_and_chosen() {
     browser.wait("document.activeElement.id === 'filter'");
     browser.keys("mm %iw9996");
     browser.wait("document.getElementById('found').textContent === '1 of 10,000 signals'");
-    wait_shown(&browser, "Word 4998", "0mm");
+    wait_shown(&browser, "Word 4998", "0.00mm");
     browser.run("document.getElementById('filter').select()");
     browser.keys("%qx0.3");
     browser.wait("document.getElementById('found').textContent === '1 of 10,000 signals'");

@@ -1,5 +1,5 @@
 //! The live page with programs of others: what is forced on it is read by mbpoll over Modbus, and its metrics are read by
-//! the parser of prometheus_client.
+//! the parser of `prometheus_client`.
 #![allow(missing_docs, reason = "a test")]
 
 #[path = "peers/commands.rs"]
@@ -197,7 +197,7 @@ fn forced_for_nobody() -> Result<(), Absent> {
     machine.await_register("3", "2", "13824")?;
     // Longer than the grace time, nothing with the token is asked but what the viewer hears.
     let begun = Instant::now();
-    let mut events = [0; 65536];
+    let mut events = vec![0; 65536];
     while begun.elapsed() < Duration::from_secs(4) {
         assert!(viewer.read(&mut events).expect("events") > 0);
     }
@@ -236,6 +236,7 @@ fn metrics() -> Result<(), Absent> {
     Ok(())
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "as all tests here")]
 fn killed_plc() -> Result<(), Absent> {
     let mut machine = Machine::start("kind = \"socket\"\nmax_age = \"10s\"", "");
     // A PLC that sends its byte of outputs, and vanishes.

@@ -132,11 +132,14 @@ fn a_driver_that_is_watched_and_forced() {
             if tick % 5 == 0 {
                 let id = watch.force(tick % signals, Slot::from_real(1.0));
                 let before = forced.replace(id.expect("there is room"));
-                before.map(|id| watch.end_fault(id).expect("it is taken"));
+                if let Some(id) = before {
+                    watch.end_fault(id).expect("it is taken");
+                }
             } else if tick % 500 == 7 {
                 // Nothing is forced for a while.
-                let last = forced.take();
-                last.map(|id| watch.end_fault(id).expect("it is taken"));
+                if let Some(id) = forced.take() {
+                    watch.end_fault(id).expect("it is taken");
+                }
             }
             let time = Nanos::from_millis(tick.try_into().expect("small"));
             let before = ALLOCATIONS.get();

@@ -86,7 +86,9 @@ impl Keeper {
             let (changes, looks): (Vec<_>, Vec<_>) = wishes
                 .into_iter()
                 .partition(|wish| matches!(wish, Wish::Change(..) | Wish::Heard(_)));
-            changes.into_iter().for_each(|wish| self.grant(wish));
+            for wish in changes {
+                self.grant(wish);
+            }
             if !looks.is_empty() || now >= due {
                 // However many ask, a tick makes no more copies.
                 self.clock.wait_until(looked + PERIOD, &Stop::new());
@@ -94,7 +96,9 @@ impl Keeper {
                 self.look(!looks.is_empty());
                 due = self.clock.now() + IDLE;
             }
-            looks.into_iter().for_each(|wish| self.grant(wish));
+            for wish in looks {
+                self.grant(wish);
+            }
         }
     }
 

@@ -171,11 +171,7 @@ impl HostThread {
             clock: Arc::clone(&clock),
             wall: Arc::clone(&wall),
         };
-        let figures = HostFigures {
-            counters: counters.clone(),
-            status: status.clone(),
-            board: Arc::clone(&board),
-        };
+        let figures = HostFigures::of(&counters, &status, &board);
         let watch = seen.map(|(config, handle)| watch(config, handle, figures));
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
@@ -255,6 +251,14 @@ pub(crate) struct HostFigures {
 }
 
 impl HostFigures {
+    fn of(counters: &HostCounters, status: &LinkStatus, board: &Arc<FaultBoard>) -> Self {
+        Self {
+            counters: counters.clone(),
+            status: status.clone(),
+            board: Arc::clone(board),
+        }
+    }
+
     /// The statistics at this moment.
     pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
         let mut statistics = Statistics::default();
@@ -339,11 +343,7 @@ impl HostCounters {
 impl HostThread {
     /// What its statistics are made of.
     pub(crate) fn figures(&self) -> HostFigures {
-        HostFigures {
-            counters: self.counters.clone(),
-            status: self.status.clone(),
-            board: Arc::clone(&self.board),
-        }
+        HostFigures::of(&self.counters, &self.status, &self.board)
     }
 
     /// Whether the program is scanned no more, for whatever reason.

@@ -175,10 +175,10 @@
     show(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
     const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
     const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
-    if (now.failSafe) told.unshift(`${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}`);
-    get("failsafe").hidden = told.length === 0;
+    const safe = now.failSafe ? `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}` : "";
+    get("failsafe").hidden = told.length === 0 && !safe;
     get("show-failsafe").hidden = now.failSafe === 0;
-    show(get("failsafe-text"), told.join(". "));
+    show(get("failsafe-text"), [safe, told.join("; ")].filter(Boolean).join(": "));
     const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
     counts = now;
     if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();

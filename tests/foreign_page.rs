@@ -150,17 +150,20 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
         (&125.into(), &"16#3600".into())
     );
     assert_eq!(level["forced"], 125);
-    let faults = machine.line()["faults"].take();
+    let mut faults = serde_json::Value::Null;
+    eventually("its fault is active", || {
+        faults = machine.line()["faults"].take();
+        faults[0]["phase"] == "active"
+    });
     assert_eq!(faults[0]["name"], "forced: Level \"left\"", "{faults}");
     assert_eq!(faults[0]["kind"], "stuck");
-    assert_eq!(faults[0]["phase"], "active");
     // What it reads: the PLC never wrote that, and the machine brings it back.
     machine.ask("PUT /force/4711/Valve", "TRUE");
     machine.await_register("1", "1", "1")?;
     machine.await_register("0", "1", "0")?;
     // Another value, without a gap; then neither any more.
     machine.ask(&format!("PUT {LEVEL}"), "-1");
-    machine.await_register("3", "2", "-111")?;
+    machine.await_register("3", "2", "65425 (-111)")?;
     machine.ask("DELETE /force/4711/Valve", "");
     machine.await_register("1", "1", "0")?;
     machine.ask("DELETE /force", "");
@@ -257,6 +260,8 @@ fn killed_plc() -> Result<(), Absent> {
     let (line, said) = (machine.line(), machine.command.after("mirror: opening: "));
     // The same sentence as the command has.
     assert_eq!(line["reason"], said, "{line}");
-    assert_eq!(line["cause"], "left", "{line}");
+    // What it had not read yet makes its system reset the connection.
+    let cause = &line["cause"];
+    assert!(cause == "left" || cause == "link", "{line}");
     Ok(())
 }

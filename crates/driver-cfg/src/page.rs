@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(read(""), Ok(None));
         assert_eq!(read("[page]\n"), Ok(Some(PageOptions::default())));
         let page = read(
-            "[page]\nlisten = \"0.0.0.0:0\"\ngrace = \"1m\"\npicture = \"pictures/rig.svg\"\n",
+            "[page]\nlisten = \"0.0.0.0:0\"\ngrace = \"1min\"\npicture = \"pictures/rig.svg\"\n",
         );
         let page = page.expect("right").expect("there");
         assert_eq!(page.listen.to_string(), "0.0.0.0:0");
@@ -129,7 +129,7 @@ mod tests {
             ("[page]\ngrace = \"1ms\"\n", "is away for a moment"),
             ("[page]\ngrace = 5\n", "driver.cfg:11:9: "),
             (
-                "[page]\nkeep_forced = true\ngrace = \"1m\"\n",
+                "[page]\nkeep_forced = true\ngrace = \"1min\"\n",
                 "have no \"grace\"",
             ),
             ("[page]\nkeep_forced = 1\n", "driver.cfg:11:15: "),

@@ -437,23 +437,22 @@ fn forced_signals_are_released_when_the_last_viewer_has_been_gone_for_long_enoug
 }
 
 #[test]
-fn ten_thousand_connections_leave_the_tick_and_the_others_alone() {
+fn connections_beyond_the_limit_leave_the_tick_and_the_viewers_alone() {
     let page = Page::open();
     let simulation = Simulation::start(&page, 1, "Cell", EVER);
     let mut viewer = page.view();
     viewer.event();
     let begin = simulation.ticks.load(Ordering::Relaxed);
-    // As many at a time as there are descriptors for.
+    // A page has 512 of them.
     let mut open = Vec::new();
-    for _ in 0..10_000 {
+    for _ in 0..2_000 {
         open.extend(TcpStream::connect(page.address));
         if open.len() > 700 {
             open.drain(..100);
         }
     }
     simulation.write(0, 7.0);
-    let values = viewer.values();
-    assert_eq!(values["1"][0][1], 7, "{values}");
+    while viewer.values()["1"][0][1] != 7 {}
     assert!(simulation.ticks.load(Ordering::Relaxed) > begin);
     drop(open);
     eventually("others are let in again", || {

@@ -180,7 +180,7 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
         refused.contains("goes from -296.2963 to 296.2873"),
         "{refused}"
     );
-    let refused = machine.ask("PUT /force/4711/Levle", "1");
+    let refused = machine.ask("PUT /force/4711/Valv", "1");
     assert!(refused.contains("did you mean"), "{refused}");
     Ok(())
 }

@@ -61,7 +61,6 @@
 
   function showChosen(signal) {
     get("chosen").hidden = !signal;
-    document.body.classList.toggle("has-chosen", Boolean(signal));
     if (!signal) return;
     const isNew = get("chosen").dataset.key !== plant.keyOf(signal);
     get("chosen").dataset.key = plant.keyOf(signal);

@@ -129,7 +129,8 @@ const line = (() => {
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
       say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
-      faults(own, line.faults ?? []);
+      // What was forced and is released is no news.
+      faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       facts(own, line);
       const several = line.stations.length > 1 ? line.stations : [];
       fill(own.stations, ["Station", "State", "Age", "Reason"], several.map((it) => [it.name, it.stale ? "stale" : it.state, words.span(it.age_ms), it.reason ?? ""]));

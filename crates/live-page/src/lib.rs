@@ -17,7 +17,7 @@ mod shown;
 mod trend;
 mod value;
 
-pub use order::{Order, order};
 pub use options::Options;
+pub use order::{Order, order};
 pub use page::{LivePage, Member};
 pub use value::parse as parse_value;

@@ -141,8 +141,14 @@ fn what_only_editors_need_goes_without_a_word() {
 
 #[test]
 fn what_only_a_picture_that_stands_still_shows_is_not_there() {
-    let picture = good("<g data-tb-still=\"\"><rect/></g><circle/><title data-tb-still=\"yes\">at 3 s</title>");
-    assert!(picture.svg.contains("\"><circle/></svg>"), "{}", picture.svg);
+    let picture = good(
+        "<g data-tb-still=\"\"><rect/></g><circle/><title data-tb-still=\"yes\">at 3 s</title>",
+    );
+    assert!(
+        picture.svg.contains("\"><circle/></svg>"),
+        "{}",
+        picture.svg
+    );
     assert_eq!(picture.left_out, [""; 0]);
 }
 

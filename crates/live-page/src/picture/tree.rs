@@ -219,7 +219,11 @@ impl Building<'_> {
             line,
         };
         let mut reference = None;
-        if start.attributes().flatten().any(|it| it.key.as_ref() == "data-tb-still") {
+        if start
+            .attributes()
+            .flatten()
+            .any(|it| it.key.as_ref() == "data-tb-still")
+        {
             self.skipped = 1;
             return Ok(());
         }

@@ -157,6 +157,10 @@ TB_IMPORT int32_t tb_end_fault(tb_driver driver, int32_t fault);
  * tb_statistics does. */
 TB_IMPORT int32_t tb_faults(tb_driver driver, char *text, size_t room);
 
+/* The address of the live page on which the driver is shown, with the token that lets who opens it force signals; "" if its
+ * driver.cfg has no [page]. Returns as tb_statistics does. */
+TB_IMPORT int32_t tb_page(tb_driver driver, char *text, size_t room);
+
 /* Why the last failed call of this thread failed, and what to do; "" if none has. Valid until this thread's next call. */
 TB_IMPORT const char *tb_last_error(void);
 

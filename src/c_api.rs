@@ -16,6 +16,7 @@ use std::path::Path;
 use std::ptr::{NonNull, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::page::{self, Place};
 use once_cell::sync::Lazy;
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
@@ -71,7 +72,7 @@ unsafe impl Send for Buffer {}
 
 /// An open driver; its buffer goes back to [`RETIRED`].
 struct Opened {
-    device: Device<()>,
+    device: Device<Option<Place>>,
     buffer: Buffer,
 }
 
@@ -131,7 +132,7 @@ fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
     Refusal::instead_of_panic(work).unwrap_or_else(|refusal| failed(&refusal))
 }
 
-fn tick(driver: i64, work: impl FnOnce(&mut Device<()>) -> Code) -> i32 {
+fn tick(driver: i64, work: impl FnOnce(&mut Device<Option<Place>>) -> Code) -> i32 {
     let code = DRIVERS.with(driver, |opened| work(&mut opened.device));
     let code = code.unwrap_or_else(|refused| refused);
     if code.code() < 0 {
@@ -207,12 +208,13 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
             // SAFETY: as above.
             unsafe { text(tables, "tables") }?
         };
-        let opened = open(Path::new(path), tables)?;
+        let mut opened = open(Path::new(path), tables)?;
+        let shown = page::show_driver(&mut opened)?;
         let slots = opened.slots().count;
-        let buffer = buffer_of(Shared::<()>::bytes(slots));
+        let buffer = buffer_of(Shared::<Option<Place>>::bytes(slots));
         // SAFETY: memory that is never given back, of at least this size, initialised, and of nobody else until this driver
         // is closed. The header demands of the caller that it leaves the slots alone during a call.
-        let shared = unsafe { Shared::new(buffer.words.cast(), slots, ()) };
+        let shared = unsafe { Shared::new(buffer.words.cast(), slots, shown) };
         let shared =
             shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
         let device = Device::new(opened, shared);
@@ -401,6 +403,19 @@ unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i
         let board = DRIVERS.with_reason(driver, |opened| opened.device.board())?;
         // SAFETY: the caller's promise.
         Ok(unsafe { hand_over(&faults(&board), into, room) })
+    })
+}
+
+/// # Safety
+///
+/// `into` must be null or have room for `room` bytes.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_page(driver: i64, into: *mut c_char, room: usize) -> i32 {
+    answer(|| {
+        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        let url = config.page.is_some().then(page::url).flatten();
+        // SAFETY: the caller's promise.
+        Ok(unsafe { hand_over(&url.unwrap_or_default(), into, room) })
     })
 }
 

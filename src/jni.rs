@@ -25,6 +25,7 @@ use tickbus_binding::{Device, EVENT_WORDS, EVENTS, Handles, Refusal, closing, fa
 use tickbus_driver::Code;
 use tickbus_report::page_beside;
 
+use crate::page;
 use failure::{Failure, ThrowFieldbusException};
 
 /// Every driver that this process has open.
@@ -179,6 +180,21 @@ extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
     env.with_env(|env| {
         let board = with(handle, |device| device.board())?;
         Ok(env.new_string(faults(&board))?)
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
+/// `static native String pageNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_pageNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) -> JString<'local> {
+    env.with_env(|env| {
+        let config = with(handle, |device| device.config())?;
+        let url = config.page.is_some().then(page::url).flatten();
+        Ok(env.new_string(url.unwrap_or_default())?)
     })
     .resolve::<ThrowFieldbusException>()
 }

@@ -44,6 +44,7 @@ pub mod cli;
 pub mod fieldbus;
 mod fmi_api;
 mod jni;
+mod page;
 
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};

@@ -116,6 +116,43 @@ const FREE: &str = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"";
 const STEPPED: &str =
     "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
 
+/// Somebody looks at every tick, and forces one signal after the other, of both directions.
+#[test]
+fn a_driver_that_is_watched_and_forced() {
+    for fieldbus in [FREE, STEPPED] {
+        let clock = Manual::new();
+        let config = config(fieldbus, "");
+        let signals = config.table.signals.len();
+        let mut driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+        let mut watch = driver.watch();
+        let mut slots = driver.initial_slots();
+        let (mut count, mut forced) = (0, None);
+        for tick in 0..2_000_usize {
+            watch.ask(tick % 3 == 0);
+            if tick % 5 == 0 {
+                let id = watch.force(tick % signals, Slot::from_real(1.0));
+                let before = forced.replace(id.expect("there is room"));
+                if let Some(id) = before {
+                    watch.end_fault(id).expect("it is taken");
+                }
+            } else if tick % 500 == 7 {
+                // Nothing is forced for a while.
+                if let Some(id) = forced.take() {
+                    watch.end_fault(id).expect("it is taken");
+                }
+            }
+            let time = Nanos::from_millis(tick.try_into().expect("small"));
+            let before = ALLOCATIONS.get();
+            driver.exchange(time, &mut slots);
+            if tick >= 100 {
+                count += ALLOCATIONS.get() - before;
+            }
+            assert!(watch.update(), "a copy came with its tick");
+        }
+        assert_eq!(count, 0);
+    }
+}
+
 #[test]
 fn a_free_bus() {
     assert_eq!(allocations(FREE, ""), 0);

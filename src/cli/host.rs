@@ -6,10 +6,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Outcome;
+use crate::page::{self, Place};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_driver::Host;
+use tickbus_driver::{Host, Watch};
 use tickbus_driver_cfg::{CommandLineEnd, Config};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
+use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_plc::Program;
 use tickbus_record as record;
@@ -28,6 +30,10 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "FILE")]
     faults: Option<std::path::PathBuf>,
 
+    /// Serve the live page, and print its address. Without HOST:PORT it is that of [page] in FILE, or 127.0.0.1:20080.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
+    page: Option<PageAddress>,
+
     /// Stop after this time; without it, on Ctrl-C.
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
@@ -40,6 +46,26 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "INTERVAL", num_args = 0..=1, require_equals = false,
         default_missing_value = "", value_parser = stats)]
     stats: Option<Stats>,
+}
+
+/// Where the page is to be served; `None` leaves it to the driver.cfg.
+#[derive(Clone, Debug)]
+pub(super) struct PageAddress(Option<Address>);
+
+/// Parses the value of --page.
+pub(super) fn page_address(text: &str) -> Result<PageAddress, String> {
+    let stated = (!text.is_empty()).then(|| super::lab::address(text));
+    Ok(PageAddress(stated.transpose()?))
+}
+
+impl PageAddress {
+    /// Asks for the page in the name of the driver.cfg.
+    pub(super) fn ask(&self, config: &mut Config) {
+        let page = config.page.get_or_insert_default();
+        if let Some(address) = &self.0 {
+            page.listen = address.clone();
+        }
+    }
 }
 
 /// When statistics are printed.
@@ -109,6 +135,9 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
             return Outcome::WrongInput;
         }
     };
+    if let Some(page) = &arguments.page {
+        page.ask(&mut config);
+    }
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
         let stop = stop.clone();
@@ -129,6 +158,10 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
                 Outcome::BusFailed
             };
         }
+    };
+    let _place = match show(title, &config, || host.watch()) {
+        Ok(place) => place,
+        Err(outcome) => return outcome,
     };
     let is_done = || report.as_ref().is_some_and(|report| report.is_done());
     // If the reader of stdout is gone (`| head`), the line keeps running.
@@ -161,6 +194,23 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     } else {
         Outcome::Done
     }
+}
+
+/// Shows what a command runs on the page that its driver.cfg asks for, and prints the address.
+pub(super) fn show(
+    title: &str,
+    config: &Config,
+    watch: impl FnOnce() -> Option<Watch>,
+) -> Result<Option<Place>, Outcome> {
+    let announce = |url: &str| super::lab::say(title, &format!("page at {url}"));
+    page::show(config, watch, announce).map_err(|error| {
+        eprintln!("{title}: {error}");
+        if error.is_wrong_input() {
+            Outcome::WrongInput
+        } else {
+            Outcome::BusFailed
+        }
+    })
 }
 
 /// The recording asked for on the command line: relative to the current folder, not to that of the

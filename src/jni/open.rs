@@ -10,13 +10,18 @@ use jni::objects::{JByteBuffer, JObject, JValue};
 use jni::refs::Global;
 use jni::{Env, jni_sig, jni_str};
 
+use tickbus_base::percent_decoded;
 use tickbus_binding::{Device, Shared, SignalDescription, SlotKind};
 use tickbus_driver::{Code, Driver};
 
 use super::failure::Failure;
+use crate::page::{self, Place};
 
-/// Keeps the memory of a shared buffer alive.
-pub(super) type Keep = Global<JByteBuffer<'static>>;
+/// Keeps the memory of a shared buffer alive, and its driver on the live page.
+pub(super) struct Keep {
+    _buffer: Global<JByteBuffer<'static>>,
+    _place: Option<Place>,
+}
 
 /// The file named by Java: a path, or a `file:` URI for a path that the JVM cannot represent as text. The URI
 /// has the bytes of the name as percent escapes.
@@ -24,19 +29,7 @@ pub(super) fn file_of(name: &str) -> PathBuf {
     let Some(escaped) = name.strip_prefix("file://") else {
         return PathBuf::from(name);
     };
-    let mut bytes = Vec::with_capacity(escaped.len());
-    let mut rest = escaped.as_bytes();
-    while let Some((first, after)) = rest.split_first() {
-        let escape = after.get(..2).filter(|_| *first == b'%');
-        let escape = escape.and_then(|digits| std::str::from_utf8(digits).ok());
-        if let Some(byte) = escape.and_then(|digits| u8::from_str_radix(digits, 16).ok()) {
-            bytes.push(byte);
-            rest = &after[2..];
-        } else {
-            bytes.push(*first);
-            rest = after;
-        }
-    }
+    let bytes = percent_decoded(escaped);
     #[cfg(unix)]
     {
         use std::os::unix::ffi::OsStringExt as _;
@@ -58,14 +51,16 @@ pub(super) fn open(
     tables: &str,
     layout: &JObject<'_>,
 ) -> Result<Device<Keep>, Failure> {
-    let driver = tickbus_binding::open(path, tables)?;
-    let shared = describe(env, &driver, layout)?;
+    let mut driver = tickbus_binding::open(path, tables)?;
+    let place = page::show_driver(&mut driver)?;
+    let shared = describe(env, &driver, place, layout)?;
     Ok(Device::new(driver, shared))
 }
 
 fn describe(
     env: &mut Env<'_>,
     driver: &Driver,
+    place: Option<Place>,
     layout: &JObject<'_>,
 ) -> Result<Shared<Keep>, Failure> {
     let config = driver.config();
@@ -81,7 +76,7 @@ fn describe(
         // One frame per signal, because local references would accumulate otherwise.
         env.with_local_frame(8, |env| describe_signal(env, layout, &signal))?;
     }
-    buffer(env, driver.slots().count, layout)
+    buffer(env, driver.slots().count, place, layout)
 }
 
 fn describe_signal(
@@ -126,7 +121,12 @@ fn index(number: usize) -> Result<i32, Failure> {
     })
 }
 
-fn buffer(env: &mut Env<'_>, slots: usize, layout: &JObject<'_>) -> Result<Shared<Keep>, Failure> {
+fn buffer(
+    env: &mut Env<'_>,
+    slots: usize,
+    place: Option<Place>,
+    layout: &JObject<'_>,
+) -> Result<Shared<Keep>, Failure> {
     let bytes = Shared::<Keep>::bytes(slots);
     let buffer = env
         .call_method(
@@ -144,7 +144,10 @@ fn buffer(env: &mut Env<'_>, slots: usize, layout: &JObject<'_>) -> Result<Share
     }
     let address = env.get_direct_buffer_address(&buffer)?;
     let address = NonNull::new(address).ok_or_else(|| unusable("has no address".into()))?;
-    let keep = env.new_global_ref(buffer)?;
+    let keep = Keep {
+        _buffer: env.new_global_ref(buffer)?,
+        _place: place,
+    };
     // SAFETY: a direct buffer's address stays the same and valid for its capacity, checked above, as
     // long as it is reachable, which `keep` sees to; the JVM zeroes it. Only the package `tickbus`
     // has the Java end. Its signals move slots outside the native call, on the one thread that ticks

@@ -1,4 +1,5 @@
-//! The patch bay in a browser: it shows what happens in the laboratory, and patches it.
+//! The pages that are served, in a browser: the patch bay shows what happens in the laboratory, and patches it; the live page
+//! (`live`) shows a driver.
 //!
 //! Not part of a plain `cargo test`, because it needs Chromium and chromedriver:
 //! `cargo test --features page --test browser_page` runs it.
@@ -7,6 +8,8 @@
 #[path = "../browser/webdriver.rs"]
 #[allow(dead_code, reason = "the report's tests use the rest")]
 mod webdriver;
+
+mod live;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

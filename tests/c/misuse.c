@@ -66,6 +66,7 @@ int main(int count, char **arguments) {
         EXPECT(tb_buffer_of(never[i]) == NULL, 1, "NOT_OPEN");
         EXPECT(tb_signal_count(never[i]), TB_NOT_OPEN, NULL);
         EXPECT(tb_statistics(never[i], text, sizeof text), TB_NOT_OPEN, NULL);
+        EXPECT(tb_page(never[i], text, sizeof text), TB_NOT_OPEN, NULL);
     }
 
     EXPECT(tb_open(arguments[1], NULL, &driver), TB_FRESH, NULL);
@@ -87,6 +88,10 @@ int main(int count, char **arguments) {
     EXPECT(tb_statistics(driver, text, 10) > 64, 1, NULL);
     EXPECT(strlen(text), 9, NULL);
     EXPECT(text[10], 'x', NULL);
+
+    /* Its driver.cfg asks for no page. */
+    EXPECT(tb_page(driver, text, sizeof text), 0, NULL);
+    EXPECT(strlen(text), 0, NULL);
 
     EXPECT(tb_inject(driver, "kind = \"stukc\""), TB_BAD_ARGUMENT, "stuck");
     int fault = tb_inject(driver, "kind = \"stuck\"\nsignal = \"Level\"\nvalue = 12.0");

@@ -9,10 +9,12 @@
 
 mod mistake;
 pub mod os;
+mod percent;
 mod quick_clock;
 pub mod statistics;
 pub mod time;
 pub mod toml_text;
 
 pub use mistake::Mistake;
+pub use percent::percent_decoded;
 pub use quick_clock::QuickClock;

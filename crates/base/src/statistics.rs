@@ -78,6 +78,11 @@ impl fmt::Display for Value {
 pub struct Statistics(Vec<(Key, Value)>);
 
 impl Statistics {
+    /// The entries in their order.
+    pub fn iter(&self) -> impl Iterator<Item = (&str, &Value)> {
+        self.0.iter().map(|(key, value)| (&*key.0, value))
+    }
+
     /// Adds a count.
     pub fn count(&mut self, key: impl Into<Key>, count: u64) {
         self.0.push((key.into(), Value::Count(count)));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::layout;
 use super::timing::{Timing, TimingKeys};
-use crate::Options;
+use crate::{Options, PageOptions};
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
@@ -50,6 +50,8 @@ pub struct Config {
     pub fault_file: Option<PathBuf>,
     /// What to record, if anything.
     pub record: Option<record::Options>,
+    /// The live page, if one is asked for.
+    pub page: Option<PageOptions>,
 }
 
 /// What a command line says about its end of the bus.
@@ -177,6 +179,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
     let axes = root.take("axis");
     let faults = root.take("fault");
     let record = root.take("record");
+    let page = root.take("page");
 
     let driver = driver
         .and_then(|value| value.table("[driver]", "write a [driver] table"))
@@ -193,6 +196,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
         let table = value.table("[record]", "write a [record] table")?;
         record::Options::read(table, replayed)
     });
+    let page = page.map(|value| PageOptions::read(value.table("[page]", "write a [page] table")?));
     let declared = stations.map(|value| value.tables("[[station]]"));
     let signals = signals
         .map(|value| value.tables("[[signal]]"))
@@ -262,7 +266,8 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
     let (driver, fieldbus) = (driver?, fieldbus?);
     // In a file that serves both ends the faults are the machine's: injected at both ends, they would happen
     // twice.
-    let (faults, fault_file) = if fieldbus.is_for_both && fieldbus.role == Role::Controller {
+    let is_other_end = fieldbus.is_for_both && fieldbus.role == Role::Controller;
+    let (faults, fault_file) = if is_other_end {
         (Vec::new(), None)
     } else {
         let beside = path.parent().unwrap_or(Path::new(""));
@@ -284,6 +289,11 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
         fault_file,
         record: match record {
             Some(record) => Some(record?),
+            None => None,
+        },
+        page: match page {
+            // As with faults: both ends cannot have one address.
+            Some(page) => Some(page?).filter(|_| !is_other_end),
             None => None,
         },
     })

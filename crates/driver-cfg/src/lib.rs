@@ -7,8 +7,10 @@ mod kinds;
 mod layout;
 pub mod loopback;
 mod overlay;
+mod page;
 mod timing;
 
 pub use config::{CommandLineEnd, Config};
 pub use kinds::{Exported, Options};
+pub use page::PageOptions;
 pub use timing::Timing;

@@ -1,7 +1,7 @@
 //! Tables that replace those of a driver.cfg: the same device on another line.
 
 use super::Config;
-use crate::{Options, loopback};
+use crate::{Options, PageOptions, loopback};
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, did_you_mean, read_text, shown};
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::SignalTable;
@@ -15,7 +15,7 @@ impl Config {
     /// the bus: sizes, cycle times, time-outs and life signs stay. `[[station]]` tables give what that bus
     /// needs to know about the file's stations, by name. A `[fieldbus]` without a `kind` changes only the
     /// `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
-    /// recording removes the file's own, which belongs to the plant.
+    /// recording removes the file's own, which belongs to the plant. So does the file's `[page]`, if the bus is replaced.
     ///
     /// # Errors
     ///
@@ -34,6 +34,7 @@ fn read(mut config: Config, mut root: Table<'_>) -> Option<Config> {
     let fieldbus = root.take("fieldbus");
     let stations = root.take("station");
     let record = root.take("record");
+    let page = root.take("page");
     root.finish();
     let stations = stations.map(|value| value.tables("[[station]]"));
     if let Some(value) = fieldbus {
@@ -49,6 +50,10 @@ fn read(mut config: Config, mut root: Table<'_>) -> Option<Config> {
     if let Some(value) = record {
         let table = value.table("[record]", "write a [record] table")?;
         config.record = Some(record::Options::read(table, config.bus.replayed())?);
+    }
+    if let Some(value) = page {
+        let table = value.table("[page]", "write a [page] table")?;
+        config.page = Some(PageOptions::read(table)?);
     }
     Some(config)
 }
@@ -75,6 +80,7 @@ fn read_fieldbus(
         if bus.replayed().is_some() {
             config.record = None;
         }
+        config.page = None;
         config.bus = bus;
         config.events = events;
         config.role = role;

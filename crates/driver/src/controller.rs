@@ -1,10 +1,8 @@
 //! A PLC program at one end of a bus, by itself: the other front door, beside that of a simulation.
 
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
 
 use tickbus_base::Mistake;
-use tickbus_base::os::dropped_log_lines;
-use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::faults::FaultStatus;
 use tickbus_fieldbus::{Bus, Hosted, Lead, Link};
@@ -12,6 +10,7 @@ use tickbus_plc::Program;
 
 use super::host::{HostThread, ScanSetup, check_fit};
 use super::recording::ScanRecorder;
+use super::watch::Watch;
 use super::{DriverError, bus};
 use tickbus_driver_cfg::Config;
 
@@ -88,14 +87,14 @@ impl Host {
     /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         let now = self.0.counters.clock.now();
-        let mut statistics = Statistics::default();
-        self.0.status.observe_call(now);
-        self.0.status.write(now, &mut statistics);
-        self.0.board.tell(self.0.status.driver());
-        self.0.board.write(&mut statistics);
-        self.0.counters.write(&mut statistics);
-        statistics.count("log.dropped", dropped_log_lines());
-        statistics.to_string()
+        self.0.figures().statistics(now).to_string()
+    }
+
+    /// Lets another thread look at the program's image, and force its signals; `None` if one has been given out already. As
+    /// long as it asks for nothing, a scan pays for a look at one word.
+    pub fn watch(&self) -> Option<Watch> {
+        let mut watch = self.0.watch.lock().unwrap_or_else(PoisonError::into_inner);
+        watch.take()
     }
 
     /// The injected faults of this end.

@@ -14,8 +14,9 @@ use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::host::Program;
 use super::station::Station;
-use super::statistics::TickTimes;
 use super::tick::Tick;
+use super::tick_counters::TickTimes;
+use super::watched::Watched;
 use super::{Exchange, SlotMap, Snapshot, TickCounters};
 use tickbus_driver_cfg::Config;
 
@@ -50,6 +51,8 @@ pub struct Driver {
     pub(super) events: Consumer,
     pub(super) program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
+    /// Where another thread looks at it.
+    pub(super) watched: Option<Box<Watched>>,
 }
 
 impl Driver {

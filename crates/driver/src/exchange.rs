@@ -17,8 +17,8 @@ use tickbus_fieldbus::{BusError, LinkState};
 use tickbus_image::signal::Slot;
 
 use super::bus_handle::BusHandle;
-use super::statistics::TickTimes;
 use super::tick::Tick;
+use super::tick_counters::TickTimes;
 use super::{Code, Driver, Exchange};
 
 impl Driver {
@@ -47,7 +47,8 @@ impl Driver {
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
         let tick = self.counters.ticks + 1;
-        let is_simple = self.is_simple && self.tick.is_none();
+        let is_watched = self.watched.as_ref().is_some_and(|watched| watched.is_wanted());
+        let is_simple = self.is_simple && self.tick.is_none() && !is_watched;
         if !is_simple || tick == 1 || TickTimes::takes(tick) {
             return None;
         }
@@ -339,6 +340,11 @@ impl Driver {
         }
         if matches!(self.line, BusHandle::Free(_)) && TickTimes::takes(self.counters.ticks) {
             self.samples.add(tick.taken, self.last.age);
+        }
+        if let Some(watched) = &self.watched
+            && watched.is_wanted()
+        {
+            self.serve_watch(tick, found.code, slots);
         }
     }
 

@@ -16,7 +16,7 @@ use tickbus_image::signal::{Area, DataType, Signal, Width};
 use tickbus_plc::{Program, Scan};
 use tickbus_virtual_time::{Declaration, Ended, Meeting, Outcome, Participant, Step};
 
-use super::{DriverError, Host};
+use super::{DriverError, Host, Watch};
 
 /// The signal whose new value begins a step of the PLC.
 const GO: &str = "sync.go";
@@ -234,6 +234,11 @@ impl Gateway {
     /// The state of the PLC's line.
     pub fn link(&self) -> Link {
         self.host.link()
+    }
+
+    /// Lets another thread look at the PLC's signals; see [`Host::watch`].
+    pub fn watch(&self) -> Option<Watch> {
+        self.host.watch()
     }
 
     /// Closes the PLC's bus.

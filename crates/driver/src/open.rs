@@ -16,8 +16,8 @@ use super::frames::directions;
 use super::heartbeat::Beat;
 use super::recording::recorder;
 use super::station::Station;
-use super::statistics::TickTimes;
 use super::supervise::BusThread;
+use super::tick_counters::TickTimes;
 use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
 
@@ -108,6 +108,7 @@ impl Driver {
             board,
             events: tick.events,
             program,
+            watched: None,
             config: Arc::new(config),
         };
         for fault in &list {

@@ -39,6 +39,11 @@ impl Station {
         self.tick.cycles()
     }
 
+    /// Tells how many edges of each latched signal there were.
+    pub(super) fn edges(&self, tell: impl FnMut(usize, u32)) {
+        self.tick.edges(tell);
+    }
+
     pub(super) fn peer_age(&self, now: Nanos) -> Nanos {
         self.tick.peer_age(now)
     }

@@ -182,8 +182,7 @@ impl EdgeCounter {
     }
 
     /// The counters, one per latched bit.
-    #[cfg(test)]
-    fn counts(&self) -> &[u32] {
+    pub fn counts(&self) -> &[u32] {
         &self.counts
     }
 }

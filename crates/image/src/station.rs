@@ -44,6 +44,8 @@ struct Beside {
 pub struct TickStation {
     tx: Writer<Frame>,
     tx_edges: EdgeCounter,
+    /// The signals of the bits whose edges are counted there.
+    tx_signals: Box<[usize]>,
     tx_sequence: u64,
     /// The bytes published last: most ticks change nothing, and need no hand-over.
     published: Box<[u8]>,
@@ -120,6 +122,7 @@ pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
     let tick = TickStation {
         tx: tx_writer,
         tx_edges: EdgeCounter::new(&tx_latched, &tx_fail_safe),
+        tx_signals: tx_latched.iter().map(|bit| bit.signal).collect(),
         tx_sequence: 0,
         published_word: as_word(&tx_fail_safe),
         published: tx_fail_safe.clone(),
@@ -292,6 +295,19 @@ impl TickStation {
     #[inline]
     pub fn is_valid(&self) -> bool {
         !self.beside.invalid.load(Ordering::Acquire)
+    }
+
+    /// Tells of every latched signal, by its index in the signal table, how many edges there were so far, of both
+    /// directions; the counts wrap.
+    pub fn edges(&self, mut tell: impl FnMut(usize, u32)) {
+        for (signal, count) in self.tx_signals.iter().zip(self.tx_edges.counts()) {
+            tell(*signal, *count);
+        }
+        self.rx.with(|frame| {
+            for (bit, count) in self.rx_shaper.bits().iter().zip(&frame.edges) {
+                tell(bit.signal, *count);
+            }
+        });
     }
 
     /// Whole bus cycles received so far.

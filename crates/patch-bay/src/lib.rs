@@ -25,6 +25,11 @@ const ASSETS: &[Asset] = &[
         text: include_str!("page.css"),
     },
     Asset {
+        path: "/client.js",
+        kind: "text/javascript; charset=utf-8",
+        text: tickbus_web::CLIENT,
+    },
+    Asset {
         path: "/board.js",
         kind: "text/javascript; charset=utf-8",
         text: include_str!("board.js"),
@@ -57,7 +62,7 @@ impl Site for PatchBay {
     fn look(&self, answer: Answer<State>) {
         self.door.send(move |dispatcher, _| {
             let snapshot = dispatcher.snapshot();
-            answer.give(Box::new(move || json::state(&snapshot)));
+            answer.give(State::whole(move || json::state(&snapshot)));
         });
     }
 

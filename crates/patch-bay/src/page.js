@@ -5,74 +5,23 @@
   const get = (id) => document.getElementById(id);
   const tray = get('chosen');
   const value = get('force-value');
-  /** Without a word for this long, what is shown counts as old. The room says something every 2 s. */
-  const PATIENCE = 5000;
   let mayChange = false;
   let chosen = null;
   /** The next channel that is chosen gets a cable to the chosen one; not after that was forced, released or cut. */
   let isEnd = false;
-  let heard = 0;
   let state = null;
-
-  /** The token comes behind "#", which is sent to nobody, and leaves the address at once. */
-  function takeToken() {
-    const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
-    if (!given) return;
-    sessionStorage.setItem('token', given[1]);
-    history.replaceState(null, '', location.pathname);
-  }
-
-  takeToken();
-  // Another token that is put into the address of this tab loads nothing.
-  window.addEventListener('hashchange', () => {
-    takeToken();
-    askAccess();
-  });
-
-  function headers() {
-    const token = sessionStorage.getItem('token');
-    return token ? { Authorization: `Bearer ${token}` } : {};
-  }
 
   function say(text, isBad = false) {
     get('status').textContent = text;
     get('status').classList.toggle('bad', isBad);
   }
 
-  /** Without an answer for this long, nobody waits any more. */
-  const ask = (path, options) => fetch(path, { ...options, headers: headers(), signal: AbortSignal.timeout(10000) });
-
-  async function askAccess() {
-    let text = 'read-only';
-    let why = 'Read-only: open the address that the dispatcher printed, with its token, to change something.';
-    try {
-      const answer = await ask('/access');
-      const access = await answer.json();
-      mayChange = access.may_change === true;
-      if (mayChange) text = 'may change';
-      if (!answer.ok) why = `Read-only: ${access.text}`;
-    } catch {
-      return;
-    }
-    get('access').textContent = text;
-    get('access').classList.toggle('good', mayChange);
-    document.body.classList.toggle('read-only', !mayChange);
-    if (!mayChange) say(why);
-    else if (get('status').textContent.startsWith('Read-only')) say('');
-    showChosen();
-  }
-
   async function change(method, path, body, done) {
-    try {
-      const answer = await ask(path, { method, body });
-      const said = await answer.json();
-      if (answer.ok) say(done);
-      else say(`ERR ${said.code} ${said.text}`, true);
-      return answer.ok;
-    } catch {
-      say('The dispatcher does not answer; check the change when it is back.', true);
-      return false;
-    }
+    const said = await room.change(method, path, body);
+    if (said === null) say('The dispatcher does not answer; check the change when it is back.', true);
+    else if (said.ok) say(done);
+    else say(`ERR ${said.code} ${said.text}`, true);
+    return said?.ok === true;
   }
 
   function connect(one, other) {
@@ -297,56 +246,27 @@
     showChosen();
   }
 
-  function setAge() {
-    const now = performance.now();
-    const isOpen = source?.readyState === EventSource.OPEN;
-    const isOld = now - heard > PATIENCE || !isOpen;
-    // A connection may be lost without a word, as when a computer sleeps or changes its network.
-    if (isOpen && now - Math.max(heard, begun) > PATIENCE) listen();
-    document.body.classList.toggle('is-old', isOld);
-    const link = isOld ? 'no connection' : 'live';
-    if (get('link').textContent !== link) get('link').textContent = link;
-    get('link').className = isOld ? 'tag bad' : 'tag good';
-    get('age').hidden = !isOld;
-    if (!isOld) return;
-    const seconds = Math.round((performance.now() - heard) / 1000);
-    const text = state ? `No connection to the dispatcher. What is shown is ${seconds} s old.` : 'No connection to the dispatcher.';
-    get('age').textContent = text;
-  }
-
-  let source = null;
-  /** When it was listened for the first time, or again. */
-  let begun = 0;
-
-  function listen() {
-    source?.close();
-    source = null;
-    // A browser has few connections to one host for all of its tabs.
-    if (document.hidden) return;
-    begun = performance.now();
-    source = new EventSource('/events');
-    source.onopen = askAccess;
-    source.onmessage = (event) => {
-      heard = performance.now();
-      show(event.data);
-      setAge();
-    };
-    source.addEventListener('beat', () => {
-      heard = performance.now();
-      setAge();
-    });
-    source.onerror = () => {
-      setAge();
-      // A refusal ends the source for good; a broken connection it restores itself.
-      if (source?.readyState === EventSource.CLOSED) setTimeout(listenAgain, 1000);
-    };
-  }
-
-  function listenAgain() {
-    if (source?.readyState === EventSource.CLOSED) listen();
-  }
-
-  document.addEventListener('visibilitychange', listen);
-  listen();
-  setInterval(setAge, 500);
+  room.listen({
+    news: show,
+    access(isRight, refusal) {
+      mayChange = isRight;
+      get('access').textContent = mayChange ? 'may change' : 'read-only';
+      get('access').classList.toggle('good', mayChange);
+      document.body.classList.toggle('read-only', !mayChange);
+      const why = refusal || 'open the address that the dispatcher printed, with its token, to change something.';
+      if (!mayChange) say(`Read-only: ${why}`);
+      else if (get('status').textContent.startsWith('Read-only')) say('');
+      showChosen();
+    },
+    age(isOld, seconds) {
+      document.body.classList.toggle('is-old', isOld);
+      const link = isOld ? 'no connection' : 'live';
+      if (get('link').textContent !== link) get('link').textContent = link;
+      get('link').className = isOld ? 'tag bad' : 'tag good';
+      get('age').hidden = !isOld;
+      if (!isOld) return;
+      const text = state ? `No connection to the dispatcher. What is shown is ${seconds} s old.` : 'No connection to the dispatcher.';
+      get('age').textContent = text;
+    },
+  });
 })();

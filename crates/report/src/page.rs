@@ -15,9 +15,14 @@ const TEMPLATE: &str = include_str!("template.html");
 const CHART: &str = include_str!("chart.html");
 /// The style of the page, for other pages that are to look like it.
 pub const STYLE: &str = include_str!("style.css");
-const SCRIPT: [&str; 4] = [
+/// The script that finds values by their time. What it needs of the page stands at its beginning.
+pub const LOOKUP: &str = include_str!("lookup.js");
+/// The script that draws signals over time, for scripts that come after [`LOOKUP`].
+pub const DRAW: &str = include_str!("draw.js");
+const SCRIPT: [&str; 5] = [
+    LOOKUP,
     include_str!("data.js"),
-    include_str!("draw.js"),
+    DRAW,
     include_str!("chart.js"),
     include_str!("start.js"),
 ];

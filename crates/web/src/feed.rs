@@ -1,18 +1,18 @@
 //! The newest state, for everyone who looks.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use hyper::body::Bytes;
-use tickbus_base::time::Clock;
+use tickbus_base::time::{Clock, Nanos};
 use tokio::sync::{Notify, watch};
 use tokio::time::timeout;
 
-use crate::site::{Answer, Site};
+use crate::site::{Answer, Differences, Site, State};
 
 /// The shortest time between two looks.
-const PERIOD: Duration = Duration::from_millis(33);
+const PERIOD: Duration = Duration::from_micros(16_667);
 
 /// Formatting that takes long is followed by a pause of this many times its length, so that large pages leave time for
 /// other work.
@@ -20,6 +20,9 @@ const REST: u32 = 20;
 
 /// The longest pause.
 const LONGEST_REST: Duration = Duration::from_secs(1);
+
+/// How many events are kept for viewers who lack the same.
+const KEPT: usize = 4;
 
 /// The newest state. Viewers who are slow miss those between, and keep nobody waiting.
 pub(crate) struct Feed {
@@ -32,6 +35,17 @@ pub(crate) struct Feed {
     hurry: Notify,
     /// Looks that were answered so far.
     looks: AtomicU64,
+    formatted: Mutex<Formatted>,
+    clock: Arc<dyn Clock>,
+}
+
+/// The events that were formatted of the present state, and what that took.
+#[derive(Default)]
+struct Formatted {
+    number: u64,
+    /// By the state that the viewer had.
+    events: Vec<(Option<u64>, Bytes)>,
+    spent: Nanos,
 }
 
 /// Somebody who looks.
@@ -39,26 +53,20 @@ pub(crate) struct Viewer {
     newest: watch::Receiver<Newest>,
     /// The changes before it came: it gets no state that was looked at before them.
     changes: u64,
+    /// What it got last.
+    seen: Seen,
 }
 
-impl Viewer {
-    /// The next state. It may be equal to the one before. `None`: there is nothing to be seen any more.
-    pub(crate) async fn next(&mut self) -> Option<Published> {
-        loop {
-            self.newest.changed().await.ok()?;
-            match &*self.newest.borrow_and_update() {
-                Newest::State(state) if state.changes >= self.changes => {
-                    return Some(state.clone());
-                }
-                Newest::State(_) | Newest::Unknown => {}
-                Newest::Ended => return None,
-            }
-        }
-    }
+#[derive(Default)]
+enum Seen {
+    #[default]
+    Nothing,
+    Whole(Bytes),
+    /// By its number.
+    State(u64),
 }
 
 /// What was seen last.
-#[derive(Debug)]
 enum Newest {
     /// Nobody looks.
     Unknown,
@@ -67,43 +75,61 @@ enum Newest {
     Ended,
 }
 
-/// A state, as it is sent.
-#[derive(Clone, Debug)]
-pub(crate) struct Published {
-    event: Bytes,
+/// A state, for everybody.
+#[derive(Clone)]
+struct Published {
+    content: Content,
     /// The changes before it was looked at.
     changes: u64,
+}
+
+#[derive(Clone)]
+enum Content {
+    /// Formatted, as an event.
+    Whole(Bytes),
+    Differences {
+        state: Arc<dyn Differences>,
+        number: u64,
+    },
+}
+
+impl Published {
+    fn is_new(&self, present: &Self) -> bool {
+        let is_other = match (&self.content, &present.content) {
+            (Content::Whole(one), Content::Whole(other)) => one != other,
+            (
+                Content::Differences { number: one, .. },
+                Content::Differences { number: other, .. },
+            ) => one != other,
+            _ => true,
+        };
+        is_other || self.changes != present.changes
+    }
 }
 
 const PREFIX: &str = "data: ";
 const SUFFIX: &str = "\n\n";
 
-impl Published {
-    fn new(json: &str, changes: u64) -> Self {
-        let event = [PREFIX, json, SUFFIX].concat().into();
-        Self { event, changes }
-    }
+/// A server-sent event.
+fn event(json: &str) -> Bytes {
+    [PREFIX, json, SUFFIX].concat().into()
+}
 
-    /// As a server-sent event.
-    pub(crate) fn event(&self) -> Bytes {
-        self.event.clone()
-    }
-
-    /// As JSON.
-    pub(crate) fn json(&self) -> Bytes {
-        let end = self.event.len() - SUFFIX.len();
-        self.event.slice(PREFIX.len()..end)
-    }
+/// The JSON of an event.
+pub(crate) fn json(event: &Bytes) -> Bytes {
+    event.slice(PREFIX.len()..event.len() - SUFFIX.len())
 }
 
 impl Feed {
-    pub(crate) fn new() -> Self {
+    pub(crate) fn new(clock: Arc<dyn Clock>) -> Self {
         Self {
             state: watch::Sender::new(Newest::Unknown),
             wanted: Notify::new(),
             changes: AtomicU64::new(0),
             hurry: Notify::new(),
             looks: AtomicU64::new(0),
+            formatted: Mutex::default(),
+            clock,
         }
     }
 
@@ -113,7 +139,73 @@ impl Feed {
         newest.mark_changed();
         self.wanted.notify_one();
         let changes = self.changes.load(Ordering::Relaxed);
-        Viewer { newest, changes }
+        Viewer {
+            newest,
+            changes,
+            seen: Seen::Nothing,
+        }
+    }
+
+    /// The next event for a viewer: the newest state, or what it lacks of it. `None`: there is nothing to be seen any
+    /// more.
+    pub(crate) async fn next(&self, viewer: &mut Viewer) -> Option<Bytes> {
+        loop {
+            viewer.newest.changed().await.ok()?;
+            let content = match &*viewer.newest.borrow_and_update() {
+                Newest::State(state) if state.changes >= viewer.changes => state.content.clone(),
+                Newest::State(_) | Newest::Unknown => continue,
+                Newest::Ended => return None,
+            };
+            match content {
+                Content::Whole(event) => {
+                    if !matches!(&viewer.seen, Seen::Whole(seen) if *seen == event) {
+                        viewer.seen = Seen::Whole(event.clone());
+                        return Some(event);
+                    }
+                }
+                Content::Differences { state, .. } => {
+                    let seen = match viewer.seen {
+                        Seen::State(number) => Some(number),
+                        Seen::Nothing | Seen::Whole(_) => None,
+                    };
+                    if seen != Some(state.number()) {
+                        let (number, event) = self.differences(&*state, seen);
+                        viewer.seen = Seen::State(number);
+                        return Some(event);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The event for somebody who has seen this. Most viewers have seen the same, and share it.
+    fn differences(&self, state: &dyn Differences, seen: Option<u64>) -> (u64, Bytes) {
+        let mut formatted = self.formatted();
+        if formatted.number == state.number() {
+            let kept = formatted.events.iter().find(|(had, _)| *had == seen);
+            if let Some((_, event)) = kept {
+                return (formatted.number, event.clone());
+            }
+        }
+        let begin = self.clock.now();
+        let (number, json) = state.since(seen);
+        let event = event(&json);
+        formatted.spent += self.clock.now() - begin;
+        if formatted.number != number {
+            formatted.events.clear();
+            formatted.number = number;
+        }
+        if formatted.events.len() < KEPT {
+            formatted.events.push((seen, event.clone()));
+        }
+        (number, event)
+    }
+
+    fn formatted(&self) -> MutexGuard<'_, Formatted> {
+        // An event is kept as a whole or not at all.
+        self.formatted
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Something was changed: viewers who come from now on see it.
@@ -128,7 +220,7 @@ impl Feed {
     }
 
     /// Looks while somebody else does, until the site has ended.
-    pub(crate) async fn run(&self, site: Arc<dyn Site>, clock: Arc<dyn Clock>) {
+    pub(crate) async fn run(&self, site: Arc<dyn Site>) {
         loop {
             while self.state.receiver_count() == 0 {
                 // What was true then need not be when the next one comes.
@@ -143,15 +235,23 @@ impl Feed {
                 return;
             };
             // How long the site took to answer was not this thread's work, and asks for no rest.
-            let begin = clock.now();
-            let state = Published::new(&state(), changes);
-            let taken = u64::try_from((clock.now() - begin).0).unwrap_or_default();
+            let begin = self.clock.now();
+            let content = match state {
+                State::Whole(make) => Content::Whole(event(&make())),
+                State::Differences(state) => Content::Differences {
+                    number: state.number(),
+                    state,
+                },
+            };
+            // With what was formatted for single viewers since the last look.
+            let spent = std::mem::take(&mut self.formatted().spent);
+            let taken = self.clock.now() - begin + spent;
+            let taken = u64::try_from(taken.0).unwrap_or_default();
             self.looks.fetch_add(1, Ordering::Relaxed);
+            let state = Published { content, changes };
             self.state.send_if_modified(|present| {
                 let is_new = match present {
-                    Newest::State(present) => {
-                        present.event != state.event || present.changes != state.changes
-                    }
+                    Newest::State(present) => state.is_new(present),
                     Newest::Unknown | Newest::Ended => true,
                 };
                 *present = Newest::State(state);

@@ -4,14 +4,16 @@ use std::fmt;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
 use std::sync::Arc;
+use std::sync::atomic::AtomicUsize;
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
-use tickbus_base::time::Clock;
-use tickbus_fieldbus::tcp::{Address, bind};
+use tickbus_base::time::{Clock, Nanos};
+use tickbus_fieldbus::tcp::{Address, bind, prepare};
+use tokio::net::TcpStream;
 use tokio::sync::{Semaphore, oneshot};
 
 use crate::feed::Feed;
@@ -107,22 +109,25 @@ impl Room {
             .enable_time()
             .build()?;
         let (stop, stopped) = oneshot::channel();
-        let thread = thread::Builder::new().name("web".to_owned()).spawn(move || {
-            let limits = self.limits;
-            let hall = Arc::new(Hall {
-                site: Arc::clone(&site),
-                guard: self.guard,
-                feed: Feed::new(),
-                patience: limits.patience,
-            });
-            runtime.block_on(async {
-                tokio::select! {
-                    () = accept(self.listener, &hall, limits) => {}
-                    () = async { hall.feed.run(site, clock).await; std::future::pending().await } => {}
-                    _ = stopped => {}
-                }
-            });
-        })?;
+        let thread = thread::Builder::new()
+            .name("web".to_owned())
+            .spawn(move || {
+                let limits = self.limits;
+                let hall = Arc::new(Hall {
+                    site: Arc::clone(&site),
+                    guard: self.guard,
+                    feed: Feed::new(clock),
+                    patience: limits.patience,
+                    holders: AtomicUsize::new(0),
+                });
+                runtime.block_on(async {
+                    tokio::select! {
+                        () = accept(self.listener, &hall, limits) => {}
+                        () = async { hall.feed.run(site).await; std::future::pending().await } => {}
+                        _ = stopped => {}
+                    }
+                });
+            })?;
         Ok(Serving {
             stop: Some(stop),
             thread: Some(thread),
@@ -147,6 +152,14 @@ impl Drop for Serving {
     }
 }
 
+/// Has the system send at once, and give up on a peer that confirms nothing.
+fn prepared(stream: TcpStream, patience: Duration) -> io::Result<TcpStream> {
+    let stream = stream.into_std()?;
+    let patience = i64::try_from(patience.as_nanos()).map_or(Nanos::MAX, Nanos);
+    prepare(&stream, patience)?;
+    TcpStream::from_std(stream)
+}
+
 async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         return;
@@ -160,8 +173,10 @@ async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
         let Ok(seat) = Arc::clone(&seats).try_acquire_owned() else {
             continue;
         };
-        // Without it an event may wait for the confirmation of the one before.
-        let _ = stream.set_nodelay(true);
+        // A viewer whose computer has gone without a word is not to be taken for one that is there.
+        let Ok(stream) = prepared(stream, limits.patience) else {
+            continue;
+        };
         let hall = Arc::clone(hall);
         tokio::spawn(async move {
             let service = service_fn(|request| answer(&hall, request));

@@ -1,8 +1,8 @@
 //! One request and its answer.
 
 use std::convert::Infallible;
-use std::fmt::Write as _;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use futures_util::stream::unfold;
@@ -16,7 +16,7 @@ use hyper::header::{
 use hyper::{Method, Request, Response, StatusCode};
 use tokio::time::{Interval, interval, timeout};
 
-use crate::feed::{Feed, Viewer};
+use crate::feed::{Feed, Viewer, json};
 use crate::guard::{Guard, Token};
 use crate::site::{Answer, Change, Site, Verb};
 
@@ -39,6 +39,33 @@ pub(crate) struct Hall {
     pub(crate) guard: Guard,
     pub(crate) feed: Feed,
     pub(crate) patience: Duration,
+    /// How many viewers have the token.
+    pub(crate) holders: AtomicUsize,
+}
+
+impl Hall {
+    /// Tells the site of somebody who has the token.
+    fn heard(&self) {
+        self.site.heard(self.holders.load(Ordering::Relaxed));
+    }
+}
+
+/// A viewer who has the token.
+struct Holder(Arc<Hall>);
+
+impl Holder {
+    fn new(hall: &Arc<Hall>) -> Self {
+        hall.holders.fetch_add(1, Ordering::Relaxed);
+        hall.heard();
+        Self(Arc::clone(hall))
+    }
+}
+
+impl Drop for Holder {
+    fn drop(&mut self) {
+        self.0.holders.fetch_sub(1, Ordering::Relaxed);
+        self.0.heard();
+    }
 }
 
 type Body = UnsyncBoxBody<Bytes, Infallible>;
@@ -52,10 +79,8 @@ pub(crate) async fn answer(
 ) -> Result<Response<Body>, Infallible> {
     let answered = respond(hall, request).await;
     let mut response = answered.unwrap_or_else(|(status, text)| {
-        let mut quoted = String::new();
-        quote(&text, &mut quoted);
-        let json = format!("{{\"code\":{},\"text\":{quoted}}}\n", status.as_u16());
-        let mut response = full(JSON, json);
+        let json = serde_json::json!({ "code": status.as_u16(), "text": text });
+        let mut response = full(JSON, format!("{json}\n"));
         *response.status_mut() = status;
         if status == StatusCode::METHOD_NOT_ALLOWED {
             let methods = HeaderValue::from_static("GET, PUT, DELETE");
@@ -88,6 +113,9 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
         .check_source(request.headers())
         .map_err(|why| (StatusCode::FORBIDDEN, why))?;
     let token = hall.guard.token_of(request.headers());
+    if token == Token::Right {
+        hall.heard();
+    }
     let path = request.uri().path().to_owned();
     let verb = match *request.method() {
         Method::GET => return get(hall, &path, token).await,
@@ -126,10 +154,12 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
 async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body>, Refusal> {
     match path {
         "/state" => {
-            let state = hall.feed.subscribe().next().await;
-            Ok(full(JSON, state.ok_or_else(nobody)?.json()))
+            let mut viewer = hall.feed.subscribe();
+            let state = timeout(hall.patience, hall.feed.next(&mut viewer)).await;
+            let state = state.map_err(|_| hung())?;
+            Ok(full(JSON, json(&state.ok_or_else(nobody)?)))
         }
-        "/events" => Ok(events(hall)),
+        "/events" => Ok(events(hall, token)),
         "/access" if token == Token::Wrong => Err(no_token(token)),
         "/access" => Ok(full(
             JSON,
@@ -137,19 +167,26 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
         )),
         _ => {
             let asset = hall.site.assets().iter().find(|asset| asset.path == path);
-            let asset =
-                asset.ok_or_else(|| (StatusCode::NOT_FOUND, format!("there is no {path} here")))?;
-            Ok(full(asset.kind, asset.text))
+            if let Some(asset) = asset {
+                return Ok(full(asset.kind, asset.text));
+            }
+            let (answer, document) = Answer::new();
+            hall.site.get(path, answer);
+            let document = timeout(hall.patience, document).await;
+            let document = document.map_err(|_| hung())?.map_err(|_| nobody())?;
+            let none = || (StatusCode::NOT_FOUND, format!("there is no {path} here"));
+            let document = document.ok_or_else(none)?;
+            Ok(full(document.kind, document.text))
         }
     }
 }
 
 /// The newest state, each time that it is another one and the viewer has taken the last.
-fn events(hall: &Arc<Hall>) -> Response<Body> {
+fn events(hall: &Arc<Hall>, token: Token) -> Response<Body> {
     let mut events = Events {
         hall: Arc::clone(hall),
+        _holder: (token == Token::Right).then(|| Holder::new(hall)),
         viewer: hall.feed.subscribe(),
-        last: Bytes::new(),
         looks: 0,
         beat: interval(BEAT),
     };
@@ -164,9 +201,8 @@ fn events(hall: &Arc<Hall>) -> Response<Body> {
 /// What one viewer hears.
 struct Events {
     hall: Arc<Hall>,
+    _holder: Option<Holder>,
     viewer: Viewer,
-    /// The last state.
-    last: Bytes,
     /// The looks that were answered when something was sent last.
     looks: u64,
     /// When the viewer is to hear something even if the state is the same.
@@ -178,13 +214,7 @@ impl Events {
         let event = loop {
             tokio::select! {
                 biased;
-                state = self.viewer.next() => {
-                    let event = state?.event();
-                    if event != self.last {
-                        self.last.clone_from(&event);
-                        break event;
-                    }
-                }
+                event = self.hall.feed.next(&mut self.viewer) => break event?,
                 // This thread lives, but does the site? If it has answered nothing since, the viewer has to know.
                 _ = self.beat.tick() => {
                     if self.hall.feed.looks() != self.looks {
@@ -233,6 +263,11 @@ fn nobody() -> Refusal {
     (StatusCode::SERVICE_UNAVAILABLE, text.to_owned())
 }
 
+fn hung() -> Refusal {
+    let text = "what this page shows does not answer; look at its log, or start it again";
+    (StatusCode::GATEWAY_TIMEOUT, text.to_owned())
+}
+
 fn full(kind: &'static str, text: impl Into<Bytes>) -> Response<Body> {
     respond_with(kind, Full::new(text.into()).boxed_unsync())
 }
@@ -242,18 +277,4 @@ fn respond_with(kind: &'static str, body: Body) -> Response<Body> {
     let kind = HeaderValue::from_static(kind);
     response.headers_mut().insert(CONTENT_TYPE, kind);
     response
-}
-
-/// Adds a text as JSON.
-fn quote(text: &str, json: &mut String) {
-    json.push('"');
-    for c in text.chars() {
-        // Writing into a text takes everything.
-        let _ = match c {
-            '"' | '\\' => write!(json, "\\{c}"),
-            c if c.is_control() => write!(json, "\\u{:04x}", u32::from(c)),
-            c => write!(json, "{c}"),
-        };
-    }
-    json.push('"');
 }

@@ -54,7 +54,7 @@ impl Site for Toy {
         } else {
             0
         });
-        answer.give(Box::new(move || {
+        answer.give(State::whole(move || {
             clock.advance(formatting);
             format!("\"{text}\"{padding}")
         }));
@@ -347,15 +347,15 @@ fn a_change_during_a_look_keeps_nobody_from_seeing_it() {
     let mut viewer = fixture.view();
     let answer = fixture.kept();
     fixture.put("one");
-    answer.give(Box::new(|| "\"before\"".to_owned()));
+    answer.give(State::whole(|| "\"before\"".to_owned()));
     assert_eq!(viewer.state(), "\"before\"");
     // Who comes after the change gets none of the looks before it.
     let answer = fixture.kept();
     fixture.put("two");
     let mut late = fixture.view();
-    answer.give(Box::new(|| "\"between\"".to_owned()));
+    answer.give(State::whole(|| "\"between\"".to_owned()));
     assert_eq!(viewer.state(), "\"between\"");
-    fixture.kept().give(Box::new(|| "\"after\"".to_owned()));
+    fixture.kept().give(State::whole(|| "\"after\"".to_owned()));
     assert_eq!(late.state(), "\"after\"");
     assert_eq!(viewer.state(), "\"after\"");
 }
@@ -380,8 +380,21 @@ fn a_site_that_answers_nothing_has_no_beat() {
     }
     stream.set_read_timeout(None).expect("none is fine");
     fixture.toy.is_hung.store(false, Ordering::SeqCst);
-    answer.give(Box::new(|| "\"back\"".to_owned()));
+    answer.give(State::whole(|| "\"back\"".to_owned()));
     assert_eq!(viewer.state(), "\"back\"");
+}
+
+#[test]
+fn who_asks_a_site_that_hangs_is_told_so() {
+    let limits = Limits {
+        patience: Duration::from_millis(100),
+        ..Limits::default()
+    };
+    let fixture = serve(limits);
+    fixture.toy.is_hung.store(true, Ordering::SeqCst);
+    let answer = fixture.ask("GET /state", "", "");
+    assert_status(&answer, 504);
+    assert!(answer.contains("does not answer"), "{answer}");
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{report, say, stop_on_ctrl_c};
 use crate::cli::Outcome;
-use crate::cli::host::span;
+use crate::cli::host::{PageAddress, page_address, show, span};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_driver::{Gateway, GatewayOptions};
 use tickbus_driver_cfg::{CommandLineEnd, Config};
@@ -38,6 +38,10 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "NUMBER", default_value = "1")]
     multiple: NonZeroU32,
 
+    /// Serve the live page, and print its address. Without HOST:PORT it is that of [page] in FILE, or 127.0.0.1:20080.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
+    page: Option<PageAddress>,
+
     /// How long the PLC may take for a step, and the PLC and the server to appear at first.
     #[arg(long, value_name = "TIME", default_value = "10s", value_parser = span)]
     timeout: Nanos,
@@ -54,13 +58,16 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         role: Role::Device,
         moved: false,
     };
-    let config = match Config::load_as(&arguments.file, Some(asked)) {
+    let mut config = match Config::load_as(&arguments.file, Some(asked)) {
         Ok(config) => config,
         Err(mistakes) => {
             eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
             return Outcome::WrongInput;
         }
     };
+    if let Some(page) = &arguments.page {
+        page.ask(&mut config);
+    }
     let options = GatewayOptions {
         client: arguments.client.clone(),
         multiple: arguments.multiple,
@@ -80,6 +87,10 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
                 Outcome::BusFailed
             };
         }
+    };
+    let _place = match show("sync", &config, || gateway.watch()) {
+        Ok(place) => place,
+        Err(outcome) => return outcome,
     };
     while gateway.link().state == LinkState::Closed && !stop.is_stopped() {
         clock.wait_until(clock.now() + LOOK, &stop);

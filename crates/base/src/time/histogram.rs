@@ -48,6 +48,19 @@ impl TimeHistogram {
         self.squares += u128::from(nanos) * u128::from(nanos);
     }
 
+    /// Becomes a copy of `other`, without allocating memory.
+    pub fn copy_from(&mut self, other: &Self) {
+        let Self {
+            histogram,
+            shortest,
+            sum,
+            squares,
+        } = self;
+        let copied = histogram.set_to(&other.histogram);
+        copied.expect("all have the same bounds");
+        (*shortest, *sum, *squares) = (other.shortest, other.sum, other.squares);
+    }
+
     /// The number of spans.
     pub fn count(&self) -> u64 {
         self.histogram.len()

@@ -10,11 +10,12 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::Area;
-use tickbus_image::{BusEnd, Receiver, TickEnd, TickStation, image};
+use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, TickStation, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
 use super::faults::FrameFaults;
+use super::watched::{ScannedStation, WatchedScans};
 
 /// A program with the tick's end of its process image: a PLC without its bus.
 pub(super) struct Cpu {
@@ -29,6 +30,8 @@ pub(super) struct Cpu {
     pub(super) faults: Option<FrameFaults>,
     /// The recording of the first station.
     pub(super) tape: Option<ScanRecorder>,
+    /// Where another thread looks at it.
+    pub(super) watched: Option<WatchedScans>,
 }
 
 /// The program of one station, and what it reads and writes.
@@ -39,6 +42,11 @@ pub(super) struct Unit {
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
     beats: FrameBeats,
+    /// What came for the present scan, and whether it was valid before it was read.
+    arrival: Option<Arrival>,
+    is_valid: bool,
+    /// Whether the program was told that its peer is there.
+    is_alive: bool,
 }
 
 impl Unit {
@@ -52,19 +60,35 @@ impl Unit {
             outputs_before: outputs.clone(),
             outputs,
             beats: FrameBeats::new(config, role, station),
+            arrival: None,
+            is_valid: false,
+            is_alive: false,
         }
     }
 
-    /// Inputs, program, outputs; returns the age of its data, and whether they are valid.
-    fn scan(
+    /// Takes over the inputs.
+    fn read(
         &mut self,
-        (now, in_time, max_age): (Nanos, bool, Nanos),
+        now: Nanos,
         image: &mut TickStation,
         scan_counters: &ScanCounters,
+        reads: Area,
+        tape: Option<&mut ScanRecorder>,
+    ) {
+        self.is_valid = image.is_valid();
+        let inputs = &mut self.inputs;
+        scan_counters.keep((self.station, reads), &mut inputs.before, &inputs.bytes);
+        self.arrival = Some(image.read(now, &mut Taking { inputs, tape }));
+    }
+
+    /// Runs the program on them.
+    fn run(
+        &mut self,
+        (now, in_time, max_age): (Nanos, bool, Nanos),
+        image: &TickStation,
+        scan_counters: &ScanCounters,
         (writes, reads): (Area, Area),
-        mut faults: Option<&mut FrameFaults>,
-        mut tape: Option<&mut ScanRecorder>,
-    ) -> (Nanos, bool) {
+    ) {
         let Self {
             program,
             station,
@@ -72,49 +96,34 @@ impl Unit {
             outputs,
             outputs_before,
             beats,
+            ..
         } = self;
-        scan_counters.keep((*station, reads), &mut inputs.before, &inputs.bytes);
-        if let Some(faults) = &mut faults {
-            faults.begin_scan(now, &mut inputs.bytes, outputs);
-        }
-        let valid = image.is_valid();
-        let mut taking = Taking {
-            inputs,
-            tape: tape.as_deref_mut(),
+        let Some(arrival) = self.arrival else {
+            return;
         };
-        let arrival = image.read(now, &mut taking);
-        if let Some(faults) = &mut faults {
-            faults.received(&mut inputs.bytes);
-        }
         scan_counters.count((*station, reads), &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
-        let alive = in_time && valid && image.is_valid() && arrival.age <= max_age;
+        self.is_alive = in_time && self.is_valid && image.is_valid() && arrival.age <= max_age;
         scan_counters.keep((*station, writes), outputs_before, outputs);
         program.scan(&mut Scan {
             now,
-            alive,
+            alive: self.is_alive,
             cycle: arrival.sequence,
             inputs: &inputs.bytes,
             outputs,
         });
         beats.beat(now, outputs);
         scan_counters.count((*station, writes), outputs_before, outputs);
-        image.write(now, |frame| {
-            frame.copy_from_slice(outputs);
-            if let Some(faults) = faults {
-                faults.sending(frame);
-            }
-        });
-        if let Some(tape) = tape {
-            let code = match arrival.fresh {
-                _ if !alive => Code::Stale,
-                true => Code::Fresh,
-                false => Code::Unchanged,
-            };
-            tape.scan(now, code, &inputs.bytes, outputs);
+    }
+
+    /// How its last scan went.
+    fn code(&self) -> Code {
+        match self.arrival {
+            _ if !self.is_alive => Code::Stale,
+            Some(Arrival { fresh: true, .. }) => Code::Fresh,
+            _ => Code::Unchanged,
         }
-        (arrival.age, alive)
     }
 }
 
@@ -160,17 +169,73 @@ impl Cpu {
     /// has received fail-safe values in the meantime: the program must then start over as after a broken
     /// line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
+        let (_, reads) = self.areas;
+        let scan_counters = &*self.scan_counters;
+        if let Some(faults) = &mut self.faults {
+            let units = self.units.iter_mut();
+            faults.begin_scan(
+                now,
+                units.map(|unit| (&mut *unit.inputs.bytes, &*unit.outputs)),
+            );
+        }
+        let images = &mut self.tick.stations;
+        for (unit, image) in self.units.iter_mut().zip(&mut *images) {
+            let tape = self.tape.as_mut().filter(|_| unit.station == 0);
+            unit.read(now, image, scan_counters, reads, tape);
+        }
+        if let Some(faults) = &mut self.faults {
+            let units = self.units.iter_mut();
+            faults.received(units.map(|unit| &mut *unit.inputs.bytes));
+        }
         let (mut age, mut alive) = (Nanos::ZERO, true);
-        for (unit, image) in self.units.iter_mut().zip(&mut self.tick.stations) {
-            let is_first = unit.station == 0;
-            let faults = self.faults.as_mut().filter(|_| is_first);
-            let tape = self.tape.as_mut().filter(|_| is_first);
+        for (unit, image) in self.units.iter_mut().zip(&*images) {
             let time = (now, in_time, self.max_age);
-            let found = unit.scan(time, image, &self.scan_counters, self.areas, faults, tape);
-            age = age.max(found.0);
-            alive &= found.1;
+            unit.run(time, image, scan_counters, self.areas);
+            age = age.max(unit.arrival.map_or(Nanos::ZERO, |arrival| arrival.age));
+            alive &= unit.is_alive;
+        }
+        if let Some(faults) = &mut self.faults {
+            faults.sending(self.units.iter().map(|unit| &*unit.outputs));
+        }
+        for (unit, image) in self.units.iter_mut().zip(images) {
+            image.write(now, |frame| {
+                frame.copy_from_slice(&unit.outputs);
+                if let Some(faults) = &mut self.faults {
+                    faults.bend_outputs(unit.station, frame);
+                }
+            });
+            if let Some(tape) = self.tape.as_mut().filter(|_| unit.station == 0) {
+                tape.scan(now, unit.code(), &unit.inputs.bytes, &unit.outputs);
+            }
+        }
+        if let Some(faults) = &mut self.faults {
+            faults.sent();
         }
         self.scan_counters.scanned(age, alive);
+        self.serve_watch(now);
+    }
+
+    /// Does what another thread wants that looks at the image.
+    fn serve_watch(&mut self, now: Nanos) {
+        let Some(watched) = self.watched.as_mut().filter(|watched| watched.is_wanted()) else {
+            return;
+        };
+        let wanted = watched.take_wanted();
+        if wanted.orders() {
+            let inputs = self.units.iter().map(|unit| &*unit.inputs.bytes);
+            watched.obey(&mut self.faults, inputs);
+        }
+        if wanted.values() {
+            let stations = self.units.iter().zip(&self.tick.stations);
+            let stations = stations.map(|(unit, image)| ScannedStation {
+                image,
+                status: unit.code(),
+                inputs: &unit.inputs.bytes,
+                outputs: &unit.outputs,
+            });
+            let (scans, _) = self.scan_counters.scans();
+            watched.show((now, scans), stations);
+        }
     }
 }
 
@@ -194,6 +259,7 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
         scan_counters,
         faults: None,
         tape: None,
+        watched: None,
     };
     (cpu, bus)
 }

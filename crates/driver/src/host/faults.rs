@@ -9,101 +9,152 @@ use tickbus_image::signal::{Area, DataType, Plan, Signal, SignalTable, Slot};
 /// The faults of a program that works on frames, not on slots.
 #[derive(Debug)]
 pub(super) struct FrameFaults {
-    faults: Faults,
+    pub(super) faults: Faults,
     signals: Vec<Signal>,
+    slots: Vec<Slot>,
+    stations: Vec<StationFrames>,
+    begun: Option<Nanos>,
+    scans: u64,
+}
+
+/// The frames of one station.
+#[derive(Debug)]
+struct StationFrames {
     writes: Plan,
     reads: Plan,
-    slots: Vec<Slot>,
     /// The true inputs.
     truth: Box<[u8]>,
     /// Frames with the bent values, from which single signals are copied.
     sent: Box<[u8]>,
     received: Box<[u8]>,
-    begun: Option<Nanos>,
-    scans: u64,
 }
 
 impl FrameFaults {
-    /// The faults of the first station of `table`, for an end that writes and reads these areas; `inputs` are
-    /// the bytes that its program sees before its first scan. `None` without faults.
-    pub(super) fn new(
+    /// The faults of a program at the end that writes and reads these areas, none of them yet. `inputs` are the bytes that
+    /// it sees before its next scan, of the stations that it serves.
+    pub(super) fn new<'a>(
+        table: &SignalTable,
+        (writes, reads): (Area, Area),
+        inputs: impl Iterator<Item = &'a [u8]>,
+        board: Arc<FaultBoard>,
+    ) -> Self {
+        let stations = inputs.zip(&table.stations).enumerate();
+        Self {
+            faults: Faults::new(board),
+            signals: table.signals.clone(),
+            slots: table
+                .signals
+                .iter()
+                .map(|signal| signal.fail_safe)
+                .collect(),
+            stations: stations
+                .map(|(index, (inputs, station))| StationFrames {
+                    writes: Plan::new(table, index, writes),
+                    reads: Plan::new(table, index, reads),
+                    truth: inputs.into(),
+                    sent: vec![0; station.bytes(writes)].into(),
+                    received: vec![0; station.bytes(reads)].into(),
+                })
+                .collect(),
+            begun: None,
+            scans: 0,
+        }
+    }
+
+    /// With the faults of a driver.cfg; `None` without any.
+    pub(super) fn of_list<'a>(
         list: &[Fault],
         table: &SignalTable,
         (writes, reads): (Area, Area),
-        inputs: &[u8],
+        inputs: impl Iterator<Item = &'a [u8]>,
         board: Arc<FaultBoard>,
     ) -> Option<Self> {
         if list.is_empty() {
             return None;
         }
-        let mut faults = Faults::new(board);
+        let mut all = Self::new(table, (writes, reads), inputs, board);
         let slots = Slots {
             table,
             writes,
             edges: &[],
         };
         for fault in list {
-            faults
+            all.faults
                 .add(fault, slots)
                 .expect("a driver.cfg has no more faults than a driver");
         }
-        let station = &table.stations[0];
-        Some(Self {
-            faults,
-            signals: table.signals.clone(),
-            writes: Plan::new(table, 0, writes),
-            reads: Plan::new(table, 0, reads),
-            slots: table
-                .signals
-                .iter()
-                .map(|signal| signal.fail_safe)
-                .collect(),
-            truth: inputs.into(),
-            sent: vec![0; station.bytes(writes)].into(),
-            received: vec![0; station.bytes(reads)].into(),
-            begun: None,
-            scans: 0,
-        })
+        Some(all)
     }
 
-    /// Begins a scan: restores the true inputs.
-    pub(super) fn begin_scan(&mut self, now: Nanos, inputs: &mut [u8], outputs: &[u8]) {
-        inputs.copy_from_slice(&self.truth);
+    /// Begins a scan of these inputs and outputs: restores the true inputs.
+    pub(super) fn begin_scan<'a>(
+        &mut self,
+        now: Nanos,
+        frames: impl Iterator<Item = (&'a mut [u8], &'a [u8])>,
+    ) {
         self.scans += 1;
         let moment = TickTime {
             time: now - *self.begun.get_or_insert(now),
             tick: self.scans,
         };
-        self.reads.decode(inputs, &mut self.slots);
-        self.writes.decode(outputs, &mut self.slots);
+        for (station, (inputs, outputs)) in self.stations.iter().zip(frames) {
+            inputs.copy_from_slice(&station.truth);
+            station.reads.decode(inputs, &mut self.slots);
+            station.writes.decode(outputs, &mut self.slots);
+        }
         self.faults.begin_tick(moment, &mut self.slots);
     }
 
     /// The inputs were read: bends them.
-    pub(super) fn received(&mut self, inputs: &mut [u8]) {
-        self.truth.copy_from_slice(inputs);
+    pub(super) fn received<'a>(&mut self, frames: impl Iterator<Item = &'a mut [u8]>) {
+        let mut frames: Vec<&mut [u8]> = frames.collect();
+        for (station, inputs) in self.stations.iter_mut().zip(&frames) {
+            station.truth.copy_from_slice(inputs);
+        }
         if self.faults.active(false).next().is_none() {
             return;
         }
-        self.reads.decode(inputs, &mut self.slots);
+        for (station, inputs) in self.stations.iter().zip(&frames) {
+            station.reads.decode(inputs, &mut self.slots);
+        }
         self.faults.received(&mut self.slots);
-        self.reads.encode(&self.slots, &mut self.received);
+        for station in &mut self.stations {
+            station.reads.encode(&self.slots, &mut station.received);
+        }
         for signal in self.faults.active(false) {
-            take_over(&self.signals[signal], &self.received, inputs);
+            let signal = &self.signals[signal];
+            if let Some(inputs) = frames.get_mut(signal.station) {
+                take_over(signal, &self.stations[signal.station].received, inputs);
+            }
         }
     }
 
-    /// The outputs are about to be sent: bends them without the program's knowledge.
-    pub(super) fn sending(&mut self, outputs: &mut [u8]) {
+    /// The outputs are about to be sent: prepares what is [bent](Self::bend_outputs).
+    pub(super) fn sending<'a>(&mut self, frames: impl Iterator<Item = &'a [u8]>) {
         if self.faults.active(true).next().is_none() {
             return;
         }
-        self.writes.decode(outputs, &mut self.slots);
-        self.faults.sending(&mut self.slots);
-        self.writes.encode(&self.slots, &mut self.sent);
-        for signal in self.faults.active(true) {
-            take_over(&self.signals[signal], &self.sent, outputs);
+        for (station, outputs) in self.stations.iter().zip(frames) {
+            station.writes.decode(outputs, &mut self.slots);
         }
+        self.faults.sending(&mut self.slots);
+        for station in &mut self.stations {
+            station.writes.encode(&self.slots, &mut station.sent);
+        }
+    }
+
+    /// Bends the outputs of a station without the program's knowledge.
+    pub(super) fn bend_outputs(&self, station: usize, outputs: &mut [u8]) {
+        for signal in self.faults.active(true) {
+            let signal = &self.signals[signal];
+            if signal.station == station {
+                take_over(signal, &self.stations[station].sent, outputs);
+            }
+        }
+    }
+
+    /// Everything is sent.
+    pub(super) fn sent(&mut self) {
         self.faults.sent(&mut self.slots);
     }
 }

@@ -7,6 +7,7 @@ mod program;
 mod scan_counters;
 mod stepped;
 mod thread;
+mod watched;
 
 pub(super) use fit::{check_fit, program_error};
 pub(super) use program::{Program, ProgramCounters};

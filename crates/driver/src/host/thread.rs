@@ -6,10 +6,14 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-use crate::DriverError;
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
-use tickbus_base::os::wake_on_time;
+use crate::tap::Handle;
+use crate::tick_counters::TickTimes;
+use crate::view::View;
+use crate::watch::{Figures, Watch};
+use crate::{DriverError, SlotMap};
+use tickbus_base::os::{dropped_log_lines, wake_on_time};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
@@ -21,6 +25,7 @@ use tickbus_record as record;
 use super::ScanCounters;
 use super::cpu::{Cpu, half};
 use super::faults::FrameFaults;
+use super::watched::WatchedScans;
 
 /// The longest time that a scan may take before it counts as hung. A PLC's own watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -76,6 +81,8 @@ pub(crate) struct HostThread {
     ended: Receiver<()>,
     pub(crate) status: LinkStatus,
     pub(crate) board: Arc<FaultBoard>,
+    /// Looks at the program's image, until somebody takes it.
+    pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<JoinHandle<()>>,
     #[expect(dead_code, reason = "kept for its drop")]
@@ -144,12 +151,10 @@ impl HostThread {
             Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        // The faults in a driver.cfg are those of its own end, not of a program behind its bus.
-        if role == config.role {
-            let (faults, board) = (&config.faults, Arc::clone(&board));
-            let inputs = &cpu.units[0].inputs.bytes;
-            cpu.faults = FrameFaults::new(faults, &config.table, cpu.areas, inputs, board);
-        }
+        // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
+        // looks at its own end.
+        let is_own = role == config.role;
+        let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
         let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
@@ -166,6 +171,8 @@ impl HostThread {
             clock: Arc::clone(&clock),
             wall: Arc::clone(&wall),
         };
+        let figures = HostFigures::of(&counters, &status, &board);
+        let watch = seen.map(|(config, handle)| watch(config, handle, figures));
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
@@ -227,10 +234,82 @@ impl HostThread {
             ended,
             status,
             board,
+            watch: Mutex::new(watch),
             stop,
             thread: Some(thread),
             bus,
         })
+    }
+}
+
+/// What belongs to the statistics of a program and its line.
+#[derive(Clone, Debug)]
+pub(crate) struct HostFigures {
+    pub(crate) counters: HostCounters,
+    pub(crate) status: LinkStatus,
+    pub(crate) board: Arc<FaultBoard>,
+}
+
+impl HostFigures {
+    fn of(counters: &HostCounters, status: &LinkStatus, board: &Arc<FaultBoard>) -> Self {
+        Self {
+            counters: counters.clone(),
+            status: status.clone(),
+            board: Arc::clone(board),
+        }
+    }
+
+    /// The statistics at this moment.
+    pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
+        let mut statistics = Statistics::default();
+        self.status.observe_call(now);
+        self.status.write(now, &mut statistics);
+        self.board.tell(self.status.driver());
+        self.board.write(&mut statistics);
+        self.counters.write(&mut statistics);
+        statistics.count("log.dropped", dropped_log_lines());
+        statistics
+    }
+}
+
+impl Figures for HostFigures {
+    fn statistics(&self, now: Nanos, _: &View, _: &TickTimes) -> Statistics {
+        Self::statistics(self, now)
+    }
+
+    fn is_driver(&self) -> bool {
+        false
+    }
+}
+
+/// Gives the end that a driver.cfg describes its faults, and lets another thread look at it.
+fn prepare_own_end(
+    cpu: &mut Cpu,
+    config: &Config,
+    board: &Arc<FaultBoard>,
+) -> (Arc<Config>, Handle) {
+    let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
+    let (table, shared) = (&config.table, Arc::clone(board));
+    cpu.faults = FrameFaults::of_list(&config.faults, table, cpu.areas, inputs, shared);
+    let config = Arc::new(config.clone());
+    let (watched, handle) = WatchedScans::new(&config, config.role, Arc::clone(board));
+    cpu.watched = Some(watched);
+    (config, handle)
+}
+
+/// What looks at it.
+fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
+    Watch {
+        role: config.role,
+        config,
+        // A program works on frames: its faults know no slots that count edges.
+        slots: SlotMap::default(),
+        handle,
+        status: figures.status.clone(),
+        board: Arc::clone(&figures.board),
+        clock: Arc::clone(&figures.counters.clock),
+        figures: Box::new(figures),
+        times: TickTimes::default(),
     }
 }
 
@@ -262,6 +341,11 @@ impl HostCounters {
 }
 
 impl HostThread {
+    /// What its statistics are made of.
+    pub(crate) fn figures(&self) -> HostFigures {
+        HostFigures::of(&self.counters, &self.status, &self.board)
+    }
+
     /// Whether the program is scanned no more, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
         self.thread.as_ref().is_none_or(JoinHandle::is_finished)

@@ -1,10 +1,11 @@
 //! What the tick and the bus tell each other about faults, and tell any other thread that asks.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::cell::Cell;
-use super::{FaultStatus, LineFault, Phase, TickTime};
+use super::{FaultStatus, LIMIT, LineFault, Phase, TickTime};
+use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 
 /// What the tick, the bus and other threads share about a driver's faults.
@@ -13,6 +14,8 @@ pub struct FaultBoard {
     /// Incremented by every change; zero as long as there has never been a fault.
     news: AtomicU64,
     cells: Mutex<Vec<Arc<Cell>>>,
+    /// The number of the fault that was injected last.
+    last: AtomicU32,
     /// Line faults on their way to the bus.
     mailbox: Mutex<Vec<LineFault>>,
     /// Beginnings of faults that are no longer on the list.
@@ -29,20 +32,37 @@ impl FaultBoard {
         self.news.load(Ordering::Acquire)
     }
 
-    pub(super) fn add(&self, cell: Arc<Cell>, line: Option<LineFault>) {
-        self.cells().push(cell);
+    /// Adds what `make` makes with the number of a new fault; gives that and, if the list was full, the number of the
+    /// oldest fault that is over, which is on it no more.
+    ///
+    /// # Errors
+    ///
+    /// Too many faults wait or are active.
+    pub(super) fn enlist(
+        &self,
+        make: impl FnOnce(u32) -> (Arc<Cell>, Option<LineFault>),
+    ) -> Result<(Arc<Cell>, Option<u32>), Mistake> {
+        let mut cells = self.cells();
+        let forgotten = if cells.len() < LIMIT {
+            None
+        } else {
+            let over = cells.iter().position(|cell| cell.phase() == Phase::Over);
+            let over = over.ok_or_else(|| {
+                Mistake::new(
+                    format!("{LIMIT} faults wait or are active, and that is the most"),
+                    "end some of them",
+                )
+            })?;
+            let over = cells.remove(over);
+            self.forgotten.fetch_add(over.begun(), Ordering::Relaxed);
+            Some(over.id())
+        };
+        let (cell, line) = make(self.last.fetch_add(1, Ordering::Relaxed) + 1);
+        cells.push(Arc::clone(&cell));
+        drop(cells);
         self.mailbox().extend(line);
         self.news.fetch_add(1, Ordering::Release);
-    }
-
-    /// Removes the oldest fault that is over from the list; tells whether there was one.
-    pub(super) fn forget_one(&self) -> Option<u32> {
-        let mut cells = self.cells();
-        let found = cells.iter().position(|cell| cell.phase() == Phase::Over)?;
-        let cell = cells.remove(found);
-        let begun = cell.begun();
-        self.forgotten.fetch_add(begun, Ordering::Relaxed);
-        Some(cell.id())
+        Ok((cell, forgotten))
     }
 
     pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: TickTime) {

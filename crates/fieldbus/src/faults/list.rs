@@ -30,8 +30,73 @@ pub struct Slots<'a> {
 pub struct Faults {
     entries: Vec<Entry>,
     board: Arc<FaultBoard>,
-    next: u32,
     time: Nanos,
+}
+
+/// A fault that is on the board and that no tick knows yet: made by any thread, so that the tick which
+/// [adopts](Faults::adopt) it need not allocate memory.
+#[derive(Debug)]
+pub struct Prepared {
+    entry: Entry,
+    /// The number of the fault whose place it takes.
+    forgotten: Option<u32>,
+    board: Arc<FaultBoard>,
+}
+
+/// A fault that a tick has no more use for; dropping it frees memory.
+#[derive(Debug)]
+pub struct Retired(#[expect(dead_code, reason = "kept for its drop")] Entry);
+
+impl Prepared {
+    /// Prepares a fault for the tick of the end that has this `board`.
+    ///
+    /// # Errors
+    ///
+    /// Too many faults wait or are active.
+    pub fn new(fault: &Fault, slots: Slots<'_>, board: &Arc<FaultBoard>) -> Result<Self, Mistake> {
+        let mut kind = Kind::Line;
+        let (cell, forgotten) = board.enlist(|id| {
+            let random = Random::new(fault.seed, id);
+            let what = fault.what(slots.table);
+            let cell = Arc::new(Cell::new(id, fault.name.clone(), fault.kind(), what));
+            let line = match fault.effect {
+                Effect::Signal(index, change) => {
+                    let signal = &slots.table.signals[index];
+                    let edges = slots.edges.get(index).copied().flatten();
+                    let fault = SignalFault::new(signal, (index, edges), change, random);
+                    kind = if signal.area == slots.writes {
+                        Kind::Written(fault)
+                    } else {
+                        Kind::Read(fault)
+                    };
+                    None
+                }
+                Effect::Line(trouble) => Some(LineFault::new(trouble, Arc::clone(&cell), random)),
+            };
+            (cell, line)
+        })?;
+        Ok(Self {
+            entry: Entry {
+                id: cell.id(),
+                schedule: Schedule::new(fault),
+                cell,
+                kind,
+            },
+            forgotten,
+            board: Arc::clone(board),
+        })
+    }
+
+    /// Its number.
+    pub fn id(&self) -> u32 {
+        self.entry.id
+    }
+
+    /// No tick will adopt it: the board has it as over.
+    pub fn cancel(self) {
+        self.board
+            .enter(&self.entry.cell, Phase::Over, TickTime::default());
+    }
 }
 
 #[derive(Debug)]
@@ -56,9 +121,9 @@ impl Faults {
     /// An empty list, which publishes its state on `board`.
     pub fn new(board: Arc<FaultBoard>) -> Self {
         Self {
-            entries: Vec::new(),
+            // Those that are forgotten may leave a little later than others come.
+            entries: Vec::with_capacity(2 * LIMIT),
             board,
-            next: 1,
             time: Nanos::ZERO,
         }
     }
@@ -69,44 +134,29 @@ impl Faults {
     ///
     /// Too many faults wait or are active.
     pub fn add(&mut self, fault: &Fault, slots: Slots<'_>) -> Result<u32, Mistake> {
-        while self.entries.len() >= LIMIT {
-            let Some(over) = self.board.forget_one() else {
-                return Err(Mistake::new(
-                    format!("{LIMIT} faults wait or are active, and that is the most"),
-                    "end some of them",
-                ));
-            };
-            self.entries.retain(|entry| entry.id != over);
-        }
-        let id = self.next;
-        self.next += 1;
-        let random = Random::new(fault.seed, id);
-        let what = fault.what(slots.table);
-        let cell = Arc::new(Cell::new(id, fault.name.clone(), fault.kind(), what));
-        let (kind, line) = match fault.effect {
-            Effect::Signal(index, change) => {
-                let signal = &slots.table.signals[index];
-                let edges = slots.edges.get(index).copied().flatten();
-                let fault = SignalFault::new(signal, (index, edges), change, random);
-                if signal.area == slots.writes {
-                    (Kind::Written(fault), None)
-                } else {
-                    (Kind::Read(fault), None)
-                }
-            }
-            Effect::Line(trouble) => {
-                let line = LineFault::new(trouble, Arc::clone(&cell), random);
-                (Kind::Line, Some(line))
-            }
-        };
-        self.board.add(Arc::clone(&cell), line);
-        self.entries.push(Entry {
-            id,
-            schedule: Schedule::new(fault),
-            cell,
-            kind,
-        });
+        let prepared = Prepared::new(fault, slots, &self.board)?;
+        let id = prepared.id();
+        self.adopt(prepared);
         Ok(id)
+    }
+
+    /// Adds a prepared fault, which can begin at the next tick; gives the one whose place it takes, if any. Neither
+    /// allocates nor frees memory.
+    pub fn adopt(&mut self, prepared: Prepared) -> Option<Retired> {
+        let forgotten = prepared.forgotten;
+        let place = self
+            .entries
+            .iter()
+            .position(|entry| Some(entry.id) == forgotten);
+        let retired = place.map(|place| Retired(self.entries.remove(place)));
+        self.entries.push(prepared.entry);
+        retired
+    }
+
+    /// Whether all of its faults are over.
+    pub fn is_idle(&self) -> bool {
+        let mut entries = self.entries.iter();
+        entries.all(|entry| entry.cell.phase() == Phase::Over)
     }
 
     /// Ends a fault at the next tick; false if no fault has this number.

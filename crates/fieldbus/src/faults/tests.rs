@@ -252,6 +252,58 @@ fn those_that_are_over_make_room_and_those_that_wait_do_not() {
     assert!(!end.faults.end(1), "forgotten");
 }
 
+#[test]
+fn a_fault_prepared_by_another_thread_begins_when_a_tick_adopts_it() {
+    let mut end = End::new();
+    let fault = read_one(
+        "kind = \"stuck\"\nsignal = \"level\"\nvalue = 7.5",
+        &end.table,
+    );
+    let fault = fault.expect("right");
+    let prepare = |end: &End| {
+        let (table, board) = (end.table.clone(), Arc::clone(&end.board));
+        let fault = fault.clone();
+        let other = std::thread::spawn(move || {
+            let slots = Slots {
+                table: &table,
+                writes: Area::Input,
+                edges: &[],
+            };
+            Prepared::new(&fault, slots, &board)
+        });
+        other.join().expect("no panic")
+    };
+    let phases = |end: &End| -> Vec<Phase> {
+        let faults = end.board.list();
+        faults.iter().map(|fault| fault.phase).collect()
+    };
+    end.set(1, 100.0);
+    let (first, cancelled) = (prepare(&end), prepare(&end));
+    let (first, cancelled) = (first.expect("room"), cancelled.expect("room"));
+    assert_eq!((first.id(), cancelled.id()), (1, 2));
+    assert_eq!(end.tick(nothing)[1], 100.0, "no tick knows of them");
+    cancelled.cancel();
+    assert_eq!(phases(&end), [Phase::Waiting, Phase::Over]);
+    assert!(end.faults.adopt(first).is_none());
+    assert_eq!(end.tick(nothing)[1], 7.5);
+    assert_eq!(phases(&end), [Phase::Active, Phase::Over]);
+    assert!(!end.faults.is_idle());
+    end.faults.end(1);
+    assert_eq!(end.tick(nothing)[1], 100.0);
+    assert!(end.faults.is_idle());
+    // What a fault that is over leaves behind is handed back to be freed elsewhere.
+    let mut retired = 0;
+    for _ in 0..LIMIT {
+        let next = prepare(&end).expect("those that are over make room");
+        end.faults.end(next.id() - 1);
+        retired += usize::from(end.faults.adopt(next).is_some());
+        end.tick(nothing);
+    }
+    assert_eq!(end.board.list().len(), LIMIT);
+    // The one that was cancelled had left nothing.
+    assert_eq!(retired, 1);
+}
+
 proptest! {
     #[test]
     fn noise_stays_within_its_amplitude_and_the_same_seed_makes_the_same(

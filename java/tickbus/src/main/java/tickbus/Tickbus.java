@@ -417,6 +417,17 @@ public final class Tickbus implements AutoCloseable {
             line[FAULT_NAME], line[FAULT_WHAT])).toList();
     }
 
+    /**
+     * The address of the live page on which this driver is shown, to be opened in a browser. Who has it may force signals, since
+     * it contains the page's token.
+     *
+     * @return empty if driver.cfg has no {@code [page]}
+     * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public Optional<String> page() {
+        return Optional.of(whenIdle(() -> pageNative(handle))).filter(address -> !address.isEmpty());
+    }
+
     InjectedFault.State faultState(int id) {
         return faultLine(id).map(line -> InjectedFault.State.valueOf(line[FAULT_STATE].toUpperCase(Locale.ROOT)))
             .orElse(InjectedFault.State.OVER);
@@ -645,6 +656,8 @@ public final class Tickbus implements AutoCloseable {
 
     /** A line per fault, with tabs between its fields; throws {@link FieldbusException}. */
     static native String faultsNative(long handle);
+
+    static native String pageNative(long handle);
 
     /** Makes the page of a recording; the text's first line is its heading. Throws {@link FieldbusException}. */
     static native String reportNative(String recording, String title, String statistics, String text);

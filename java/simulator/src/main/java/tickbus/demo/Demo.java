@@ -46,6 +46,9 @@ public final class Demo {
     private Operator operator;
     private boolean pictured;
 
+    /** The verdict on the script, once it is over. */
+    private String verdict;
+
     private Demo(DemoOptions options, Display display, List<String> notes) {
         this.options = options;
         this.display = display;
@@ -177,14 +180,14 @@ public final class Demo {
             }
             ControlInterfaceDeviceDriver driver = simulator.drivers().get(0);
             ending.plc = maker.make(driver);
-            operate(simulator, driver, ending.plc, guard);
-            return check(simulator);
+            return operate(simulator, driver, ending.plc, guard);
         } catch (RuntimeException | Error e) {
             return VERDICT.failed(e, err);
         }
     }
 
-    private void operate(Simulator simulator, ControlInterfaceDeviceDriver driver, Plc plc, ShutdownGuard guard) {
+    /** Runs the script; returns the verdict on it. */
+    private String operate(Simulator simulator, ControlInterfaceDeviceDriver driver, Plc plc, ShutdownGuard guard) {
         for (String name : simulator.unconnected()) {
             timeline.add(0, "note", "no row of the control table writes " + name);
         }
@@ -196,7 +199,13 @@ public final class Demo {
                 () -> new Outage(watcher, driver, timeline, plc.name(), PlcCommand.maxAgeNanos(driver)));
         simulator.run(options.mode(), () -> {
             if (guard.triggered()) {
+                if (verdict != null) {
+                    return false;
+                }
                 throw new DemoFailure("interrupted");
+            }
+            if (verdict != null) {
+                return true;
             }
             if (simulator.ticks() > 0) {
                 lookForStalls(plc);
@@ -211,12 +220,18 @@ public final class Demo {
                 throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
                         + " of simulation time is over in stage " + operator.stage());
             }
-            return !operator.done();
+            if (operator.done()) {
+                audit.end(plc.counts());
+                verdict = check(simulator);
+                timeline.add(simulator.simulationNanos(), "demo", options.page()
+                        ? "is over; the live page goes on until Ctrl-C" : "is over");
+            }
+            return verdict == null || options.page();
         });
-        if (!operator.done()) {
+        if (verdict == null) {
             throw new DemoFailure("interrupted");
         }
-        audit.end(plc.counts());
+        return verdict;
     }
 
     private void lookForStalls(Plc plc) {

@@ -18,9 +18,10 @@ import tickbus.simulator.TickMode;
  * @param stepNanos simulation step size
  * @param cycles cycles to complete
  * @param timeLimitNanos longest simulation time
+ * @param page whether the rig stays after its last cycle, for the live page
  */
 record DemoOptions(Path drivers, Path control, Path report, Path recording, Path plc, List<String> plcCommand,
-        TickMode mode, long stepNanos, int cycles, long timeLimitNanos) {
+        TickMode mode, long stepNanos, int cycles, long timeLimitNanos, boolean page) {
     static final String USAGE = """
             usage: demo --drivers DIR --control FILE --report FILE [options]
 
@@ -42,6 +43,8 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
               --step TIME        simulation step size (default 2ms)
               --cycles N         cycles to complete (default 3)
               --time-limit TIME  longest simulation time (default 2min)
+              --page             after the last cycle the rig stays as it is until Ctrl-C: the live page
+                                 ([page] in driver.cfg) goes on, and its buttons can be forced
 
             The last line is "demo: ok …" with exit code 0, or "demo: failed reason=…" with exit code 1;
             2 if the command line was wrong, 130 after Ctrl-C.
@@ -49,13 +52,13 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
 
     static DemoOptions read(String[] args) {
         Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--report", "--recording", "--plc",
-                "--plc-command", "--mode", "--step", "--cycles", "--time-limit"), List.of());
+                "--plc-command", "--mode", "--step", "--cycles", "--time-limit"), List.of("--page"));
         return new DemoOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--report"),
                 arguments.has("--recording") ? arguments.path("--recording") : null,
                 arguments.has("--plc") ? arguments.path("--plc") : null,
                 arguments.has("--plc-command") ? arguments.words("--plc-command") : null,
                 arguments.choice("--mode", Arguments.MODES, "real-time"), arguments.duration("--step", "2ms"),
-                arguments.count("--cycles", 3), arguments.duration("--time-limit", "2min"));
+                arguments.count("--cycles", 3), arguments.duration("--time-limit", "2min"), arguments.has("--page"));
     }
 
     /** The cycle in which the PLC is killed: the one in the middle. */

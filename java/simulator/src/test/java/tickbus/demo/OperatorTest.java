@@ -42,7 +42,7 @@ class OperatorTest {
 
     private int play(int cycles, Path table, Demo.PlcMaker maker) {
         DemoOptions options = new DemoOptions(folder, table, folder.resolve("demo/report.txt"), null, null, null,
-                TickMode.BEST_EFFORT, 2_000_000, cycles, 120_000_000_000L);
+                TickMode.BEST_EFFORT, 2_000_000, cycles, 120_000_000_000L, false);
         ByteArrayOutputStream bytes = new ByteArrayOutputStream();
         PrintStream out = new PrintStream(bytes, true, StandardCharsets.UTF_8);
         int code = Demo.run(options, () -> new DriverSet(List.of(plc)), maker, out, out);

@@ -19,7 +19,7 @@ final class PlcMain {
             }
         };
         DemoOptions options = new DemoOptions(Path.of("none"), Path.of(args[0]), Path.of(args[1]), null, null, null,
-                TickMode.REAL_TIME, 2_000_000, 1000, Long.MAX_VALUE);
+                TickMode.REAL_TIME, 2_000_000, 1000, Long.MAX_VALUE, false);
         System.exit(Demo.run(options, () -> new DriverSet(List.of(plc)), HostedPlc::new, System.out, System.err));
     }
 }

@@ -164,7 +164,11 @@ public final class PeelingDemo {
             }
         }
         simulator.run(TickMode.REAL_TIME, () -> {
+            boolean peeled = line.wood().coreCount() >= options.logs();
             if (guard.triggered()) {
+                if (peeled) {
+                    return false;
+                }
                 throw new DemoFailure("interrupted");
             }
             if (simulator.ticks() > 0) {
@@ -173,7 +177,8 @@ public final class PeelingDemo {
                 rate.look(simulator.simulationNanos());
                 watcher.look();
                 lookAtLinks(plcs, guard);
-                if (simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
+                // With enough peeled, Ctrl-C ends it, which may reach the PLCs first.
+                if (!peeled && simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
                     plcs.listen(simulator.simulationNanos(), timeline);
                     Verdict.unlessInterrupted(guard, plcs::check);
                 }
@@ -185,7 +190,7 @@ public final class PeelingDemo {
                         + " of simulation time is over with " + line.wood().coreCount() + " of " + options.logs()
                         + " blocks peeled");
             }
-            return line.wood().coreCount() < options.logs();
+            return options.page() || line.wood().coreCount() < options.logs();
         });
         if (line.wood().coreCount() < options.logs()) {
             throw new DemoFailure("interrupted");

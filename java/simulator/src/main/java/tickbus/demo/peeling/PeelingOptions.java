@@ -15,9 +15,10 @@ import tickbus.simulator.Arguments;
  * @param stepNanos simulation step size
  * @param logs blocks to peel
  * @param timeLimitNanos longest simulation time
+ * @param page whether it peels on until Ctrl-C, for the live page
  */
 record PeelingOptions(Path drivers, Path control, Path report, Path plc, Path recordings, long stepNanos, int logs,
-        long timeLimitNanos) {
+        long timeLimitNanos, boolean page) {
     static final String USAGE = """
             usage: demo-peeler --drivers DIR --control FILE --report FILE --plc FILE [options]
 
@@ -33,6 +34,7 @@ record PeelingOptions(Path drivers, Path control, Path report, Path plc, Path re
               --step TIME        simulation step size (default 2ms)
               --logs N           blocks to peel; the first is a cylinder, the second is not (default 2)
               --time-limit TIME  longest simulation time (default 2min)
+              --page             peel on until Ctrl-C, however many: for the live page ([page] in the .cfg)
 
             The last line is "demo-peeler: ok …" with exit code 0, or "demo-peeler: failed reason=…" with exit
             code 1; 2 if the command line was wrong, 130 after Ctrl-C.
@@ -40,10 +42,10 @@ record PeelingOptions(Path drivers, Path control, Path report, Path plc, Path re
 
     static PeelingOptions read(String[] args) {
         Arguments arguments = new Arguments(args, List.of("--drivers", "--control", "--report", "--plc", "--recordings",
-                "--step", "--logs", "--time-limit"), List.of());
+                "--step", "--logs", "--time-limit"), List.of("--page"));
         return new PeelingOptions(arguments.path("--drivers"), arguments.path("--control"), arguments.path("--report"),
                 arguments.path("--plc"), arguments.has("--recordings") ? arguments.path("--recordings") : null,
                 arguments.duration("--step", "2ms"), arguments.count("--logs", 2),
-                arguments.duration("--time-limit", "2min"));
+                arguments.duration("--time-limit", "2min"), arguments.has("--page"));
     }
 }

@@ -9,11 +9,15 @@ import tickbus.simulator.text.Svg;
 /**
  * Draws the current state of a rig as a self-contained SVG: both wheels seen from a little above, both lifts with
  * their cups, every bottle with its number, the lamp, the sensors, and a caption with phase, step and cycle.
+ *
+ * <p>What signals tell is bound to them, so that the same picture lives on the live page: {@code java/simulator/rig.svg} is
+ * it in the rig's start position.
  */
 public final class RigPicture {
     private static final int WIDTH = 960;
     private static final int HEIGHT = 780;
     private static final int BAR = 66;
+    private static final int PHASES = 8;
     private static final String INK = "fill=\"#22313f\"";
     private static final String PALE = "fill=\"#8fa1b0\"";
 
@@ -90,39 +94,57 @@ public final class RigPicture {
         String[] colours = {"#3b82c4", "#2fa85a", "#d64545", "#8a6fc2", "#d64545"};
         for (int i = 0; i < names.length; i++) {
             double y = 72 + 25 * i;
-            svg.ellipse(38, y, 7.5, 7.5, lit[i]
+            String signal = i < 4 ? names[i] + " lamp" : names[i];
+            svg.ellipse(38, y, 7.5, 7.5, (lit[i]
                     ? "fill=\"" + colours[i] + "\" stroke=\"#ffffff\" stroke-width=\"1.5\""
-                    : "fill=\"#dde4e9\" stroke=\"#b4c0ca\" stroke-width=\"1.5\"");
-            svg.text(54, y + 5, "font-size=\"14\" " + (lit[i] ? INK + " font-weight=\"600\"" : PALE), names[i]);
+                    : "fill=\"#dde4e9\" stroke=\"#b4c0ca\" stroke-width=\"1.5\"")
+                    + Svg.bound("fill", "%s: off -> #dde4e9, on -> %s", signal, colours[i]));
+            svg.text(54, y + 5, "font-size=\"14\" " + (lit[i] ? INK + " font-weight=\"600\"" : PALE)
+                    + Svg.bound("fill", "%s: off -> #8fa1b0, on -> #22313f", signal), names[i]);
         }
-        for (int i = 0; i < 2; i++) {
-            String paint = i == 0 ? "fresh" : "treated";
-            svg.rect(155, 64 + 25 * i, 14, 17, 4, "fill=\"url(#" + paint + ")\" stroke=\"#1f4a66\"");
-            svg.text(178, 77 + 25 * i, "font-size=\"14\" " + INK, paint);
-        }
+        svg.group(Svg.STILL, () -> {
+            for (int i = 0; i < 2; i++) {
+                String paint = i == 0 ? "fresh" : "treated";
+                svg.rect(155, 64 + 25 * i, 14, 17, 4, "fill=\"url(#" + paint + ")\" stroke=\"#1f4a66\"");
+                svg.text(178, 77 + 25 * i, "font-size=\"14\" " + INK, paint);
+            }
+        });
     }
 
     private static void bar(Rig rig, Svg svg) {
         double top = HEIGHT - BAR;
         svg.rect(0, top, WIDTH, BAR, 0, "fill=\"#22313f\"");
-        field(svg, 28, "phase", RigPanel.phase(rig.panelPhase()));
-        field(svg, 180, "step", rig.panelStep() == 0 ? "–" : rig.panelStep() + " of 6");
-        field(svg, 290, "cycle", Long.toString(rig.panelCycles()));
-        field(svg, 380, "time", String.format(Locale.ROOT, "%.2f s", rig.time() * 1e-9));
-        Counters counters = rig.counters();
-        field(svg, 500, "bottles fed", Long.toString(counters.fed()));
-        field(svg, 610, "treated", Long.toString(counters.treated()));
-        field(svg, 700, "delivered", Long.toString(counters.delivered()));
-        field(svg, 800, "jams", Long.toString(counters.jams()));
-        if (rig.notOk()) {
+        field(svg, 28, "phase", phases(), RigPanel.phase(rig.panelPhase()));
+        field(svg, 180, "step", Svg.bound("text", "Step: 0 -> –, else -> {0} of 6"),
+                rig.panelStep() == 0 ? "–" : rig.panelStep() + " of 6");
+        field(svg, 290, "cycle", Svg.bound("text", "Cycles: {0}"), Long.toString(rig.panelCycles()));
+        svg.group(Svg.STILL, () -> {
+            field(svg, 380, "time", "", String.format(Locale.ROOT, "%.2f s", rig.time() * 1e-9));
+            Counters counters = rig.counters();
+            field(svg, 500, "bottles fed", "", Long.toString(counters.fed()));
+            field(svg, 610, "treated", "", Long.toString(counters.treated()));
+            field(svg, 700, "delivered", "", Long.toString(counters.delivered()));
+            field(svg, 800, "jams", "", Long.toString(counters.jams()));
+        });
+        svg.group((rig.notOk() ? "" : "display=\"none\"") + Svg.bound("show", "Not OK"), () -> {
             svg.rect(0, top - 32, WIDTH, 32, 0, "fill=\"#b83232\"");
-            svg.text(28, top - 11, "font-size=\"14.5\" font-weight=\"600\" fill=\"#ffffff\"",
-                    "Not OK: " + rig.faults().get(0) + (rig.faults().size() > 1 ? " …" : ""));
-        }
+            String look = "font-size=\"14.5\" font-weight=\"600\" fill=\"#ffffff\"";
+            svg.text(28, top - 11, look + Svg.bound("text", "Not OK: 0 -> OK, 1 -> Not OK: a jam or a collision"),
+                    rig.notOk() ? "Not OK: " + rig.faults().get(0) + (rig.faults().size() > 1 ? " …" : "") : "OK");
+        });
     }
 
-    private static void field(Svg svg, double x, String name, String value) {
+    /** What the phases of the PLC program are called. */
+    private static String phases() {
+        StringBuilder cases = new StringBuilder("Phase: ");
+        for (int phase = 0; phase < PHASES; phase++) {
+            cases.append(phase == 0 ? "" : ", ").append(phase).append(" -> ").append(RigPanel.phase(phase));
+        }
+        return Svg.bound("text", cases.toString());
+    }
+
+    private static void field(Svg svg, double x, String name, String bound, String value) {
         svg.text(x, HEIGHT - BAR + 24, "font-size=\"12\" fill=\"#9fb2c2\"", name);
-        svg.text(x, HEIGHT - BAR + 48, "font-size=\"19\" font-weight=\"600\" fill=\"#ffffff\"", value);
+        svg.text(x, HEIGHT - BAR + 48, "font-size=\"19\" font-weight=\"600\" fill=\"#ffffff\"" + bound, value);
     }
 }

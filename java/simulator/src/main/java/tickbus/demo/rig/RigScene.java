@@ -26,6 +26,8 @@ final class RigScene {
     private static final double LIFT1 = RADIUS1;
     private static final double LIFT2 = MIDDLE2 + RADIUS2;
     private static final double GROUND = -112;
+    /** Above all that a lift carries. */
+    private static final double TOP = Geometry.LAMP_FLOOR + Geometry.BOTTLE_HEIGHT + 20;
     private static final double LAMP = Geometry.LAMP_FLOOR + Geometry.BOTTLE_HEIGHT + 26;
 
     private static final String STEEL = "fill=\"url(#steel)\" stroke=\"#6d7f8f\"";
@@ -71,7 +73,7 @@ final class RigScene {
         cylinder(MIDDLE2, 0, 10, GROUND, 26, MOTOR, MOTOR);
         cylinder(MIDDLE2, 0, Geometry.SLEEVE_FLOOR - 12, 10, 7, STEEL, STEEL);
         cylinder(LIFT2, 0, 130, GROUND, 14, MOTOR, MOTOR);
-        rod(LIFT2, 130, Math.min(rig.cupHeight(Lift.LA2), Geometry.SLEEVE_FLOOR - 6));
+        within("under", LIFT2, 130, Geometry.SLEEVE_FLOOR - 6, () -> moved(Lift.LA2, () -> rod(Lift.LA2, LIFT2)));
     }
 
     private void wheel1() {
@@ -81,11 +83,15 @@ final class RigScene {
             double angle = Math.toRadians(rig.wheel1Angle() + 90 * i);
             double across = RADIUS1 * Math.sin(angle);
             double near = RADIUS1 * Math.cos(angle);
-            svg.ellipse(x(across), y(near, -3), 20 * ACROSS, 20 * NEAR, HOLE);
             bottleIn(Bottle.Place.POCKET, i, across, near, things);
         }
+        wheel(0, -3, "IM1 index", -90, rig.wheel1Angle(), () -> {
+            for (int i = 0; i < 4; i++) {
+                svg.line("<circle cx=\"0\" cy=\"%.1f\" r=\"20\" transform=\"rotate(%d)\" %s/>", RADIUS1, -90 * i, HOLE);
+            }
+        });
         things.add(new Thing(0, () -> cylinder(0, 0, 12, -3, 13, STEEL, STEEL)));
-        things.add(new Thing(0.1, () -> column(Lift.LA1, LIFT1, 0, Geometry.SLEEVE_FLOOR - 6)));
+        things.add(new Thing(0.1, () -> column("low1", Lift.LA1, LIFT1, -8, Geometry.SLEEVE_FLOOR - 6)));
         paint(things);
         belt(RADIUS1 + RIM + 4, RADIUS1 + RIM + 106);
     }
@@ -111,20 +117,26 @@ final class RigScene {
             double angle = Math.toRadians(rig.wheel2Angle() + 180 * i);
             double across = MIDDLE2 - RADIUS2 * Math.cos(angle);
             double near = RADIUS2 * Math.sin(angle);
-            svg.ellipse(x(across), y(near, floor - 3), 20 * ACROSS, 20 * NEAR, HOLE);
             bottleIn(Bottle.Place.SLEEVE, i, across, near, things);
-            things.add(new Thing(near + 2, () -> sleeve(across, near)));
+            int number = i;
+            things.add(new Thing(near + 2, () -> wheel(MIDDLE2, floor - 3, "IM2 index", -180, rig.wheel2Angle(),
+                    () -> sleeve(180 * number))));
         }
+        wheel(MIDDLE2, floor - 3, "IM2 index", -180, rig.wheel2Angle(), () -> {
+            for (int i = 0; i < 2; i++) {
+                svg.line("<circle cx=\"%.1f\" cy=\"0\" r=\"20\" transform=\"rotate(%d)\" %s/>", -RADIUS2, -180 * i, HOLE);
+            }
+        });
         things.add(new Thing(0, () -> cylinder(MIDDLE2, 0, floor + 14, floor - 3, 15, STEEL, STEEL)));
-        things.add(new Thing(0.2, () -> column(Lift.LA1, LIFT1, floor - 6, Geometry.LAMP_FLOOR)));
-        things.add(new Thing(0.3, () -> column(Lift.LA2, LIFT2, floor - 6, Geometry.LAMP_FLOOR)));
+        things.add(new Thing(0.2, () -> column("high1", Lift.LA1, LIFT1, floor - 6, TOP)));
+        things.add(new Thing(0.3, () -> column("high2", Lift.LA2, LIFT2, floor - 6, TOP)));
         paint(things);
     }
 
     private void bottleIn(Bottle.Place place, int slot, double across, double near, List<Thing> things) {
         for (Bottle bottle : bottles) {
             if (bottle.place() == place && bottle.slot() == slot) {
-                things.add(new Thing(near + 1, () -> bottle(bottle, across, near)));
+                things.add(new Thing(near + 1, () -> svg.group(Svg.STILL, () -> bottle(bottle, across, near))));
             }
         }
     }
@@ -135,81 +147,120 @@ final class RigScene {
     }
 
     /** The part of a lift between two heights: rod, cup, and the bottle that it carries. */
-    private void column(Lift lift, double across, double from, double to) {
-        double cup = rig.cupHeight(lift);
-        rod(across, from, Math.min(cup - 5, to));
-        if (cup < from || cup > to) {
-            return;
-        }
-        cup(lift, x(across), y(0, cup));
-        for (Bottle bottle : bottles) {
-            boolean here = lift == Lift.LA1
-                    ? bottle.place() == Bottle.Place.CUP1 || bottle.place() == Bottle.Place.STUCK1
-                    : bottle.place() == Bottle.Place.CUP2 || bottle.place() == Bottle.Place.STUCK2;
-            if (here) {
-                bottle(bottle, across, 0);
+    private void column(String id, Lift lift, double across, double from, double to) {
+        within(id, across, from, to, () -> moved(lift, () -> {
+            rod(lift, across);
+            cup(lift, x(across), y(0, rig.cupHeight(lift)));
+            carried(lift, across);
+        }));
+    }
+
+    /** What is seen of something between two heights: the wheel that it passes hides the rest. */
+    private void within(String id, double across, double from, double to, Runnable inside) {
+        svg.line("<clipPath id=\"%s\"><rect x=\"%.1f\" y=\"%.1f\" width=\"120\" height=\"%.1f\"/></clipPath>",
+                id, x(across) - 60, y(0, to), (to - from) * UP);
+        svg.group("clip-path=\"url(#" + id + ")\"", inside);
+    }
+
+    /** What goes up and down with a lift. */
+    private void moved(Lift lift, Runnable inside) {
+        svg.group(Svg.bound("y", "%s position: %.2f + %.4f", lift, -UP, rig.position(lift) * UP), inside);
+    }
+
+    /** What turns with a wheel, in the wheel's own plane; each command turns it by so many degrees. */
+    private void wheel(double across, double height, String command, int degrees, double angle, Runnable inside) {
+        svg.line("<g transform=\"translate(%.1f %.1f) scale(%.2f %.2f)\">", x(across), y(0, height), ACROSS, NEAR);
+        svg.group(turn(command, degrees) + String.format(Locale.ROOT, " transform=\"rotate(%.1f)\"", -angle), inside);
+        svg.line("</g>");
+    }
+
+    private static String turn(String command, int degrees) {
+        return Svg.bound("turn", "%s.edges: %d", command, degrees) + Svg.bound("pivot", "0 0") + Svg.bound("smooth", "1");
+    }
+
+    private void carried(Lift lift, double across) {
+        boolean first = lift == Lift.LA1;
+        Bottle carried = bottles.stream()
+                .filter(bottle -> bottle.place() == (first ? Bottle.Place.CUP1 : Bottle.Place.CUP2)
+                        || bottle.place() == (first ? Bottle.Place.STUCK1 : Bottle.Place.STUCK2))
+                .findFirst().orElse(null);
+        svg.group((carried == null ? "display=\"none\"" : "") + Svg.bound("show", first ? "SC1" : "SC2"), () -> {
+            if (carried == null) {
+                glass(x(across), y(0, rig.cupHeight(lift)), "fresh", false);
+            } else {
+                bottle(carried, across, 0);
             }
-        }
+        });
     }
 
     private void cup(Lift lift, double px, double py) {
-        boolean sunk = rig.position(lift) <= Geometry.REACH;
-        if (sunk && !rig.homed(lift == Lift.LA1 ? 1 : 2)) {
+        if (rig.position(lift) <= Geometry.REACH && !rig.homed(lift == Lift.LA1 ? 1 : 2)) {
             return;
         }
-        String look = "fill=\"" + (rig.vacuum(lift) ? "#e8862e" : "#3b4a57") + "\" stroke=\"#26333d\"";
-        if (!sunk) {
-            svg.path(String.format(Locale.ROOT, "M%.1f %.1fL%.1f %.1fH%.1fL%.1f %.1fZ",
-                    px - 15, py, px - 7, py + 9, px + 7, px + 15, py), look);
-        }
+        String look = "fill=\"" + (rig.vacuum(lift) ? "#e8862e" : "#3b4a57") + "\" stroke=\"#26333d\""
+                + Svg.bound("fill", "SC%d: off -> #3b4a57, on -> #e8862e", lift.ordinal() + 1);
+        svg.path(String.format(Locale.ROOT, "M%.1f %.1fL%.1f %.1fH%.1fL%.1f %.1fZ",
+                px - 15, py, px - 7, py + 9, px + 7, px + 15, py), look);
         svg.ellipse(px, py, 15, 15 * NEAR / ACROSS, look);
     }
 
-    private void rod(double across, double from, double to) {
-        if (to > from) {
-            svg.rect(x(across) - 4.5, y(0, to), 9, (to - from) * UP, 0, STEEL);
-        }
+    /** The rod of a lift, from its cup down into the ground; what of it is seen, others say. */
+    private void rod(Lift lift, double across) {
+        double top = rig.cupHeight(lift) - 5;
+        svg.rect(x(across) - 4.5, y(0, top), 9, (top - GROUND + Geometry.STROKE) * UP, 0, STEEL);
     }
 
     private void bottle(Bottle bottle, double across, double near) {
         double px = x(across);
         double base = y(near, bottle.height());
-        double tall = Geometry.BOTTLE_HEIGHT * UP;
-        String paint = bottle.treated() ? "treated" : "fresh";
+        double middle = base - Geometry.BOTTLE_HEIGHT * UP * 0.36;
         boolean stuck = bottle.place() == Bottle.Place.STUCK1 || bottle.place() == Bottle.Place.STUCK2;
+        glass(px, base, bottle.treated() ? "treated" : "fresh", stuck);
+        svg.group(Svg.STILL, () -> {
+            svg.ellipse(px, middle, 11.5, 11.5, "fill=\"#ffffff\" fill-opacity=\"0.92\"");
+            svg.text(px, middle + 4.5, "font-size=\"12.5\" font-weight=\"700\" fill=\"#22313f\"" + CENTRED,
+                    Integer.toString(bottle.id()));
+        });
+    }
+
+    private void glass(double px, double base, String paint, boolean stuck) {
+        double tall = Geometry.BOTTLE_HEIGHT * UP;
         String edge = stuck ? "stroke=\"#d12f2f\" stroke-width=\"3\"" : "stroke=\"#1f4a66\" stroke-width=\"1\"";
         svg.path(String.format(Locale.ROOT,
                 "M%.1f %.1fv%.1fq0 -9 10 -12v%.1fh14v%.1fq10 3 10 12v%.1fa17 5.6 0 0 1 -34 0Z",
                 px - 17, base, -(tall - 25), -9.0, 9.0, tall - 25), "fill=\"url(#" + paint + ")\" " + edge);
         svg.rect(px - 8, base - tall - 1, 16, 6, 2, "fill=\"#f4f6f8\" stroke=\"#52636f\"");
-        svg.ellipse(px, base - tall * 0.36, 11.5, 11.5, "fill=\"#ffffff\" fill-opacity=\"0.92\"");
-        svg.text(px, base - tall * 0.36 + 4.5, "font-size=\"12.5\" font-weight=\"700\" fill=\"#22313f\"" + CENTRED,
-                Integer.toString(bottle.id()));
     }
 
-    private void sleeve(double across, double near) {
-        double px = x(across);
-        double bottom = y(near, Geometry.SLEEVE_FLOOR - 3);
-        double top = y(near, Geometry.SLEEVE_FLOOR + 46);
+    /** A sleeve at an angle of its wheel: it goes round with it, and stays upright. */
+    private void sleeve(int angle) {
+        double around = Math.toRadians(angle);
+        double upright = rig.wheel2Angle();
+        svg.line("<g transform=\"translate(%.1f %.1f)\">", -RADIUS2 * Math.cos(around), RADIUS2 * Math.sin(around));
+        svg.line("<g transform=\"rotate(%.1f)\"%s>", upright, turn("IM2 index", 180));
+        svg.line("<g transform=\"scale(%.4f %.4f)\">", 1 / ACROSS, 1 / NEAR);
         String look = "fill=\"url(#glass)\" fill-opacity=\"0.38\" stroke=\"#5f8299\" stroke-width=\"1.3\"";
-        svg.path(String.format(Locale.ROOT, "M%.1f %.1fV%.1fa22 7 0 0 0 44 0V%.1fa22 7 0 0 1 -44 0Z",
-                px - 22, top, bottom, top), look);
-        svg.ellipse(px, top, 22, 7, "fill=\"none\" stroke=\"#5f8299\" stroke-width=\"1.3\"");
+        double top = -49 * UP;
+        svg.path(String.format(Locale.ROOT, "M-22 %.1fV0a22 7 0 0 0 44 0V%.1fa22 7 0 0 1 -44 0Z", top, top), look);
+        svg.ellipse(0, top, 22, 7, "fill=\"none\" stroke=\"#5f8299\" stroke-width=\"1.3\"");
+        svg.line("</g></g></g>");
     }
 
     private void lamp() {
         double px = x(LIFT2);
         double py = y(0, LAMP);
-        if (rig.lamp()) {
-            svg.ellipse(px, py + 12, 118, 100, "fill=\"url(#glow)\"");
-        }
+        svg.ellipse(px, py + 12, 118, 100, "fill=\"url(#glow)\"" + (rig.lamp() ? "" : " display=\"none\"")
+                + Svg.bound("show", "Lamp"));
         svg.path(String.format(Locale.ROOT, "M%.1f %.1fH%.1fl14 30h-88Z", px - 30, py - 26, px + 30),
                 "fill=\"#3b4a57\" stroke=\"#26333d\"");
-        svg.ellipse(px, py + 5, 25, 11, rig.lamp()
+        svg.ellipse(px, py + 5, 25, 11, (rig.lamp()
                 ? "fill=\"#fff6c4\" stroke=\"#e0a500\" stroke-width=\"2\""
-                : "fill=\"#a9b5be\" stroke=\"#66757f\" stroke-width=\"2\"");
+                : "fill=\"#a9b5be\" stroke=\"#66757f\" stroke-width=\"2\"")
+                + Svg.bound("fill", "Lamp: off -> #a9b5be, on -> #fff6c4")
+                + Svg.bound("stroke", "Lamp: off -> #66757f, on -> #e0a500"));
         svg.rect(px - 4, 0, 8, py - 26, 0, STEEL);
-        svg.text(px + 54, py - 8, LABEL, rig.lamp() ? "lamp on" : "lamp off");
+        svg.text(px + 54, py - 8, LABEL + Svg.bound("text", "Lamp: 0 -> lamp off, 1 -> lamp on"),
+                rig.lamp() ? "lamp on" : "lamp off");
     }
 
     /** A package sensor: the beam ends at a bottle that blocks it. */
@@ -219,29 +270,38 @@ final class RigScene {
         boolean blocked = rig.beamBlocked(lift);
         svg.rect(px - 66, py - 7, 13, 14, 3, "fill=\"#3b4a57\"");
         svg.rect(px + 53, py - 7, 13, 14, 3, "fill=\"#3b4a57\"");
-        svg.ellipse(px + 59.5, py, 3.6, 3.6, blocked ? "fill=\"#ff5d4d\"" : "fill=\"#58d68d\"");
-        svg.stroke(px - 53, py, blocked ? px - 17 : px + 53, py,
-                "stroke=\"#e23b2e\" stroke-width=\"2\" stroke-opacity=\"0.85\"");
+        String signal = "Package sensor " + (lift.ordinal() + 1);
+        svg.ellipse(px + 59.5, py, 3.6, 3.6, (blocked ? "fill=\"#ff5d4d\"" : "fill=\"#58d68d\"")
+                + Svg.bound("fill", signal + ": off -> #58d68d, on -> #ff5d4d"));
+        ray(px - 17, px, py, blocked, Svg.bound("show", signal));
+        ray(px + 53, px, py, !blocked, Svg.bound("hide", signal));
         if (!blocked && rig.cupHeight(lift) > height) {
-            svg.rect(px - 4.5, py - 2, 9, 4, 0, "fill=\"#d5dde4\"");
+            svg.group(Svg.STILL, () -> svg.rect(px - 4.5, py - 2, 9, 4, 0, "fill=\"#d5dde4\""));
         }
-        String words = "package " + (lift.ordinal() + 1) + (blocked ? " blocked" : "");
+        String name = "package " + (lift.ordinal() + 1);
+        String words = name + (blocked ? " blocked" : "");
+        String look = LABEL + Svg.bound("text", "%s: 0 -> %s, 1 -> %s blocked", signal, name, name);
         if (lift == Lift.LA1) {
-            svg.text(px - 73, py + 5, LABEL + ENDING, words);
+            svg.text(px - 73, py + 5, look + ENDING, words);
         } else {
-            svg.text(px + 73, py + 5, LABEL, words);
+            svg.text(px + 73, py + 5, look, words);
         }
+    }
+
+    private void ray(double end, double px, double py, boolean shown, String when) {
+        svg.stroke(px - 53, py, end, py, "stroke=\"#e23b2e\" stroke-width=\"2\" stroke-opacity=\"0.85\""
+                + (shown ? "" : " display=\"none\"") + when);
     }
 
     private void signs() {
         double left = x(-RADIUS1 - RIM);
         sensor(1, left - 14, y(0, -8));
         svg.text(24, y(0, -8) - 30, LABEL, "homing 1");
-        svg.text(24, y(0, -8) + 74, LABEL, String.format(Locale.ROOT, "index wheel 1 at %.0f°", rig.wheel1Angle()));
+        svg.text(24, y(0, -8) + 74, LABEL + Svg.STILL, String.format(Locale.ROOT, "index wheel 1 at %.0f°", rig.wheel1Angle()));
         double right = x(MIDDLE2 + RADIUS2 + RIM);
         sensor(2, right + 14, y(0, Geometry.SLEEVE_FLOOR - 7));
         svg.text(right + 30, y(0, Geometry.SLEEVE_FLOOR - 7) + 5, LABEL, "homing 2");
-        svg.text(right + 5, y(0, Geometry.SLEEVE_FLOOR - 7) - 24, LABEL,
+        svg.text(right + 5, y(0, Geometry.SLEEVE_FLOOR - 7) - 24, LABEL + Svg.STILL,
                 String.format(Locale.ROOT, "chamber wheel at %.0f°", rig.wheel2Angle()));
         svg.text(x(30), y(RADIUS1 + RIM + 78, -6), LABEL, "infeed");
         svg.text(x(-31), y(-RADIUS1 - RIM - 78, -6), LABEL + ENDING, "outfeed");
@@ -251,13 +311,16 @@ final class RigScene {
 
     private void lift(Lift lift, double px, double py) {
         int number = lift.ordinal() + 1;
-        svg.text(px, py, LABEL, String.format(Locale.ROOT, "lift %d at %.0f mm", number, rig.position(lift)));
-        svg.text(px, py + 18, LABEL, "SC" + number + (rig.vacuum(lift) ? " on" : " off"));
+        svg.text(px, py, LABEL + Svg.bound("text", "%s position: lift %d at {0} mm", lift, number),
+                String.format(Locale.ROOT, "lift %d at %.0f mm", number, rig.position(lift)));
+        svg.text(px, py + 18, LABEL + Svg.bound("text", "SC%1$d: 0 -> SC%1$d off, 1 -> SC%1$d on", number),
+                "SC" + number + (rig.vacuum(lift) ? " on" : " off"));
     }
 
     private void sensor(int wheel, double px, double py) {
         svg.rect(px - 9, py - 8, 18, 16, 4, "fill=\"#3b4a57\"");
-        svg.ellipse(px, py, 4, 4, rig.homed(wheel) ? "fill=\"#58d68d\"" : "fill=\"#7c8b97\"");
+        svg.ellipse(px, py, 4, 4, (rig.homed(wheel) ? "fill=\"#58d68d\"" : "fill=\"#7c8b97\"")
+                + Svg.bound("fill", "Homing sensor %d: off -> #7c8b97, on -> #58d68d", wheel));
     }
 
     private void shadow(double across, double half) {

@@ -2,8 +2,15 @@ package tickbus.simulator.text;
 
 import java.util.Locale;
 
-/** Writes SVG elements, with numbers short enough to read and the same on every locale. */
+/**
+ * Writes SVG elements, with numbers short enough to read and the same on every locale.
+ *
+ * <p>What is drawn may be bound to signals: the live page moves it then (docs/live-page.md).
+ */
 public final class Svg {
+    /** An attribute: drawn when the picture stands still, and left out of the live page, since no signal tells it. */
+    public static final String STILL = " data-tb-still=\"\"";
+
     private final StringBuilder text = new StringBuilder(16_384);
 
     /**
@@ -17,7 +24,33 @@ public final class Svg {
         line("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\""
                         + " font-family=\"'Segoe UI', 'DejaVu Sans', Helvetica, Arial, sans-serif\" role=\"img\">",
                 width, height, width, height);
-        line("<title>%s</title>", escape(title));
+        line("<title" + STILL + ">%s</title>", escape(title));
+    }
+
+    /**
+     * The attribute that binds an element to a signal.
+     *
+     * @param what moves or changes of it: "y", "fill", "show", "text", …
+     * @param how the signal's name, and behind a colon what its values become
+     * @param values of a format in it
+     * @return an attribute, with a blank in front of it
+     */
+    public static String bound(String what, String how, Object... values) {
+        return " data-tb-" + what + "=\"" + escape(String.format(Locale.ROOT, how, values)) + "\"";
+    }
+
+    /**
+     * Adds what is inside of a clipping rectangle, or moves together.
+     *
+     * @param look attributes of the group
+     * @param inside draws it
+     * @return this
+     */
+    public Svg group(String look, Runnable inside) {
+        text.append("<g ").append(look.strip()).append(">\n");
+        inside.run();
+        text.append("</g>\n");
+        return this;
     }
 
     /**
@@ -128,6 +161,6 @@ public final class Svg {
     }
 
     private static String escape(String words) {
-        return words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;");
+        return words.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;").replace("\"", "&quot;");
     }
 }

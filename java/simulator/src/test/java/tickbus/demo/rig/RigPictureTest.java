@@ -8,6 +8,7 @@ import java.io.ByteArrayInputStream;
 import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.util.Locale;
 import javax.xml.parsers.DocumentBuilderFactory;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
@@ -30,12 +31,34 @@ class RigPictureTest {
                 .parse(new ByteArrayInputStream(svg.getBytes(StandardCharsets.UTF_8)));
         assertEquals("svg", document.getDocumentElement().getTagName());
         assertFalse(svg.contains("href"), "nothing outside is needed");
-        assertTrue(svg.contains("lamp on"));
+        assertTrue(svg.contains(">lamp on</text>"));
         assertTrue(svg.contains("phase run, step 5, cycle 2"));
         for (Bottle bottle : player.rig.bottles()) {
             assertTrue(svg.contains(">" + bottle.id() + "</text>"), "bottle " + bottle.id());
         }
         assertEquals(svg, RigPicture.draw(player.rig), "drawing changes nothing");
+    }
+
+    /** {@code TICKBUS_UPDATE=1} draws it anew. */
+    @Test
+    void thePictureOfTheLivePageIsTheSameDrawing() throws Exception {
+        Rig rig = new Rig(0, 0, 0, 0);
+        rig.step(WordPlayer.MILLI);
+        Path file = Path.of("rig.svg");
+        if (System.getenv("TICKBUS_UPDATE") != null) {
+            RigPicture.write(rig, file);
+        }
+        assertEquals(Files.readString(file), RigPicture.draw(rig));
+    }
+
+    /** What is bound stays where it was drawn while its signal has the value of that moment. */
+    @Test
+    void whatMovesIsBoundRelativeToWhereItWasDrawn() {
+        player.play(WordPlayer.LA1_BIG_UP, 1000);
+        double position = player.rig.position(Lift.LA1);
+        String svg = RigPicture.draw(player.rig);
+        String expected = String.format(Locale.ROOT, "data-tb-y=\"LA1 position: -1.06 + %.4f\"", position * 1.06);
+        assertTrue(position > 100 && svg.contains(expected), expected);
     }
 
     @Test

@@ -1,0 +1,147 @@
+//! The `[page]` table.
+
+use std::path::PathBuf;
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::tcp::Address;
+
+/// The port of a page where none is stated.
+const PORT: u16 = 20080;
+
+/// How long signals stay forced for nobody, where it is not stated.
+const GRACE: Nanos = Nanos::from_secs(10);
+
+/// The shortest that can be stated: a page that is loaded again is away for a moment.
+const LEAST_GRACE: Nanos = Nanos::from_secs(1);
+
+/// The longest path of a picture, in characters.
+const PATH_LIMIT: usize = 1000;
+
+/// The live page of a driver.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PageOptions {
+    /// Where it is served; port 0 lets the system choose one.
+    pub listen: Address,
+    /// How long signals stay forced when nobody with the token looks any more; `None` for as long as the driver runs.
+    pub grace: Option<Nanos>,
+    /// The picture of the machine as written there: relative to the folder of the driver.cfg.
+    pub picture: Option<PathBuf>,
+}
+
+impl Default for PageOptions {
+    /// On port 20080 of this machine alone, 10 s, without a picture.
+    fn default() -> Self {
+        Self {
+            listen: Address::local(PORT),
+            grace: Some(GRACE),
+            picture: None,
+        }
+    }
+}
+
+impl PageOptions {
+    pub(super) fn read(mut table: Table<'_>) -> Option<Self> {
+        let [listen, grace, keep_forced, picture] =
+            ["listen", "grace", "keep_forced", "picture"].map(|key| table.take(key));
+        table.finish();
+        let usual = Self::default();
+        let listen = listen.map_or(Some(usual.listen), |value| Address::read(&value));
+        let keeps = keep_forced.as_ref().map_or(Some(false), Value::boolean);
+        let why = "a page that is loaded again is away for a moment";
+        let stated = grace
+            .as_ref()
+            .map(|value| value.duration_from(LEAST_GRACE, why));
+        if let (Some(value), Some(true)) = (&grace, keeps) {
+            value.wrong(
+                "signals that stay forced have no \"grace\"",
+                "remove it, or \"keep_forced\"",
+            );
+            return None;
+        }
+        let picture = picture.map(|value| {
+            let right = "name an SVG file, such as \"rig.svg\"";
+            let file = PathBuf::from(value.label(PATH_LIMIT, right)?);
+            let is_svg = file
+                .extension()
+                .is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+            if !is_svg {
+                let what = format!("\"{}\" does not end in .svg", file.display());
+                value.wrong(
+                    what,
+                    "name a drawing in SVG; docs/live-page.md tells how one is made",
+                );
+            }
+            is_svg.then_some(file)
+        });
+        let grace = match (keeps?, stated) {
+            (true, _) => None,
+            (false, None) => usual.grace,
+            (false, Some(stated)) => Some(stated?),
+        };
+        Some(Self {
+            listen: listen?,
+            grace,
+            picture: match picture {
+                None => None,
+                Some(picture) => Some(picture?),
+            },
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Config;
+
+    fn read(page: &str) -> Result<Option<PageOptions>, String> {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+             [[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n{page}"
+        );
+        let config = Config::parse("driver.cfg", &text);
+        config
+            .map(|config| config.page)
+            .map_err(|wrong| wrong.to_string())
+    }
+
+    #[test]
+    fn a_page_has_what_is_stated_and_else_what_is_usual() {
+        assert_eq!(read(""), Ok(None));
+        assert_eq!(read("[page]\n"), Ok(Some(PageOptions::default())));
+        let page = read(
+            "[page]\nlisten = \"0.0.0.0:0\"\ngrace = \"1min\"\npicture = \"pictures/rig.svg\"\n",
+        );
+        let page = page.expect("right").expect("there");
+        assert_eq!(page.listen.to_string(), "0.0.0.0:0");
+        assert_eq!(page.grace, Some(Nanos::from_secs(60)));
+        assert_eq!(page.picture, Some(PathBuf::from("pictures/rig.svg")));
+        let keeps = read("[page]\nkeep_forced = true\n").expect("right");
+        assert_eq!(keeps.expect("there").grace, None);
+    }
+
+    #[test]
+    fn mistakes_are_told_where_they_stand() {
+        for (page, told) in [
+            ("[page]\nlisten = \"20080\"\n", "driver.cfg:11:10: "),
+            ("[page]\nlisten = \"localhost\"\n", "has no port"),
+            ("[page]\ngrace = \"1ms\"\n", "is away for a moment"),
+            ("[page]\ngrace = 5\n", "driver.cfg:11:9: "),
+            (
+                "[page]\nkeep_forced = true\ngrace = \"1min\"\n",
+                "have no \"grace\"",
+            ),
+            ("[page]\nkeep_forced = 1\n", "driver.cfg:11:15: "),
+            ("[page]\npicture = \"rig.png\"\n", "does not end in .svg"),
+            (
+                "[page]\npictures = \"rig.svg\"\n",
+                "did you mean \"picture\"?",
+            ),
+            ("[[page]]\n", "driver.cfg:10:"),
+        ] {
+            let wrong = read(page).expect_err(page);
+            assert!(wrong.contains(told), "{wrong}");
+        }
+    }
+}

@@ -1,0 +1,178 @@
+//! The tap: another thread looks at a driver, and injects faults into it, without the tick waiting for it.
+//!
+//! The tick looks at one word at its end. If something is wanted, it hands over one copy of what it has, through a triple
+//! buffer, and takes over what was ordered: faults that were prepared outside. Memory is neither allocated nor freed here.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, TrySendError, sync_channel};
+
+use tickbus_base::Mistake;
+use tickbus_fieldbus::faults::{Faults, Prepared, Retired};
+use tickbus_image::{Reader, Writer, triple_buffer};
+
+use super::view::View;
+
+/// A copy of the values is wanted.
+const VALUES: u8 = 1;
+/// Copies of the distributions as well.
+const TIMES: u8 = 2;
+/// There are orders.
+const ORDERS: u8 = 4;
+
+/// How many orders wait at most.
+const ORDERS_LIMIT: usize = 256;
+
+/// What is to be done at the end of a tick.
+#[derive(Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "a box would have to be freed by the tick"
+)]
+enum Order {
+    Inject(Prepared),
+    End(u32),
+}
+
+/// What a tick has been asked for.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Wanted(u8);
+
+impl Wanted {
+    pub(super) const fn values(self) -> bool {
+        self.0 & VALUES != 0
+    }
+
+    pub(super) const fn times(self) -> bool {
+        self.0 & TIMES != 0
+    }
+
+    pub(super) const fn orders(self) -> bool {
+        self.0 & ORDERS != 0
+    }
+}
+
+/// The tick's end.
+#[derive(Debug)]
+pub(super) struct Tap {
+    wanted: Arc<AtomicU8>,
+    views: Writer<View>,
+    orders: Receiver<Order>,
+    /// The way back for what only others may free.
+    retired: SyncSender<Retired>,
+}
+
+/// The other end.
+#[derive(Debug)]
+pub(super) struct Handle {
+    wanted: Arc<AtomicU8>,
+    views: Reader<View>,
+    orders: SyncSender<Order>,
+    retired: Receiver<Retired>,
+}
+
+/// Makes both ends; `initial` is seen before the first tick.
+pub(super) fn tap(initial: &View) -> (Tap, Handle) {
+    let wanted = Arc::<AtomicU8>::default();
+    let (writer, reader) = triple_buffer(initial);
+    let (send, orders) = sync_channel(ORDERS_LIMIT);
+    // An order retires one fault at most, and orders are sent by who empties this.
+    let (retired, take) = sync_channel(2 * ORDERS_LIMIT);
+    let tap = Tap {
+        wanted: Arc::clone(&wanted),
+        views: writer,
+        orders,
+        retired,
+    };
+    let handle = Handle {
+        wanted,
+        views: reader,
+        orders: send,
+        retired: take,
+    };
+    (tap, handle)
+}
+
+impl Tap {
+    /// Whether anything is wanted.
+    #[inline]
+    pub(super) fn is_wanted(&self) -> bool {
+        self.wanted.load(Ordering::Relaxed) != 0
+    }
+
+    /// What is wanted; it is wanted no more then.
+    pub(super) fn take_wanted(&self) -> Wanted {
+        Wanted(self.wanted.swap(0, Ordering::Acquire))
+    }
+
+    /// Hands over a copy, which `fill` makes of an older one.
+    pub(super) fn show(&mut self, fill: impl FnOnce(&mut View)) {
+        self.views.with_buffer(fill);
+        self.views.publish();
+    }
+
+    /// Carries out what was ordered.
+    pub(super) fn obey(&mut self, faults: &mut Faults) {
+        // Nobody ever waits to send, so that receiving wakes nobody.
+        loop {
+            match self.orders.try_recv() {
+                Ok(Order::Inject(prepared)) => {
+                    if let Some(retired) = faults.adopt(prepared) {
+                        // There is room, see above; what is left over without it is freed here.
+                        let _ = self.retired.try_send(retired);
+                    }
+                }
+                Ok(Order::End(id)) => drop(faults.end(id)),
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => return,
+            }
+        }
+    }
+}
+
+impl Handle {
+    /// Asks for a copy at the end of the next tick.
+    pub(super) fn ask(&self, with_times: bool) {
+        let wanted = if with_times { VALUES | TIMES } else { VALUES };
+        self.wanted.fetch_or(wanted, Ordering::Release);
+    }
+
+    /// Takes over the newest copy, if there is a new one.
+    pub(super) fn update(&mut self) -> bool {
+        self.views.update()
+    }
+
+    pub(super) fn with<R>(&self, read: impl FnOnce(&View) -> R) -> R {
+        self.views.with(read)
+    }
+
+    /// Hands a fault over to the next tick.
+    pub(super) fn inject(&self, fault: Prepared) -> Result<(), Mistake> {
+        self.order(Order::Inject(fault)).map_err(|(order, why)| {
+            if let Order::Inject(fault) = order {
+                fault.cancel();
+            }
+            why
+        })
+    }
+
+    /// Lets the next tick end a fault.
+    pub(super) fn end(&self, id: u32) -> Result<(), Mistake> {
+        self.order(Order::End(id)).map_err(|(_, why)| why)
+    }
+
+    #[expect(clippy::result_large_err, reason = "what was not sent is given back")]
+    fn order(&self, order: Order) -> Result<(), (Order, Mistake)> {
+        self.retired.try_iter().for_each(drop);
+        self.orders.try_send(order).map_err(|error| match error {
+            TrySendError::Full(order) => {
+                let what = "the simulation has taken over none of the last orders";
+                (order, Mistake::new(what, "let it tick"))
+            }
+            TrySendError::Disconnected(order) => {
+                (order, Mistake::new("the driver is closed", "open it again"))
+            }
+        })?;
+        self.wanted.fetch_or(ORDERS, Ordering::Release);
+        Ok(())
+    }
+}

@@ -1,0 +1,178 @@
+//! A driver that another thread looks at: the tick's part.
+
+use std::sync::Arc;
+
+use tickbus_base::statistics::Statistics;
+use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::LinkStatus;
+use tickbus_fieldbus::faults::{FaultBoard, Faults};
+use tickbus_image::signal::Slot;
+use tickbus_record::RecorderCounters;
+
+use super::extras::Extras;
+use super::host::{Program, ProgramCounters};
+use super::statistics::Snapshot;
+use super::tap::tap;
+use super::tick::Tick;
+use super::tick_counters::TickTimes;
+use super::view::{StationView, View};
+use super::watch::{Figures, Watch};
+use super::watched::Watched;
+use super::{Code, Driver};
+
+/// What belongs to the statistics of a driver and is not in the ticks' copies.
+#[derive(Debug)]
+struct DriverFigures {
+    config: Arc<Config>,
+    status: LinkStatus,
+    board: Arc<FaultBoard>,
+    /// What is at the other end, and the recording.
+    program: Option<ProgramCounters>,
+    record: Option<Arc<RecorderCounters>>,
+}
+
+impl Figures for DriverFigures {
+    fn statistics(&self, now: Nanos, view: &View, times: &TickTimes) -> Statistics {
+        let stations = view.stations.iter();
+        let snapshot = Snapshot {
+            config: Arc::clone(&self.config),
+            counters: view.counters,
+            stations: stations
+                .map(|station| (station.age, station.is_valid, station.cycles))
+                .collect(),
+            events_lost: view.events_lost,
+            now,
+            samples: times.clone(),
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+            program: self.program.clone(),
+            record: self.record.clone(),
+        };
+        snapshot.gather()
+    }
+
+    fn is_driver(&self) -> bool {
+        true
+    }
+}
+
+impl Driver {
+    /// Lets another thread look at this driver, and force its signals. As long as it asks for nothing, a tick pays for a
+    /// look at one word. An earlier handle sees nothing new from now on.
+    pub fn watch(&mut self) -> Watch {
+        let signals = self.config.table.signals.len();
+        let mut slots = self.initial_slots();
+        slots.truncate(signals);
+        let (tap, handle) = tap(&View::new(slots, self.stations.len()));
+        let spare = Extras {
+            faults: Some(Faults::new(Arc::clone(&self.board))),
+            ..Extras::default()
+        };
+        self.watched = Some(Box::new(Watched {
+            tap,
+            spare: Some(Box::new(spare)),
+        }));
+        let recorder = self.recorder.as_ref();
+        Watch {
+            config: Arc::clone(&self.config),
+            role: self.config.role,
+            slots: self.slots.clone(),
+            handle,
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+            clock: Arc::clone(&self.clock),
+            figures: Box::new(DriverFigures {
+                config: Arc::clone(&self.config),
+                status: self.status.clone(),
+                board: Arc::clone(&self.board),
+                program: self.program.as_ref().map(Program::counters),
+                record: recorder.map(|recorder| Arc::clone(recorder.counters())),
+            }),
+            times: TickTimes::default(),
+        }
+    }
+
+    /// Does what is wanted at the end of a tick.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn serve_watch(&mut self, tick: Tick, code: Code, slots: &[Slot]) {
+        let Some(mut watched) = self.watched.take() else {
+            return;
+        };
+        let wanted = watched.tap.take_wanted();
+        if wanted.orders() {
+            self.obey(&mut watched);
+        } else {
+            self.put_away(&mut watched);
+        }
+        self.simplify();
+        if wanted.values() {
+            // The simulation's clock stands still during a tick, and others may be read.
+            let now = self.clock.now();
+            watched
+                .tap
+                .show(|view| self.fill(view, wanted.times(), (now, tick.time), code, slots));
+        }
+        self.watched = Some(watched);
+    }
+
+    /// Takes over the faults that were ordered.
+    fn obey(&mut self, watched: &mut Watched) {
+        match &mut self.extras {
+            None => self.extras = watched.spare.take(),
+            Some(extras) if extras.faults.is_none() => {
+                let spare = watched.spare.as_mut();
+                extras.faults = spare.and_then(|spare| spare.faults.take());
+            }
+            Some(_) => {}
+        }
+        let extras = self.extras.as_mut();
+        if let Some(faults) = extras.and_then(|extras| extras.faults.as_mut()) {
+            watched.tap.obey(faults);
+        }
+    }
+
+    /// Lets the tick pay for no faults when all of them are over.
+    fn put_away(&mut self, watched: &mut Watched) {
+        let is_idle = |extras: &Extras| {
+            let faults = extras.faults.as_ref();
+            extras.is_for_faults_alone() && faults.is_some_and(Faults::is_idle)
+        };
+        if watched.spare.is_none() && self.extras.as_deref().is_some_and(is_idle) {
+            watched.spare = self.extras.take();
+        }
+    }
+
+    fn fill(
+        &self,
+        view: &mut View,
+        with_times: bool,
+        (now, time): (Nanos, Nanos),
+        code: Code,
+        slots: &[Slot],
+    ) {
+        let signals = view.slots.len();
+        view.slots.copy_from_slice(&slots[..signals]);
+        for (seen, station) in view.stations.iter_mut().zip(&self.stations) {
+            *seen = StationView {
+                status: station.status,
+                age: station.peer_age(now),
+                is_valid: station.is_valid(),
+                is_fail_safe: station.stale,
+                cycles: station.cycles(),
+            };
+            station.edges(|signal, count| view.edges[signal] = count);
+        }
+        view.now = now;
+        view.tick = self.counters.ticks;
+        view.time = time;
+        view.code = code;
+        view.counters = self.counters;
+        view.events_lost = self.events.lost();
+        view.has_times = with_times;
+        if with_times {
+            view.times.copy_from(&self.samples);
+        }
+    }
+}

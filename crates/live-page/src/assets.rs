@@ -1,0 +1,42 @@
+//! The files of the page.
+
+use tickbus_web::Asset;
+
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const STYLE: &str = "text/css; charset=utf-8";
+
+/// The page itself, its styles and its scripts: what the report and the room have too comes from there.
+pub(crate) const ASSETS: &[Asset] = &[
+    Asset {
+        path: "/",
+        kind: "text/html; charset=utf-8",
+        text: include_str!("page.html"),
+    },
+    Asset {
+        path: "/report.css",
+        kind: STYLE,
+        text: tickbus_report::STYLE,
+    },
+    Asset {
+        path: "/live.css",
+        kind: STYLE,
+        text: include_str!("page.css"),
+    },
+    script("/client.js", tickbus_web::CLIENT),
+    script("/lookup.js", tickbus_report::LOOKUP),
+    script("/draw.js", tickbus_report::DRAW),
+    script("/signals.js", include_str!("signals.js")),
+    script("/trend.js", include_str!("trend.js")),
+    script("/list.js", include_str!("list.js")),
+    script("/line.js", include_str!("line.js")),
+    script("/picture.js", include_str!("picture.js")),
+    script("/live.js", include_str!("live.js")),
+];
+
+const fn script(path: &'static str, text: &'static str) -> Asset {
+    Asset {
+        path,
+        kind: SCRIPT,
+        text,
+    }
+}

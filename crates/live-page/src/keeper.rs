@@ -1,0 +1,224 @@
+//! The page's own thread: it asks ticks for copies, answers requests, and lets go of what nobody forces any more.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_web::{Answer, Change, Document, Outcome, Refused, State};
+
+use crate::metrics;
+use crate::model::{Model, Shared};
+use crate::order::{Order, order};
+
+/// How often it looks when nobody else does: for the trends.
+const IDLE: Nanos = Nanos::from_millis(500);
+
+/// The shortest time between two copies of a tick: 60 in a second.
+const PERIOD: Nanos = Nanos(16_666_667);
+
+/// How long it waits for a tick that was asked for a copy.
+const PATIENCE: Nanos = Nanos::from_millis(20);
+
+/// How often it looks whether a copy has come.
+const LOOK: Nanos = Nanos::from_micros(500);
+
+const JSON: &str = "application/json";
+const SVG: &str = "image/svg+xml";
+const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+
+/// What the room wants.
+pub(crate) enum Wish {
+    Look(Answer<State>),
+    Get(String, Answer<Option<Document>>),
+    Change(Change, Answer<Outcome>),
+    /// Somebody with the token was heard of, and there are so many viewers who have it.
+    Heard(usize),
+}
+
+/// Where wishes wait.
+#[derive(Default)]
+pub(crate) struct Inbox {
+    wishes: Mutex<Vec<Wish>>,
+    pub(crate) stop: Stop,
+}
+
+impl Inbox {
+    pub(crate) fn put(&self, wish: Wish) {
+        self.lock().push(wish);
+        self.stop.wake();
+    }
+
+    fn take(&self) -> Vec<Wish> {
+        std::mem::take(&mut *self.lock())
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Wish>> {
+        // A list is whole after each change.
+        self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// What the thread has.
+pub(crate) struct Keeper {
+    pub(crate) inbox: Arc<Inbox>,
+    pub(crate) model: Arc<Shared>,
+    pub(crate) clock: Arc<dyn Clock>,
+    /// When somebody with the token was heard of last, and how many viewers have it.
+    pub(crate) heard: Nanos,
+    pub(crate) holders: usize,
+}
+
+impl Keeper {
+    /// Until the page is stopped.
+    pub(crate) fn run(mut self) {
+        let stop = self.inbox.stop.clone();
+        let mut due = self.clock.now();
+        let mut looked = due - PERIOD;
+        while !stop.is_stopped() {
+            self.clock.wait_until(due, &stop);
+            let wishes = self.inbox.take();
+            let now = self.clock.now();
+            for wish in &wishes {
+                if let Wish::Heard(holders) = wish {
+                    (self.heard, self.holders) = (now, *holders);
+                }
+            }
+            self.let_go(now);
+            let (changes, looks): (Vec<_>, Vec<_>) = wishes
+                .into_iter()
+                .partition(|wish| matches!(wish, Wish::Change(..) | Wish::Heard(_)));
+            for wish in changes {
+                self.grant(wish);
+            }
+            if !looks.is_empty() || now >= due {
+                // However many ask, a tick makes no more copies.
+                self.clock.wait_until(looked + PERIOD, &Stop::new());
+                looked = self.clock.now();
+                self.look(!looks.is_empty());
+                due = self.clock.now() + IDLE;
+            }
+            for wish in looks {
+                self.grant(wish);
+            }
+        }
+    }
+
+    /// Has the ticks make copies, and takes them over.
+    fn look(&self, with_line: bool) {
+        let begin = self.clock.now();
+        self.model.with(|model| {
+            for driver in model.drivers_mut() {
+                driver.ask(begin);
+            }
+        });
+        // Nobody wakes this: ticks do not, since it would take a system call.
+        let nap = Stop::new();
+        let end = begin + PATIENCE;
+        loop {
+            let is_complete = self.model.with(|model| {
+                let mut is_complete = true;
+                for driver in model.drivers_mut() {
+                    if driver.watch.update() {
+                        driver.is_waiting = false;
+                        driver.has_come = true;
+                    }
+                    // One that did not tick the last time keeps nobody waiting.
+                    is_complete &= driver.has_come || driver.is_waiting;
+                }
+                is_complete
+            });
+            let now = self.clock.now();
+            if is_complete || now >= end || self.inbox.stop.is_stopped() {
+                break;
+            }
+            self.clock.wait_until((now + LOOK).min(end), &nap);
+        }
+        self.model.with(|model| {
+            for driver in model.drivers_mut() {
+                driver.is_waiting = !std::mem::take(&mut driver.has_come);
+                driver.look_at_forced();
+            }
+            model.update(self.clock.now(), with_line);
+        });
+    }
+
+    /// Releases what is forced for nobody.
+    fn let_go(&self, now: Nanos) {
+        if self.holders > 0 {
+            return;
+        }
+        let released = self.model.with(|model| {
+            let drivers = model.drivers_mut().filter_map(|driver| {
+                let grace = driver.options.grace?;
+                if !driver.is_forcing() || now - self.heard <= grace {
+                    return None;
+                }
+                let name = driver.watch.config().name.clone();
+                driver.release_all().is_ok().then_some((name, grace))
+            });
+            drivers.collect::<Vec<_>>()
+        });
+        for (name, grace) in released {
+            log::info!(
+                "driver \"{name}\": its forced signals are released, since nobody with the token has looked for {grace}"
+            );
+        }
+    }
+
+    fn grant(&self, wish: Wish) {
+        match wish {
+            Wish::Look(answer) => answer.give(State::Differences(Arc::clone(&self.model) as _)),
+            Wish::Get(path, answer) => {
+                let now = self.clock.now();
+                answer.give(self.model.with(|model| document(model, &path, now)));
+            }
+            Wish::Change(change, answer) => {
+                let done = order(&change).and_then(|order| self.obey(&order));
+                answer.give(done);
+            }
+            Wish::Heard(_) => {}
+        }
+    }
+
+    fn obey(&self, order: &Order) -> Result<(), Refused> {
+        self.model.with(|model| {
+            let done = model.obey(order);
+            // What is forced shows at once, and not with the next tick.
+            model.update(self.clock.now(), false);
+            done
+        })
+    }
+}
+
+/// What there is at a path.
+fn document(model: &Model, path: &str, now: Nanos) -> Option<Document> {
+    let (kind, text) = match path {
+        "/signals" => (JSON, model.signals()),
+        "/line" => (JSON, model.line()),
+        "/metrics" => (METRICS, metrics::text(model)),
+        _ => of_driver(model, path, now)?,
+    };
+    Some(Document { kind, text })
+}
+
+fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, String)> {
+    if let Some(file) = path.strip_prefix("/picture/") {
+        let (id, ending) = file.split_once('.')?;
+        let picture = model.driver(id.parse().ok()?)?.picture()?;
+        return match ending {
+            "svg" => Some((SVG, picture.svg.clone())),
+            "json" => {
+                let (left_out, mistakes) = (&picture.left_out, &picture.mistakes);
+                let json = serde_json::json!({ "left_out": left_out, "mistakes": mistakes });
+                Some((JSON, json.to_string()))
+            }
+            _ => None,
+        };
+    }
+    let (id, index) = path.strip_prefix("/trend/")?.split_once('/')?;
+    let driver = model.driver(id.parse().ok()?)?;
+    let points = driver.trend(index.parse().ok()?, now)?;
+    let millis: Vec<i64> = points.iter().map(|(at, _)| at.0 / 1_000_000).collect();
+    let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
+    let json = serde_json::json!({ "ms": millis, "values": values });
+    Some((JSON, json.to_string()))
+}

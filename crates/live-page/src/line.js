@@ -1,0 +1,147 @@
+"use strict";
+
+// The line of each driver: its state in the words of the log, its stations, faults, times and counters.
+
+const line = (() => {
+  const box = document.getElementById("drivers");
+  let cards = new Map();
+
+  function make(tag, className, parent, content) {
+    const it = document.createElement(tag);
+    if (className) it.className = className;
+    if (content !== undefined) it.textContent = content;
+    parent.append(it);
+    return it;
+  }
+
+  function say(element, text) {
+    if (element.textContent !== text) element.textContent = text;
+  }
+
+  /** How a state is coloured. */
+  const colour = { running: "good", stale: "stale", failed: "bad", opening: "stale", closed: "gap" };
+
+  function card(driver) {
+    const it = make("article", "driver", box);
+    const head = make("header", "", it);
+    const state = make("span", "tag", head);
+    const name = make("h3", "", head, driver.name);
+    make("span", "note", head, `${driver.kind}, ${driver.role}`);
+    const reason = make("p", "reason", it);
+    reason.setAttribute("role", "status");
+    const since = make("p", "note since", it);
+    const faults = make("ul", "faults", it);
+    const facts = make("dl", "facts", it);
+    const stations = make("table", "stations", make("div", "wide", it));
+    const more = make("details", "", it);
+    make("summary", "", more, "Times, counters and what the bus knows");
+    const times = make("table", "times", make("div", "wide", more));
+    const texts = make("table", "texts", make("div", "wide", more));
+    const counters = make("table", "counters", make("div", "wide", more));
+    return { it, state, name, reason, since, faults, facts, stations, more, times, texts, counters };
+  }
+
+  /** Makes the rows of a table equal to these lists of cells, and touches only what is another. */
+  function fill(table, head, rows) {
+    const shape = `${rows.length}/${rows[0]?.length ?? 0}`;
+    if (table.dataset.shape !== shape) {
+      table.dataset.shape = shape;
+      table.replaceChildren();
+      table.hidden = rows.length === 0;
+      if (!rows.length) return;
+      if (head.length) {
+        const titles = make("tr", "", make("thead", "", table));
+        head.forEach((title, i) => make("th", i ? "n" : "", titles, title).setAttribute("scope", "col"));
+      }
+      const body = make("tbody", "", table);
+      for (const cells of rows) {
+        const row = make("tr", "", body);
+        cells.forEach((_, i) => {
+          const cell = make(i ? "td" : "th", i ? "n" : "", row);
+          if (!i) cell.setAttribute("scope", "row");
+        });
+      }
+    }
+    rows.forEach((cells, i) => cells.forEach((cell, j) => say(table.tBodies[0].rows[i].cells[j], cell)));
+  }
+
+  const figures = (number) => (Number.isInteger(number) ? number.toLocaleString("en") : String(number));
+  const byName = ([a], [b]) => (a < b ? -1 : 1);
+
+  function facts(card, line) {
+    const times = line.times ?? {};
+    const shown = [];
+    const age = Math.max(-1, ...line.stations.map((station) => station.age_ms ?? -1));
+    if (age >= 0) shown.push(["Age of data", words.span(age), line.stations.some(({ stale }) => stale) ? "warn" : "good"]);
+    if (times.exchange?.count) shown.push(["Exchange, p50", words.fine(times.exchange.p50_us), ""]);
+    if (times.bus_cycle?.count) shown.push(["Bus cycle, p50", words.fine(times.bus_cycle.p50_us), ""]);
+    if (line.tick) shown.push(["Ticks", figures(line.tick), isSilent(line) ? "bad" : ""]);
+    if (card.facts.children.length !== shown.length) {
+      card.facts.replaceChildren();
+      for (const [title] of shown) {
+        const it = make("div", "", card.facts);
+        make("dt", "", it, title);
+        make("dd", "", it);
+      }
+    }
+    shown.forEach(([title, value, look], i) => {
+      const it = card.facts.children[i];
+      say(it.children[0], title);
+      say(it.children[1], value);
+      it.className = look;
+    });
+  }
+
+  function faults(card, list) {
+    const key = JSON.stringify(list);
+    if (card.faults.dataset.key === key) return;
+    card.faults.dataset.key = key;
+    card.faults.hidden = !list.length;
+    card.faults.replaceChildren();
+    for (const fault of list) {
+      const it = make("li", "", card.faults);
+      make("span", fault.phase === "active" ? "tag fault" : "tag", it, fault.phase);
+      make("span", "", it, ` ${fault.name.startsWith("forced: ") ? fault.what : `${fault.name || fault.kind}: ${fault.what}`}`);
+    }
+  }
+
+  /** Whether the simulation stands still. */
+  const isSilent = (line) => line.silence_ms > 1000;
+
+  /** The time that has passed since what was heard, for what counts on by itself. */
+  const since = (line) => line.since_ms + (performance.now() - line.heard);
+
+  function show() {
+    if (cards.size !== plant.drivers.length || plant.drivers.some(({ id }) => !cards.has(id))) {
+      box.replaceChildren();
+      cards = new Map(plant.drivers.map((driver) => [driver.id, card(driver)]));
+    }
+    for (const driver of plant.drivers) {
+      const { line } = driver;
+      const own = cards.get(driver.id);
+      if (!line) continue;
+      // A line may run whose data are stale, while the PLC is in STOP.
+      const isStale = line.status === "stale" && line.state === "running";
+      const state = isStale ? "stale" : line.state;
+      say(own.name, driver.name);
+      say(own.state, state);
+      own.state.className = `tag ${colour[state] ?? ""}`;
+      own.it.classList.toggle("trouble", state !== "running");
+      say(own.reason, line.reason || "no reason known");
+      say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
+      // What was forced and is released is no news.
+      faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
+      facts(own, line);
+      const several = line.stations.length > 1 ? line.stations : [];
+      fill(own.stations, ["Station", "State", "Age", "Reason"], several.map((it) => [it.name, it.stale ? "stale" : it.state, words.span(it.age_ms), it.reason ?? ""]));
+      if (!own.more.open) continue;
+      const times = Object.entries(line.times ?? {}).filter(([, it]) => it.count);
+      fill(own.times, ["Time", "p50", "p99", "max", "count"], times.sort(byName).map(([name, it]) => [name.replaceAll("_", " "), words.fine(it.p50_us), words.fine(it.p99_us), words.fine(it.max_us), figures(it.count)]));
+      fill(own.texts, [], Object.entries(line.texts ?? {}).sort(byName));
+      fill(own.counters, ["Counter", "so far"], Object.entries(line.counters ?? {}).sort(byName).map(([name, it]) => [name, figures(it)]));
+    }
+  }
+
+  box.addEventListener("toggle", show, true);
+  return { show };
+})();

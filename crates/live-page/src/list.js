@@ -1,0 +1,337 @@
+"use strict";
+
+// The list of signals. Only the rows that can be seen exist; each shows another signal when the list is scrolled.
+
+const list = (() => {
+  const TREND = 132;
+  const frame = document.getElementById("list");
+  const view = document.getElementById("window");
+  const narrow = matchMedia("(max-width: 640px)");
+  /** What is listed: `{ kind: "station" | "signal" | "trend", … }`, and where each begins, in pixels. */
+  let rows = [];
+  let tops = [0];
+  let chosen = null;
+  let chosenRow = -1;
+  let kind = "all";
+  let wanted = [];
+  let isDue = false;
+  /** The elements of rows by what they show, and those that show nothing. */
+  let shown = new Map();
+  const spare = { station: [], signal: [], trend: [] };
+  /** For measurements: how many pictures there were, and the longest time that one took, in milliseconds. */
+  const drawn = { count: 0, longest: 0 };
+  let act = {};
+
+  const heightOf = { station: () => 38, signal: () => (narrow.matches ? 58 : 34), trend: () => TREND };
+
+  function fits(signal) {
+    if (kind === "I" || kind === "Q") {
+      if (signal.direction !== kind) return false;
+    } else if (kind === "forced" ? !signal.isForced : kind === "failsafe" && !signal.isFailSafe) {
+      return false;
+    }
+    return wanted.every((word) => signal.words.includes(word));
+  }
+
+  /** Makes the rows anew. */
+  function choose() {
+    rows = [];
+    let found = 0;
+    const isOne = plant.drivers.length === 1 && plant.drivers[0].stations.length <= 1;
+    for (const driver of plant.drivers) {
+      let station = null;
+      for (const signal of driver.signals) {
+        if (!fits(signal)) continue;
+        found += 1;
+        if (!isOne && signal.station !== station) rows.push({ kind: "station", key: `${driver.id}/${signal.station}/${signal.index}`, driver, station: signal.station });
+        station = signal.station;
+        rows.push({ kind: "signal", key: `s${plant.keyOf(signal)}`, signal });
+        if (signal.isOpen) rows.push({ kind: "trend", key: `t${plant.keyOf(signal)}`, signal });
+      }
+    }
+    layOut();
+    chosenRow = rows.findIndex((row) => row.kind === "signal" && row.signal === chosen);
+    const all = plant.signals.length;
+    document.getElementById("found").textContent = found === all ? words.count(all, "signal", "signals") : `${found.toLocaleString("en")} of ${words.count(all, "signal", "signals")}`;
+    const empty = document.getElementById("empty");
+    empty.hidden = found > 0 || all === 0;
+    const nothing = { forced: "No signal is forced.", failsafe: "No signal has its fail-safe value." };
+    empty.textContent = (!wanted.length && nothing[kind]) || "No signal fits the filter.";
+    frame.setAttribute("aria-rowcount", rows.length + 1);
+    redraw();
+  }
+
+  function layOut() {
+    tops = new Array(rows.length + 1);
+    tops[0] = 0;
+    rows.forEach((row, i) => { tops[i + 1] = tops[i] + heightOf[row.kind](); });
+    view.style.height = tops[rows.length] + "px";
+  }
+
+  function redraw() {
+    if (isDue) return;
+    isDue = true;
+    requestAnimationFrame(() => {
+      isDue = false;
+      draw();
+    });
+  }
+
+  /** From where to where the rows can be seen, whoever scrolls. */
+  function seen() {
+    const box = view.getBoundingClientRect();
+    const own = frame.getBoundingClientRect();
+    const top = Math.max(0, own.top) - box.top;
+    return [top, Math.min(window.innerHeight, own.bottom) - box.top];
+  }
+
+  function draw() {
+    const begun = performance.now();
+    const [top, bottom] = seen();
+    const first = Math.max(0, indexAt(tops, top - 80));
+    const now = new Map();
+    for (let i = first; i < rows.length && tops[i] < bottom + 80; i++) now.set(rows[i].key, i);
+    for (const [key, element] of shown) {
+      if (now.has(key)) continue;
+      shown.delete(key);
+      element.hidden = true;
+      spare[element.dataset.kind].push(element);
+    }
+    for (const [key, i] of now) {
+      const row = rows[i];
+      let element = shown.get(key);
+      if (!element) {
+        element = spare[row.kind].pop() ?? make[row.kind]();
+        element.hidden = false;
+        shown.set(key, element);
+        if (!element.isConnected) view.append(element);
+      }
+      set(element, "top", `${tops[i]}px`, (it, value) => { it.style.transform = `translateY(${value})`; });
+      set(element, "index", i + 2, (it, value) => it.setAttribute("aria-rowindex", value));
+      paint[row.kind](element, row);
+    }
+    frame.setAttribute("aria-activedescendant", shown.get(`s${chosen ? plant.keyOf(chosen) : ""}`)?.id ?? "");
+    drawn.count += 1;
+    drawn.longest = Math.max(drawn.longest, performance.now() - begun);
+  }
+
+  /** Changes an element only where it is another: most of it stays as it is from one picture to the next. */
+  function set(element, name, value, change) {
+    const known = element.known ??= {};
+    if (known[name] === value) return;
+    known[name] = value;
+    change(element, value);
+  }
+
+  const text = (element, name, value) => set(element, name, value, (it) => { it.parts[name].textContent = value; });
+  const flag = (element, name, value) => set(element, name, value, (it) => it.classList.toggle(name, value));
+
+  function part(name, role, parent, tag = "span") {
+    const it = document.createElement(tag);
+    it.className = name;
+    if (role) it.setAttribute("role", role);
+    parent.append(it);
+    return it;
+  }
+
+  let ids = 0;
+  const make = {
+    station() {
+      const element = document.createElement("div");
+      element.className = "row station";
+      element.setAttribute("role", "row");
+      element.dataset.kind = "station";
+      const cell = part("name", "rowheader", element);
+      element.parts = { name: part("", "", cell, "b"), facts: part("note", "", cell) };
+      return element;
+    },
+    signal() {
+      const element = document.createElement("div");
+      element.className = "row signal";
+      element.id = `row${ids++}`;
+      element.setAttribute("role", "row");
+      element.dataset.kind = "signal";
+      const name = part("name", "rowheader", element);
+      const parts = { name: part("text", "", name), mark: part("tag", "", name) };
+      for (const cell of ["address", "value", "raw", "edges", "age"]) parts[cell] = part(cell, "gridcell", element);
+      parts.lamp = part("lamp", "", parts.value);
+      parts.number = part("number", "", parts.value);
+      parts.unit = part("unit", "", parts.value);
+      const cell = part("do", "gridcell", element);
+      parts.open = part("open", "", cell, "button");
+      parts.open.type = "button";
+      parts.open.tabIndex = -1;
+      element.parts = parts;
+      return element;
+    },
+    trend() {
+      const element = document.createElement("div");
+      element.className = "row trend";
+      element.setAttribute("role", "row");
+      element.dataset.kind = "trend";
+      const cell = part("picture", "gridcell", element);
+      const canvas = part("", "", cell, "canvas");
+      const length = part("length", "", cell, "button");
+      length.type = "button";
+      length.tabIndex = -1;
+      length.title = "Another length of time";
+      element.parts = { canvas, length };
+      return element;
+    },
+  };
+
+  const paint = {
+    station(element, { driver, station }) {
+      const line = driver.line?.stations?.[station];
+      const name = driver.stations[station];
+      text(element, "name", plant.drivers.length > 1 ? (driver.stations.length > 1 ? `${driver.name} · ${name}` : driver.name) : name);
+      text(element, "facts", line ? `${line.stale ? "stale" : line.state}, ${words.span(line.age_ms)} old` : "");
+      flag(element, "is-stale", Boolean(line?.stale));
+    },
+    signal(element, { signal }) {
+      element.signal = signal;
+      const value = words.value(signal);
+      const isOn = signal.isBool && plant.number(signal) > 0.5;
+      text(element, "name", signal.name);
+      text(element, "address", signal.address);
+      text(element, "number", value);
+      text(element, "unit", signal.unit);
+      text(element, "raw", signal.isBool ? "" : signal.raw);
+      text(element, "edges", signal.latch ? signal.edges.toLocaleString("en") : "");
+      text(element, "age", words.span(plant.age(signal)));
+      text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : "");
+      text(element, "open", signal.isOpen ? "▾" : "▸");
+      flag(element, "bool", signal.isBool);
+      flag(element, "on", isOn);
+      flag(element, "input", signal.direction === "I");
+      flag(element, "forced", signal.isForced);
+      flag(element, "failsafe", signal.isFailSafe && !signal.isForced);
+      flag(element, "new", plant.isNew(signal));
+      set(element, "chosen", signal === chosen, (it, yes) => it.setAttribute("aria-selected", yes));
+      set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.open.setAttribute("aria-label", label); it.parts.open.title = label; });
+      set(element, "title", `${signal.name}, ${signal.type} at ${signal.address}${signal.latch ? `, latch ${signal.latch}` : ""}`, (it, title) => { it.title = title; });
+      set(element, "expanded", signal.isOpen, (it, yes) => it.parts.open.setAttribute("aria-expanded", yes));
+    },
+    trend(element, { signal }) {
+      element.signal = signal;
+      if (!signal.trend) trend.open(signal);
+      text(element, "length", words.span(trend.length).replace("120 s", "2 min"));
+      set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.canvas.setAttribute("role", "img"); it.parts.canvas.setAttribute("aria-label", label); });
+      trend.draw(element.parts.canvas, signal, element.clientWidth, TREND - 8);
+    },
+  };
+
+  /** Whether something of what can be seen moves by itself: trends, and what was new a moment ago. */
+  const isMoving = () => {
+    for (const element of shown.values()) {
+      if (element.dataset.kind === "trend" || element.known?.new) return true;
+    }
+    return false;
+  };
+
+  function scrollTo(row) {
+    const [top, bottom] = seen();
+    const head = narrow.matches ? 0 : document.getElementById("head").offsetHeight;
+    const scroller = frame.scrollHeight > frame.clientHeight + 1 && getComputedStyle(frame).overflowY !== "visible" ? frame : document.scrollingElement;
+    const space = scroller === frame ? 0 : document.getElementById("tray").offsetHeight;
+    if (tops[row] < top + head) scroller.scrollTop -= top + head - tops[row];
+    else if (tops[row + 1] > bottom - space) scroller.scrollTop += tops[row + 1] - bottom + space;
+  }
+
+  function select(signal) {
+    chosen = signal;
+    chosenRow = rows.findIndex((row) => row.kind === "signal" && row.signal === signal);
+    act.chosen(signal);
+    redraw();
+  }
+
+  /** To the next signal in a direction, over so many. */
+  function move(by) {
+    const step = Math.sign(by);
+    let at = chosenRow;
+    let last = chosenRow;
+    for (let left = Math.abs(by); left > 0;) {
+      at += step;
+      if (at < 0 || at >= rows.length) break;
+      if (rows[at].kind !== "signal") continue;
+      last = at;
+      left -= 1;
+    }
+    if (last < 0) return;
+    select(rows[last].signal);
+    scrollTo(last);
+  }
+
+  function toggle(signal) {
+    if (signal.isOpen) trend.close(signal);
+    else trend.open(signal);
+    choose();
+  }
+
+  const page = () => Math.max(1, Math.floor((seen()[1] - seen()[0]) / heightOf.signal()) - 1);
+  const keys = {
+    ArrowDown: () => move(1),
+    ArrowUp: () => move(-1),
+    PageDown: () => move(page()),
+    PageUp: () => move(-page()),
+    Home: () => { chosenRow = -1; move(1); },
+    End: () => { chosenRow = rows.length; move(-1); },
+    Enter: () => { if (chosen) toggle(chosen); },
+    " ": () => { if (chosen) toggle(chosen); },
+    f: () => act.force(chosen),
+    Delete: () => act.release(chosen),
+    Backspace: () => act.release(chosen),
+    Escape: () => select(null),
+  };
+
+  frame.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const action = keys[event.key] ?? keys[event.key.toLowerCase()];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  });
+
+  view.addEventListener("click", (event) => {
+    const element = event.target.closest(".row");
+    if (!element?.signal) return;
+    if (event.target.closest(".length")) {
+      trend.next();
+      redraw();
+    } else if (event.target.closest(".open")) {
+      toggle(element.signal);
+    } else {
+      select(element.signal);
+    }
+  });
+
+  document.addEventListener("scroll", redraw, { passive: true, capture: true });
+  window.addEventListener("resize", redraw);
+  narrow.addEventListener("change", () => {
+    layOut();
+    redraw();
+  });
+
+  return {
+    choose, redraw, select, toggle, isMoving, drawn,
+    filter(text) {
+      wanted = text.toLowerCase().split(/\s+/).filter(Boolean);
+      choose();
+    },
+    show(which) {
+      kind = which;
+      choose();
+    },
+    /** Who is told: `chosen(signal)`, `force(signal)`, `release(signal)`. */
+    begin(actions) { act = actions; },
+    /** After the signals were made anew: the chosen one by its name. */
+    renew() {
+      const key = chosen && plant.keyOf(chosen);
+      chosen = (key && plant.signals.find((signal) => plant.keyOf(signal) === key)) ?? null;
+      act.chosen(chosen);
+      choose();
+    },
+    get kind() { return kind; },
+    get chosen() { return chosen; },
+  };
+})();

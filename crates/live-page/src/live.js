@@ -1,0 +1,249 @@
+"use strict";
+
+// The work of the page: it hears what happens, shows it, and asks for forced values.
+
+(() => {
+  const get = (id) => document.getElementById(id);
+  const forceValue = get("force-value");
+  let mayForce = false;
+  let isOld = true;
+  let counts = { forced: 0, failSafe: 0 };
+  /** For measurements: when the first signals were painted, in milliseconds since the page was asked for. */
+  let painted = 0;
+
+  function say(text, isBad = false) {
+    get("status").textContent = text;
+    get("status").classList.toggle("bad", isBad);
+  }
+
+  function show(element, text) {
+    if (element.textContent !== text) element.textContent = text;
+  }
+
+  // Forcing.
+
+  const pathOf = (signal) => `/force/${signal.driver.id}/${encodeURIComponent(signal.name)}`;
+
+  async function change(method, path, body, done) {
+    const answer = await room.change(method, path, body);
+    if (answer === null) say("Nobody answers; look at the values when the page is live again.", true);
+    else if (answer.ok) say(done);
+    else say(answer.text, true);
+    return answer?.ok === true;
+  }
+
+  function force(signal, text) {
+    if (!signal) return;
+    const value = text.trim().replace(",", ".").replace("−", "-");
+    change("PUT", pathOf(signal), value, `${signal.name} is forced to ${value}${signal.unit ? ` ${signal.unit}` : ""}.`);
+  }
+
+  function release(signal) {
+    if (!signal || !mayForce) return;
+    change("DELETE", pathOf(signal), undefined, `${signal.name} is released.`);
+  }
+
+  /** To the tools that force the chosen signal. */
+  function edit(signal) {
+    if (!signal) {
+      say("Choose a signal first.", true);
+    } else if (!mayForce) {
+      say("Read-only: open the address that was printed, with its token, to force a signal.", true);
+    } else if (!signal.isWritable) {
+      say(`${signal.name} cannot be forced.`, true);
+    } else if (signal.isBool) {
+      get(plant.number(signal) > 0.5 ? "force-false" : "force-true").focus();
+    } else {
+      forceValue.focus();
+      forceValue.select();
+    }
+  }
+
+  function showChosen(signal) {
+    get("chosen").hidden = !signal;
+    if (!signal) return;
+    const isNew = get("chosen").dataset.key !== plant.keyOf(signal);
+    get("chosen").dataset.key = plant.keyOf(signal);
+    show(get("chosen-name"), signal.name);
+    const facts = [signal.address, signal.type, signal.direction === "I" ? "to the PLC" : "from the PLC"];
+    if (signal.latch) facts.push(`latch ${signal.latch}`);
+    if (plant.drivers.length > 1) facts.push(signal.driver.name);
+    show(get("chosen-facts"), facts.join(" · "));
+    get("chosen-tools").hidden = !mayForce || !signal.isWritable;
+    get("force-bool").hidden = !signal.isBool;
+    get("force-number").hidden = signal.isBool;
+    show(get("force-unit"), signal.unit);
+    show(get("trend"), signal.isOpen ? "Close trend" : "Trend");
+    if (isNew) {
+      forceValue.value = signal.value === null ? "" : signal.isBool ? "" : String(typeof signal.value === "string" ? signal.value : Number(signal.value.toPrecision(6)));
+      if (/^Released?|^Force|is forced|is released/.test(get("status").textContent)) say("");
+    }
+    const isLost = !signal.isForced && document.activeElement === get("release");
+    get("release").disabled = !signal.isForced;
+    if (isLost) get("list").focus({ preventScroll: true });
+  }
+
+  list.begin({
+    chosen: showChosen,
+    force: edit,
+    release,
+  });
+
+  get("chosen").addEventListener("submit", (event) => {
+    event.preventDefault();
+    if (list.chosen && !list.chosen.isBool) force(list.chosen, forceValue.value);
+  });
+  get("force-true").addEventListener("click", () => force(list.chosen, "TRUE"));
+  get("force-false").addEventListener("click", () => force(list.chosen, "FALSE"));
+  get("release").addEventListener("click", () => release(list.chosen));
+  get("trend").addEventListener("click", () => {
+    if (list.chosen) list.toggle(list.chosen);
+    showChosen(list.chosen);
+  });
+  get("let-go").addEventListener("click", () => {
+    list.select(null);
+    say("");
+    get("list").focus({ preventScroll: true });
+  });
+  get("release-all").addEventListener("click", () => change("DELETE", "/force", undefined, "All signals are released."));
+
+  window.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const isTyping = event.target.matches?.("input");
+    const isTray = get("tray").contains(event.target);
+    if (event.key === "Escape" && isTray) {
+      get("list").focus({ preventScroll: true });
+    } else if (event.key === "Escape" && event.target === get("filter")) {
+      get("filter").value = "";
+      list.filter("");
+      get("list").focus({ preventScroll: true });
+    } else if (isTyping) {
+      return;
+    } else if (event.key === "/") {
+      get("filter").focus();
+      get("filter").select();
+    } else if (isTray && list.chosen?.isBool && mayForce && (event.key === "1" || event.key === "0")) {
+      force(list.chosen, event.key === "1" ? "TRUE" : "FALSE");
+    } else if (isTray && event.key === "Delete") {
+      release(list.chosen);
+    } else {
+      return;
+    }
+    event.preventDefault();
+  });
+
+  // Which signals are listed.
+
+  get("filter").addEventListener("input", () => list.filter(get("filter").value));
+
+  function choose(kind) {
+    for (const button of get("kinds").children) button.setAttribute("aria-pressed", String(button.dataset.kind === kind));
+    list.show(kind);
+  }
+
+  get("kinds").addEventListener("click", (event) => {
+    const kind = event.target.closest("button")?.dataset.kind;
+    if (kind) choose(kind);
+  });
+  for (const [id, kind] of [["show-forced", "forced"], ["show-failsafe", "failsafe"]]) {
+    get(id).addEventListener("click", () => {
+      get("filter").value = "";
+      list.filter("");
+      choose(kind);
+      get("signals").scrollIntoView({ block: "nearest" });
+    });
+  }
+
+  // What happens.
+
+  /** What nobody may overlook. */
+  function alarm() {
+    const now = { forced: 0, failSafe: 0 };
+    const names = [];
+    for (const signal of plant.signals) {
+      if (signal.isForced) {
+        now.forced += 1;
+        if (names.length < 3) names.push(`${signal.name} to ${words.value(signal)}${signal.unit ? ` ${signal.unit}` : ""}`);
+      } else if (signal.isFailSafe) {
+        now.failSafe += 1;
+      }
+    }
+    get("forced").hidden = now.forced === 0;
+    get("release-all").hidden = !mayForce;
+    const further = now.forced > names.length ? ` and ${now.forced - names.length} more` : "";
+    show(get("forced-text"), `${words.count(now.forced, "signal is", "signals are")} forced: ${names.join(", ")}${further}`);
+    const down = plant.drivers.filter(({ line }) => line && (line.status === "stale" || line.state !== "running"));
+    const told = down.map((driver) => (plant.drivers.length > 1 ? `${driver.name}: ${driver.line.reason}` : driver.line.reason));
+    const safe = now.failSafe ? `${words.count(now.failSafe, "signal has its", "signals have their")} fail-safe ${now.failSafe === 1 ? "value" : "values"}` : "";
+    get("failsafe").hidden = told.length === 0 && !safe;
+    get("show-failsafe").hidden = now.failSafe === 0;
+    show(get("failsafe-text"), [safe, told.join("; ")].filter(Boolean).join(": "));
+    const isOther = now.forced !== counts.forced || now.failSafe !== counts.failSafe;
+    counts = now;
+    if (isOther && (list.kind === "forced" || list.kind === "failsafe")) list.choose();
+  }
+
+  function renew() {
+    const names = plant.drivers.map(({ name }) => name);
+    show(get("title"), names.join(" · ") || "tickbus");
+    document.title = `${names.join(" · ") || "No driver"} – tickbus`;
+    show(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
+    list.renew();
+    pictures.load();
+    if (!painted) requestAnimationFrame(() => requestAnimationFrame(() => { painted = performance.now(); }));
+  }
+
+  let isDue = false;
+  /** After an event, and as long as something moves by itself. */
+  function redraw() {
+    if (isDue) return;
+    isDue = true;
+    requestAnimationFrame(() => {
+      isDue = false;
+      alarm();
+      list.redraw();
+      if (list.chosen) showChosen(list.chosen);
+      const moves = !isOld && pictures.move();
+      if (!isOld && (moves || list.isMoving())) redraw();
+    });
+  }
+
+  room.listen({
+    news(text) {
+      const { isOther, isLine } = plant.hear(text);
+      if (isOther) renew();
+      if (isLine) line.show();
+      redraw();
+    },
+    access(isRight, refusal) {
+      mayForce = isRight;
+      show(get("access"), mayForce ? "may force" : "read-only");
+      get("access").classList.toggle("good", mayForce);
+      document.body.classList.toggle("read-only", !mayForce);
+      if (refusal) say(`Read-only: ${refusal}`);
+      else if (get("status").textContent.startsWith("Read-only")) say("");
+      get("access").title = mayForce ? "Signals can be forced from this page" : "Open the address that was printed, with its token, to force a signal";
+      redraw();
+    },
+    age(isNowOld, seconds) {
+      isOld = isNowOld;
+      document.body.classList.toggle("is-old", isOld);
+      show(get("link"), isOld ? "no connection" : "live");
+      get("link").className = isOld ? "tag bad" : "tag good";
+      get("age").hidden = !isOld;
+      if (isOld) show(get("age"), plant.signals.length ? `No connection to the simulation. What is shown is ${seconds} s old.` : "No connection to the simulation.");
+      else redraw();
+    },
+  });
+
+  /** For measurements and tests. */
+  window.tickbusPage = {
+    get painted() { return painted; },
+    get drawn() { return { ...list.drawn }; },
+    value: (name) => plant.signals.find((signal) => signal.name === name)?.value,
+    signal: (name) => {
+      const signal = plant.signals.find((it) => it.name === name);
+      return signal && { value: signal.value, raw: signal.raw, edges: signal.edges, isForced: signal.isForced, isFailSafe: signal.isFailSafe };
+    },
+  };
+})();

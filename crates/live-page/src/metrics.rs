@@ -1,0 +1,154 @@
+//! What Prometheus and its like read of the page.
+
+use std::fmt::Write as _;
+
+use tickbus_base::statistics::Value;
+use tickbus_fieldbus::LinkState;
+
+use crate::model::Model;
+use crate::shown::Shown;
+
+/// Labels in braces.
+struct Labels(String);
+
+impl Labels {
+    fn of(driver: &Shown) -> Self {
+        let config = driver.watch.config();
+        Self(String::new())
+            .and("driver", &config.name)
+            .and("id", &driver.id.to_string())
+    }
+
+    /// With one more.
+    fn and(&self, name: &str, value: &str) -> Self {
+        let mut text = self.0.clone();
+        if !text.is_empty() {
+            text.push(',');
+        }
+        text.push_str(name);
+        text.push_str("=\"");
+        for c in value.chars() {
+            match c {
+                '\\' => text.push_str("\\\\"),
+                '"' => text.push_str("\\\""),
+                '\n' => text.push_str("\\n"),
+                c => text.push(c),
+            }
+        }
+        text.push('"');
+        Self(text)
+    }
+}
+
+/// The text of all metrics.
+pub(crate) fn text(model: &Model) -> String {
+    let mut text = String::new();
+    // Into a text, which takes everything.
+    let _ = write(model, &mut text);
+    text.push_str("# EOF\n");
+    text
+}
+
+fn write(model: &Model, text: &mut String) -> std::fmt::Result {
+    family(
+        text,
+        "tickbus_signal_value",
+        "gauge",
+        "The value of a signal, in its unit.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        for (signal, value, _, _) in driver.values() {
+            let unit = signal.unit.as_deref().unwrap_or_default();
+            let of_signal = labels.and("signal", &signal.name).and("unit", unit);
+            sample(text, "tickbus_signal_value", &of_signal, value.real())?;
+        }
+    }
+    family(
+        text,
+        "tickbus_signal_edges",
+        "counter",
+        "The latched edges of a signal.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        for (signal, _, edges, _) in driver.values() {
+            if let Some(edges) = edges {
+                let of_signal = labels.and("signal", &signal.name);
+                sample(
+                    text,
+                    "tickbus_signal_edges_total",
+                    &of_signal,
+                    f64::from(edges),
+                )?;
+            }
+        }
+    }
+    family(
+        text,
+        "tickbus_signal_forced",
+        "gauge",
+        "1 for each signal that is forced.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        for (signal, ..) in driver.values().filter(|(.., is_forced)| *is_forced) {
+            sample(
+                text,
+                "tickbus_signal_forced",
+                &labels.and("signal", &signal.name),
+                1.0,
+            )?;
+        }
+    }
+    family(
+        text,
+        "tickbus_line_state",
+        "stateset",
+        "The state of the line.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        for state in LinkState::ALL {
+            let is_it = f64::from(u8::from(state == driver.link().state));
+            let of_state = labels.and("tickbus_line_state", state.name());
+            sample(text, "tickbus_line_state", &of_state, is_it)?;
+        }
+    }
+    family(
+        text,
+        "tickbus_statistic",
+        "gauge",
+        "What a driver counts and measures: docs/statistics.md.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        for (key, value) in driver.statistics().iter() {
+            let number = match value {
+                #[expect(clippy::cast_precision_loss, reason = "the format has doubles")]
+                Value::Count(count) => *count as f64,
+                Value::Number(number, _) => *number,
+                Value::Time(time) => time.as_micros() / 1e6,
+                Value::Text(_) => continue,
+            };
+            sample(text, "tickbus_statistic", &labels.and("key", key), number)?;
+        }
+    }
+    Ok(())
+}
+
+fn family(text: &mut String, name: &str, kind: &str, help: &str) -> std::fmt::Result {
+    writeln!(text, "# TYPE {name} {kind}\n# HELP {name} {help}")
+}
+
+fn sample(text: &mut String, name: &str, labels: &Labels, value: f64) -> std::fmt::Result {
+    let labels = &labels.0;
+    if value.is_nan() {
+        writeln!(text, "{name}{{{labels}}} NaN")
+    } else if value.is_infinite() {
+        let sign = if value > 0.0 { '+' } else { '-' };
+        writeln!(text, "{name}{{{labels}}} {sign}Inf")
+    } else {
+        writeln!(text, "{name}{{{labels}}} {value}")
+    }
+}

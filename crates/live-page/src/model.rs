@@ -1,0 +1,171 @@
+//! All drivers on the page, and what viewers lack of them.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::sync::Mutex;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::Watch;
+use tickbus_web::{Differences, Refused};
+
+use crate::options::Options;
+use crate::order::Order;
+use crate::shown::Shown;
+
+/// The drivers, and the number of the state that they are in.
+#[derive(Debug, Default)]
+pub(crate) struct Model {
+    number: u64,
+    /// How often drivers came or went, and the number of the state since it is so.
+    layout: u64,
+    layout_number: u64,
+    /// When it was looked at last.
+    now: Nanos,
+    /// By their ids.
+    drivers: BTreeMap<i32, Shown>,
+}
+
+impl Model {
+    /// Adds a driver; gives the id that it has on the page.
+    pub(crate) fn join(&mut self, watch: Watch, options: Options, now: Nanos) -> i32 {
+        let mut id = watch.config().id;
+        while self.drivers.contains_key(&id) {
+            id = id.checked_add(1).unwrap_or(1);
+        }
+        self.drivers.insert(id, Shown::new(id, watch, options, now));
+        self.has_new_layout();
+        id
+    }
+
+    /// Removes a driver; tells whether it was the last one.
+    pub(crate) fn leave(&mut self, id: i32) -> bool {
+        self.drivers.remove(&id);
+        self.has_new_layout();
+        self.drivers.is_empty()
+    }
+
+    fn has_new_layout(&mut self) {
+        self.number += 1;
+        self.layout += 1;
+        self.layout_number = self.number;
+        for driver in self.drivers.values_mut() {
+            driver.forget();
+        }
+    }
+
+    pub(crate) fn drivers(&self) -> impl Iterator<Item = &Shown> {
+        self.drivers.values()
+    }
+
+    pub(crate) fn drivers_mut(&mut self) -> impl Iterator<Item = &mut Shown> {
+        self.drivers.values_mut()
+    }
+
+    pub(crate) fn driver(&self, id: i32) -> Option<&Shown> {
+        self.drivers.get(&id)
+    }
+
+    /// Takes over what is there at `now`.
+    pub(crate) fn update(&mut self, now: Nanos, with_line: bool) {
+        self.now = now;
+        let number = self.number + 1;
+        let mut is_new = false;
+        for driver in self.drivers.values_mut() {
+            is_new |= driver.update(now, number, with_line);
+        }
+        if is_new {
+            self.number = number;
+        }
+    }
+
+    /// Carries out an order.
+    pub(crate) fn obey(&mut self, order: &Order) -> Result<(), Refused> {
+        match order {
+            Order::ReleaseAll => {
+                let released = self.drivers.values_mut().map(Shown::release_all);
+                // All of them, whatever becomes of one.
+                let released: Vec<_> = released.collect();
+                released.into_iter().collect()
+            }
+            Order::Force {
+                driver,
+                signal,
+                value,
+            } => self.named(*driver)?.force(signal, value),
+            Order::Release { driver, signal } => self.named(*driver)?.release(signal),
+        }
+    }
+
+    fn named(&mut self, id: i32) -> Result<&mut Shown, Refused> {
+        let ids: Vec<String> = self.drivers.keys().map(i32::to_string).collect();
+        self.drivers.get_mut(&id).ok_or_else(|| Refused {
+            status: 404,
+            text: format!("there is no driver {id} here; ids are {}", ids.join(", ")),
+        })
+    }
+
+    /// `GET /signals`.
+    pub(crate) fn signals(&self) -> String {
+        let drivers: Vec<String> = self.drivers().map(Shown::signals).collect();
+        let (layout, drivers) = (self.layout, drivers.join(","));
+        format!("{{\"layout\":{layout},\"drivers\":[{drivers}]}}")
+    }
+
+    /// `GET /line`.
+    pub(crate) fn line(&self) -> String {
+        let drivers: Vec<&str> = self.drivers().map(Shown::line).collect();
+        format!("{{\"drivers\":[{}]}}", drivers.join(","))
+    }
+
+    fn since(&self, seen: Option<u64>) -> String {
+        let (layout, time) = (self.layout, self.now.0 / 1_000_000);
+        let seen = seen.filter(|seen| *seen >= self.layout_number);
+        let Some(seen) = seen else {
+            let (signals, line) = (self.signals(), self.line());
+            return format!(
+                "{{\"layout\":{layout},\"full\":true,\"time_ms\":{time},\"signals\":{signals},\"line\":{line}}}"
+            );
+        };
+        let mut json = format!("{{\"layout\":{layout},\"time_ms\":{time},\"values\":{{");
+        let mut comma = "";
+        for driver in self.drivers() {
+            if let Some(changes) = driver.changes(seen) {
+                // Into a text, which takes everything.
+                let _ = write!(json, "{comma}\"{}\":{changes}", driver.id);
+                comma = ",";
+            }
+        }
+        json.push('}');
+        if self.drivers().any(|driver| driver.has_new_line(seen)) {
+            let _ = write!(json, ",\"line\":{}", self.line());
+        }
+        json.push('}');
+        json
+    }
+}
+
+/// The model, for the room and the page's own thread.
+#[derive(Debug, Default)]
+pub(crate) struct Shared(Mutex<Model>);
+
+impl Shared {
+    /// Works on the model.
+    pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Model) -> R) -> R {
+        // Whatever broke off, each driver is looked at anew by the next look.
+        let mut model = self
+            .0
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        work(&mut model)
+    }
+}
+
+impl Differences for Shared {
+    fn number(&self) -> u64 {
+        self.with(|model| model.number)
+    }
+
+    fn since(&self, seen: Option<u64>) -> (u64, String) {
+        self.with(|model| (model.number, model.since(seen)))
+    }
+}

@@ -1,0 +1,116 @@
+//! What a request asks to be changed.
+
+use tickbus_base::percent_decoded;
+use tickbus_web::{Change, Refused, Verb};
+
+/// A change that is asked for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// To hold a signal to a value.
+    Force {
+        /// The driver's id.
+        driver: i32,
+        /// The signal's name.
+        signal: String,
+        /// The value, as it was written.
+        value: String,
+    },
+    /// To hold a signal no longer.
+    Release {
+        /// The driver's id.
+        driver: i32,
+        /// The signal's name.
+        signal: String,
+    },
+    /// To hold no signal of any driver any longer.
+    ReleaseAll,
+}
+
+/// The order that a request is: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, or
+/// `DELETE /force`.
+///
+/// # Errors
+///
+/// It is none; with what would be one.
+pub fn order(change: &Change) -> Result<Order, Refused> {
+    const RIGHT: &str = "PUT or DELETE /force/ID/SIGNAL, with the driver's id and the signal's name in percent-encoding";
+    let refused = |status, text: String| Err(Refused { status, text });
+    let path = change.path.strip_prefix("/force");
+    let rest = path.map(|rest| rest.trim_end_matches('/'));
+    match (rest, change.verb) {
+        (Some(""), Verb::Delete) => return Ok(Order::ReleaseAll),
+        (Some(""), Verb::Put) => {
+            return refused(405, format!("it is not said what is to be forced; {RIGHT}"));
+        }
+        _ => {}
+    }
+    let path = path.and_then(|rest| rest.strip_prefix('/'));
+    let Some((id, name)) = path.and_then(|rest| rest.split_once('/')) else {
+        return refused(404, format!("there is nothing to change here; {RIGHT}"));
+    };
+    let Ok(driver) = id.parse() else {
+        return refused(400, format!("the path has no id of a driver; {RIGHT}"));
+    };
+    let Ok(signal) = String::from_utf8(percent_decoded(name)) else {
+        return refused(400, "the signal's name in the path is not UTF-8".to_owned());
+    };
+    Ok(match change.verb {
+        Verb::Put => Order::Force {
+            driver,
+            signal,
+            value: change.body.clone(),
+        },
+        Verb::Delete => Order::Release { driver, signal },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(verb: Verb, path: &str, body: &str) -> Result<Order, u16> {
+        let change = Change {
+            verb,
+            path: path.to_owned(),
+            body: body.to_owned(),
+        };
+        order(&change).map_err(|refused| refused.status)
+    }
+
+    #[test]
+    fn a_change_is_an_order_or_a_mistake() {
+        let signal = || "LA1 run".to_owned();
+        let force = Order::Force {
+            driver: 4711,
+            signal: signal(),
+            value: "TRUE".to_owned(),
+        };
+        assert_eq!(read(Verb::Put, "/force/4711/LA1%20run", "TRUE"), Ok(force));
+        let release = Order::Release {
+            driver: 4711,
+            signal: "a/b".to_owned(),
+        };
+        for path in [
+            "/force/4711/a/b",
+            "/force/4711/a%2Fb",
+            "/force/4711/%61%2fb",
+        ] {
+            assert_eq!(read(Verb::Delete, path, ""), Ok(release.clone()), "{path}");
+        }
+        for path in ["/force", "/force/"] {
+            assert_eq!(read(Verb::Delete, path, ""), Ok(Order::ReleaseAll));
+            assert_eq!(read(Verb::Put, path, "1"), Err(405));
+        }
+        for (path, status) in [
+            ("/", 404),
+            ("/forced", 404),
+            ("/signals", 404),
+            ("/force/4711", 404),
+            ("/force/x/LA1", 400),
+            ("/force/99999999999/LA1", 400),
+            ("/force/1/%FF", 400),
+        ] {
+            assert_eq!(read(Verb::Put, path, "1"), Err(status), "{path}");
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The page as a whole.
+
+use std::fmt;
+use std::io;
+use std::sync::Arc;
+use std::thread::{self, JoinHandle};
+
+use tickbus_base::time::Clock;
+use tickbus_driver::Watch;
+use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
+
+use crate::assets::ASSETS;
+use crate::keeper::{Inbox, Keeper, Wish};
+use crate::model::Shared;
+use crate::options::Options;
+
+/// A page that drivers join; dropping it stops its thread.
+pub struct LivePage {
+    inbox: Arc<Inbox>,
+    model: Arc<Shared>,
+    clock: Arc<dyn Clock>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl fmt::Debug for LivePage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LivePage").finish_non_exhaustive()
+    }
+}
+
+/// A driver's place on the page; dropping it removes the driver.
+#[derive(Debug)]
+pub struct Member {
+    model: Arc<Shared>,
+    id: i32,
+}
+
+impl LivePage {
+    /// A page without drivers.
+    ///
+    /// # Errors
+    ///
+    /// The system has no thread.
+    pub fn open(clock: Arc<dyn Clock>) -> io::Result<Self> {
+        let (inbox, model) = (Arc::<Inbox>::default(), Arc::<Shared>::default());
+        let keeper = Keeper {
+            inbox: Arc::clone(&inbox),
+            model: Arc::clone(&model),
+            heard: clock.now(),
+            holders: 0,
+            clock: Arc::clone(&clock),
+        };
+        let thread = thread::Builder::new().name("page".to_owned());
+        let thread = thread.spawn(move || keeper.run())?;
+        Ok(Self {
+            inbox,
+            model,
+            clock,
+            thread: Some(thread),
+        })
+    }
+
+    /// What the room serves.
+    pub fn site(&self) -> Arc<dyn Site> {
+        Arc::new(LiveSite(Arc::clone(&self.inbox)))
+    }
+
+    /// Shows a driver, or a PLC program, until what is returned is dropped.
+    pub fn join(&self, watch: Watch, options: Options) -> Member {
+        let now = self.clock.now();
+        let id = self.model.with(|model| model.join(watch, options, now));
+        // What it has to show is looked at.
+        self.inbox.stop.wake();
+        Member {
+            model: Arc::clone(&self.model),
+            id,
+        }
+    }
+}
+
+impl Drop for LivePage {
+    fn drop(&mut self) {
+        self.inbox.stop.stop();
+        if let Some(thread) = self.thread.take() {
+            // A panic has been reported by itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Drop for Member {
+    fn drop(&mut self) {
+        self.model.with(|model| model.leave(self.id));
+    }
+}
+
+/// The page, as the room serves it.
+struct LiveSite(Arc<Inbox>);
+
+impl Site for LiveSite {
+    fn assets(&self) -> &[Asset] {
+        ASSETS
+    }
+
+    fn look(&self, answer: Answer<State>) {
+        self.0.put(Wish::Look(answer));
+    }
+
+    fn get(&self, path: &str, answer: Answer<Option<Document>>) {
+        self.0.put(Wish::Get(path.to_owned(), answer));
+    }
+
+    fn change(&self, change: Change, answer: Answer<Outcome>) {
+        self.0.put(Wish::Change(change, answer));
+    }
+
+    fn heard(&self, viewers: usize) {
+        self.0.put(Wish::Heard(viewers));
+    }
+}

@@ -1,0 +1,249 @@
+"use strict";
+
+// The machines' pictures. The server has made each harmless and read its bindings, which stand in `data-tb` as a list of
+// `{ do, signal, edges, map }`; what a map is stands at `valueOf` below.
+
+const pictures = (() => {
+  const box = document.getElementById("pictures");
+  const NAMESPACE = "http://www.w3.org/2000/svg";
+  let all = [];
+  let generation = 0;
+  /** A page that is left in the background for long turns nothing by more than this, in milliseconds. */
+  const LONGEST = 200;
+  let last = 0;
+
+  async function load() {
+    const mine = ++generation;
+    const wanted = plant.drivers.filter(({ picture }) => picture);
+    document.getElementById("machine").hidden = wanted.length === 0;
+    document.body.classList.toggle("has-picture", wanted.length > 0);
+    const loaded = await Promise.all(wanted.map(one));
+    if (mine !== generation) return;
+    all = loaded.filter(Boolean);
+    box.replaceChildren(...all.map(({ element }) => element));
+    for (const picture of all) prepare(picture);
+    move();
+  }
+
+  async function one(driver) {
+    try {
+      const [drawing, notes] = await Promise.all([room.ask(`/picture/${driver.id}.svg`), room.ask(`/picture/${driver.id}.json`)]);
+      const told = notes.ok ? await notes.json() : { left_out: [], mistakes: [] };
+      const element = document.createElement("figure");
+      element.className = "picture";
+      const frame = document.createElement("div");
+      element.append(frame);
+      tell(element, "warn", "This picture has mistakes: what they are about does not move.", told.mistakes);
+      tell(element, "note", "Left out of this picture:", told.left_out);
+      if (!drawing.ok) {
+        const text = document.createElement("p");
+        text.className = "note";
+        text.textContent = (await drawing.json()).text;
+        frame.append(text);
+        return { driver, element, movers: [], root: null };
+      }
+      const root = new DOMParser().parseFromString(await drawing.text(), "image/svg+xml").documentElement;
+      if (root.namespaceURI !== NAMESPACE) return null;
+      const title = root.querySelector(":scope > title")?.textContent;
+      if (!root.hasAttribute("viewBox") && root.width.baseVal.value) {
+        root.setAttribute("viewBox", `0 0 ${root.width.baseVal.value} ${root.height.baseVal.value}`);
+      }
+      root.setAttribute("role", "img");
+      root.setAttribute("aria-label", title || `The machine of ${driver.name}`);
+      // A picture's names of gradients and its styles are its own.
+      const shadow = frame.attachShadow({ mode: "open" });
+      const sheet = new CSSStyleSheet();
+      const styles = Array.from(root.querySelectorAll("style"), (style) => style.textContent);
+      for (const style of root.querySelectorAll("style")) style.remove();
+      sheet.replaceSync(`${styles.join("\n")}\nsvg:root, :host > svg { display: block; width: 100%; height: auto; max-height: var(--picture-height, none); }`);
+      shadow.adoptedStyleSheets = [sheet];
+      shadow.append(document.importNode(root, true));
+      return { driver, element, root: shadow.firstElementChild, movers: [] };
+    } catch {
+      return null;
+    }
+  }
+
+  function tell(element, className, title, list) {
+    if (!list?.length) return;
+    const details = document.createElement("details");
+    details.className = className;
+    const summary = document.createElement("summary");
+    summary.textContent = `${title} ${list.length}`;
+    const items = document.createElement("ul");
+    for (const text of list) {
+      const item = document.createElement("li");
+      item.textContent = text;
+      items.append(item);
+    }
+    details.append(summary, items);
+    details.open = className === "warn";
+    element.append(details);
+  }
+
+  /** Finds what moves, and where each was drawn, before anything is hidden. */
+  function prepare(picture) {
+    if (!picture.root) return;
+    for (const element of picture.root.querySelectorAll("[data-tb]")) {
+      const bindings = JSON.parse(element.dataset.tb);
+      const signals = bindings.map(({ signal }) => picture.driver.byName.get(signal) ?? null);
+      if (element === picture.root) continue;
+      // A copy: the element's own changes with what is done to it.
+      const base = picture.root.createSVGMatrix().multiply(element.transform?.baseVal.consolidate()?.matrix ?? picture.root.createSVGMatrix());
+      let area = { x: 0, y: 0, width: 0, height: 0 };
+      try {
+        area = element.getBBox();
+      } catch {
+        // What is within a definition has no place of its own.
+      }
+      picture.movers.push({
+        element, bindings, signals, base, area,
+        pivot: (element.dataset.tbPivot ?? "").split(" ").filter(Boolean).map(Number),
+        smooth: Number(element.dataset.tbSmooth ?? 0) * 1000,
+        was: {}, moving: {}, spun: 0,
+      });
+    }
+  }
+
+  /**
+   * What a value becomes: without a map itself; by `{ factor, offset }`; or by the first of `{ cases: [[from, to, out], …] }`
+   * whose range has it, where `from` is null for "else" and an `out` of two lies between them. Beyond all ranges the nearest
+   * end counts, for numbers. `undefined`: as it was drawn.
+   */
+  function mapped(map, value) {
+    if (!map) return value;
+    if (map.factor !== undefined) return value * map.factor + map.offset;
+    let near = null;
+    for (const [from, to, out] of map.cases) {
+      if (from === null) return Array.isArray(out) ? out[0] : out;
+      const [low, high] = from < to ? [from, to] : [to, from];
+      const clamped = Math.min(high, Math.max(low, value));
+      const found = Array.isArray(out) ? between(out, to === from ? 1 : (clamped - from) / (to - from)) : out;
+      if (value >= low && value <= high) return found;
+      const distance = Math.abs(clamped - value);
+      if (Array.isArray(out) && (near === null || distance < near.distance)) near = { distance, found };
+    }
+    return near?.found;
+  }
+
+  function between([from, to], share) {
+    if (typeof from === "number") return from + (to - from) * share;
+    const parts = [from, to].map((colour) => [1, 3, 5].map((at) => parseInt(colour.slice(at, at + 2), 16)));
+    return `rgb(${parts[0].map((part, i) => Math.round(part + (parts[1][i] - part) * share)).join(", ")})`;
+  }
+
+  /** A text with the value in place of `{}` (as in the list), or `{0.00}` with so many decimals. */
+  const filled = (pattern, signal, value) => pattern.replace(/\{(0(?:\.0*)?)?\}/g, (_, digits) => {
+    if (digits === undefined && !signal) return String(value);
+    if (digits === undefined) return signal.unit ? `${words.value(signal)} ${signal.unit}` : words.value(signal);
+    return value.toFixed((digits.split(".")[1] ?? "").length).replace("-", "−");
+  });
+
+  /** Where something is on its way: it gets to a new place evenly within the time that the drawing says. */
+  function eased(mover, what, target, now) {
+    if (!mover.smooth || !Number.isFinite(target)) return target;
+    const way = mover.moving[what] ??= { from: target, to: target, begin: now - mover.smooth };
+    const at = () => way.from + (way.to - way.from) * Math.min(1, (now - way.begin) / mover.smooth);
+    if (way.to !== target) Object.assign(way, { from: at(), to: target, begin: now });
+    if (now - way.begin < mover.smooth) isBusy = true;
+    return at();
+  }
+
+  let isBusy = false;
+
+  /** Brings the pictures to what the signals have now. Whether something still moves. */
+  function move() {
+    const now = performance.now();
+    const passed = Math.min(LONGEST, now - last);
+    last = now;
+    isBusy = false;
+    for (const { driver, movers, root } of all) {
+      if (!root) continue;
+      for (const mover of movers) moveOne(driver, mover, root, now, passed);
+    }
+    return isBusy;
+  }
+
+  function moveOne(driver, mover, root, now, passed) {
+    const place = { x: 0, y: 0, turn: 0, scale: 1, width: 1, height: 1 };
+    let isPlaced = false;
+    mover.bindings.forEach((binding, i) => {
+      const signal = mover.signals[i];
+      const value = binding.signal.startsWith("bus.") ? ofBus(driver, binding.signal) : signal === null ? NaN : binding.edges ? signal.edges : plant.number(signal);
+      if (Number.isNaN(value)) return;
+      const out = mapped(binding.map, value);
+      switch (binding.do) {
+        case "show":
+        case "hide": {
+          const isThere = binding.map ? out !== undefined : value !== 0;
+          style(mover, "display", isThere === (binding.do === "show") ? "inline" : "none");
+          break;
+        }
+        case "fill":
+        case "stroke":
+          style(mover, binding.do, out ?? null);
+          break;
+        case "opacity":
+          style(mover, "opacity", out === undefined ? null : String(Math.min(1, Math.max(0, out))));
+          break;
+        case "text":
+          say(mover, filled(binding.map && out !== undefined ? String(out) : "{}", signal, value));
+          break;
+        case "spin":
+          mover.spun = (mover.spun + (out ?? 0) * passed / 1000) % 360;
+          place.turn += mover.spun;
+          if (out) isBusy = true;
+          isPlaced = true;
+          break;
+        default: {
+          const target = out === undefined ? place[binding.do] : eased(mover, binding.do, out, now);
+          place[binding.do] = binding.do === "turn" ? place.turn + target : target;
+          isPlaced = true;
+        }
+      }
+    });
+    if (!isPlaced) return;
+    const transform = matrix(mover, place, root);
+    if (mover.was.transform === transform) return;
+    mover.was.transform = transform;
+    mover.element.setAttribute("transform", transform);
+  }
+
+  /** Where an element is: moved, and turned and scaled about its middle or the point that the drawing says. */
+  function matrix({ base, area, pivot }, { x, y, turn, scale, width, height }, root) {
+    const point = root.createSVGPoint();
+    [point.x, point.y] = pivot.length === 2 ? pivot : [area.x + area.width / 2, area.y + area.height / 2];
+    const centre = point.matrixTransform(base);
+    let to = root.createSVGMatrix().translate(centre.x + x, centre.y + y).rotate(turn).scale(scale).translate(-centre.x, -centre.y).multiply(base);
+    // A level rises from the bottom, and a bar grows from the left, of what was drawn.
+    if (width !== 1 || height !== 1) {
+      const [left, bottom] = [area.x, area.y + area.height];
+      to = to.translate(left, bottom).scaleNonUniform(Math.max(0, width), Math.max(0, height)).translate(-left, -bottom);
+    }
+    return `matrix(${[to.a, to.b, to.c, to.d, to.e, to.f].map((it) => Number(it.toFixed(4))).join(" ")})`;
+  }
+
+  function ofBus({ line }, name) {
+    if (!line) return NaN;
+    if (name === "bus.age") return Math.max(...line.stations.map(({ age_ms: age }) => age ?? NaN));
+    return { fresh: 0, unchanged: 1, stale: 2 }[line.status] ?? NaN;
+  }
+
+  /** A property, which counts before what the drawing and its style sheet say; null: as they say. */
+  function style(mover, name, value) {
+    if (mover.was[name] === value) return;
+    mover.was[name] = value;
+    if (value === null) mover.element.style.removeProperty(name);
+    else mover.element.style.setProperty(name, value);
+  }
+
+  function say(mover, text) {
+    if (mover.was.text === text) return;
+    mover.was.text = text;
+    // Inkscape writes each line of a text as a span that has its place.
+    const line = mover.element.querySelector("tspan") ?? mover.element;
+    line.textContent = text;
+  }
+
+  return { load, move, get all() { return all; } };
+})();

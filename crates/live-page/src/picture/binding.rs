@@ -1,0 +1,179 @@
+//! What of a picture is bound to signals.
+//!
+//! A binding is `NAME`, or `NAME: MAP`. A map is a factor (`0.5`, `90 - 45`), or cases: `0..250 -> 0..-180, else -> 0`. Of what is
+//! shown or hidden, cases have no arrow: `1, 3..5`. Of a text, a map without an arrow is a pattern: `lift 1 at {0} mm`.
+
+mod map;
+
+use std::collections::HashMap;
+
+use serde_json::{Value, json};
+use tickbus_base::toml_text::nearest;
+
+use self::map::Kind;
+use super::tree::{Child, Element};
+use super::{Notes, short};
+
+/// What can be bound, and what a map of it gives.
+const ACTIONS: &[(&str, Kind)] = &[
+    ("fill", Kind::Colour),
+    ("height", Kind::Share),
+    ("hide", Kind::Condition),
+    ("opacity", Kind::Share),
+    ("scale", Kind::Share),
+    ("show", Kind::Condition),
+    ("spin", Kind::Number),
+    ("stroke", Kind::Colour),
+    ("text", Kind::Text),
+    ("turn", Kind::Number),
+    ("width", Kind::Share),
+    ("x", Kind::Number),
+    ("y", Kind::Number),
+];
+
+/// What else an element may say about how it moves.
+const PIVOT: &str = "pivot";
+const SMOOTH: &str = "smooth";
+
+/// The longest time in which something gets to its place, in seconds.
+const SLOWEST: f64 = 60.0;
+
+/// What every driver has, beside its signals.
+const OF_BUS: &[&str] = &["bus.age", "bus.status"];
+
+/// Reads the bindings of all elements: they get the attributes `data-tb`, `data-tb-pivot` and `data-tb-smooth`.
+pub(super) fn bind(root: &mut Element, signals: &[&str], notes: &mut Notes) {
+    let names = signals.iter().enumerate().map(|(at, name)| (*name, at));
+    let names = Names {
+        signals,
+        known: names.collect(),
+    };
+    bind_all(root, &names, notes);
+}
+
+fn bind_all(element: &mut Element, names: &Names<'_>, notes: &mut Notes) {
+    let mut bindings = Vec::new();
+    for (what, text) in std::mem::take(&mut element.bound) {
+        let read = match &*what {
+            PIVOT => pivot(&text).map(|value| set(element, "data-tb-pivot", value)),
+            SMOOTH => smooth(&text).map(|value| set(element, "data-tb-smooth", value)),
+            _ => binding(&what, &text, names).map(|binding| bindings.push(binding)),
+        };
+        if let Err(mistake) = read {
+            notes.mistake(
+                element.line,
+                &format!("data-tb-{}: {mistake}", short(&what)),
+            );
+        }
+    }
+    if !bindings.is_empty() {
+        set(element, "data-tb", Value::Array(bindings).to_string());
+    }
+    for child in &mut element.children {
+        if let Child::Element(child) = child {
+            bind_all(child, names, notes);
+        }
+    }
+}
+
+fn set(element: &mut Element, name: &str, value: String) {
+    element.attributes.push((name.to_owned(), value));
+}
+
+/// The names that can be bound.
+struct Names<'n> {
+    signals: &'n [&'n str],
+    known: HashMap<&'n str, usize>,
+}
+
+impl Names<'_> {
+    /// The name at the beginning of a binding, and what comes behind its colon. A name may have colons itself, so the longest
+    /// one that is known counts.
+    fn split<'t>(&self, text: &'t str) -> Option<(&'t str, bool, Option<&'t str>)> {
+        let colons = text.match_indices(':').map(|(at, _)| (at, Some(at + 1)));
+        let ends = colons.chain([(text.len(), None)]);
+        let mut found = None;
+        for (end, rest) in ends {
+            let name = text[..end].trim();
+            let rest = rest.map(|at| text[at..].trim());
+            if self.known.contains_key(name) || OF_BUS.contains(&name) {
+                found = Some((name, false, rest));
+            } else if let Some(of) = name
+                .strip_suffix(".edges")
+                .filter(|of| self.known.contains_key(of))
+            {
+                found = Some((of, true, rest));
+            }
+        }
+        found
+    }
+
+    /// What to write instead of a name that is not known.
+    fn advice(&self, name: &str) -> String {
+        let all = self.signals.iter().copied().chain(OF_BUS.iter().copied());
+        match nearest(name, all) {
+            Some(near) => format!("did you mean \"{near}\"?"),
+            None => "write the name of a signal as it stands in the driver.cfg".to_owned(),
+        }
+    }
+}
+
+/// One binding, as the script on the page takes it.
+fn binding(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
+    let Some((_, kind)) = ACTIONS.iter().find(|(name, _)| *name == what) else {
+        let all = ACTIONS.iter().map(|(name, _)| *name).chain([PIVOT, SMOOTH]);
+        return Err(match nearest(what, all.clone()) {
+            Some(near) => format!("nothing can be done by this name; did you mean data-tb-{near}?"),
+            None => format!(
+                "nothing can be done by this name; there are {}",
+                all.collect::<Vec<_>>().join(", ")
+            ),
+        });
+    };
+    let Some((signal, edges, rest)) = names.split(text) else {
+        let name = text.split(':').next().unwrap_or_default().trim();
+        return Err(format!(
+            "there is no signal \"{}\"; {}",
+            short(name),
+            names.advice(name)
+        ));
+    };
+    let map = rest.map(|rest| map::read(rest, *kind)).transpose()?;
+    Ok(json!({ "do": what, "signal": signal, "edges": edges, "map": map }))
+}
+
+/// A point: two numbers, in the element's own units.
+fn pivot(text: &str) -> Result<String, String> {
+    let numbers: Vec<f64> = text
+        .split([' ', ','])
+        .filter(|it| !it.is_empty())
+        .map_while(number)
+        .collect();
+    match numbers[..] {
+        [x, y] => Ok(format!("{x} {y}")),
+        _ => Err(format!(
+            "\"{}\" is no point; write its two coordinates, such as 120 80.5",
+            short(text)
+        )),
+    }
+}
+
+/// A time in seconds.
+fn smooth(text: &str) -> Result<String, String> {
+    let seconds = number(text.trim().trim_end_matches('s').trim_end());
+    match seconds {
+        Some(seconds) if (0.0..=SLOWEST).contains(&seconds) => Ok(seconds.to_string()),
+        _ => Err(format!(
+            "\"{}\" is no time; write seconds, from 0 to {SLOWEST}, such as 0.5",
+            short(text)
+        )),
+    }
+}
+
+/// A number that is one: neither infinite nor none.
+fn number(text: &str) -> Option<f64> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|number: &f64| number.is_finite())
+}

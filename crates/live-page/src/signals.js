@@ -1,0 +1,153 @@
+"use strict";
+
+// The drivers and their signals, as they are known from the events.
+
+/** For what draws: units are milliseconds, and the present is 0 s. */
+const run = { begin: 0, end: 0, unit: 1e6 };
+
+const plant = (() => {
+  /** How long a value that has changed is shown as new. */
+  const NEW = 350;
+  const FAIL_SAFE = 1;
+  const FORCED = 2;
+  let layout = null;
+  let drivers = [];
+  let signals = [];
+  /** The server's clock when it was heard last, in milliseconds, and this page's then. */
+  let time = 0;
+  let heard = 0;
+
+  function signalOf(driver, given, index) {
+    const words = [given.name, given.address, given.unit ?? "", given.type];
+    const signal = {
+      driver, index,
+      name: given.name,
+      address: given.address,
+      type: given.type,
+      unit: given.unit ?? "",
+      station: given.station,
+      direction: given.direction,
+      latch: given.latch,
+      isWritable: given.writable,
+      isBool: given.type === "BOOL",
+      words: words.join(" ").toLowerCase(),
+      changed: -Infinity,
+      isOpen: false,
+      trend: null,
+    };
+    take(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED));
+    return signal;
+  }
+
+  function take(signal, value, raw, edges, flags) {
+    signal.value = value;
+    signal.raw = raw;
+    signal.edges = edges;
+    signal.isFailSafe = (flags & FAIL_SAFE) !== 0;
+    signal.isForced = (flags & FORCED) !== 0;
+  }
+
+  /** The signals as such: the same ones after a restart keep what was opened of them. */
+  function takeAll(given) {
+    const known = new Map(signals.map((signal) => [keyOf(signal), signal]));
+    drivers = given.drivers.map((driver) => ({ ...driver, line: null }));
+    signals = [];
+    for (const driver of drivers) {
+      driver.signals = driver.signals.map((it, index) => signalOf(driver, it, index));
+      driver.byName = new Map(driver.signals.map((signal) => [signal.name, signal]));
+      for (const signal of driver.signals) {
+        signal.isOpen = known.get(keyOf(signal))?.isOpen ?? false;
+        signals.push(signal);
+      }
+    }
+  }
+
+  const keyOf = (signal) => `${signal.driver.id}/${signal.name}`;
+
+  function takeLine(line) {
+    for (const given of line.drivers) {
+      const driver = drivers.find(({ id }) => id === given.id);
+      if (driver) driver.line = { ...given, heard: performance.now() };
+    }
+  }
+
+  /** Takes an event over. Whether there are other signals now, and whether the line was told. */
+  function hear(text) {
+    const event = JSON.parse(text);
+    // Another server has another clock: what was collected on the old one is not comparable.
+    if (event.full && event.time_ms < time) for (const signal of signals) signal.trend = null;
+    time = event.time_ms;
+    heard = performance.now();
+    const isOther = event.full === true;
+    if (isOther) {
+      layout = event.layout;
+      takeAll(event.signals);
+    } else if (event.layout !== layout) {
+      return { isOther: false, isLine: false };
+    }
+    if (event.line) takeLine(event.line);
+    for (const [id, changes] of Object.entries(event.values ?? {})) {
+      const driver = drivers.find((driver) => String(driver.id) === id);
+      for (const [index, value, raw, edges, flags] of changes) {
+        const signal = driver?.signals[index];
+        if (!signal) continue;
+        if (!Object.is(signal.value, value)) signal.changed = heard;
+        take(signal, value, raw, edges, flags);
+        if (signal.trend) trend.add(signal, time);
+      }
+    }
+    return { isOther, isLine: Boolean(event.line) };
+  }
+
+  /** The server's time, in milliseconds. */
+  const now = () => time + (performance.now() - heard);
+
+  /** A value as a number; NaN if there is none. */
+  const number = (signal) => (signal.value === null ? NaN : Number(signal.value));
+
+  /** How old the data of a signal's station are, in milliseconds; null if that is not known. */
+  function age(signal) {
+    const line = signal.driver.line;
+    const age = line?.stations?.[signal.station]?.age_ms;
+    return age === undefined || age === null ? null : age;
+  }
+
+  return {
+    hear, now, number, age, keyOf,
+    isNew: (signal) => performance.now() - signal.changed < NEW,
+    get drivers() { return drivers; },
+    get signals() { return signals; },
+  };
+})();
+
+/** Texts for people. */
+const words = {
+  /** A value without its unit, with so many decimals that it stands still while it changes. */
+  value(signal) {
+    if (signal.value === null) return "–";
+    if (signal.isBool) return plant.number(signal) > 0.5 ? "TRUE" : "FALSE";
+    if (typeof signal.value === "string") return signal.value.replace("-", "−");
+    return this.number(signal.value, signal);
+  },
+  number(value, signal) {
+    if (Number.isInteger(value) && !signal.unit && !/REAL/.test(signal.type)) return String(value).replace("-", "−");
+    const size = Math.abs(value);
+    if (size !== 0 && (size >= 1e7 || size < 1e-4)) return value.toExponential(3).replaceAll("-", "−");
+    const decimals = size >= 10000 ? 0 : size >= 1000 ? 1 : size >= 1 || size === 0 ? 2 : 4;
+    return value.toFixed(decimals).replace("-", "−");
+  },
+  /** A length of time in milliseconds. */
+  span(ms) {
+    if (ms === null) return "–";
+    if (ms < 1000) return `${Math.round(ms)} ms`;
+    if (ms < 120000) return `${(ms / 1000).toFixed(ms < 10000 ? 1 : 0)} s`;
+    if (ms < 7200000) return `${Math.floor(ms / 60000)} min`;
+    return `${Math.floor(ms / 3600000)} h`;
+  },
+  /** A length of time in microseconds. */
+  fine(us) {
+    if (us < 1000) return `${Number(us.toPrecision(3))} µs`;
+    return us < 1e6 ? `${Number((us / 1e3).toPrecision(3))} ms` : `${Number((us / 1e6).toPrecision(3))} s`;
+  },
+  count: (number, one, many) => `${number.toLocaleString("en")} ${number === 1 ? one : many}`,
+};

@@ -1,0 +1,71 @@
+//! The live page of this process, which all of its drivers share.
+//!
+//! Without the feature `page` there is none, and a driver.cfg that asks for one is told so.
+
+#[cfg(not(feature = "page"))]
+mod none;
+#[cfg(feature = "page")]
+mod open;
+
+#[cfg(not(feature = "page"))]
+pub(crate) use none::{Place, show, url};
+#[cfg(feature = "page")]
+pub(crate) use open::{Place, show, url};
+
+use std::io::{self, Write as _};
+
+use tickbus_binding::Refusal;
+use tickbus_driver::{Code, Driver};
+
+/// Why a driver cannot be shown.
+#[derive(Debug)]
+pub(crate) enum PageError {
+    /// This build has no pages.
+    #[cfg_attr(feature = "page", expect(dead_code, reason = "it has them"))]
+    Unsupported(String),
+    /// The driver.cfg, or the picture that it names, is wrong.
+    #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "nothing is read"))]
+    WrongInput(String),
+    /// The page cannot be served.
+    #[cfg_attr(not(feature = "page"), expect(dead_code, reason = "nothing is served"))]
+    NotServed(String),
+}
+
+impl PageError {
+    /// Whether the driver.cfg must be changed, rather than the system.
+    pub(crate) const fn is_wrong_input(&self) -> bool {
+        !matches!(self, Self::NotServed(_))
+    }
+}
+
+impl std::fmt::Display for PageError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Unsupported(text) | Self::WrongInput(text) | Self::NotServed(text) => {
+                f.write_str(text)
+            }
+        }
+    }
+}
+
+/// Shows a simulation's driver on the page, if its driver.cfg asks for one; whoever started the simulation reads the address
+/// on stderr.
+pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
+    let config = std::sync::Arc::clone(driver.config());
+    let announce = |url: &str| {
+        // Without a reader of stderr the simulation runs all the same.
+        let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
+    };
+    Ok(show(&config, || Some(driver.watch()), announce)?)
+}
+
+impl From<PageError> for Refusal {
+    fn from(error: PageError) -> Self {
+        let code = match error {
+            PageError::Unsupported(_) => Code::Unsupported,
+            PageError::WrongInput(_) => Code::BadConfig,
+            PageError::NotServed(_) => Code::BusFailed,
+        };
+        Self::new(code, error)
+    }
+}

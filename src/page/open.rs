@@ -1,0 +1,158 @@
+//! The page that is served: opened for the first driver that asks for one, closed with the last.
+
+use std::fs;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+
+use tickbus_base::time::Monotonic;
+use tickbus_driver::Watch;
+use tickbus_driver_cfg::{Config, PageOptions};
+use tickbus_fieldbus::tcp::Address;
+use tickbus_live_page::picture::{self, Picture};
+use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_web::{Limits, Room, Serving};
+
+use super::PageError;
+
+/// The page of this process, while there is one.
+static PAGE: Mutex<Weak<Open>> = Mutex::new(Weak::new());
+
+/// The largest picture that is read, in bytes.
+const LARGEST: u64 = 16 << 20;
+
+/// What is served.
+#[derive(Debug)]
+struct Open {
+    // Dropped in this order: nobody asks a page that has ended.
+    _serving: Serving,
+    page: LivePage,
+    url: String,
+    /// The address that the first driver asked for.
+    asked: Address,
+}
+
+/// A driver's place on the page.
+#[derive(Debug)]
+pub(crate) struct Place {
+    member: Option<Member>,
+    open: Option<Arc<Open>>,
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        // While the address is given up, nobody may want it.
+        let present = present();
+        self.member = None;
+        self.open = None;
+        drop(present);
+    }
+}
+
+fn present() -> MutexGuard<'static, Weak<Open>> {
+    // It is replaced as a whole.
+    PAGE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The address of the page with its token, while there is one.
+pub(crate) fn url() -> Option<String> {
+    Some(present().upgrade()?.url.clone())
+}
+
+/// Shows what `watch` gives on the page, if the driver.cfg asks for one. `announce` is given the address of a page that was
+/// not there before.
+pub(crate) fn show(
+    config: &Config,
+    watch: impl FnOnce() -> Option<Watch>,
+    announce: impl FnOnce(&str),
+) -> Result<Option<Place>, PageError> {
+    let Some(wanted) = &config.page else {
+        return Ok(None);
+    };
+    let picture = wanted.picture.as_deref();
+    let picture = picture.map(|file| read_picture(config, file)).transpose()?;
+    let open = open(config, wanted, announce)?;
+    let Some(watch) = watch() else {
+        return Ok(None);
+    };
+    let options = Options {
+        grace: wanted.grace,
+        picture,
+    };
+    Ok(Some(Place {
+        member: Some(open.page.join(watch, options)),
+        open: Some(open),
+    }))
+}
+
+/// The page that there is, or a new one.
+fn open(
+    config: &Config,
+    wanted: &PageOptions,
+    announce: impl FnOnce(&str),
+) -> Result<Arc<Open>, PageError> {
+    let mut present = present();
+    if let Some(open) = present.upgrade() {
+        if open.asked != wanted.listen {
+            log::warn!(
+                "driver \"{}\" asks for a page at {}, and is shown on that of this process, at {}",
+                config.name,
+                wanted.listen,
+                open.asked
+            );
+        }
+        return Ok(open);
+    }
+    let asked = wanted.listen.clone();
+    let refused = |error: std::io::Error| {
+        PageError::NotServed(format!(
+            "the page cannot be served on {asked} ({error}); end the program that has this port, or choose another one: \
+             listen = \"127.0.0.1:0\" in [page] takes any"
+        ))
+    };
+    let room = Room::bind(&asked, Limits::default()).map_err(refused)?;
+    let url = room.url();
+    let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
+    let serving = room.serve(page.site(), Monotonic::shared());
+    let open = Arc::new(Open {
+        _serving: serving.map_err(refused)?,
+        page,
+        url,
+        asked: asked.clone(),
+    });
+    *present = Arc::downgrade(&open);
+    log::info!("the live page is at {}", open.url);
+    announce(&open.url);
+    Ok(open)
+}
+
+/// Reads the picture of a driver; mistakes in it are told, and leave the rest alive.
+fn read_picture(config: &Config, file: &Path) -> Result<Picture, PageError> {
+    let path = config.folder().join(file);
+    let wrong = |what: String| {
+        let (cfg, path) = (config.path.display(), path.display());
+        PageError::WrongInput(format!("{cfg}: the picture \"{path}\" {what}"))
+    };
+    let size = fs::metadata(&path).map_err(|error| {
+        wrong(format!(
+            "cannot be read ({error}); name an SVG file, relative to the driver.cfg"
+        ))
+    })?;
+    if size.len() > LARGEST {
+        return Err(wrong(format!(
+            "has {} bytes; simplify it, or take pictures out of it",
+            size.len()
+        )));
+    }
+    let text = fs::read_to_string(&path)
+        .map_err(|error| wrong(format!("cannot be read ({error}); save it as plain SVG")))?;
+    let signals = config.table.signals.iter();
+    let signals: Vec<&str> = signals.map(|signal| signal.name.as_str()).collect();
+    let picture = picture::read(&text, &signals).map_err(|mistake| wrong(mistake.to_string()))?;
+    for mistake in &picture.mistakes {
+        log::warn!("{}: {mistake}", path.display());
+    }
+    for left_out in &picture.left_out {
+        log::info!("{}: left out: {left_out}", path.display());
+    }
+    Ok(picture)
+}

@@ -214,7 +214,7 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
         let folder = misbehaving_as(how);
         for isolated in [&[][..], &["--isolated"]] {
             let output = tickbus(folder.path(), &[&RUN, isolated].concat());
-            let told = out(&output) + &err(&output);
+            let told = out(&output) + err(&output).as_str();
             assert_eq!(output.status.code(), Some(3), "{told}");
             assert!(told.contains(words), "{how} {isolated:?}: {told}");
         }

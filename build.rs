@@ -1,8 +1,21 @@
-//! Looks for what the tests need beside Rust.
+//! Looks for what the tests need beside Rust, and hands on how the product is linked.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     find_compiler();
+    link();
+}
+
+/// `TICKBUS_LINK_ARG` is an option for the linker of a release; `tools/build` sets it where the linker has it.
+fn link() {
+    const OPTION: &str = "TICKBUS_LINK_ARG";
+    if std::env::var("PROFILE").as_deref() != Ok("release") {
+        return;
+    }
+    println!("cargo::rerun-if-env-changed={OPTION}");
+    if let Ok(option) = std::env::var(OPTION) {
+        println!("cargo::rustc-link-arg={option}");
+    }
 }
 
 /// The tests of the plug-in bus need a C compiler; `no_cc` leaves them out.

@@ -34,6 +34,8 @@ pub struct Watch {
     pub(super) figures: Box<dyn Figures>,
     /// The distributions that came last.
     pub(super) times: TickTimes,
+    /// When the copy was asked for that has not come yet.
+    pub(super) asked: Option<Nanos>,
 }
 
 /// What the copies of the ticks do not have.
@@ -73,7 +75,9 @@ impl Watch {
 
     /// Asks for a copy at the end of the next tick; `with_times` for new distributions as well, which take the tick some
     /// microseconds.
-    pub fn ask(&self, with_times: bool) {
+    pub fn ask(&mut self, with_times: bool) {
+        let now = self.clock.now();
+        self.asked.get_or_insert(now);
         self.handle.ask(with_times);
     }
 
@@ -82,14 +86,19 @@ impl Watch {
         if !self.handle.update() {
             return false;
         }
+        self.asked = None;
+        let since = self.status.link().since;
         let times = &mut self.times;
         self.handle.with(|view| {
             if view.has_times {
                 times.copy_from(&view.times);
             }
-            // In case the bus cannot look at its line itself.
-            let ages = view.stations.iter().map(|station| station.age);
-            self.status.observe(view.now, ages);
+            // In case the bus cannot look at its line itself. A copy that is older than the state of the line says nothing
+            // against it.
+            if view.now >= since {
+                let ages = view.stations.iter().map(|station| station.age);
+                self.status.observe(view.now, ages);
+            }
         });
         true
     }
@@ -164,12 +173,69 @@ impl Watch {
         self.handle.end(id)
     }
 
-    /// How long no tick has come, going by the copy that was taken over last; [`Nanos::MAX`] before the first.
+    /// How long no tick has come that was asked for a copy; [`Nanos::MAX`] before the first. Zero while the copy that was
+    /// asked for last has come, however long ago: nobody knows of the ticks since.
     pub fn silence(&self) -> Nanos {
         let now = self.clock.now();
-        self.view(|view| match view.tick {
-            0 => Nanos::MAX,
-            _ => (now - view.now).max(Nanos::ZERO),
+        self.view(|view| match (view.tick, self.asked) {
+            (0, _) => Nanos::MAX,
+            (_, None) => Nanos::ZERO,
+            (_, Some(asked)) => (now - asked.max(view.now)).max(Nanos::ZERO),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Driver;
+    use tickbus_base::time::Manual;
+    use tickbus_fieldbus::{Cause, LinkState};
+
+    const TEXT: &str = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
+                        program = \"mirror\"\nscan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n\
+                        [[signal]]\nname = \"b\"\naddress = \"%QB0\"\n";
+
+    /// A driver that has ticked once, and what looks at it.
+    fn watched() -> (Driver, Watch, Vec<Slot>) {
+        let config = Config::parse("driver.cfg", TEXT).unwrap_or_else(|why| panic!("{why}"));
+        let mut driver = Driver::open(config, Manual::new()).expect("opens");
+        let mut watch = driver.watch();
+        let mut slots = driver.initial_slots();
+        watch.ask(false);
+        driver.exchange(Nanos::from_millis(1), &mut slots);
+        (driver, watch, slots)
+    }
+
+    #[test]
+    fn a_copy_that_nobody_took_over_for_long_is_no_silence() {
+        let (mut driver, mut watch, mut slots) = watched();
+        // It ticks on, and nobody asks.
+        driver.exchange(Nanos::from_millis(400), &mut slots);
+        assert!(watch.update());
+        assert_eq!(watch.silence(), Nanos::ZERO);
+        // It owes a copy: here because nobody takes it over.
+        watch.ask(false);
+        let asked = watch.clock().now();
+        driver.exchange(Nanos::from_millis(700), &mut slots);
+        let owed = watch.clock().now() - asked;
+        assert!(owed > Nanos::ZERO);
+        assert_eq!(watch.silence(), owed);
+    }
+
+    #[test]
+    fn an_old_copy_does_not_change_a_newer_state_of_the_line() {
+        let (mut driver, mut watch, mut slots) = watched();
+        driver.exchange(Nanos::from_millis(400), &mut slots);
+        let now = watch.clock().now();
+        let (state, cause) = (LinkState::Stale, Cause::Silent);
+        watch.status.enter(now, state, cause, "nothing has come");
+        assert!(watch.update());
+        assert_eq!(watch.status.state(), LinkState::Stale);
+        // A newer one does.
+        watch.ask(false);
+        driver.exchange(Nanos::from_millis(401), &mut slots);
+        assert!(watch.update());
+        assert_eq!(watch.status.state(), LinkState::Running);
     }
 }

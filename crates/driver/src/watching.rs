@@ -90,6 +90,7 @@ impl Driver {
                 record: recorder.map(|recorder| Arc::clone(recorder.counters())),
             }),
             times: TickTimes::default(),
+            asked: None,
         }
     }
 

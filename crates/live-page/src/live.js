@@ -75,7 +75,8 @@
     show(get("force-unit"), signal.unit);
     show(get("trend"), signal.isOpen ? "Close trend" : "Trend");
     if (isNew) {
-      forceValue.value = signal.value === null ? "" : signal.isBool ? "" : String(typeof signal.value === "string" ? signal.value : Number(signal.value.toPrecision(6)));
+      // To the last digit: whoever confirms it holds what is there.
+      forceValue.value = signal.value === null || signal.isBool ? "" : String(signal.value);
       if (/^Released?|^Force|is forced|is released/.test(get("status").textContent)) say("");
     }
     const isLost = !signal.isForced && document.activeElement === get("release");

@@ -169,7 +169,8 @@ const pictures = (() => {
     let isPlaced = false;
     mover.bindings.forEach((binding, i) => {
       const signal = mover.signals[i];
-      const value = binding.signal.startsWith("bus.") ? ofBus(driver, binding.signal) : signal === null ? NaN : binding.edges ? signal.edges : plant.number(signal);
+      // Without a latch no edges are counted.
+      const value = signal === null ? ofBus(driver, binding.signal) : binding.edges ? signal.edges ?? NaN : plant.number(signal);
       if (Number.isNaN(value)) return;
       const out = mapped(binding.map, value);
       switch (binding.do) {
@@ -187,7 +188,7 @@ const pictures = (() => {
           style(mover, "opacity", out === undefined ? null : String(Math.min(1, Math.max(0, out))));
           break;
         case "text":
-          say(mover, filled(binding.map && out !== undefined ? String(out) : "{}", signal, value));
+          say(mover, filled(binding.map && out !== undefined ? String(out) : "{}", binding.edges ? null : signal, value));
           break;
         case "spin":
           mover.spun = (mover.spun + (out ?? 0) * passed / 1000) % 360;
@@ -226,6 +227,7 @@ const pictures = (() => {
   function ofBus({ line }, name) {
     if (!line) return NaN;
     if (name === "bus.age") return Math.max(...line.stations.map(({ age_ms: age }) => age ?? NaN));
+    if (name !== "bus.status") return NaN;
     return { fresh: 0, unchanged: 1, stale: 2 }[line.status] ?? NaN;
   }
 

@@ -208,7 +208,8 @@ impl Shown {
         let config = watch.config();
         let (table, writes) = (&config.table, watch.writes());
         let silence = watch.silence();
-        let watchdog = config.timing.watchdog;
+        // A program behind its bus is not watched by it: it has a limit of its own, of its scans.
+        let watchdog = config.timing.watchdog.filter(|_| watch.is_driver());
         // The other end gets fail-safe values of a simulation that has stopped.
         let has_stopped = watchdog.is_some_and(|limit| silence > limit);
         let mut is_new = false;

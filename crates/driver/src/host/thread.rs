@@ -310,6 +310,7 @@ fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
         clock: Arc::clone(&figures.counters.clock),
         figures: Box::new(figures),
         times: TickTimes::default(),
+        asked: None,
     }
 }
 

@@ -77,6 +77,14 @@ int fmi2DoStep(void *it, double from, double length, int prior) {
         return 3;
     } else if (is("print")) {
         write(1, "hello\n", 6);
+    } else if (is("close") || is("hang")) {
+        write(1, "hangs\n", 6);
+        for (int file = 0; is("close") && file < 100; file++) {
+            close(file);
+        }
+        for (;;) {
+            pause();
+        }
     }
     now = from + length;
     return 0;

@@ -27,6 +27,7 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
     callbacks = with;
     strncpy(how, guid, sizeof how - 1);
     now = 0.0;
+    callbacks->logger(NULL, "it", 0, "logAll", "%s", "without its environment");
     if (is("null")) {
         say(3, "no licence on this computer");
         return NULL;

@@ -109,27 +109,7 @@ impl Join {
             }
         }
         if inputs.is_empty() && outputs.is_empty() {
-            let names = |wanted: Causality| {
-                let names = model.variables.iter().filter(|one| one.causality == wanted);
-                let names: Vec<_> = names
-                    .take(5)
-                    .map(|one| format!("\"{}\"", one.name))
-                    .collect();
-                if names.is_empty() {
-                    "none".to_owned()
-                } else {
-                    names.join(", ")
-                }
-            };
-            return Err(Mistake::new(
-                format!(
-                    "no signal of {} has the name of a variable (inputs: {}; outputs: {})",
-                    config.path.display(),
-                    names(Causality::Input),
-                    names(Causality::Output)
-                ),
-                "write a map: --map map.toml, with [signals] and lines such as \"Level\" = \"tank.level\"",
-            ));
+            return Err(nothing_in_common(config, model));
         }
         Ok(Self {
             inputs,
@@ -138,6 +118,31 @@ impl Join {
             left,
         })
     }
+}
+
+/// What there is to say when no name meets another.
+fn nothing_in_common(config: &Config, model: &Model) -> Mistake {
+    let names = |wanted: Causality| {
+        let names = model.variables.iter().filter(|one| one.causality == wanted);
+        let names: Vec<_> = names
+            .take(5)
+            .map(|one| format!("\"{}\"", one.name))
+            .collect();
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(", ")
+        }
+    };
+    Mistake::new(
+        format!(
+            "no signal of {} has the name of a variable (inputs: {}; outputs: {})",
+            config.path.display(),
+            names(Causality::Input),
+            names(Causality::Output)
+        ),
+        "write a map: --map map.toml, with [signals] and lines such as \"Level\" = \"tank.level\"",
+    )
 }
 
 #[cfg(test)]

@@ -164,29 +164,6 @@ fn holds(kind: ValueType, number: f64) -> bool {
     found == number
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_parameter_has_the_very_value_that_the_map_says() {
-        for (kind, number, right) in [
-            (ValueType::UInt8, 255.0, true),
-            (ValueType::UInt8, 256.0, false),
-            (ValueType::UInt8, -1.0, false),
-            (ValueType::Int32, 2.5, false),
-            (ValueType::Int64, -3.0, true),
-            (ValueType::Boolean, 1.0, true),
-            (ValueType::Boolean, 2.0, false),
-            (ValueType::Float32, 0.1, true),
-            (ValueType::Float32, 1e300, false),
-            (ValueType::Float64, 1e300, true),
-        ] {
-            assert_eq!(holds(kind, number), right, "{number} as {kind:?}");
-        }
-    }
-}
-
 fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> Option<Joined> {
     const SHAPE: &str = "write the variable's name in quotes, or { variable = \"h\", scale = 1000.0, offset = 0.0 }";
     let Some(signal) = config.table.position(name) else {
@@ -275,4 +252,27 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
         scale,
         offset,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_has_the_very_value_that_the_map_says() {
+        for (kind, number, right) in [
+            (ValueType::UInt8, 255.0, true),
+            (ValueType::UInt8, 256.0, false),
+            (ValueType::UInt8, -1.0, false),
+            (ValueType::Int32, 2.5, false),
+            (ValueType::Int64, -3.0, true),
+            (ValueType::Boolean, 1.0, true),
+            (ValueType::Boolean, 2.0, false),
+            (ValueType::Float32, 0.1, true),
+            (ValueType::Float32, 1e300, false),
+            (ValueType::Float64, 1e300, true),
+        ] {
+            assert_eq!(holds(kind, number), right, "{number} as {kind:?}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! `tickbus run MODEL.fmu --config FILE`: a foreign FMU as the machine, or as the PLC.
 
 use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Outcome;
@@ -17,6 +17,9 @@ use tickbus_image::signal::Slot;
 
 /// How often the command checks its line.
 const LOOK: Nanos = Nanos::from_millis(20);
+
+/// How long a run may take to end after a Ctrl-C, before another one ends the process.
+const PATIENCE: Nanos = Nanos::from_secs(1);
 
 /// The step where neither the command line nor the FMU names one.
 const STEP: Nanos = Nanos::from_millis(10);
@@ -123,13 +126,7 @@ fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
     let join = Join::of(&config, &fmu.model, &map)
         .map_err(|mistake| wrong(format!("{}: {mistake}", fmu.file)))?;
     let stop = Stop::new();
-    let on_interrupt = stop.clone();
-    if let Err(error) = ctrlc::set_handler(move || on_interrupt.stop()) {
-        return Err(Refused(
-            format!("Ctrl-C cannot be caught: {error}"),
-            Outcome::BusFailed,
-        ));
-    }
+    catch_interrupts(&stop, fmu.folder())?;
     let step = arguments.step.or(proposed(fmu.model.step)).unwrap_or(STEP);
     let default = if is_stepped(&config) { 0.0 } else { 1.0 };
     let pace = arguments.pace.unwrap_or(default);
@@ -163,6 +160,33 @@ fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
         end: arguments.duration,
     };
     Ok(tick(line, machine, times, arguments.stats, &*clock, &stop))
+}
+
+/// Lets Ctrl-C stop the run; a later one ends this process, for an FMU that hangs in a step never comes back. `folder` is where
+/// the FMU was unpacked to.
+fn catch_interrupts(stop: &Stop, folder: &Path) -> Result<(), Refused> {
+    let (stop, folder) = (stop.clone(), folder.to_owned());
+    let clock = Monotonic::shared();
+    let mut last_chance = None;
+    let caught = ctrlc::set_handler(move || {
+        stop.stop();
+        let now = clock.now();
+        if now < *last_chance.get_or_insert(now + PATIENCE) {
+            return;
+        }
+        // Nothing can be done if it stays.
+        let _ = std::fs::remove_dir_all(&folder);
+        eprintln!(
+            "run: interrupted again, while the FMU or the line did not come back; a recording may lack its end"
+        );
+        std::process::exit(3);
+    });
+    caught.map_err(|error| {
+        Refused(
+            format!("Ctrl-C cannot be caught: {error}"),
+            Outcome::BusFailed,
+        )
+    })
 }
 
 /// The driver.cfg as this command's end has it.

@@ -27,6 +27,7 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
     callbacks = with;
     strncpy(how, guid, sizeof how - 1);
     now = 0.0;
+    callbacks->logger(NULL, "it", 0, "logAll", "%s", "without its environment");
     if (is("null")) {
         say(3, "no licence on this computer");
         return NULL;
@@ -77,6 +78,14 @@ int fmi2DoStep(void *it, double from, double length, int prior) {
         return 3;
     } else if (is("print")) {
         write(1, "hello\n", 6);
+    } else if (is("close") || is("hang")) {
+        write(1, "hangs\n", 6);
+        for (int file = 0; is("close") && file < 100; file++) {
+            close(file);
+        }
+        for (;;) {
+            pause();
+        }
     }
     now = from + length;
     return 0;

@@ -1,7 +1,11 @@
 //! FMUs that are cut, hostile, for something else, or that misbehave: each is a sentence that says what to do.
 
 use std::fs::{self, File};
+use std::io::{BufRead as _, BufReader};
 use std::path::Path;
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Duration;
 
 use zip::{ZipArchive, ZipWriter};
 
@@ -245,6 +249,10 @@ fn a_crash_in_a_helper_is_a_sentence_and_the_recording_is_whole() {
             "exit",
             "it.fmu: its process ended by itself, with exit code 7,",
         ),
+        (
+            "close",
+            "it.fmu: its process has closed the line to its host, and hangs in the step of 0.01 s at 0.03 s",
+        ),
     ] {
         let folder = misbehaving_as(how);
         let output = tickbus(
@@ -262,4 +270,39 @@ fn a_crash_in_a_helper_is_a_sentence_and_the_recording_is_whole() {
     let output = tickbus(folder.path(), &[&RUN[..], &["--isolated"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", out(&output));
     assert!(err(&output).contains("hello"), "{}", err(&output));
+}
+
+#[test]
+fn an_fmu_that_hangs_can_be_interrupted() {
+    let (folder, temporary) = (
+        misbehaving_as("hang"),
+        tempfile::tempdir().expect("a folder"),
+    );
+    let mut child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(RUN)
+        .current_dir(folder.path())
+        .env("TMPDIR", temporary.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let lines = BufReader::new(child.stdout.take().expect("piped")).lines();
+    let hangs = lines.map_while(Result::ok).any(|line| line == "hangs");
+    assert!(hangs, "it gets to its third step");
+    // The first one asks; one of those a second later ends it.
+    let pid = rustix::process::Pid::from_child(&child);
+    while child.try_wait().expect("it is known").is_none() {
+        rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");
+        thread::sleep(Duration::from_millis(50));
+    }
+    let output = child.wait_with_output().expect("it has ended");
+    assert_eq!(output.status.code(), Some(3));
+    assert!(
+        err(&output)
+            .contains("run: interrupted again, while the FMU or the line did not come back"),
+        "{}",
+        err(&output)
+    );
+    let left = fs::read_dir(temporary.path()).expect("a folder").count();
+    assert_eq!(left, 0, "what was unpacked has gone");
 }

@@ -72,6 +72,11 @@ impl Unpacked {
         })
     }
 
+    /// The folder that it was unpacked to, which goes away with this.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// The library with its functions.
     pub fn library(&self) -> &Path {
         &self.library

@@ -54,7 +54,7 @@ pub struct ForeignVariable {
     pub type_name: String,
     /// What it is to the importing tool.
     pub causality: Causality,
-    /// Whether its value may be read as one of a signal: a text, an array and a clock cannot.
+    /// Its unit, if it names one.
     pub unit: Option<String>,
 }
 

@@ -6,7 +6,7 @@ use std::os::unix::net::UnixStream;
 use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_bus_plugin::{Inbox, Message as _};
 
 use super::helper::next;
@@ -16,6 +16,9 @@ use crate::value::Value;
 
 /// How long an FMU may take to begin, or for a step.
 const PATIENCE: Nanos = Nanos::from_secs(60);
+
+/// How long a helper may take to end after its line has.
+const END: Nanos = Nanos::from_secs(2);
 
 /// An FMU in a process of its own.
 #[derive(Debug)]
@@ -112,10 +115,24 @@ impl Isolated {
         Failure(format!("{}: {why}", self.file))
     }
 
+    /// How the helper has ended; `None` if it has not, though its line has: an FMU may close files that are not its own.
+    fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
+        let clock = Monotonic::shared();
+        let due = clock.now() + END;
+        loop {
+            let ended = self.child.try_wait()?;
+            if ended.is_some() || clock.now() >= due {
+                return Ok(ended);
+            }
+            clock.wait_until(clock.now() + Nanos::from_millis(2), &Stop::new());
+        }
+    }
+
     /// The helper has ended by itself.
     fn gone(&mut self, what: &str) -> Failure {
-        let how = match self.child.wait() {
-            Ok(status) => ending(status),
+        let how = match self.ended() {
+            Ok(Some(status)) => ending(status),
+            Ok(None) => "has closed the line to its host, and hangs".to_owned(),
             Err(error) => format!("has gone ({error})"),
         };
         self.failed(&format!("its process {how} in {what}: tell its maker"))

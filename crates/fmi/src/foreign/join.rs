@@ -45,8 +45,14 @@ impl Join {
             };
             let fits = |one: &&ForeignVariable| one.causality == wanted && one.value_type.is_some();
             let by_map = map.joined.iter().find(|joined| joined.signal == index);
+            let same = model.position(&signal.name);
+            // An input of the FMU has one source, and the map goes first.
+            let taken = map
+                .joined
+                .iter()
+                .find(|joined| !is_from_fmu && Some(joined.variable) == same);
             let by_name = || {
-                let variable = model.position(&signal.name)?;
+                let variable = same.filter(|_| taken.is_none())?;
                 fits(&&model.variables[variable]).then_some(Joined {
                     signal: index,
                     variable,
@@ -60,12 +66,16 @@ impl Join {
                 } else {
                     ("is read by nobody", "input")
                 };
-                let same = model.position(&signal.name).map(|at| &model.variables[at]);
+                let same = same.map(|at| &model.variables[at]);
                 let near = nearest(
                     &signal.name,
                     model.variables.iter().filter(fits).map(|one| &*one.name),
                 );
                 let hint = match (same, near) {
+                    (Some(_), _) if taken.is_some() => format!(
+                        "the map joins the FMU's variable of that name with \"{}\"",
+                        taken.map_or("", |taken| &config.table.signals[taken.signal].name)
+                    ),
                     (Some(same), _) => format!(
                         "the FMU's variable of that name is no {kind} that can be a signal ({})",
                         same.type_name
@@ -99,27 +109,7 @@ impl Join {
             }
         }
         if inputs.is_empty() && outputs.is_empty() {
-            let names = |wanted: Causality| {
-                let names = model.variables.iter().filter(|one| one.causality == wanted);
-                let names: Vec<_> = names
-                    .take(5)
-                    .map(|one| format!("\"{}\"", one.name))
-                    .collect();
-                if names.is_empty() {
-                    "none".to_owned()
-                } else {
-                    names.join(", ")
-                }
-            };
-            return Err(Mistake::new(
-                format!(
-                    "no signal of {} has the name of a variable (inputs: {}; outputs: {})",
-                    config.path.display(),
-                    names(Causality::Input),
-                    names(Causality::Output)
-                ),
-                "write a map: --map map.toml, with [signals] and lines such as \"Level\" = \"tank.level\"",
-            ));
+            return Err(nothing_in_common(config, model));
         }
         Ok(Self {
             inputs,
@@ -127,5 +117,73 @@ impl Join {
             parameters: map.parameters.clone(),
             left,
         })
+    }
+}
+
+/// What there is to say when no name meets another.
+fn nothing_in_common(config: &Config, model: &Model) -> Mistake {
+    let names = |wanted: Causality| {
+        let names = model.variables.iter().filter(|one| one.causality == wanted);
+        let names: Vec<_> = names
+            .take(5)
+            .map(|one| format!("\"{}\"", one.name))
+            .collect();
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(", ")
+        }
+    };
+    Mistake::new(
+        format!(
+            "no signal of {} has the name of a variable (inputs: {}; outputs: {})",
+            config.path.display(),
+            names(Causality::Input),
+            names(Causality::Output)
+        ),
+        "write a map: --map map.toml, with [signals] and lines such as \"Level\" = \"tank.level\"",
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_input_that_the_map_joins_is_not_joined_by_its_name_too() {
+        let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                    [[signal]]\nname = \"Command\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"valve\"\naddress = \"%QX0.1\"\n";
+        let config = Config::parse("it.cfg", text).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let text = "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"g\">\
+                    <CoSimulation modelIdentifier=\"x\"/><ModelVariables>\
+                    <Boolean name=\"valve\" valueReference=\"1\" causality=\"input\"/></ModelVariables></fmiModelDescription>";
+        let model = Model::parse("m.xml", text).expect("right");
+        let command = Joined {
+            signal: 0,
+            variable: 0,
+            scale: 1.0,
+            offset: 0.0,
+        };
+        let map = Map {
+            joined: vec![command],
+            parameters: Vec::new(),
+        };
+        let join = Join::of(&config, &model, &map).expect("one is joined");
+        assert_eq!(join.inputs, [command]);
+        assert_eq!(
+            join.left,
+            [Unjoined(
+                "signal \"valve\" (%QX0.1) is read by nobody: the map joins the FMU's variable of that name with \"Command\""
+                    .to_owned()
+            )]
+        );
+        let join = Join::of(&config, &model, &Map::default()).expect("one is joined");
+        assert_eq!(
+            join.inputs,
+            [Joined {
+                signal: 1,
+                ..command
+            }]
+        );
     }
 }

@@ -38,13 +38,13 @@ pub(super) struct StepEnd {
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
+    /// After a fatal answer, nothing of it may be called.
+    is_dead: bool,
+    /// Dropped before what follows, which its finalisers may still use: they may log.
+    _library: Library,
     journal: Box<Journal>,
     /// Kept where it is: the FMU may keep its address.
     _callbacks: Option<Box<Callbacks>>,
-    /// After a fatal answer, nothing of it may be called.
-    is_dead: bool,
-    /// Dropped last.
-    _library: Library,
 }
 
 impl Instance {

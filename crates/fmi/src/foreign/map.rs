@@ -9,7 +9,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
 
 use super::description::{Causality, Model};
-use crate::value::{Value, ValueType};
+use crate::value::{Number, Value, ValueType};
 
 /// A signal and its variable: signal = `scale` × variable + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -124,7 +124,44 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
     } else {
         "write a number"
     })?;
+    if !holds(kind, number) {
+        value.wrong(
+            format!(
+                "\"{}\" is of type {}, which has no such value",
+                shown(name),
+                variable.type_name
+            ),
+            if kind == ValueType::Boolean {
+                "write true or false"
+            } else {
+                "write a whole number within its range"
+            },
+        );
+        return None;
+    }
     Some((at, Value::Real(number)))
+}
+
+/// Whether a type has this very number; floating point numbers have the nearest one.
+#[expect(clippy::float_cmp, reason = "exactly as written")]
+fn holds(kind: ValueType, number: f64) -> bool {
+    fn nearest<T: Number>(number: f64) -> f64 {
+        T::from_real(number).value().real()
+    }
+    let found = match kind {
+        ValueType::Int8 => nearest::<i8>(number),
+        ValueType::UInt8 => nearest::<u8>(number),
+        ValueType::Int16 => nearest::<i16>(number),
+        ValueType::UInt16 => nearest::<u16>(number),
+        ValueType::Int32 => nearest::<i32>(number),
+        ValueType::UInt32 => nearest::<u32>(number),
+        ValueType::Int64 => nearest::<i64>(number),
+        ValueType::UInt64 => nearest::<u64>(number),
+        ValueType::Boolean => nearest::<bool>(number),
+        ValueType::Float32 => return nearest::<f32>(number).is_finite(),
+        ValueType::Float64 | ValueType::String => return true,
+    };
+    found == number
 }
 
 fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> Option<Joined> {
@@ -215,4 +252,27 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
         scale,
         offset,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_has_the_very_value_that_the_map_says() {
+        for (kind, number, right) in [
+            (ValueType::UInt8, 255.0, true),
+            (ValueType::UInt8, 256.0, false),
+            (ValueType::UInt8, -1.0, false),
+            (ValueType::Int32, 2.5, false),
+            (ValueType::Int64, -3.0, true),
+            (ValueType::Boolean, 1.0, true),
+            (ValueType::Boolean, 2.0, false),
+            (ValueType::Float32, 0.1, true),
+            (ValueType::Float32, 1e300, false),
+            (ValueType::Float64, 1e300, true),
+        ] {
+            assert_eq!(holds(kind, number), right, "{number} as {kind:?}");
+        }
+    }
 }

@@ -41,6 +41,8 @@ pub struct Instance {
     driver: Option<Driver>,
     /// The end of the last step, in seconds.
     time: f64,
+    /// Where the driver's time is 0, in seconds: it has none before.
+    origin: f64,
     real_time: RealTime,
     address: CString,
     record: CString,
@@ -79,6 +81,7 @@ impl Instance {
             phase: Phase::Before,
             driver: None,
             time: 0.0,
+            origin: 0.0,
             real_time: RealTime::new(0.0),
             address: CString::default(),
             record: CString::default(),
@@ -102,6 +105,7 @@ impl Instance {
         self.found = Exchange::NONE;
         self.phase = Phase::Before;
         self.time = 0.0;
+        self.origin = 0.0;
         self.real_time = RealTime::new(default_pace(&self.config));
         let file = self.config.record.as_ref().map(|record| &record.file);
         let file = file.map(|file| file.to_string_lossy().into_owned());
@@ -122,6 +126,7 @@ impl Instance {
             return Err(format!("the start time is {start}; hand in seconds"));
         }
         self.time = start;
+        self.origin = start.min(0.0);
         Ok(())
     }
 
@@ -181,7 +186,7 @@ impl Instance {
             return Err(not_next(self.time, from, length));
         }
         #[expect(clippy::cast_possible_truncation, reason = "it saturates")]
-        let at = Nanos((to * 1e9).round() as i64);
+        let at = Nanos(((to - self.origin) * 1e9).round() as i64);
         self.found = driver.exchange(at, &mut self.slots);
         self.time = to;
         if self.found.code.code() < 0 {
@@ -405,4 +410,27 @@ fn failed(code: Code, reason: &str) -> String {
         reason
     };
     format!("{name}: {what}; {remedy}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_simulation_may_begin_before_zero() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\n\
+                    [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\n[[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\n";
+        std::fs::write(folder.path().join("driver.cfg"), text).expect("a file");
+        let made = Instance::new(Version::Two, folder.path(), &token(text.as_bytes()));
+        let mut instance = made.unwrap_or_else(|why| panic!("{why}"));
+        for start in [-2.0, 0.0, 1000.0] {
+            assert_eq!(instance.begin_at(start), Ok(()));
+            assert_eq!(instance.open(), Ok(()));
+            assert_eq!(instance.step(start, 0.01), Ok(()), "{start}");
+            assert_eq!(instance.step(start + 0.01, 0.01), Ok(()), "{start}");
+            assert!(instance.step(start, 0.01).is_err(), "{start}");
+            instance.reset();
+        }
+    }
 }

@@ -58,6 +58,13 @@ unsafe fn words<'a>(text: *const c_char) -> Cow<'a, str> {
     unsafe { CStr::from_ptr(text) }.to_string_lossy()
 }
 
+/// What nobody knows the FMU of is of no use.
+fn take(journal: Option<&Journal>, status: c_int, text: &str) {
+    if let Some(journal) = journal {
+        journal.take(status, text);
+    }
+}
+
 /// The logger of FMI 3.0.
 pub(super) unsafe extern "C" fn log_of_three(
     env: Handle,
@@ -65,9 +72,10 @@ pub(super) unsafe extern "C" fn log_of_three(
     _: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: `env` is the journal that the instance was made with and that outlives it; the message is the FMU's C string.
-    let (journal, text) = unsafe { (&*env.cast::<Journal>(), words(message)) };
-    journal.take(status, &text);
+    // SAFETY: `env` is the journal that the instance was made with and that outlives it, or null where an FMU does not hand it back. The
+    // message is the FMU's C string.
+    let (journal, text) = unsafe { (env.cast::<Journal>().as_ref(), words(message)) };
+    take(journal, status, &text);
 }
 
 /// The logger of FMI 2.0, which by the standard has any number of further arguments. Rust cannot write such a function; where the
@@ -81,14 +89,14 @@ pub(super) unsafe extern "C" fn log_of_two(
     first: *const c_char,
 ) {
     // SAFETY: as above.
-    let (journal, format) = unsafe { (&*env.cast::<Journal>(), words(format)) };
+    let (journal, format) = unsafe { (env.cast::<Journal>().as_ref(), words(format)) };
     // On Apple's arm64 further arguments are on the stack.
     let has_first = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
     if has_first && matches!(format.trim_end(), "%s") {
         // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 (System V and
         // Windows) and of arm64 Linux pass it where they pass the sixth parameter of a plain function.
-        journal.take(status, &unsafe { words(first) });
+        take(journal, status, &unsafe { words(first) });
     } else {
-        journal.take(status, &format);
+        take(journal, status, &format);
     }
 }

@@ -172,6 +172,8 @@ RED = [
     ('plc.set("Run", True)', "signal 'Run' at %QX0.0 is written by the other end"),
     ('plc.await_(on("Run")).within(0)', "a limit of 0 ticks; give it a whole number, at least 1, or use expect"),
     ('plc.await_(on("Run")).within("1ms")', "a limit of 1ms is shorter than one tick of 2ms"),
+    ('plc.expect(off("Run")).during(0.5)', "a span of 0.5 ticks; give it a whole number, at least 0"),
+    ('plc.expect(off("Run")).during(-5)', "a span of -5 ticks; give it a whole number, at least 0"),
     ("plc.tick(-1)", "-1 ticks; time does not run backwards"),
     ("plc.connect(lambda same, time: same.tick()).tick()", "a machine must not let time pass in its own step"),
     ("plc.connect(3)", "3 is no machine: it has no method step"),

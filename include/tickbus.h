@@ -118,7 +118,7 @@ typedef struct tb_event {
  * another [fieldbus]. Does not wait for the PLC. `driver` gets the handle, or 0. */
 TB_IMPORT int32_t tb_open(const char *path, const char *tables, tb_driver *driver);
 
-/* Sends what was set last, and closes. */
+/* Closes. What was set since the last tb_send or tb_exchange is not sent; a recording has it if tb_receive had begun a tick. */
 TB_IMPORT int32_t tb_close(tb_driver driver);
 
 /* A tick: sends what was set, and gets what the PLC has sent. Takes no lock, makes no system call, allocates nothing; on

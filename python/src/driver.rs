@@ -284,7 +284,8 @@ impl Driver {
         self.handle.memory.is_closed() || self.handle.is_forked()
     }
 
-    /// Sends what was set last, and closes; a second time it does nothing.
+    /// Closes; a second time it does nothing. What was set since the last ``send()`` or ``exchange()`` is not sent; a recording has it
+    /// if ``receive()`` had begun a tick.
     ///
     /// In a forked child of the process that opened the driver it does nothing, too. Arrays of ``slots`` stay valid memory.
     fn close(&self, py: Python<'_>) -> PyResult<()> {

@@ -145,6 +145,13 @@ impl Handle {
             let place = DRIVERS.reserve()?;
             let driver = open(path, tables)?;
             let config = Arc::clone(driver.config());
+            if config.page.is_some() {
+                log::warn!(
+                    "driver \"{}\": {} asks for a live page, and simulations in Python have none",
+                    config.name,
+                    config.path.display()
+                );
+            }
             let signals: Vec<Description> = (0..config.table.signals.len())
                 .map(|index| Description::of(&SignalDescription::of(&driver, index), &config))
                 .collect();

@@ -213,6 +213,14 @@ def test_a_fault_is_injected_and_ended(line):
     assert [fault.name for fault in line.faults()] == [stuck.name]
 
 
+def test_a_fault_may_have_any_name_that_driver_cfg_allows(line):
+    name = "Bruch\u2028im Kabel"
+    with line.inject(kind="stuck", signal="Start", value=True, name=name) as fault:
+        line.exchange(0.002)
+        assert fault.is_active
+    assert [fault.name for fault in line.faults()] == [name]
+
+
 def test_keys_that_are_words_of_python_take_an_underscore(line):
     fault = line.inject(kind="stuck", signal="Start", value=True, at="4ms", for_="2ms")
     states = [(line.exchange(ns=tick * 2_000_000), fault.is_active)[1] for tick in range(6)]

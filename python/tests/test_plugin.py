@@ -1,5 +1,7 @@
 """The plug-in for pytest, by pytest itself: tests that pass, and tests that fail, with what they say."""
 
+from pathlib import Path
+
 import pytest
 
 from conftest import root
@@ -172,6 +174,8 @@ RED = [
     ('plc.set("Run", True)', "signal 'Run' at %QX0.0 is written by the other end"),
     ('plc.await_(on("Run")).within(0)', "a limit of 0 ticks; give it a whole number, at least 1, or use expect"),
     ('plc.await_(on("Run")).within("1ms")', "a limit of 1ms is shorter than one tick of 2ms"),
+    ('plc.expect(off("Run")).during(0.5)', "a span of 0.5 ticks; give it a whole number, at least 0"),
+    ('plc.expect(off("Run")).during(-5)', "a span of -5 ticks; give it a whole number, at least 0"),
     ("plc.tick(-1)", "-1 ticks; time does not run backwards"),
     ("plc.connect(lambda same, time: same.tick()).tick()", "a machine must not let time pass in its own step"),
     ("plc.connect(3)", "3 is no machine: it has no method step"),
@@ -258,6 +262,35 @@ def test_a_recording_is_kept_always_or_never_where_asked(tests):
     result.stdout.fnmatch_lines(["E *the test stood at tick 2 (4ms)"])
     kept = [file.name for file in tests.path.joinpath("tickbus-reports").iterdir()]
     assert len(kept) == 2 and all("test_good" in name for name in kept)
+
+
+def test_another_process_of_the_run_may_remove_the_empty_folder(tests, monkeypatch):
+    touch, removed = Path.touch, []
+
+    def late(path):
+        if not removed:
+            removed.append(path.parent)
+            path.parent.rmdir()
+        touch(path)
+
+    monkeypatch.setattr(Path, "touch", late)
+    tests.makepyfile(HEAD + "\ndef test(plc):\n    plc.tick()\n")
+    tests.runpytest_inprocess().assert_outcomes(passed=1)
+    assert removed
+
+
+def test_names_may_be_longer_than_those_of_files(tests):
+    bodies = (f"\n\ndef test_{'x' * 300}_{number}(plc):\n    assert False\n" for number in range(2))
+    tests.makepyfile(HEAD + "".join(bodies))
+    tests.runpytest_inprocess().assert_outcomes(failed=2)
+    assert len(list(tests.path.joinpath("tickbus-reports").glob("*.vcd"))) == 2
+
+
+def test_a_driver_cfg_with_mistakes_leaves_nothing(tests):
+    tests.path.joinpath("line.cfg").write_text("[driver]\n")
+    tests.makepyfile(HEAD + "\ndef test(plc):\n    pass\n")
+    tests.runpytest_inprocess().assert_outcomes(errors=1)
+    assert not tests.path.joinpath("tickbus-reports").exists()
 
 
 def test_a_machine_that_is_not_there_is_told(tests):

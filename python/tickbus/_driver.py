@@ -72,7 +72,7 @@ class Driver(_native.Driver):
 
     def faults(self) -> list["Fault"]:
         """The faults in driver.cfg and those that were injected; of those long over some may be missing."""
-        return [Fault(self, *line.split("\t")) for line in self._faults().splitlines()]
+        return [Fault(self, *line.split("\t")) for line in self._faults().split("\n") if line]
 
     def __enter__(self) -> Self:
         return self
@@ -104,7 +104,7 @@ class Fault:
         self._last = (state, begun)
 
     def _now(self) -> tuple[str, str]:
-        for line in self._driver._faults().splitlines():
+        for line in filter(None, self._driver._faults().split("\n")):
             number, state, begun, *_ = line.split("\t")
             if int(number) == self.id:
                 self._last = (state, begun)
@@ -167,7 +167,7 @@ _open: weakref.WeakSet[Driver] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Lets the drivers that are open send what was set last, and finish their recordings."""
+    """Closes the drivers that are open, so that their recordings are whole."""
     for driver in list(_open):
         try:
             driver.close()

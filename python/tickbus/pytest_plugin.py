@@ -5,8 +5,10 @@ What is expensive is imported by the fixtures, so that the plug-in costs nothing
 
 from __future__ import annotations
 
+import os
 import re
 import warnings
+import zlib
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -24,6 +26,9 @@ _MARK = (
 )
 _KEYS = ("config", "program", "options", "scan", "step", "machine", "recording")
 _RECORDING = ("on failure", "always", "never")
+_LONGEST = 200
+"""The most bytes of a recording's name without its end; file systems have room for 255."""
+_ATTEMPTS = 100
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -80,7 +85,13 @@ def _plc_bench(request: pytest.FixtureRequest) -> Iterator[_Bench]:
 
     setup = _setup(request)
     keep = _Keep(setup["recording"], request)
-    with tickbus.open(_config(setup["config"], request), keep.table() | _fieldbus(setup)) as driver:
+    config, fieldbus = _config(setup["config"], request), _fieldbus(setup)
+    try:
+        opened = tickbus.open(config, keep.table() | fieldbus)
+    except tickbus.FieldbusError:
+        keep.abandon()
+        raise
+    with opened as driver:
         machine = setup["machine"]
         bench = _Bench(Plc(driver, setup["step"]), machine() if isinstance(machine, type) else machine, keep)
         if bench.machine is not None:
@@ -155,14 +166,37 @@ class _Keep:
         self._title = request.node.name
         folder = request.config.getoption("--tickbus-reports") or request.config.rootpath / "tickbus-reports"
         name = re.sub(r"[^\w.\-]+", "-", request.node.nodeid.replace("::", ".").replace("/", ".")).strip("-")
+        if len(os.fsencode(name)) > _LONGEST:
+            name = f"{name[:40]}-{zlib.crc32(name.encode()):08x}"
         self._recording = Path(folder).resolve() / f"{name}.vcd"
 
     def table(self) -> dict[str, Any]:
         """Takes the place of driver.cfg's own: tests must not write to the plant's recording."""
         if self._when == "never":
             return {"record": {"file": "none.vcd", "when": "never"}}
-        self._recording.parent.mkdir(parents=True, exist_ok=True)
+        self._reserve()
         return {"record": {"file": self._recording}}
+
+    def _reserve(self) -> None:
+        """Makes the file. Its folder may be removed meanwhile, by another process of the same run that kept nothing."""
+        for _ in range(_ATTEMPTS):
+            with suppress(FileNotFoundError, FileExistsError):
+                self._recording.parent.mkdir(parents=True, exist_ok=True)
+                self._recording.touch()
+                return
+        self._recording.parent.mkdir(parents=True, exist_ok=True)
+
+    def abandon(self) -> None:
+        """The driver was not opened. What an earlier run has left stays."""
+        with suppress(OSError):
+            if self._recording.stat().st_size == 0:
+                self._drop()
+
+    def _drop(self) -> None:
+        self._recording.unlink(missing_ok=True)
+        # It stays if there is something else in it.
+        with suppress(OSError):
+            self._recording.parent.rmdir()
 
     def told(self) -> str:
         """Where it is, if the test has failed."""
@@ -177,10 +211,7 @@ class _Keep:
         if self._when == "never":
             return
         if failure is None and self._when != "always":
-            self._recording.unlink(missing_ok=True)
-            # It stays if there is something else in it.
-            with suppress(OSError):
-                self._recording.parent.rmdir()
+            self._drop()
             return
         texts = {"What failed": str(failure)} if failure is not None else {}
         try:

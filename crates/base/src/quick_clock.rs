@@ -14,9 +14,9 @@ const SHORTEST: u64 = SPAN / 2;
 /// The longest span from which the counter's pace is learnt: in a longer one the computer may have slept.
 const LONGEST: u64 = 1_000_000_000;
 
-/// The most counts that a look at the clock may take. If it takes longer, the thread was interrupted, and clock and counter
-/// do not belong together.
-const MOST: u64 = 20_000;
+/// The most counts that a look at the clock may take, some ten times as many as it does. If it takes longer, the thread was
+/// interrupted, and clock and counter do not belong together: the pace would be taken too fast by as much.
+const MOST: u64 = 1_000;
 
 /// The share by which the counter is taken to be slower than it was, as a power of two: a system that corrects its clock makes
 /// it faster by less.
@@ -145,6 +145,8 @@ mod tests {
         nanos: u64,
         count: u64,
         looks: usize,
+        /// How long it takes to the clock, and back.
+        way: u64,
     }
 
     impl Computer {
@@ -154,6 +156,7 @@ mod tests {
                 nanos: 5_000_000,
                 count: u64::MAX - 1_000,
                 looks: 0,
+                way: 20,
             }
         }
 
@@ -170,9 +173,9 @@ mod tests {
             let count = self.count;
             self.course.time_at(count).unwrap_or_else(|| {
                 self.looks += 1;
-                self.pass(20);
+                self.pass(self.way);
                 let now = self.clock();
-                self.pass(20);
+                self.pass(self.way);
                 self.course.learn([count, self.count], now)
             })
         }
@@ -208,6 +211,21 @@ mod tests {
             "one in a millisecond: {}",
             computer.looks
         );
+    }
+
+    #[test]
+    fn looks_that_take_long_do_not_put_it_far_ahead() {
+        for way in [150, 1_500, 3_000] {
+            let mut computer = Computer::learnt();
+            computer.way = way;
+            for _ in 0..100_000 {
+                computer.pass(100);
+                let before = computer.clock();
+                let now = computer.now();
+                assert!(now >= before, "behind the clock: {now} at {before}");
+                assert!(now - computer.clock() < Nanos(2_000), "far ahead: {now}");
+            }
+        }
     }
 
     #[test]

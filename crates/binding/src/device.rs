@@ -132,7 +132,7 @@ impl<K> Device<K> {
         count
     }
 
-    /// Sends what was written last, and closes the driver.
+    /// Closes the driver; a tick that was begun and not answered is recorded with what was written last.
     pub fn close(mut self) {
         self.driver.end_tick(self.shared.slots());
         self.driver.close();

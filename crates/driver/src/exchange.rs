@@ -47,7 +47,10 @@ impl Driver {
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
         let tick = self.counters.ticks + 1;
-        let is_watched = self.watched.as_ref().is_some_and(|watched| watched.is_wanted());
+        let is_watched = self
+            .watched
+            .as_ref()
+            .is_some_and(|watched| watched.is_wanted());
         let is_simple = self.is_simple && self.tick.is_none() && !is_watched;
         if !is_simple || tick == 1 || TickTimes::takes(tick) {
             return None;

@@ -173,6 +173,8 @@ impl tickbus_image::Receiver for Receiver<'_> {
 #[cfg(all(test, not(loom)))]
 #[expect(clippy::float_cmp, reason = "small whole numbers")]
 mod tests {
+    use std::fmt::Write as _;
+
     use super::*;
     use crate::SlotMap;
     use crate::frames::directions;
@@ -212,5 +214,90 @@ mod tests {
         let shown = [0, 1, edges].map(|slot| slots[slot].real());
         assert!(station.stale);
         assert_eq!(shown, [0.0, 7.0, 0.0]);
+    }
+
+    #[test]
+    fn the_quick_way_through_a_station_finds_and_sends_what_the_slow_one_does() {
+        let mut text =
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n"
+                .to_owned();
+        for (area, bit) in ["I", "Q"]
+            .into_iter()
+            .flat_map(|area| (0..8).map(move |bit| (area, bit)))
+        {
+            let latch = match (bit % 3, area) {
+                (0, _) => "",
+                (1, "I") => "latch = \"rising\"\nhold = \"7ns\"\n",
+                _ => "latch = \"both\"\n",
+            };
+            write!(
+                text,
+                "[[signal]]\nname = \"{area}{bit}\"\naddress = \"%{area}X0.{bit}\"\n{latch}"
+            )
+            .expect("a text takes it");
+        }
+        let config = Config::parse("driver.cfg", &text).expect("right");
+        let (table, role, map) = (
+            &config.table,
+            Role::Device,
+            SlotMap::new(&config.table, Role::Device),
+        );
+        let mut ends = [(); 2].map(|()| {
+            let (tick, bus) = image(directions(table, role));
+            let tick = tick.stations.into_iter().next().expect("one");
+            let bus = bus.stations.into_iter().next().expect("one");
+            (
+                Station::new(tick, table, 0, role.areas()),
+                bus,
+                vec![Slot::default(); map.count],
+            )
+        });
+        let (mut now, mut random) = (Nanos(1), 1_u64);
+        for step in 0..20_000 {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let draw = |shift: u32, below: u64| (random >> shift) % below;
+            now += Nanos(i64::try_from(draw(20, 4) * draw(24, 4)).expect("small"));
+            let bit = usize::try_from(draw(28, 8)).expect("a bit");
+            let level = [0.0, 1.0, 1.0, f64::NAN][usize::try_from(draw(32, 4)).expect("one")];
+            let found = [true, false].map(|is_quick| {
+                let (station, bus, slots) = &mut ends[usize::from(is_quick)];
+                match draw(40, 8) {
+                    0 | 1 => bus.received(now, &[draw(44, 256).to_le_bytes()[0]]),
+                    2 => bus.touch(now),
+                    3 => bus.set_valid(draw(44, 4) != 0),
+                    _ => {}
+                }
+                slots[bit] = Slot::from_real(level);
+                let mut counters = TickCounters::default();
+                let (age, sequence) = if is_quick {
+                    station.send(now, slots, &mut counters);
+                    let arrival = station.receive(now, Nanos(20), slots, &map);
+                    (arrival.age, arrival.sequence)
+                } else {
+                    station.send_any(now, slots, &mut counters);
+                    let valid = station.is_valid();
+                    let arrival = station.receive_as(valid, (now, Nanos(20)), slots, &map);
+                    (arrival.age, arrival.sequence)
+                };
+                let sent = bus.outgoing(now, Some(Nanos(30))).to_vec();
+                if draw(52, 3) == 0 {
+                    bus.sent();
+                }
+                let slots: Vec<u64> = slots.iter().map(|slot| slot.0).collect();
+                let mut edges = Vec::new();
+                station.edges(|signal, count| edges.push((signal, count)));
+                (
+                    sent,
+                    slots,
+                    edges,
+                    (age, sequence),
+                    (station.status, station.stale),
+                    counters,
+                )
+            });
+            assert_eq!(found[0], found[1], "step {step}");
+        }
     }
 }

@@ -286,6 +286,8 @@ class Expectation:
         plc = self._plc
         if not isinstance(span, str) and (unit is None or unit.nanos is None):
             count = int(span)
+            if count < 0 or count != span:
+                raise ValueError(f"a span of {span} ticks; give it a whole number, at least 0, or a duration such as \"1.5s\"")
         else:
             count = -(-plc._nanos(span, unit) // plc.step_ns)
         begin = plc.ticks

@@ -44,6 +44,8 @@ impl Driver {
             Bus::Free(_) => clock,
             Bus::Stepped(_) => Arc::clone(&simulation_time) as _,
         };
+        // Before the bus starts: what has to be found out for it would be time in which the bus finds no tick.
+        let quick = QuickClock::new(Arc::clone(&clock));
         let watchdog = config.timing.watchdog;
         let board = Arc::<FaultBoard>::default();
         let (signs, max_age) = (&config.life_signs, config.timing.max_age);
@@ -92,7 +94,7 @@ impl Driver {
             recorder,
             stations,
             line,
-            quick: QuickClock::new(Arc::clone(&clock)),
+            quick,
             clock,
             max_age: config.timing.max_age,
             status,

@@ -15,16 +15,20 @@ mod x86_64 {
         reason = "the instruction that reads the counter is an unsafe function before Rust 1.89 or so"
     )]
 
+    use std::sync::LazyLock;
+
     use super::TimeStampCounter;
 
     /// Where Linux says what it takes its time from.
     const SOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
 
     impl TimeStampCounter {
-        /// The counter, if the system trusts it.
+        /// The counter, if the system trusts it. It is asked once per process.
         pub fn trusted() -> Option<Self> {
-            let source = std::fs::read_to_string(SOURCE).ok()?;
-            (source.trim() == "tsc").then_some(Self(()))
+            static IS_TRUSTED: LazyLock<bool> = LazyLock::new(|| {
+                std::fs::read_to_string(SOURCE).is_ok_and(|source| source.trim() == "tsc")
+            });
+            IS_TRUSTED.then_some(Self(()))
         }
 
         /// What it counts now. It may wrap, and is not the same after the computer has slept.

@@ -214,7 +214,12 @@ fn metrics() -> Result<(), Absent> {
     let machine = Machine::start("kind = \"modbus-server\"", "keep_forced = true");
     machine.ask(&format!("PUT {LEVEL}"), "125.0");
     eventually("it is forced", || machine.signal(2)["value"] == 125);
-    let text = machine.ask("GET /metrics", "");
+    // The statistics are made anew twice a second.
+    let mut text = String::new();
+    eventually("the statistics tell of it", || {
+        text = machine.ask("GET /metrics", "");
+        text.contains("key=\"fault.begun\"")
+    });
     let mut reader = python
         .arg("tests/peers/read_metrics.py")
         .stdin(Stdio::piped())

@@ -1,4 +1,4 @@
-//! Mosquitto, if it is installed: a value line is a message at QoS 0.
+//! Mosquitto, if it is installed: a value line is a message at `QoS` 0.
 
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};

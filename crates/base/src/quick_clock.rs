@@ -28,7 +28,7 @@ const TOLERANCE: u32 = 6;
 /// A clock for who looks at it millions of times per second: between two looks at the system's, which are a millisecond
 /// apart or less, it takes the time from the processor's counter, in a third of the time.
 ///
-/// It is never behind the clock that it was made of, and at most 2 us ahead of it: ages that are measured with it are not
+/// It is never behind the clock that it was made of, and about 2 us ahead of it at most: ages that are measured with it are not
 /// understated. It never goes back. A system that corrects its clock by more than one part in a thousand can put it
 /// behind by as much of one millisecond; systems correct theirs by half of that, unless they are made to set the time
 /// right in a hurry.
@@ -114,7 +114,7 @@ impl Course {
             return self.latest;
         }
         let rate = Self::rate_of(before.wrapping_sub(self.count_after), span);
-        // A pace that was not the same twice is none.
+        // Two spans in a row have to agree before the counter is used.
         let is_even = rate > 0 && rate.abs_diff(self.rate) <= rate >> TOLERANCE;
         self.limit = if is_even { (SPAN << 32) / rate } else { 0 };
         self.rate = rate;

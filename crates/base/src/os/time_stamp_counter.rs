@@ -4,7 +4,7 @@
 ///
 /// Linux does so only where the counter runs evenly, on all processors alike and while they idle; it keeps checking, and
 /// changes to another source of time if it finds otherwise. In a virtual machine it is the host that has to promise this.
-/// Elsewhere there is none: the system's clock is used.
+/// On other systems the counter is not used: the system's clock is read instead.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeStampCounter(());
 
@@ -44,7 +44,7 @@ mod x86_64 {
 
 #[cfg(not(all(target_os = "linux", target_arch = "x86_64", not(miri))))]
 impl TimeStampCounter {
-    /// There is none here.
+    /// Not used on this system.
     pub const fn trusted() -> Option<Self> {
         None
     }

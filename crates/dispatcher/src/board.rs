@@ -124,6 +124,8 @@ pub(crate) struct Board {
     /// What has changed, if there are other dispatchers to be told.
     changes: Option<Vec<Change>>,
     patch: Patch,
+    /// Whether it is as it was saved last, or was in the beginning.
+    is_saved: bool,
     /// Channels of clients that are here, and what an operator holds them at.
     forces: BTreeMap<Pin, Number>,
     on_loss: OnLoss,
@@ -144,6 +146,7 @@ impl Board {
             supplies: BTreeMap::new(),
             changes: None,
             patch,
+            is_saved: true,
             forces: BTreeMap::new(),
             on_loss,
             touched: Vec::new(),
@@ -154,6 +157,16 @@ impl Board {
 
     pub(crate) fn patch(&self) -> &Patch {
         &self.patch
+    }
+
+    /// Whether the patch has not changed since it was saved.
+    pub(crate) const fn is_saved(&self) -> bool {
+        self.is_saved
+    }
+
+    /// The patch was saved as it is.
+    pub(crate) const fn set_saved(&mut self) {
+        self.is_saved = true;
     }
 
     /// Makes sure that there is this seat, with nobody on it.
@@ -326,6 +339,7 @@ impl Board {
         self.join(&sink, &source);
         self.changed(Change::Patched(sink.clone(), Some(source.clone())));
         self.patch.connect(sink, source);
+        self.is_saved = false;
     }
 
     /// Cuts the connection of an input.
@@ -333,6 +347,7 @@ impl Board {
         let Some(source) = self.patch.disconnect(sink) else {
             return;
         };
+        self.is_saved = false;
         self.changed(Change::Patched(sink.clone(), None));
         if let (Some(to), Some(from)) = (self.place(sink), self.place(&source)) {
             self.part(to, from);
@@ -402,13 +417,17 @@ impl Board {
             return;
         }
         output.value = value;
-        let count = output.sinks.len();
-        for at in 0..count {
-            let output = self.output(Place { seat, channel });
-            let Some(to) = output.and_then(|output| output.sinks.get(at).copied()) else {
-                return;
-            };
+        if let [to] = *output.sinks {
             self.deliver(to, value, false);
+            return;
+        }
+        // They are not changed meanwhile.
+        let sinks = std::mem::take(&mut output.sinks);
+        for to in &sinks {
+            self.deliver(*to, value, false);
+        }
+        if let Some(output) = self.output(Place { seat, channel }) {
+            output.sinks = sinks;
         }
     }
 

@@ -9,10 +9,10 @@ use std::net::SocketAddr;
 use tickbus_base::time::Nanos;
 
 use crate::board::{Board, OnLoss, Traffic};
-use crate::channel::Channel;
+use crate::channel::{Channel, Counts};
 use crate::device::{Device, Role};
 use crate::federation::{Federation, Request};
-use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, Values};
+use crate::grammar::{self, Channels, Identification, Joints, LONGEST_LINE, Line, QUICK, Values};
 use crate::host::HostId;
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
@@ -305,12 +305,19 @@ impl Dispatcher {
                 "the patch could not be saved ({why}); it holds until the dispatcher ends"
             ))
         });
-        for Promised { author, sinks } in std::mem::take(&mut self.promised) {
-            self.conclude(author, outcome.clone());
-            self.board.begin_line();
-            for sink in sinks {
-                self.board.refresh(&sink);
-            }
+        if outcome.is_ok() {
+            self.board.set_saved();
+        }
+        for promised in std::mem::take(&mut self.promised) {
+            self.fulfil(promised, outcome.clone());
+        }
+    }
+
+    fn fulfil(&mut self, Promised { author, sinks }: Promised, outcome: Result<(), Refusal>) {
+        self.conclude(author, outcome);
+        self.board.begin_line();
+        for sink in sinks {
+            self.board.refresh(&sink);
         }
     }
 
@@ -339,6 +346,8 @@ impl Dispatcher {
             if !session.begun.is_empty() {
                 self.resumable.push(seat);
             }
+            // Its bytes are wanted again, even if there was nothing to say.
+            self.board.touch(seat);
         }
     }
 
@@ -371,27 +380,21 @@ impl Dispatcher {
         let mut at = 0;
         let mut counts = self.board.device(seat).map(|device| device.counts);
         while at < bytes.len() {
+            let is_skipping = match &self.sessions[seat] {
+                Some(session) if session.progress == Progress::Closing => return bytes.len(),
+                Some(session) if session.progress == Progress::Going => session.is_skipping,
+                _ => break,
+            };
+            let rest = &bytes[at..];
+            let quick = counts.filter(|_| !is_skipping);
+            let quick = quick.map_or(0, |counts| self.quick_lines(seat, rest, counts));
             let Some(session) = &mut self.sessions[seat] else {
                 break;
             };
-            if session.progress == Progress::Closing {
-                return bytes.len();
-            }
-            if session.progress == Progress::Stuck {
-                break;
-            }
-            let rest = &bytes[at..];
-            if let Some(counts) = counts
-                && !session.is_skipping
-            {
-                self.items.clear();
-                if let Some(length) = grammar::quick_values(rest, counts, &mut self.items) {
-                    session.heard = now;
-                    self.board.traffic.lines += 1;
-                    self.set_values(seat);
-                    at += length;
-                    continue;
-                }
+            if quick > 0 {
+                session.heard = now;
+                at += quick;
+                continue;
             }
             let Some(end) = rest.iter().position(|byte| *byte == b'\n') else {
                 if session.is_skipping {
@@ -428,6 +431,30 @@ impl Dispatcher {
             counts = self.board.device(seat).map(|device| device.counts);
         }
         at
+    }
+
+    /// Works on the lines of values in their usual form at the beginning of `bytes`; returns how many bytes those were.
+    fn quick_lines(&mut self, seat: usize, bytes: &[u8], counts: Counts) -> usize {
+        let mut done = 0;
+        while let Some(line) = bytes.get(done..)
+            && line.starts_with(QUICK)
+        {
+            let mut value = grammar::quick_value(line, QUICK.len(), counts);
+            // Most lines have one value. Of others nothing holds before all is read: it may be wrong.
+            self.items.clear();
+            while let Some(first) = value.take_if(|it| !it.is_last) {
+                self.items.push((first.place, first.number));
+                value = grammar::quick_value(line, first.next, counts);
+            }
+            let Some(last) = value else {
+                break;
+            };
+            self.board.traffic.lines += 1;
+            self.set_values(seat);
+            self.board.set(seat, last.place, last.number);
+            done += last.next;
+        }
+        done
     }
 
     /// Carries a line out.

@@ -367,55 +367,57 @@ pub(crate) fn printable(bytes: &[u8]) -> String {
     bytes.iter().map(character).collect()
 }
 
-/// Reads a line of values in its usual form at the beginning of `bytes`, in one pass: the places of the outputs of a
-/// client with these `counts`, and the numbers. Returns the length of the line with its end, or `None` if the line has to
-/// be looked at properly.
+/// A value in its usual form within a line.
+pub(crate) struct QuickValue {
+    /// The place of its output.
+    pub(crate) place: usize,
+    pub(crate) number: Number,
+    /// Where the next value begins, or the next line.
+    pub(crate) next: usize,
+    pub(crate) is_last: bool,
+}
+
+/// How a line of values in its usual form begins.
+pub(crate) const QUICK: &[u8] = b"P ";
+
+/// Reads a value in its usual form from `at` on in a line of values, in one pass; its client has these `counts`. `None` if the
+/// line has to be looked at properly.
 #[inline]
-pub(crate) fn quick_values(
-    bytes: &[u8],
-    counts: Counts,
-    items: &mut Vec<(usize, Number)>,
-) -> Option<usize> {
-    let &[b'P', b' ', ..] = bytes else {
-        return None;
-    };
-    let mut at = 2;
-    loop {
-        let kind = match *bytes.get(at)? {
-            b'Q' => Kind::DigitalOutput,
-            b'A' if *bytes.get(at + 1)? == b'Q' => {
-                at += 1;
-                Kind::AnalogOutput
-            }
-            _ => return None,
-        };
-        at += 1;
-        let first = at;
-        let mut number = 0_u16;
-        while let digit @ b'0'..=b'9' = *bytes.get(at)? {
-            if at - first == 4 {
-                return None;
-            }
-            number = number * 10 + u16::from(digit - b'0');
+pub(crate) fn quick_value(bytes: &[u8], mut at: usize, counts: Counts) -> Option<QuickValue> {
+    let kind = match *bytes.get(at)? {
+        b'Q' => Kind::DigitalOutput,
+        b'A' if *bytes.get(at + 1)? == b'Q' => {
             at += 1;
+            Kind::AnalogOutput
         }
-        if at == first || bytes[at] != b'=' {
+        _ => return None,
+    };
+    at += 1;
+    let first = at;
+    let mut number = 0_u16;
+    while let digit @ b'0'..=b'9' = *bytes.get(at)? {
+        if at - first == 4 {
             return None;
         }
-        let place = counts.place(Channel { kind, number })?;
-        let (value, length) = Number::quick(&bytes[at + 1..])?;
-        items.push((place, value));
-        at += 1 + length;
-        at += match *bytes.get(at)? {
-            b' ' | b'\n' => 1,
-            b'\r' if *bytes.get(at + 1)? == b'\n' => 2,
-            _ => return None,
-        };
-        if at > LONGEST_LINE {
-            return None;
-        }
-        if bytes[at - 1] == b'\n' {
-            return Some(at);
-        }
+        number = number * 10 + u16::from(digit - b'0');
+        at += 1;
     }
+    if at == first || bytes[at] != b'=' {
+        return None;
+    }
+    let place = counts.place(Channel { kind, number })?;
+    let (number, length) = Number::quick(&bytes[at + 1..])?;
+    at += 1 + length;
+    let end = *bytes.get(at)?;
+    at += match end {
+        b' ' | b'\n' => 1,
+        b'\r' if *bytes.get(at + 1)? == b'\n' => 2,
+        _ => return None,
+    };
+    (at <= LONGEST_LINE).then_some(QuickValue {
+        place,
+        number,
+        next: at,
+        is_last: end != b' ',
+    })
 }

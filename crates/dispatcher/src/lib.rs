@@ -24,6 +24,7 @@ mod patch_file;
 mod post;
 mod refusal;
 pub mod tcp;
+mod trickle;
 mod volts;
 
 /// The TCP port on which a dispatcher listens, unless it is started with another one.

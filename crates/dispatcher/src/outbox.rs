@@ -131,6 +131,8 @@ impl Outbox {
         text[at..at + 24].copy_from_slice(number.padded());
         at += number.len();
         text[at..at + 2].copy_from_slice(b"\r\n");
-        self.bytes.extend_from_slice(&text[..at + 2]);
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(&text);
+        self.bytes.truncate(start + at + 2);
     }
 }

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::thread;
 
 use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Clock, Nanos, Stop};
@@ -14,6 +15,7 @@ use crate::dispatcher::Dispatcher;
 use crate::door::Door;
 use crate::patch_file::PatchFile;
 use crate::post::Post;
+use crate::trickle::Trickle;
 
 /// The key of the listener in the poll set; a client's key is its seat.
 const LISTENER: usize = usize::MAX - 1;
@@ -106,6 +108,7 @@ impl Listener {
             buffer: vec![0; BUFFER].into(),
             ready: Vec::new(),
             accept_paused_until: None,
+            trickle: Trickle::default(),
         };
         let mut outcome = Ok(());
         while outcome.is_ok() && !host.hosting.stop.is_stopped() {
@@ -123,7 +126,28 @@ impl Listener {
 
 struct Connection {
     stream: TcpStream,
-    interest: Interest,
+    /// What the set waits for; `None` while it is not in the set, since nothing is wanted from it.
+    interest: Option<Interest>,
+}
+
+impl Connection {
+    /// Waits for something else from now on.
+    fn watch(
+        &mut self,
+        set: &mut PollSet,
+        seat: usize,
+        wanted: Option<Interest>,
+    ) -> io::Result<()> {
+        match (self.interest, wanted) {
+            (before, after) if before == after => return Ok(()),
+            (Some(_), Some(interest)) => set.change(seat, &self.stream, interest)?,
+            (None, Some(interest)) => set.add(seat, &self.stream, interest)?,
+            // Not merely without an interest: a connection that breaks would be reported all the same, again and again.
+            (_, None) => set.remove(seat, &self.stream),
+        }
+        self.interest = wanted;
+        Ok(())
+    }
 }
 
 struct Host<'d, 'h> {
@@ -138,6 +162,7 @@ struct Host<'d, 'h> {
     buffer: Box<[u8]>,
     ready: Vec<Ready>,
     accept_paused_until: Option<Nanos>,
+    trickle: Trickle,
 }
 
 impl Host<'_, '_> {
@@ -155,7 +180,7 @@ impl Host<'_, '_> {
                 continue;
             }
             if ready.is_readable {
-                self.read(now, ready.key);
+                self.read(now, ready.key)?;
             }
             if ready.is_writable {
                 self.write(ready.key)?;
@@ -195,15 +220,24 @@ impl Host<'_, '_> {
             self.accept_paused_until = None;
             self.set.add(LISTENER, &self.listener, Interest::Read)?;
         }
+        if self.trickle.turn(now, self.dispatcher.traffic().lines) {
+            thread::yield_now();
+        }
         Ok(())
     }
 
-    fn read(&mut self, now: Nanos, seat: usize) {
+    fn read(&mut self, now: Nanos, seat: usize) -> io::Result<()> {
         let Some(connection) = self.connections.get_mut(seat).and_then(Option::as_mut) else {
-            return;
+            return Ok(());
         };
         if !self.dispatcher.wants_bytes(seat) {
-            return;
+            // It waits for an answer, which may come from another host. What it says meanwhile must not keep this thread
+            // awake. What ends its wait touches it, and `write` waits for it again.
+            let wanted = match connection.interest {
+                Some(Interest::ReadWrite | Interest::Write) => Some(Interest::Write),
+                Some(Interest::Read) | None => None,
+            };
+            return connection.watch(&mut self.set, seat, wanted);
         }
         match connection.stream.read(&mut self.buffer) {
             Ok(0) => self.drop_client(seat),
@@ -211,6 +245,7 @@ impl Host<'_, '_> {
             Err(error) if is_for_later(&error) => {}
             Err(_) => self.drop_client(seat),
         }
+        Ok(())
     }
 
     /// Writes what the system takes, and closes if that was the last.
@@ -242,22 +277,20 @@ impl Host<'_, '_> {
             self.close(seat);
             return Ok(());
         }
-        let interest = match (is_blocked, self.dispatcher.wants_bytes(seat)) {
-            (false, _) => Interest::Read,
-            (true, true) => Interest::ReadWrite,
-            (true, false) => Interest::Write,
+        let wanted = match (is_blocked, self.dispatcher.wants_bytes(seat)) {
+            (false, true) => Some(Interest::Read),
+            (false, false) => None,
+            (true, true) => Some(Interest::ReadWrite),
+            (true, false) => Some(Interest::Write),
         };
-        if interest != connection.interest {
-            connection.interest = interest;
-            self.set.change(seat, &connection.stream, interest)?;
-        }
-        Ok(())
+        connection.watch(&mut self.set, seat, wanted)
     }
 
     /// The connection of a seat is gone.
     fn drop_client(&mut self, seat: usize) {
-        if let Some(connection) = self.connections[seat].take() {
-            self.set.remove(seat, &connection.stream);
+        if let Some(mut connection) = self.connections[seat].take() {
+            // Without an interest nothing can fail.
+            let _ = connection.watch(&mut self.set, seat, None);
             self.dispatcher.gone(seat);
         }
     }
@@ -303,7 +336,7 @@ impl Host<'_, '_> {
             if seat >= self.connections.len() {
                 self.connections.resize_with(seat + 1, || None);
             }
-            let interest = Interest::Read;
+            let interest = Some(Interest::Read);
             self.connections[seat] = Some(Connection { stream, interest });
         }
         Ok(())

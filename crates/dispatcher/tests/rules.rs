@@ -508,3 +508,38 @@ fn a_patch_that_cannot_be_saved_is_told_and_holds() {
     lab.say(from, "P Q1=1");
     assert_eq!(lab.hear(to), ["P I1=1"]);
 }
+
+#[test]
+fn who_asks_again_for_the_connections_that_it_has_is_answered_without_a_further_save() {
+    let mut lab = Lab::new();
+    let pump = lab.join("VP PUMP Q01");
+    let line = b"CONNECT I1:PUMP:Q1\r\n";
+    for round in 0..3 {
+        let logo = lab.join("VR LOGO I01 V=2");
+        lab.say(pump, &format!("P Q1={round}"));
+        lab.hear(logo);
+        lab.dispatcher.arrived(lab.now, logo, line);
+        let is_unsaved = lab.dispatcher.unsaved().is_some();
+        assert_eq!(
+            is_unsaved,
+            round == 0,
+            "only the first one changes the patch"
+        );
+        lab.settle();
+        assert_eq!(
+            lab.hear(logo),
+            ["OK CONNECT".to_owned(), format!("P I1={round}")]
+        );
+        lab.dispatcher.gone(logo);
+    }
+    // What could not be saved is tried again.
+    let logo = lab.join("VR LOGO I01 V=2");
+    lab.say(logo, "DISCONNECT I1");
+    lab.hear(logo);
+    for _ in 0..2 {
+        lab.dispatcher.arrived(lab.now, logo, line);
+        assert!(lab.dispatcher.unsaved().is_some());
+        lab.dispatcher.saved(&Err("disk full".to_owned()));
+        refused(&lab.hear(logo)[..1], 500);
+    }
+}

@@ -8,7 +8,7 @@ use std::net::{SocketAddr, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 use std::thread;
 
@@ -82,6 +82,15 @@ impl Client {
         self.say(line);
         self.hear()
     }
+
+    /// The list of devices.
+    fn list(&mut self) -> String {
+        let mut all = self.ask("LIST");
+        while !all.contains("END ") {
+            all += &self.hear();
+        }
+        all
+    }
 }
 
 #[test]
@@ -110,14 +119,31 @@ struct Pipe {
     own: Door,
     other: Door,
     is_busy: Arc<AtomicBool>,
+    cable: Arc<Cable>,
+}
+
+/// What becomes of the letters.
+#[derive(Default)]
+struct Cable {
+    /// They are lost.
+    is_cut: AtomicBool,
+    /// How many were.
+    lost: AtomicUsize,
+    /// How often a loop has asked whether there is room: once per turn, and once per letter.
+    asked: AtomicUsize,
 }
 
 impl Post for Pipe {
     fn has_room(&self) -> bool {
+        self.cable.asked.fetch_add(1, Ordering::Relaxed);
         !self.is_busy.load(Ordering::Relaxed)
     }
 
     fn send(&mut self, _: HostId, letter: Vec<u8>) {
+        if self.cable.is_cut.load(Ordering::Relaxed) {
+            self.cable.lost.fetch_add(1, Ordering::Relaxed);
+            return;
+        }
         self.is_busy.store(true, Ordering::Relaxed);
         let (own, is_busy) = (self.own.clone(), Arc::clone(&self.is_busy));
         self.other.send(move |dispatcher, now| {
@@ -128,10 +154,11 @@ impl Post for Pipe {
     }
 }
 
-#[test]
-fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
+/// Runs `test` with two dispatchers that are joined by a cable, once each has told that the other is there.
+fn serve_two(test: impl FnOnce([SocketAddr; 2], &Cable)) {
     let stops = [Stop::new(), Stop::new()];
     let doors = [Door::new(&stops[0]), Door::new(&stops[1])];
+    let cable = Arc::new(Cable::default());
     let (news, told) = channel();
     thread::scope(|scope| {
         let mut addresses = Vec::new();
@@ -140,7 +167,7 @@ fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
             addresses.push(listener.address());
             let (own, other) = (doors[at].clone(), doors[1 - at].clone());
             let door = &doors[at];
-            let news = news.clone();
+            let (news, cable) = (news.clone(), Arc::clone(&cable));
             scope.spawn(move || {
                 let mut dispatcher = Dispatcher::new(Settings::default(), Patch::new());
                 let id = |at: usize| HostId(at as u128 + 1);
@@ -151,13 +178,14 @@ fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
                     own,
                     other,
                     is_busy,
+                    cable,
                 });
                 let hosting = Hosting {
                     clock: &*Monotonic::shared(),
                     stop,
                     door: Some(door),
                     patch_file: None,
-                    news: &mut |line| news.send(line.to_owned()).expect("it is heard"),
+                    news: &mut |line| drop(news.send(line.to_owned())),
                 };
                 let listener = listener.with_post(post);
                 listener.run(&mut dispatcher, hosting).expect("it serves");
@@ -170,20 +198,55 @@ fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
                     .iter()
                     .all(|line| line.contains("is here; its clients: 0"))
             );
-            let mut pump = Client::join(addresses[0], "VP PUMP Q01");
-            let mut logo = Client::join(addresses[1], "VR LOGO I01");
-            pump.say("P Q1=0");
-            while !logo.ask("CONNECT I1:PUMP:Q1").starts_with("OK") {}
-            assert_eq!(logo.hear(), "P I1=0");
-            for value in 1..100 {
-                pump.say(&format!("P Q1={value}"));
-            }
-            for value in 1..100 {
-                assert_eq!(logo.hear(), format!("P I1={value}"));
-            }
+            test([addresses[0], addresses[1]], &cable);
         }));
         stops.iter().for_each(Stop::stop);
         outcome.unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+    });
+}
+
+#[test]
+fn two_loops_pass_letters_to_each_other_and_tell_their_news() {
+    serve_two(|[left, right], _| {
+        let mut pump = Client::join(left, "VP PUMP Q01");
+        let mut logo = Client::join(right, "VR LOGO I01");
+        pump.say("P Q1=0");
+        while !logo.ask("CONNECT I1:PUMP:Q1").starts_with("OK") {}
+        assert_eq!(logo.hear(), "P I1=0");
+        for value in 1..100 {
+            pump.say(&format!("P Q1={value}"));
+        }
+        for value in 1..100 {
+            assert_eq!(logo.hear(), format!("P I1={value}"));
+        }
+    });
+}
+
+#[test]
+fn a_client_that_waits_for_another_host_keeps_no_loop_awake_and_is_heard_again() {
+    serve_two(|[left, right], cable| {
+        let mut other = Client::join(left, "VP OTHER Q01");
+        let _logo = Client::join(right, "VR LOGO I01");
+        // A client of version 1 gets no answer, and is heard again all the same.
+        let mut pump = Client::connect(left);
+        pump.say("VP PUMP Q01");
+        while !other.list().contains("VR:LOGO:") {}
+        cable.is_cut.store(true, Ordering::Relaxed);
+        pump.say("CONNECT Q1:LOGO:I1");
+        // Who is answered came later: that line was read.
+        assert_eq!(other.ask("PING"), "OK PING");
+        // While its answer is awaited, there is something to be read.
+        pump.say("PING");
+        // Signs of life come once a second. A loop that is kept awake has made thousands of turns by then.
+        let lost = || cable.lost.load(Ordering::Relaxed);
+        let (before, beats) = (cable.asked.load(Ordering::Relaxed), lost() + 3);
+        while lost() < beats {
+            thread::yield_now();
+        }
+        let turns = cable.asked.load(Ordering::Relaxed) - before;
+        assert!(turns < 100, "{turns} turns");
+        cable.is_cut.store(false, Ordering::Relaxed);
+        while pump.hear() != "OK PING" {}
     });
 }
 

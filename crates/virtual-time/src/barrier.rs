@@ -9,6 +9,7 @@ use tickbus_image::signal::DataType;
 
 use crate::hash::Trace;
 use crate::logic::{Access, Hook, Logic};
+use crate::members::{Client, Members};
 use crate::shared_data::SharedData;
 use crate::{Declaration, Outcome, Step};
 
@@ -185,6 +186,29 @@ impl<'l> Barrier<'l> {
     /// What a client reads in this step.
     pub(crate) fn snapshot(&self, client: usize) -> &[u64] {
         &self.members[client].snapshot
+    }
+
+    /// Who takes part.
+    pub(crate) fn members(&self) -> Members {
+        let client = |member: &Member| Client {
+            name: member.declaration.name.clone(),
+            multiple: member.declaration.multiple,
+            writes: member.writes.clone(),
+        };
+        Members {
+            clients: self.members.iter().map(client).collect(),
+            variables: self.data.variables().to_vec(),
+        }
+    }
+
+    /// The values that all see, one per variable.
+    pub(crate) fn committed(&self) -> &[u64] {
+        self.data.committed()
+    }
+
+    /// Per client, whether it has not answered yet.
+    pub(crate) fn owes(&self) -> Vec<bool> {
+        self.members.iter().map(|member| member.owes).collect()
     }
 
     /// The clients that have not answered yet.

@@ -6,13 +6,22 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tickbus_base::time::{Clock, Nanos, Stop};
 
 use crate::server::{Control, Server};
+use crate::view::RunView;
 use crate::wire::{self, FromClient};
 
 /// Controls a server from other threads. Clones control the same server.
 #[derive(Clone, Debug, Default)]
 pub struct Controls {
-    asked: Arc<Mutex<Vec<Control>>>,
+    asked: Arc<Mutex<Asked>>,
     stop: Stop,
+}
+
+/// What the server was asked for, and what it has shown.
+#[derive(Debug, Default)]
+struct Asked {
+    controls: Vec<Control>,
+    wants_view: bool,
+    view: Option<RunView>,
 }
 
 impl Controls {
@@ -25,12 +34,26 @@ impl Controls {
 
     /// Asks the server for something; it does so within some 20 ms.
     pub fn send(&self, control: Control) {
-        self.lock().push(control);
+        self.lock().controls.push(control);
         self.stop.wake();
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Control>> {
-        // A list is in order after every single change.
+    /// Asks the server for a copy of the run, for [`take_view`](Self::take_view); it makes one within some 20 ms, and none any
+    /// more once the run has ended.
+    pub fn ask_view(&self) {
+        let is_new = !std::mem::replace(&mut self.lock().wants_view, true);
+        if is_new {
+            self.stop.wake();
+        }
+    }
+
+    /// The copy that was asked for, if it has come. Each is given once, to whoever comes first.
+    pub fn take_view(&self) -> Option<RunView> {
+        self.lock().view.take()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Asked> {
+        // It is in order after every single change.
         self.asked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -42,12 +65,20 @@ impl Controls {
     /// Passes on what was asked.
     pub(crate) fn apply(&self, now: Nanos, server: &mut Server<'_>) {
         // A hook may send one, too.
-        let asked = std::mem::take(&mut *self.lock());
-        for control in asked {
+        let (controls, wants_view) = {
+            let mut asked = self.lock();
+            let wants_view = std::mem::take(&mut asked.wants_view);
+            (std::mem::take(&mut asked.controls), wants_view)
+        };
+        for control in controls {
             server.control(now, control);
         }
         if self.stop.is_stopped() {
             server.control(now, Control::Stop);
+        }
+        if wants_view {
+            let view = server.view(now);
+            self.lock().view = view;
         }
     }
 }

@@ -3,8 +3,10 @@
 mod joining;
 mod message;
 mod patience;
+mod showing;
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace};
@@ -12,6 +14,7 @@ use tickbus_base::toml_text::shown;
 
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
+use crate::members::Members;
 use crate::{Cause, Declaration, Ended, Outcome, Settings, Step};
 use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
@@ -47,6 +50,8 @@ pub struct Server<'l> {
     /// By when the run has to have ended.
     stop_by: Option<Nanos>,
     pace: Option<Pace>,
+    /// Who takes part, once somebody has looked at the running run.
+    shown: Option<Arc<Members>>,
 }
 
 #[derive(Debug)]
@@ -99,6 +104,7 @@ impl<'l> Server<'l> {
             singles: 0,
             stop_by: None,
             pace: None,
+            shown: None,
         })
     }
 

@@ -103,7 +103,6 @@ impl SharedData {
     }
 
     /// All variables, in order.
-    #[cfg(feature = "script")]
     pub(crate) fn variables(&self) -> &[Variable] {
         &self.variables
     }

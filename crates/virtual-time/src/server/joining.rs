@@ -3,6 +3,7 @@
 use tickbus_base::Mistake;
 
 use crate::declaration::check_name;
+use crate::members::{Client, Members};
 use crate::{Declaration, StartCondition};
 
 /// The most clients of one run.
@@ -98,6 +99,21 @@ impl Joining {
                     listed(self.joined.iter().map(|(_, declaration)| &declaration.name))
                 )
             }
+        }
+    }
+
+    /// Who has joined, in the order of their names; what they write is told when the run starts.
+    pub(super) fn members(&self) -> Members {
+        let client = |(_, declaration): &(usize, Declaration)| Client {
+            name: declaration.name.clone(),
+            multiple: declaration.multiple,
+            writes: 0..0,
+        };
+        let mut clients: Vec<Client> = self.joined.iter().map(client).collect();
+        clients.sort_by(|a, b| a.name.cmp(&b.name));
+        Members {
+            clients,
+            variables: Vec::new(),
         }
     }
 

@@ -8,9 +8,9 @@ mod none;
 mod open;
 
 #[cfg(not(feature = "page"))]
-pub(crate) use none::{Place, show, url};
+pub(crate) use none::{Place, show, show_run, url};
 #[cfg(feature = "page")]
-pub(crate) use open::{Place, show, url};
+pub(crate) use open::{Place, show, show_run, url};
 
 use std::io::{self, Write as _};
 

@@ -2,6 +2,10 @@
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
+#[cfg(feature = "page")]
+#[path = "sync/page.rs"]
+mod page;
+
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::thread;
@@ -41,12 +45,18 @@ struct Sync {
 
 impl Sync {
     fn start(text: &str, arguments: &[&str]) -> Self {
+        Self::start_logging(text, arguments, "error")
+    }
+
+    /// As [`start`](Self::start), with a log of this level on stderr.
+    fn start_logging(text: &str, arguments: &[&str], level: &str) -> Self {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         std::fs::write(file.path(), text).expect("it can be written");
         let mut child = Command::new(env!("CARGO_BIN_EXE_tickbus"))
             .arg("sync")
             .arg(file.path())
             .args(arguments)
+            .env("TICKBUS_LOG", level)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())

@@ -6,15 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Outcome;
-use crate::page::{self, Place};
+use crate::page::{self, PageError, Place};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Host, Watch};
-use tickbus_driver_cfg::{CommandLineEnd, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config, PageOptions};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_plc::Program;
 use tickbus_record as record;
+use tickbus_virtual_time::Controls;
 
 /// How often the command checks its line.
 const LOOK: Nanos = Nanos::from_millis(20);
@@ -30,7 +31,7 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "FILE")]
     faults: Option<std::path::PathBuf>,
 
-    /// Serve the live page, and print its address. Without HOST:PORT it is that of [page] in FILE, or 127.0.0.1:20080.
+    /// Serve the live page, and print its address. Without HOST:PORT it is that of FILE's table page, or 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 
@@ -65,6 +66,12 @@ impl PageAddress {
         if let Some(address) = &self.0 {
             page.listen = address.clone();
         }
+    }
+
+    /// Where it is for what has no driver.cfg.
+    pub(super) fn listen(&self) -> Address {
+        let usual = || PageOptions::default().listen;
+        self.0.clone().unwrap_or_else(usual)
     }
 }
 
@@ -202,15 +209,32 @@ pub(super) fn show(
     config: &Config,
     watch: impl FnOnce() -> Option<Watch>,
 ) -> Result<Option<Place>, Outcome> {
-    let announce = |url: &str| super::lab::say(title, &format!("page at {url}"));
-    page::show(config, watch, announce).map_err(|error| {
-        eprintln!("{title}: {error}");
-        if error.is_wrong_input() {
-            Outcome::WrongInput
-        } else {
-            Outcome::BusFailed
-        }
-    })
+    page::show(config, watch, announce(title)).map_err(|error| not_shown(title, &error))
+}
+
+/// Shows a run on virtual time on the page, and prints the address.
+pub(super) fn show_run(
+    title: &str,
+    name: &str,
+    listen: &Address,
+    controls: Controls,
+) -> Result<Place, Outcome> {
+    page::show_run(name, listen, controls, announce(title))
+        .map_err(|error| not_shown(title, &error))
+}
+
+/// Prints the address of the page.
+fn announce(title: &str) -> impl FnOnce(&str) {
+    move |url| super::lab::say(title, &format!("page at {url}"))
+}
+
+fn not_shown(title: &str, error: &PageError) -> Outcome {
+    eprintln!("{title}: {error}");
+    if error.is_wrong_input() {
+        Outcome::WrongInput
+    } else {
+        Outcome::BusFailed
+    }
 }
 
 /// The recording asked for on the command line: relative to the current folder, not to that of the

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 
 use super::Outcome;
+use super::host::{PageAddress, page_address, show_run};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_virtual_time as virtual_time;
@@ -33,6 +34,10 @@ pub(super) struct Arguments {
     /// Begin paused, and wait for commands on stdin.
     #[arg(long)]
     paused: bool,
+
+    /// Serve the live page of the run, and print its address. Without HOST:PORT it is 127.0.0.1:20080.
+    #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
+    page: Option<PageAddress>,
 }
 
 /// What else belongs to a run in lock-step.
@@ -43,12 +48,12 @@ enum Other {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let file = match (&arguments.other, &arguments.file) {
+    let path = match (&arguments.other, &arguments.file) {
         (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments),
         (Some(Other::Prepare(arguments)), _) => return prepare::run(arguments),
         (None, file) => file.as_ref().expect("it is required"),
     };
-    let mut file = match RunFile::load(file) {
+    let mut file = match RunFile::load(path) {
         Ok(file) => file,
         Err(mistakes) => {
             eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
@@ -67,6 +72,14 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         return Outcome::BusFailed;
     };
     let controls = Controls::new(&stop);
+    let show = |page: &PageAddress| {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        show_run("sync", &name, &page.listen(), controls.clone())
+    };
+    let _place = match arguments.page.as_ref().map(show).transpose() {
+        Ok(place) => place,
+        Err(outcome) => return outcome,
+    };
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({
         let controls = controls.clone();

@@ -2,6 +2,8 @@
 
 use tickbus_driver::Watch;
 use tickbus_driver_cfg::Config;
+use tickbus_fieldbus::tcp::Address;
+use tickbus_virtual_time::Controls;
 
 use super::PageError;
 
@@ -22,6 +24,17 @@ pub(crate) fn show(
         "{}: this tickbus was built without live pages; build it with --features page, or remove [page]",
         config.path.display()
     )))
+}
+
+/// Nothing: there are no pages.
+pub(crate) fn show_run(
+    _name: &str,
+    _listen: &Address,
+    _controls: Controls,
+    _announce: impl FnOnce(&str),
+) -> Result<Place, PageError> {
+    let text = "this tickbus was built without live pages; build it with --features page, or leave out --page";
+    Err(PageError::Unsupported(text.to_owned()))
 }
 
 /// There is no page.

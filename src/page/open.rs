@@ -6,10 +6,11 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 use tickbus_base::time::Monotonic;
 use tickbus_driver::Watch;
-use tickbus_driver_cfg::{Config, PageOptions};
+use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_live_page::picture::{self, Picture};
 use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_virtual_time::Controls;
 use tickbus_web::{Limits, Room, Serving};
 
 use super::PageError;
@@ -31,7 +32,7 @@ struct Open {
     asked: Address,
 }
 
-/// A driver's place on the page.
+/// The place of a driver or a run on the page.
 #[derive(Debug)]
 pub(crate) struct Place {
     member: Option<Member>,
@@ -70,7 +71,7 @@ pub(crate) fn show(
     };
     let picture = wanted.picture.as_deref();
     let picture = picture.map(|file| read_picture(config, file)).transpose()?;
-    let open = open(config, wanted, announce)?;
+    let open = open(&config.name, &wanted.listen, announce)?;
     let Some(watch) = watch() else {
         return Ok(None);
     };
@@ -84,32 +85,39 @@ pub(crate) fn show(
     }))
 }
 
-/// The page that there is, or a new one.
-fn open(
-    config: &Config,
-    wanted: &PageOptions,
+/// Shows a run on virtual time on the page, which is served at `listen` unless there is one.
+pub(crate) fn show_run(
+    name: &str,
+    listen: &Address,
+    controls: Controls,
     announce: impl FnOnce(&str),
-) -> Result<Arc<Open>, PageError> {
+) -> Result<Place, PageError> {
+    let open = open(name, listen, announce)?;
+    Ok(Place {
+        member: Some(open.page.join_run(name, controls)),
+        open: Some(open),
+    })
+}
+
+/// The page that there is, or a new one at `asked`.
+fn open(name: &str, asked: &Address, announce: impl FnOnce(&str)) -> Result<Arc<Open>, PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
-        if open.asked != wanted.listen {
+        if open.asked != *asked {
             log::warn!(
-                "driver \"{}\" asks for a page at {}, and is shown on that of this process, at {}",
-                config.name,
-                wanted.listen,
+                "\"{name}\" asks for a page at {asked}, and is shown on that of this process, at {}",
                 open.asked
             );
         }
         return Ok(open);
     }
-    let asked = wanted.listen.clone();
     let refused = |error: std::io::Error| {
         PageError::NotServed(format!(
             "the page cannot be served on {asked} ({error}); end the program that has this port, or choose another one: \
              listen = \"127.0.0.1:0\" in [page] takes any"
         ))
     };
-    let room = Room::bind(&asked, Limits::default()).map_err(refused)?;
+    let room = Room::bind(asked, Limits::default()).map_err(refused)?;
     let url = room.url();
     let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
     let serving = room.serve(page.site(), Monotonic::shared());
@@ -120,7 +128,9 @@ fn open(
         asked: asked.clone(),
     });
     *present = Arc::downgrade(&open);
-    log::info!("the live page is at {}", open.url);
+    // Who reads the log must not be able to force anything: the token is for whoever started this.
+    let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
+    log::info!("the live page is at {plain}");
     announce(&open.url);
     Ok(open)
 }

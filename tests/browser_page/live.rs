@@ -337,18 +337,18 @@ fn the_bottle_in_the_picture_moves_with_the_lift() {
     let machine = Machine::rig();
     let _plc = machine.plc();
     let browser = open(&machine, 1280, 800);
-    browser.wait("document.querySelector('.picture > div')?.shadowRoot");
+    browser.wait("document.querySelector('.picture > div > div')?.shadowRoot");
     let told = browser.run("return document.querySelectorAll('.picture details').length");
     assert_eq!(
         told, 0,
         "nothing is left out of our own picture, and no binding is wrong"
     );
-    let bottle = "document.querySelector('.picture > div').shadowRoot.querySelector('#low1 ~ g [data-tb*=\"show\"]')";
+    let bottle = "document.querySelector('.picture > div > div').shadowRoot.querySelector('#low1 ~ g [data-tb*=\"show\"]')";
     force(&browser, "SC1", "TRUE");
     browser.wait(&format!("getComputedStyle({bottle}).display !== 'none'"));
     force(&browser, "LA1 position", "0");
     // Where it is in the drawing, wherever that is on the page.
-    let svg = "document.querySelector('.picture > div').shadowRoot.firstElementChild";
+    let svg = "document.querySelector('.picture > div > div').shadowRoot.firstElementChild";
     let place = format!(
         "(({bottle}.getBoundingClientRect().top - {svg}.getBoundingClientRect().top) / {svg}.getScreenCTM().d)"
     );
@@ -383,6 +383,8 @@ fn a_picture_that_would_do_harm_does_none_and_says_what_was_left_out() {
     let svg = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 100 100\" onload=\"window.harm = 1\">\
         <script>window.harm = 2</script>\n<image href=\"http://127.0.0.1:9/x.png\" onerror=\"window.harm = 3\"/>\
         <rect id=\"level\" x=\"10\" y=\"10\" width=\"80\" height=\"80\" data-tb-height=\"Level: 0..500\" data-tb-fill=\"Valve: off -> #111111, on -> #222222\"/>\
+        <style>:host { position: fixed !important; inset: 0; z-index: 99; background: red } svg { position: fixed; inset: 0; \
+        width: 100vw !important; height: 100vh !important; max-height: none !important }</style>\
         <text y=\"99\" data-tb-text=\"Levl: {0}\">?</text></svg>";
     fs::write(folder.path().join("tank.cfg"), text)
         .and_then(|()| fs::write(folder.path().join("tank.svg"), svg))
@@ -403,7 +405,7 @@ fn a_picture_that_would_do_harm_does_none_and_says_what_was_left_out() {
     ] {
         assert!(told.contains(words), "{words}: {told}");
     }
-    let level = "document.querySelector('.picture > div').shadowRoot.getElementById('level')";
+    let level = "document.querySelector('.picture > div > div').shadowRoot.getElementById('level')";
     machine.write("4", "1", "13824");
     machine.write("0", "0", "1");
     // Half full: from the bottom, half as high.
@@ -414,6 +416,15 @@ fn a_picture_that_would_do_harm_does_none_and_says_what_was_left_out() {
         "Math.abs({level}.getCTM().d * 80 / {level}.ownerSVGElement.getCTM().d - 40) < 0.1"
     ));
     assert_eq!(browser.run("return window.harm ?? 0"), 0);
+    // Styles that would lay it over the whole page leave it in its frame.
+    let covered = "return ['#filter', '#title', '.driver .reason', '.picture summary'].filter((it) => { \
+         const found = document.querySelector(it), box = found.getBoundingClientRect(); \
+         const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2); \
+         return top !== found && !found.contains(top); })";
+    assert_eq!(browser.run(covered), json!([]), "the picture covers them");
+    browser.run("document.querySelector('.picture > div').style.contain = 'none'");
+    let without = browser.run(covered);
+    assert_ne!(without, json!([]), "without it, it would cover them");
     assert_quiet(&browser);
 }
 
@@ -529,7 +540,7 @@ fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
         browser.devtools("Emulation.setEmulatedMedia", &media);
         browser.go(&machine.url);
         browser.wait("document.getElementById('access').textContent === 'may force'");
-        browser.wait("document.querySelector('.picture > div')?.shadowRoot");
+        browser.wait("document.querySelector('.picture > div > div')?.shadowRoot");
         assert_fits(&browser);
         let background = if scheme == "dark" {
             "rgb(20, 23, 26)"
@@ -561,6 +572,26 @@ fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
         let landmarks = browser.run("return ['header', 'main', 'aside'].map((it) => document.querySelectorAll(`body > ${it}`).length)");
         assert_eq!(landmarks, json!([1, 1, 1]));
         assert_quiet(&browser);
+    }
+}
+
+#[test]
+fn a_number_is_written_out_as_far_as_it_has_digits() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1280, 800);
+    for (value, unit, data_type, text) in [
+        ("12345678", "mm", "UDINT", "12345678"),
+        ("4294967295", "mm", "UDINT", "4294967295"),
+        ("-12345678.25", "Pa", "DINT", "−12345678"),
+        ("12345678", "", "DINT", "12345678"),
+        ("12345678", "Pa", "REAL", "1.235e+7"),
+        ("1e300", "", "LREAL", "1.000e+300"),
+        ("12.5", "mm", "INT", "12.50"),
+    ] {
+        let told = browser.run(&format!(
+            "return words.number({value}, {{ unit: '{unit}', type: '{data_type}' }})"
+        ));
+        assert_eq!(told, text, "{value} {unit}, {data_type}");
     }
 }
 

@@ -1,5 +1,5 @@
 //! The pages that are served, in a browser: the patch bay shows what happens in the laboratory, and patches it; the live page
-//! (`live`) shows a driver.
+//! (`live`) shows a driver, or a run (`run`).
 //!
 //! Not part of a plain `cargo test`, because it needs Chromium and chromedriver:
 //! `cargo test --features page --test browser_page` runs it.
@@ -10,6 +10,7 @@
 mod webdriver;
 
 mod live;
+mod run;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};
 use std::net::TcpStream;

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_web::{Answer, Change, Document, Outcome, Refused, State};
 
+use crate::exhibit::Exhibit;
 use crate::metrics;
 use crate::model::{Model, Shared};
 use crate::order::{Order, order};
@@ -17,6 +18,10 @@ const PERIOD: Nanos = Nanos(16_666_667);
 
 /// How long it waits for a tick that was asked for a copy.
 const PATIENCE: Nanos = Nanos::from_millis(20);
+
+/// How long the answer to a single request waits for slow ticks: it is to have what is true then, and not what was half a
+/// second ago.
+const LATE: Nanos = Nanos::from_millis(500);
 
 /// How often it looks whether a copy has come.
 const LOOK: Nanos = Nanos::from_micros(500);
@@ -73,6 +78,8 @@ impl Keeper {
         let stop = self.inbox.stop.clone();
         let mut due = self.clock.now();
         let mut looked = due - PERIOD;
+        // Requests that wait for a tick, and when they came.
+        let mut waiting: Vec<(Nanos, Wish)> = Vec::new();
         while !stop.is_stopped() {
             self.clock.wait_until(due, &stop);
             let wishes = self.inbox.take();
@@ -93,13 +100,30 @@ impl Keeper {
                 // However many ask, a tick makes no more copies.
                 self.clock.wait_until(looked + PERIOD, &Stop::new());
                 looked = self.clock.now();
-                self.look(!looks.is_empty());
+                self.look(!looks.is_empty() || !waiting.is_empty());
                 due = self.clock.now() + IDLE;
             }
-            for wish in looks {
-                self.grant(wish);
+            let asked = looks.into_iter().map(|wish| (now, wish));
+            for (since, wish) in std::mem::take(&mut waiting).into_iter().chain(asked) {
+                if matches!(wish, Wish::Get(..)) && self.is_to_wait(since) {
+                    waiting.push((since, wish));
+                    due = self.clock.now();
+                } else {
+                    self.grant(wish);
+                }
             }
         }
+    }
+
+    /// Whether a tick is under way, as far as is known, with newer values than those of this time.
+    fn is_to_wait(&self, since: Nanos) -> bool {
+        let now = self.clock.now();
+        let is_late = |driver: &dyn Exhibit| {
+            let sheet = driver.sheet();
+            // Who has not ticked for so long need not tick at all.
+            !sheet.is_known_at(since) && !sheet.is_missing_since(now - LATE)
+        };
+        now - since < LATE && self.model.with(|model| model.drivers().any(is_late))
     }
 
     /// Has the ticks make copies, and takes them over.
@@ -107,7 +131,11 @@ impl Keeper {
         let begin = self.clock.now();
         self.model.with(|model| {
             for driver in model.drivers_mut() {
+                // One that came late is there, and may be old by now.
+                let is_slow = driver.sheet().is_missing();
+                take(&mut **driver);
                 driver.ask(begin);
+                driver.sheet_mut().ask(begin, is_slow);
             }
         });
         // Nobody wakes this: ticks do not, since it would take a system call.
@@ -117,12 +145,8 @@ impl Keeper {
             let is_complete = self.model.with(|model| {
                 let mut is_complete = true;
                 for driver in model.drivers_mut() {
-                    if driver.watch.update() {
-                        driver.is_waiting = false;
-                        driver.has_come = true;
-                    }
-                    // One that did not tick the last time keeps nobody waiting.
-                    is_complete &= driver.has_come || driver.is_waiting;
+                    take(&mut **driver);
+                    is_complete &= driver.sheet().is_complete(begin);
                 }
                 is_complete
             });
@@ -134,7 +158,6 @@ impl Keeper {
         }
         self.model.with(|model| {
             for driver in model.drivers_mut() {
-                driver.is_waiting = !std::mem::take(&mut driver.has_come);
                 driver.look_at_forced();
             }
             model.update(self.clock.now(), with_line);
@@ -148,11 +171,11 @@ impl Keeper {
         }
         let released = self.model.with(|model| {
             let drivers = model.drivers_mut().filter_map(|driver| {
-                let grace = driver.options.grace?;
-                if !driver.is_forcing() || now - self.heard <= grace {
+                let grace = driver.grace()?;
+                if now - self.heard <= grace {
                     return None;
                 }
-                let name = driver.watch.config().name.clone();
+                let name = driver.name().to_owned();
                 driver.release_all().is_ok().then_some((name, grace))
             });
             drivers.collect::<Vec<_>>()
@@ -189,6 +212,13 @@ impl Keeper {
     }
 }
 
+/// Takes over the copy that was asked for, if it has come.
+fn take(driver: &mut dyn Exhibit) {
+    if driver.take() {
+        driver.sheet_mut().has_come();
+    }
+}
+
 /// What there is at a path.
 fn document(model: &Model, path: &str, now: Nanos) -> Option<Document> {
     let (kind, text) = match path {
@@ -216,7 +246,9 @@ fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, Str
     }
     let (id, index) = path.strip_prefix("/trend/")?.split_once('/')?;
     let driver = model.driver(id.parse().ok()?)?;
-    let points = driver.trend(index.parse().ok()?, now)?;
+    let index = index.parse().ok()?;
+    driver.signals().get(index)?;
+    let points = driver.sheet().trend.of(index, now);
     let millis: Vec<i64> = points.iter().map(|(at, _)| at.0 / 1_000_000).collect();
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
     let json = serde_json::json!({ "ms": millis, "values": values });

@@ -70,7 +70,7 @@ const line = (() => {
 
   function facts(card, line) {
     const times = line.times ?? {};
-    const shown = [];
+    const shown = (line.facts ?? []).map(([title, value]) => [title, value, ""]);
     const age = Math.max(-1, ...line.stations.map((station) => station.age_ms ?? -1));
     if (age >= 0) shown.push(["Age of data", words.span(age), line.stations.some(({ stale }) => stale) ? "warn" : "good"]);
     if (times.exchange?.count) shown.push(["Exchange, p50", words.fine(times.exchange.p50_us), ""]);
@@ -132,8 +132,10 @@ const line = (() => {
       // What was forced and is released is no news.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       facts(own, line);
-      const several = line.stations.length > 1 ? line.stations : [];
-      fill(own.stations, ["Station", "State", "Age", "Reason"], several.map((it) => [it.name, it.stale ? "stale" : it.state, words.span(it.age_ms), it.reason ?? ""]));
+      const isRun = driver.kind === "sync";
+      const several = line.stations.length > 1 || isRun ? line.stations : [];
+      if (isRun) fill(own.stations, ["Client", "State", "Reason"], several.map((it) => [it.name, it.state, it.reason]));
+      else fill(own.stations, ["Station", "State", "Age", "Reason"], several.map((it) => [it.name, it.stale ? "stale" : it.state, words.span(it.age_ms), it.reason ?? ""]));
       if (!own.more.open) continue;
       const times = Object.entries(line.times ?? {}).filter(([, it]) => it.count);
       fill(own.times, ["Time", "p50", "p99", "max", "count"], times.sort(byName).map(([name, it]) => [name.replaceAll("_", " "), words.fine(it.p50_us), words.fine(it.p99_us), words.fine(it.max_us), figures(it.count)]));

@@ -6,7 +6,7 @@ use serde::Serialize;
 use tickbus_base::statistics::{Statistics, Value};
 use tickbus_base::time::Nanos;
 use tickbus_driver::{StationView, Watch};
-use tickbus_fieldbus::{Link, is_stale};
+use tickbus_fieldbus::{Cause, Link, LinkState, is_stale};
 
 use crate::value::Number;
 
@@ -34,36 +34,90 @@ const TOLD: [&str; 6] = [
     "reason",
 ];
 
+/// A line in full.
 #[derive(Serialize)]
-struct Line<'a> {
-    id: i32,
-    name: &'a str,
-    state: &'static str,
-    cause: &'static str,
-    reason: &'a str,
-    since_ms: i64,
-    status: String,
-    tick: u64,
-    silence_ms: Option<i64>,
-    stations: Vec<Station<'a>>,
-    faults: Vec<Fault<'a>>,
-    counters: BTreeMap<&'a str, Number>,
-    times: BTreeMap<&'a str, BTreeMap<&'a str, Number>>,
-    texts: BTreeMap<&'a str, String>,
+pub(crate) struct Line<'a> {
+    pub(crate) id: i32,
+    pub(crate) name: &'a str,
+    pub(crate) state: &'static str,
+    pub(crate) cause: &'static str,
+    pub(crate) reason: &'a str,
+    pub(crate) since_ms: i64,
+    pub(crate) status: String,
+    pub(crate) tick: u64,
+    pub(crate) silence_ms: Option<i64>,
+    /// What stands first, as title and text.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) facts: Vec<(&'static str, String)>,
+    pub(crate) stations: Vec<Station<'a>>,
+    pub(crate) faults: Vec<Fault<'a>>,
+    pub(crate) counters: BTreeMap<&'a str, Number>,
+    pub(crate) times: BTreeMap<&'a str, BTreeMap<&'a str, Number>>,
+    pub(crate) texts: BTreeMap<&'a str, String>,
 }
 
-#[derive(Serialize)]
-struct Station<'a> {
-    name: &'a str,
-    state: String,
-    reason: String,
-    age_ms: Option<f64>,
-    stale: bool,
-    cycles: u64,
+impl<'a> Line<'a> {
+    /// A line of which no more is known.
+    pub(crate) fn new(
+        id: i32,
+        name: &'a str,
+        state: LinkState,
+        cause: Cause,
+        status: &str,
+    ) -> Self {
+        Self {
+            id,
+            name,
+            state: state.name(),
+            cause: cause.name(),
+            reason: "",
+            since_ms: 0,
+            status: status.to_ascii_lowercase(),
+            tick: 0,
+            silence_ms: None,
+            facts: Vec::new(),
+            stations: Vec::new(),
+            faults: Vec::new(),
+            counters: BTreeMap::new(),
+            times: BTreeMap::new(),
+            texts: BTreeMap::new(),
+        }
+    }
+
+    /// It as JSON.
+    pub(crate) fn text(&self) -> String {
+        serde_json::to_string(self).expect("texts and numbers")
+    }
 }
 
+/// A station of a line, or a client of a run.
 #[derive(Serialize)]
-struct Fault<'a> {
+pub(crate) struct Station<'a> {
+    pub(crate) name: &'a str,
+    pub(crate) state: String,
+    pub(crate) reason: String,
+    pub(crate) age_ms: Option<f64>,
+    pub(crate) stale: bool,
+    pub(crate) cycles: u64,
+}
+
+impl<'a> Station<'a> {
+    /// One that has nothing to tell but its name.
+    pub(crate) fn new(name: &'a str) -> Self {
+        Self {
+            name,
+            state: String::new(),
+            reason: String::new(),
+            age_ms: None,
+            stale: false,
+            cycles: 0,
+        }
+    }
+}
+
+/// A fault that was injected.
+#[derive(Serialize)]
+pub(crate) struct Fault<'a> {
     id: u32,
     name: &'a str,
     kind: &'static str,
@@ -115,17 +169,11 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
                 cycles: station.cycles,
             }
         });
-        let status = view.code.name().to_ascii_lowercase();
-        (stations.collect(), status, view.tick)
+        (stations.collect(), view.code.name(), view.tick)
     });
     let mut line = Line {
-        id,
-        name: &config.name,
-        state: link.state.name(),
-        cause: link.cause.name(),
         reason: &link.reason,
         since_ms: (now - link.since).0.max(0) / 1_000_000,
-        status,
         tick,
         silence_ms: (silence != Nanos::MAX).then_some(silence.0 / 1_000_000),
         stations,
@@ -140,16 +188,14 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
                 begun: fault.begun,
             })
             .collect(),
-        counters: BTreeMap::new(),
-        times: BTreeMap::new(),
-        texts: BTreeMap::new(),
+        ..Line::new(id, &config.name, link.state, link.cause, status)
     };
     sort(statistics, &mut line);
-    serde_json::to_string(&line).expect("texts and numbers")
+    line.text()
 }
 
 /// Sorts statistics into counters, distributions and texts.
-fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
+pub(crate) fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
     for (key, value) in statistics.iter() {
         let number = match value {
             _ if TOLD.contains(&key) || key.starts_with(RISES) => continue,

@@ -185,7 +185,8 @@ const list = (() => {
       const line = driver.line?.stations?.[station];
       const name = driver.stations[station];
       text(element, "name", plant.drivers.length > 1 ? (driver.stations.length > 1 ? `${driver.name} · ${name}` : driver.name) : name);
-      text(element, "facts", line ? `${line.stale ? "stale" : line.state}, ${words.span(line.age_ms)} old` : "");
+      const age = typeof line?.age_ms === "number" ? `, ${words.span(line.age_ms)} old` : "";
+      text(element, "facts", line?.state ? `${line.stale && line.age_ms !== null ? "stale" : line.state}${age}` : "");
       flag(element, "is-stale", Boolean(line?.stale));
     },
     signal(element, { signal }) {
@@ -209,7 +210,7 @@ const list = (() => {
       flag(element, "new", plant.isNew(signal));
       set(element, "chosen", signal === chosen, (it, yes) => it.setAttribute("aria-selected", yes));
       set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.open.setAttribute("aria-label", label); it.parts.open.title = label; });
-      set(element, "title", `${signal.name}, ${signal.type} at ${signal.address}${signal.latch ? `, latch ${signal.latch}` : ""}`, (it, title) => { it.title = title; });
+      set(element, "title", `${signal.name}, ${signal.type}${signal.address && ` at ${signal.address}`}${signal.latch ? `, latch ${signal.latch}` : ""}`, (it, title) => { it.title = title; });
       set(element, "expanded", signal.isOpen, (it, yes) => it.parts.open.setAttribute("aria-expanded", yes));
     },
     trend(element, { signal }) {

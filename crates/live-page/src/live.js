@@ -65,7 +65,8 @@
     const isNew = get("chosen").dataset.key !== plant.keyOf(signal);
     get("chosen").dataset.key = plant.keyOf(signal);
     show(get("chosen-name"), signal.name);
-    const facts = [signal.address, signal.type, signal.direction === "I" ? "to the PLC" : "from the PLC"];
+    const ways = { I: "to the PLC", Q: "from the PLC" };
+    const facts = [signal.address, signal.type, ways[signal.direction] ?? `written by ${signal.driver.stations[signal.station]}`].filter(Boolean);
     if (signal.latch) facts.push(`latch ${signal.latch}`);
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
     show(get("chosen-facts"), facts.join(" · "));
@@ -189,6 +190,8 @@
     show(get("title"), names.join(" · ") || "tickbus");
     document.title = `${names.join(" · ") || "No driver"} – tickbus`;
     show(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
+    // The variables of a run have no address and no direction, and none is forced.
+    document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every(({ kind }) => kind === "sync"));
     list.renew();
     pictures.load();
     if (!painted) requestAnimationFrame(() => requestAnimationFrame(() => { painted = performance.now(); }));

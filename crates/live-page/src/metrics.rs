@@ -5,18 +5,19 @@ use std::fmt::Write as _;
 use tickbus_base::statistics::Value;
 use tickbus_fieldbus::LinkState;
 
+use crate::exhibit::Exhibit;
 use crate::model::Model;
-use crate::shown::Shown;
+use crate::sheet::FORCED;
+use crate::value::Number;
 
 /// Labels in braces.
 struct Labels(String);
 
 impl Labels {
-    fn of(driver: &Shown) -> Self {
-        let config = driver.watch.config();
+    fn of(driver: &dyn Exhibit) -> Self {
         Self(String::new())
-            .and("driver", &config.name)
-            .and("id", &driver.id.to_string())
+            .and("driver", driver.name())
+            .and("id", &driver.id().to_string())
     }
 
     /// With one more.
@@ -58,10 +59,11 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     )?;
     for driver in model.drivers() {
         let labels = Labels::of(driver);
-        for (signal, value, _, _) in driver.values() {
+        for (signal, row) in driver.signals().iter().zip(&driver.sheet().rows) {
             let unit = signal.unit.as_deref().unwrap_or_default();
             let of_signal = labels.and("signal", &signal.name).and("unit", unit);
-            sample(text, "tickbus_signal_value", &of_signal, value.real())?;
+            let value = Number::of(signal, row.slot).real();
+            sample(text, "tickbus_signal_value", &of_signal, value)?;
         }
     }
     family(
@@ -72,16 +74,11 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     )?;
     for driver in model.drivers() {
         let labels = Labels::of(driver);
-        for (signal, _, edges, _) in driver.values() {
-            if let Some(edges) = edges {
-                let of_signal = labels.and("signal", &signal.name);
-                sample(
-                    text,
-                    "tickbus_signal_edges_total",
-                    &of_signal,
-                    f64::from(edges),
-                )?;
-            }
+        let rows = driver.signals().iter().zip(&driver.sheet().rows);
+        for (signal, row) in rows.filter(|(signal, _)| signal.latch.is_some()) {
+            let of_signal = labels.and("signal", &signal.name);
+            let edges = f64::from(row.edges);
+            sample(text, "tickbus_signal_edges_total", &of_signal, edges)?;
         }
     }
     family(
@@ -92,7 +89,8 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     )?;
     for driver in model.drivers() {
         let labels = Labels::of(driver);
-        for (signal, ..) in driver.values().filter(|(.., is_forced)| *is_forced) {
+        let rows = driver.signals().iter().zip(&driver.sheet().rows);
+        for (signal, _) in rows.filter(|(_, row)| row.flags & FORCED != 0) {
             sample(
                 text,
                 "tickbus_signal_forced",
@@ -110,7 +108,7 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     for driver in model.drivers() {
         let labels = Labels::of(driver);
         for state in LinkState::ALL {
-            let is_it = f64::from(u8::from(state == driver.link().state));
+            let is_it = f64::from(u8::from(state == driver.state()));
             let of_state = labels.and("tickbus_line_state", state.name());
             sample(text, "tickbus_line_state", &of_state, is_it)?;
         }

@@ -5,14 +5,12 @@ use std::fmt::Write as _;
 use std::sync::Mutex;
 
 use tickbus_base::time::Nanos;
-use tickbus_driver::Watch;
 use tickbus_web::{Differences, Refused};
 
-use crate::options::Options;
+use crate::exhibit::Exhibit;
 use crate::order::Order;
-use crate::shown::Shown;
 
-/// The drivers, and the number of the state that they are in.
+/// The drivers and runs, and the number of the state that they are in.
 #[derive(Debug, Default)]
 pub(crate) struct Model {
     number: u64,
@@ -22,17 +20,17 @@ pub(crate) struct Model {
     /// When it was looked at last.
     now: Nanos,
     /// By their ids.
-    drivers: BTreeMap<i32, Shown>,
+    drivers: BTreeMap<i32, Box<dyn Exhibit>>,
 }
 
 impl Model {
-    /// Adds a driver; gives the id that it has on the page.
-    pub(crate) fn join(&mut self, watch: Watch, options: Options, now: Nanos) -> i32 {
-        let mut id = watch.config().id;
+    /// Adds what `make` makes of an id, which is the one that is asked for unless another has it; gives the id.
+    pub(crate) fn join(&mut self, asked: i32, make: impl FnOnce(i32) -> Box<dyn Exhibit>) -> i32 {
+        let mut id = asked;
         while self.drivers.contains_key(&id) {
             id = id.checked_add(1).unwrap_or(1);
         }
-        self.drivers.insert(id, Shown::new(id, watch, options, now));
+        self.drivers.insert(id, make(id));
         self.has_new_layout();
         id
     }
@@ -49,20 +47,20 @@ impl Model {
         self.layout += 1;
         self.layout_number = self.number;
         for driver in self.drivers.values_mut() {
-            driver.forget();
+            driver.sheet_mut().forget_line();
         }
     }
 
-    pub(crate) fn drivers(&self) -> impl Iterator<Item = &Shown> {
-        self.drivers.values()
+    pub(crate) fn drivers(&self) -> impl Iterator<Item = &dyn Exhibit> {
+        self.drivers.values().map(|driver| &**driver)
     }
 
-    pub(crate) fn drivers_mut(&mut self) -> impl Iterator<Item = &mut Shown> {
+    pub(crate) fn drivers_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn Exhibit>> {
         self.drivers.values_mut()
     }
 
-    pub(crate) fn driver(&self, id: i32) -> Option<&Shown> {
-        self.drivers.get(&id)
+    pub(crate) fn driver(&self, id: i32) -> Option<&dyn Exhibit> {
+        self.drivers.get(&id).map(|driver| &**driver)
     }
 
     /// Takes over what is there at `now`.
@@ -76,13 +74,16 @@ impl Model {
         if is_new {
             self.number = number;
         }
+        if self.drivers().any(Exhibit::is_other) {
+            self.has_new_layout();
+        }
     }
 
     /// Carries out an order.
     pub(crate) fn obey(&mut self, order: &Order) -> Result<(), Refused> {
         match order {
             Order::ReleaseAll => {
-                let released = self.drivers.values_mut().map(Shown::release_all);
+                let released = self.drivers.values_mut().map(|driver| driver.release_all());
                 // All of them, whatever becomes of one.
                 let released: Vec<_> = released.collect();
                 released.into_iter().collect()
@@ -96,7 +97,7 @@ impl Model {
         }
     }
 
-    fn named(&mut self, id: i32) -> Result<&mut Shown, Refused> {
+    fn named(&mut self, id: i32) -> Result<&mut Box<dyn Exhibit>, Refused> {
         let ids: Vec<String> = self.drivers.keys().map(i32::to_string).collect();
         self.drivers.get_mut(&id).ok_or_else(|| Refused {
             status: 404,
@@ -106,14 +107,14 @@ impl Model {
 
     /// `GET /signals`.
     pub(crate) fn signals(&self) -> String {
-        let drivers: Vec<String> = self.drivers().map(Shown::signals).collect();
+        let drivers: Vec<String> = self.drivers().map(Exhibit::json).collect();
         let (layout, drivers) = (self.layout, drivers.join(","));
         format!("{{\"layout\":{layout},\"drivers\":[{drivers}]}}")
     }
 
     /// `GET /line`.
     pub(crate) fn line(&self) -> String {
-        let drivers: Vec<&str> = self.drivers().map(Shown::line).collect();
+        let drivers: Vec<&str> = self.drivers().map(|driver| driver.sheet().line()).collect();
         format!("{{\"drivers\":[{}]}}", drivers.join(","))
     }
 
@@ -129,14 +130,17 @@ impl Model {
         let mut json = format!("{{\"layout\":{layout},\"time_ms\":{time},\"values\":{{");
         let mut comma = "";
         for driver in self.drivers() {
-            if let Some(changes) = driver.changes(seen) {
+            if let Some(changes) = driver.sheet().changes(driver.signals(), seen) {
                 // Into a text, which takes everything.
-                let _ = write!(json, "{comma}\"{}\":{changes}", driver.id);
+                let _ = write!(json, "{comma}\"{}\":{changes}", driver.id());
                 comma = ",";
             }
         }
         json.push('}');
-        if self.drivers().any(|driver| driver.has_new_line(seen)) {
+        if self
+            .drivers()
+            .any(|driver| driver.sheet().has_new_line(seen))
+        {
             let _ = write!(json, ",\"line\":{}", self.line());
         }
         json.push('}');

@@ -7,14 +7,18 @@ use std::thread::{self, JoinHandle};
 
 use tickbus_base::time::Clock;
 use tickbus_driver::Watch;
+use tickbus_virtual_time::Controls;
 use tickbus_web::{Answer, Asset, Change, Document, Outcome, Site, State};
 
 use crate::assets::ASSETS;
+use crate::exhibit::Exhibit;
 use crate::keeper::{Inbox, Keeper, Wish};
 use crate::model::Shared;
 use crate::options::Options;
+use crate::run::ShownRun;
+use crate::shown::Shown;
 
-/// A page that drivers join; dropping it stops its thread.
+/// A page that drivers and runs join; dropping it stops its thread.
 pub struct LivePage {
     inbox: Arc<Inbox>,
     model: Arc<Shared>,
@@ -28,7 +32,7 @@ impl fmt::Debug for LivePage {
     }
 }
 
-/// A driver's place on the page; dropping it removes the driver.
+/// The place of a driver or a run on the page; dropping it removes that.
 #[derive(Debug)]
 pub struct Member {
     model: Arc<Shared>,
@@ -68,7 +72,18 @@ impl LivePage {
     /// Shows a driver, or a PLC program, until what is returned is dropped.
     pub fn join(&self, watch: Watch, options: Options) -> Member {
         let now = self.clock.now();
-        let id = self.model.with(|model| model.join(watch, options, now));
+        let id = watch.config().id;
+        self.add(id, |id| Box::new(Shown::new(id, watch, options, now)))
+    }
+
+    /// Shows a run on virtual time, under this name, until what is returned is dropped.
+    pub fn join_run(&self, name: &str, controls: Controls) -> Member {
+        let now = self.clock.now();
+        self.add(1, |id| Box::new(ShownRun::new(id, name, controls, now)))
+    }
+
+    fn add(&self, id: i32, make: impl FnOnce(i32) -> Box<dyn Exhibit>) -> Member {
+        let id = self.model.with(|model| model.join(id, make));
         // What it has to show is looked at.
         self.inbox.stop.wake();
         Member {

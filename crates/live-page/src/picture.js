@@ -42,7 +42,9 @@ const pictures = (() => {
         frame.append(text);
         return { driver, element, movers: [], root: null };
       }
-      const root = new DOMParser().parseFromString(await drawing.text(), "image/svg+xml").documentElement;
+      // What is parsed is held to the policy of the page, which has no styles but its own: these come in by another way below.
+      const text = (await drawing.text()).replace(/<(\/?)style\b/g, "<$1styles");
+      const root = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
       if (root.namespaceURI !== NAMESPACE) return null;
       const title = root.querySelector(":scope > title")?.textContent;
       if (!root.hasAttribute("viewBox") && root.width.baseVal.value) {
@@ -50,11 +52,13 @@ const pictures = (() => {
       }
       root.setAttribute("role", "img");
       root.setAttribute("aria-label", title || `The machine of ${driver.name}`);
-      // A picture's names of gradients and its styles are its own.
-      const shadow = frame.attachShadow({ mode: "open" });
+      // A picture's names of gradients and its styles are its own, and whatever they do to its host stays within the frame.
+      const host = document.createElement("div");
+      frame.append(host);
+      const shadow = host.attachShadow({ mode: "open" });
       const sheet = new CSSStyleSheet();
-      const styles = Array.from(root.querySelectorAll("style"), (style) => style.textContent);
-      for (const style of root.querySelectorAll("style")) style.remove();
+      const styles = Array.from(root.querySelectorAll("styles"), (style) => style.textContent);
+      for (const style of root.querySelectorAll("styles")) style.remove();
       sheet.replaceSync(`${styles.join("\n")}\nsvg:root, :host > svg { display: block; width: 100%; height: auto; max-height: var(--picture-height, none); }`);
       shadow.adoptedStyleSheets = [sheet];
       shadow.append(document.importNode(root, true));

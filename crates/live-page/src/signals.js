@@ -18,7 +18,7 @@ const plant = (() => {
   let heard = 0;
 
   function signalOf(driver, given, index) {
-    const words = [given.name, given.address, given.unit ?? "", given.type];
+    const words = [given.name, given.address, given.unit ?? "", given.type, driver.kind === "sync" ? driver.stations[given.station] : ""];
     const signal = {
       driver, index,
       name: given.name,
@@ -132,7 +132,8 @@ const words = {
   number(value, signal) {
     if (Number.isInteger(value) && !signal.unit && !/REAL/.test(signal.type)) return String(value).replace("-", "−");
     const size = Math.abs(value);
-    if (size !== 0 && (size >= 1e7 || size < 1e-4)) return value.toExponential(3).replaceAll("-", "−");
+    // A REAL has seven digits; integers of 32 bits, scaled or not, are written out.
+    if (size !== 0 && (size >= (signal.type === "REAL" ? 1e7 : 1e10) || size < 1e-4)) return value.toExponential(3).replaceAll("-", "−");
     const decimals = size >= 10000 ? 0 : size >= 1000 ? 1 : size >= 1 || size === 0 ? 2 : 4;
     return value.toFixed(decimals).replace("-", "−");
   },

@@ -56,6 +56,11 @@ type = "LINT"
 
 impl Simulation {
     fn start(page: &Page, id: i32, name: &str, grace: Option<Nanos>) -> Self {
+        Self::start_in(Duration::from_millis(1), page, id, name, grace)
+    }
+
+    /// As [`start`](Self::start), with this time between two ticks.
+    fn start_in(pause: Duration, page: &Page, id: i32, name: &str, grace: Option<Nanos>) -> Self {
         let text = format!(
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
              scan = \"1ms\"\nmode = \"stepped\"\n{SIGNALS}"
@@ -90,7 +95,7 @@ impl Simulation {
                         // Not everybody wants to know.
                         let _ = send.send(seen);
                     }
-                    thread::sleep(Duration::from_millis(1));
+                    thread::sleep(pause);
                 }
                 driver.close();
             }
@@ -269,6 +274,25 @@ fn a_viewer_gets_everything_once_and_then_what_has_changed() {
     // Who comes late gets all of it.
     let late = page.view().event();
     assert_eq!(late["signals"]["drivers"][0]["signals"][1]["value"], 7);
+}
+
+#[test]
+fn a_single_request_has_the_values_of_now_however_slow_the_ticks_are() {
+    let page = Page::open();
+    let pause = Duration::from_millis(150);
+    let simulation = Simulation::start_in(pause, &page, 1, "Slow", EVER);
+    for value in 1..=4 {
+        // The page looks by itself every half a second.
+        let seen = simulation.slots(0, f64::from(value));
+        assert_eq!(seen[0], f64::from(value));
+        let signal = page.get("/signals")["drivers"][0]["signals"][0].take();
+        assert_eq!(signal["value"], value);
+    }
+    // It stands still, as in a debugger: nobody waits for long.
+    simulation.is_over.store(true, Ordering::Relaxed);
+    let asked = Instant::now();
+    page.get("/signals");
+    assert!(asked.elapsed() < Duration::from_secs(2));
 }
 
 #[test]

@@ -55,7 +55,7 @@ const room = (() => {
   function setAge() {
     const now = performance.now();
     // A connection may be lost without a word, as when a computer sleeps or changes its network.
-    if (isOpen && now - Math.max(heard, begun) > PATIENCE) connect();
+    if (now - Math.max(heard, begun) > PATIENCE) connect();
     tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000));
   }
 

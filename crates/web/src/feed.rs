@@ -16,7 +16,7 @@ const PERIOD: Duration = Duration::from_micros(16_667);
 
 /// Formatting that takes long is followed by a pause of this many times its length, so that large pages leave time for
 /// other work.
-const REST: u32 = 20;
+const REST: u32 = 5;
 
 /// The longest pause.
 const LONGEST_REST: Duration = Duration::from_secs(1);

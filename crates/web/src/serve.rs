@@ -132,7 +132,8 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     let body = body(hall, request).await?;
     let (answer, outcome) = Answer::new();
     hall.site.change(Change { verb, path, body }, answer);
-    let outcome = outcome.await.map_err(|_| nobody())?;
+    let outcome = timeout(hall.patience, outcome).await;
+    let outcome = outcome.map_err(|_| undecided())?.map_err(|_| nobody())?;
     // One that was refused changed nothing, unless the site itself failed.
     if outcome
         .as_ref()
@@ -265,6 +266,11 @@ fn nobody() -> Refusal {
 
 fn hung() -> Refusal {
     let text = "what this page shows does not answer; look at its log, or start it again";
+    (StatusCode::GATEWAY_TIMEOUT, text.to_owned())
+}
+
+fn undecided() -> Refusal {
+    let text = "what this page shows does not answer, and may still make the change; look at its log, or start it again";
     (StatusCode::GATEWAY_TIMEOUT, text.to_owned())
 }
 

@@ -43,7 +43,7 @@ impl Driver {
 
     /// The exchange of a driver that has nothing to do but to exchange, which is what most of them do in most ticks: what
     /// [`exchange_at`](Self::exchange_at) comes to, in half of its instructions. `None` if there is more to do: a
-    /// first tick, one in the sample, or one that another has to be ended before.
+    /// first tick, or one that another has to be ended before.
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
         let tick = self.counters.ticks + 1;
@@ -51,8 +51,7 @@ impl Driver {
             .watched
             .as_ref()
             .is_some_and(|watched| watched.is_wanted());
-        let is_simple = self.is_simple && self.tick.is_none() && !is_watched;
-        if !is_simple || tick == 1 || TickTimes::takes(tick) {
+        if !self.is_simple || self.tick.is_some() || is_watched || tick == 1 {
             return None;
         }
         self.check(slots);
@@ -72,7 +71,16 @@ impl Driver {
         };
         self.last = found;
         self.counters.count(found.code);
+        if TickTimes::takes(tick) {
+            self.sample(now, found.age);
+        }
         Some(found)
+    }
+
+    /// Adds a tick to the sample that began then, and delivered data of that age.
+    #[inline(never)]
+    fn sample(&mut self, begun: Nanos, age: Nanos) {
+        self.samples.add(self.quick.now() - begun, age);
     }
 
     /// Finds out whether [`exchange_simply`](Self::exchange_simply) will do.
@@ -366,4 +374,114 @@ fn went_back(before: Nanos, time: Nanos) -> BusError {
         "simulation time went back from {before} to {time}, and what runs on it cannot; hand in the \
          nanoseconds since the simulation began, and open the driver again when it begins anew"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::directions;
+    use std::sync::Arc;
+    use tickbus_base::time::{Clock, Manual};
+    use tickbus_driver_cfg::Config;
+    use tickbus_fieldbus::loopback::End;
+    use tickbus_fieldbus::{LinkStatus, Port, Role};
+    use tickbus_image::{TickEnd, image};
+
+    /// A driver on a free loopback, whose other end is cycled by hand.
+    struct Rig {
+        driver: Driver,
+        clock: Arc<Manual>,
+        slots: Vec<Slot>,
+        peer: (TickEnd, Port, End),
+    }
+
+    impl Rig {
+        fn new(link: &str) -> Self {
+            let mut text = format!(
+                "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"{link}\"\n\
+                 cycle = \"1ms\"\nmax_age = \"20ms\"\n"
+            );
+            for (area, bit) in ["I", "Q"]
+                .map(|area| (0..16).map(move |bit| (area, bit)))
+                .into_iter()
+                .flatten()
+            {
+                let place = format!("{area}X{}.{}", bit / 8, bit % 8);
+                let signal = format!("name = \"{place}\"\naddress = \"%{place}\"");
+                text.extend(["[[signal]]\n", &signal, "\nlatch = \"both\"\n"]);
+            }
+            let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+            let clock = Manual::new();
+            let shared = || Arc::clone(&clock) as Arc<dyn Clock>;
+            let (tick, bus) = image(directions(&config.table, Role::Controller));
+            let status = LinkStatus::new("peer", config.timing.max_age);
+            let port = Port::new(bus, shared(), Role::Controller, None, status);
+            let end = End::join(link, &port).expect("its place is free");
+            let driver = Driver::open(config, shared()).expect("opens");
+            let slots = driver.initial_slots();
+            Self {
+                driver,
+                clock,
+                slots,
+                peer: (tick, port, end),
+            }
+        }
+
+        /// Lets time pass, in which the other end sends this, if anything; waits until the bus has nothing more to do.
+        fn pass(&mut self, pause: Nanos, sent: Option<u8>) {
+            let now = self.clock.now();
+            let (tick, port, end) = &mut self.peer;
+            if let Some(sent) = sent {
+                tick.stations[0].write(now, |bytes| bytes.copy_from_slice(&[sent, !sent]));
+                end.cycle(now, port);
+            }
+            self.clock.advance(pause);
+            while !self.clock.is_settled(1) {
+                std::thread::yield_now();
+            }
+        }
+    }
+
+    #[test]
+    fn an_exchange_with_nothing_else_to_do_comes_to_the_same_as_any_other() {
+        let mut rigs = ["exchanges simply", "exchanges otherwise"].map(Rig::new);
+        let (mut codes, mut random) = ([0; 3], 1_u64);
+        for step in 0..1_000 {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let draw =
+                |shift: u32, below: u64| usize::try_from((random >> shift) % below).expect("small");
+            let (bit, level) = (draw(20, 16), [0.0, 1.0, 1.0, f64::NAN][draw(24, 4)]);
+            let time = (draw(28, 4) != 0).then_some(Nanos::from_millis(step));
+            // Also longer than data count for.
+            let pause = Nanos::from_millis([0, 0, 1, 1, 1, 30][draw(30, 6)]);
+            let sent = (draw(34, 2) == 0).then_some(draw(36, 256).to_le_bytes()[0]);
+            let is_halved = draw(44, 8) == 0;
+            let seen = [0, 1].map(|index| {
+                let rig = &mut rigs[index];
+                rig.pass(pause, sent);
+                let Rig { driver, slots, .. } = rig;
+                assert!(driver.is_simple || index == 1, "else nothing is compared");
+                driver.is_simple = index == 0;
+                slots[bit] = Slot::from_real(level);
+                let found = if is_halved {
+                    driver.receive(time, slots);
+                    driver.send(slots)
+                } else {
+                    driver.exchange(time, slots)
+                };
+                (found, slots.iter().map(|slot| slot.0).collect::<Vec<_>>())
+            });
+            assert_eq!(seen[0], seen[1], "step {step}");
+            codes[usize::try_from(seen[0].0.code.code()).expect("no error")] += 1;
+        }
+        assert!(
+            codes.iter().all(|count| *count > 20),
+            "all kinds of ticks: {codes:?}"
+        );
+        let [one, other] = rigs.map(|rig| rig.driver.statistics());
+        assert_eq!(one, other);
+        assert!(one.contains("ticks=1000\n") && one.contains("age"), "{one}");
+    }
 }

@@ -16,6 +16,12 @@ impl Driver {
     /// Too many faults wait or are active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
         self.is_simple = false;
+        // What a tick put away when all faults were over: it has room for one of them alone, and puts that away again.
+        if self.extras.is_none()
+            && let Some(watched) = &mut self.watched
+        {
+            self.extras = watched.spare.take();
+        }
         let board = &self.board;
         let extras = self.extras.get_or_insert_default();
         let faults = extras
@@ -70,5 +76,46 @@ impl Driver {
     /// The injected faults in order of injection; those that ended long ago may be missing.
     pub fn injected_faults(&self) -> Vec<FaultStatus> {
         self.board.list()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Watch;
+    use tickbus_base::time::Monotonic;
+    use tickbus_driver_cfg::Config;
+    use tickbus_image::signal::Slot;
+
+    #[test]
+    fn a_driver_whose_faults_are_over_takes_the_quick_way_again_whoever_injected_them() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                    scan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n";
+        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+        let mut watch = driver.watch();
+        let mut slots = driver.initial_slots();
+        // One tick that somebody looks at; whether the next one is quick.
+        let mut tick = |driver: &mut Driver, watch: &mut Watch| {
+            watch.ask(false);
+            driver.exchange(None, &mut slots);
+            driver.is_simple
+        };
+        assert!(tick(&mut driver, &mut watch), "nothing is to be done");
+        let fault = watch.force(0, Slot::from_real(5.0)).expect("room");
+        assert!(!tick(&mut driver, &mut watch), "it is forced");
+        watch.end_fault(fault).expect("room");
+        tick(&mut driver, &mut watch);
+        assert!((0..3).any(|_| tick(&mut driver, &mut watch)), "released");
+        for _ in 0..2 {
+            let text = "kind = \"stuck\"\nsignal = \"a\"\nvalue = 7\n";
+            let fault = driver
+                .inject_text(text)
+                .unwrap_or_else(|why| panic!("{why}"));
+            assert!(!tick(&mut driver, &mut watch), "it is injected");
+            assert!(driver.end_fault(fault));
+            assert!((0..3).any(|_| tick(&mut driver, &mut watch)), "it is over");
+        }
+        driver.close();
     }
 }

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::one_line;
 use tickbus_base::statistics::{Key, Statistics};
-use tickbus_base::time::{Nanos, TimeHistogram};
+use tickbus_base::time::{Nanos, SharedHistogram};
 
 use super::BusError;
 use super::rarely::Rarely;
@@ -161,6 +161,8 @@ struct Shared {
     state: AtomicU8,
     /// How many stations were stale when the reason was written.
     stale: AtomicUsize,
+    /// The times from one bus cycle to the next.
+    cycle: SharedHistogram,
     record: Mutex<Record>,
 }
 
@@ -183,7 +185,6 @@ struct Record {
     counts: BTreeMap<&'static str, u64>,
     /// What was logged.
     log: Rarely,
-    cycle: TimeHistogram,
 }
 
 /// A library call in progress.
@@ -225,6 +226,7 @@ impl LinkStatus {
             stations,
             state: AtomicU8::new(0),
             stale: AtomicUsize::new(0),
+            cycle: SharedHistogram::new(),
             record: Mutex::new(Record {
                 link,
                 running: String::new(),
@@ -237,7 +239,6 @@ impl LinkStatus {
                 facts: BTreeMap::new(),
                 counts: BTreeMap::new(),
                 log: Rarely::default(),
-                cycle: TimeHistogram::new(),
             }),
         }))
     }
@@ -260,13 +261,22 @@ impl LinkStatus {
     }
 
     /// The current state, without a lock.
+    #[inline]
     pub fn state(&self) -> LinkState {
-        LinkState::ALL[usize::from(self.0.state.load(Ordering::Relaxed)) % LinkState::ALL.len()]
+        let state = usize::from(self.0.state.load(Ordering::Relaxed));
+        // It is always one of them.
+        LinkState::ALL
+            .get(state)
+            .copied()
+            .unwrap_or(LinkState::Failed)
     }
 
     /// Whether the peer is there, as it was entered last: the line is running or stale.
+    #[inline]
     pub fn is_up(&self) -> bool {
-        matches!(self.state(), LinkState::Running | LinkState::Stale)
+        const RUNNING: u8 = LinkState::Running as u8;
+        const STALE: u8 = LinkState::Stale as u8;
+        matches!(self.0.state.load(Ordering::Relaxed), RUNNING | STALE)
     }
 
     /// What a running line says of itself; empty before it ran for the first time.
@@ -345,6 +355,7 @@ impl LinkStatus {
     /// Checks the time: a running line becomes stale when the newest data of a station are too old (`ages`
     /// has one entry per station), and running again when all are recent and none is invalid. Lock-free
     /// unless something changes.
+    #[inline]
     pub fn observe(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
         let stale = ages
@@ -356,6 +367,13 @@ impl LinkStatus {
             LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}
             _ => return,
         }
+        self.look_again(now, stale, ages);
+    }
+
+    /// Does what follows from `stale` stations' data being too old.
+    #[cold]
+    fn look_again(&self, now: Nanos, stale: usize, ages: impl Iterator<Item = Nanos> + Clone) {
+        let limit = self.0.max_age;
         let mut record = self.lock();
         let shown = now - record.link.since;
         match record.link.state {
@@ -466,9 +484,10 @@ impl LinkStatus {
         }
     }
 
-    /// A bus cycle took `span`.
+    /// A bus cycle took `span`. One thread at a time tells: the one that runs the bus.
+    #[inline]
     pub fn cycle(&self, span: Nanos) {
-        self.lock().cycle.record(span);
+        self.0.cycle.record(span);
     }
 
     /// Adds the state of the line.
@@ -497,7 +516,7 @@ impl LinkStatus {
             statistics.count(*key, *count);
         }
         statistics.count("log.untold", record.log.untold());
-        statistics.distribution("bus_cycle", &record.cycle);
+        statistics.distribution("bus_cycle", &self.0.cycle.read());
     }
 
     fn lock(&self) -> MutexGuard<'_, Record> {

@@ -109,6 +109,7 @@ impl Port {
     }
 
     /// The number of stations.
+    #[inline]
     pub fn stations(&self) -> usize {
         self.image.stations()
     }
@@ -121,6 +122,7 @@ impl Port {
 
     /// Whether the line can carry anything at `now`. While it cannot, nothing that the peer says is to be answered, and
     /// what is handed in is lost.
+    #[inline]
     pub fn is_up(&mut self, now: Nanos) -> bool {
         self.faults.attend(now, &mut self.image);
         !self.faults.is_down()
@@ -128,16 +130,13 @@ impl Port {
 
     /// The frames that these stations send in a cycle at `now`. `None`: nothing is to be sent in this cycle, because
     /// the line is not [up](Self::is_up) or loses them.
+    #[inline]
     pub fn take(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
         if !self.is_up(now) {
             return None;
         }
         if self.faults.loses_cycle() {
-            // This end believes that it has sent them.
-            for station in stations {
-                self.outgoing(station, now);
-                self.faults.sent(station, None, &mut self.image);
-            }
+            self.lose(stations, now);
             return None;
         }
         Some(Frames {
@@ -145,6 +144,15 @@ impl Port {
             stations,
             now,
         })
+    }
+
+    /// This end believes that it has sent these frames.
+    #[cold]
+    fn lose(&mut self, stations: Range<usize>, now: Nanos) {
+        for station in stations {
+            self.outgoing(station, now);
+            self.faults.sent(station, None, &mut self.image);
+        }
     }
 
     /// The frames of these stations at `now`, to see whether there is anything to send, or for a peer that reads
@@ -158,6 +166,7 @@ impl Port {
     }
 
     /// As [`take`](Self::take), of all stations.
+    #[inline]
     pub fn take_all(&mut self, now: Nanos) -> Option<Frames<'_>> {
         self.take(0..self.stations(), now)
     }
@@ -165,7 +174,8 @@ impl Port {
     #[inline]
     fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
         if station == 0 {
-            self.observe(now);
+            // Faults were attended to when the frames were taken.
+            self.image.observe(now);
         }
         self.faults.outgoing(station, now, &mut self.image)
     }
@@ -185,6 +195,7 @@ impl Port {
     /// # Panics
     ///
     /// When the frame does not have the station's size.
+    #[inline]
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
         self.faults.attend(now, &mut self.image);
         self.faults.received(station, now, bytes, &mut self.image);
@@ -211,6 +222,7 @@ impl Port {
 
     /// Reports that the peer was alive at `now`. After a STOP has ended, the station's data are valid again
     /// from then on; if the station is read, hand in its first frame before this call.
+    #[inline]
     pub fn touch(&mut self, station: usize, now: Nanos) {
         self.faults.touch(station, now, &mut self.image);
     }
@@ -309,6 +321,7 @@ impl Port {
 
     /// The peer is there. The port itself checks that it sends: a line that is silent for too long becomes
     /// stale.
+    #[inline]
     pub fn running(&mut self, reason: &str) {
         // Said in every cycle of some buses.
         if !self.faults.any() && self.image.status.is_up() {

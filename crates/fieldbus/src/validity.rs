@@ -135,6 +135,7 @@ impl Validity {
     }
 
     /// A whole frame of `station` arrived at `now`. Returns whether the validity of its data changes.
+    #[inline]
     pub(super) fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
         let mut changes = false;
         for watched in &mut self.watched {
@@ -146,6 +147,7 @@ impl Validity {
     }
 
     /// `station` gave a sign of life. Returns whether the validity of its data changes.
+    #[inline]
     pub(super) fn heard(&mut self, station: usize) -> bool {
         let station = &mut self.stations[station];
         let revives = station.is_stopped && station.plc == Some(PlcState::Run);
@@ -154,6 +156,7 @@ impl Validity {
     }
 
     /// Checks the time; returns a station, if any, of which a signal has just been found frozen.
+    #[inline]
     pub(super) fn look(&mut self, now: Nanos) -> Option<usize> {
         self.watched.iter_mut().find_map(|watched| {
             let station = watched.watch.station;

@@ -47,9 +47,7 @@ pub struct TickStation {
     /// The signals of the bits whose edges are counted there.
     tx_signals: Box<[usize]>,
     tx_sequence: u64,
-    /// The bytes published last: most ticks change nothing, and need no hand-over.
-    published: Box<[u8]>,
-    /// The same as a number whose least significant byte comes first, if there are no more than eight.
+    /// The bytes published last, up to eight, as a number whose least significant byte comes first.
     published_word: u64,
     rx: Reader<Frame>,
     /// Of the frame shown last.
@@ -94,8 +92,21 @@ pub struct BusStation {
     tx: Reader<Frame>,
     tx_shaper: PulseShaper,
     tx_fail_safe: Box<[u8]>,
-    outgoing: Box<[u8]>,
+    /// The frame with its pulses shaped, if they need it.
+    shaped: Box<[u8]>,
+    last_outgoing: Outgoing,
     beside: Arc<Beside>,
+}
+
+/// Which bytes are sent.
+#[derive(Clone, Copy, Debug)]
+enum Outgoing {
+    /// Those of the frame, which needs no shaping.
+    Frame,
+    /// The shaped ones.
+    Shaped,
+    /// The fail-safe ones.
+    FailSafe,
 }
 
 /// Creates the two ends of one station.
@@ -125,7 +136,6 @@ pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
         tx_signals: tx_latched.iter().map(|bit| bit.signal).collect(),
         tx_sequence: 0,
         published_word: as_word(&tx_fail_safe),
-        published: tx_fail_safe.clone(),
         rx: rx_reader,
         rx_sequence: 0,
         rx_shaper: PulseShaper::new(rx_latched.clone(), &rx_fail_safe),
@@ -140,8 +150,9 @@ pub fn station(directions: StationStreams) -> (TickStation, BusStation) {
         rx_len: rx_fail_safe.len(),
         tx: tx_reader,
         tx_shaper: PulseShaper::new(tx_latched, &tx_fail_safe),
-        outgoing: tx_fail_safe.clone(),
+        shaped: tx_fail_safe.clone(),
         tx_fail_safe,
+        last_outgoing: Outgoing::FailSafe,
         beside,
     };
     (tick, bus)
@@ -178,25 +189,21 @@ fn differ(one: &[u8], other: &[u8]) -> bool {
 
 impl TickStation {
     /// Lets `encode` write the whole tx frame; if that changed it, counts its edges and publishes it to the
-    /// bus.
+    /// bus. Most ticks change nothing, and need no hand-over.
     #[inline]
     pub fn write<R>(&mut self, now: Nanos, encode: impl FnOnce(&mut [u8]) -> R) -> R {
         let (edges, sequence) = (&mut self.tx_edges, self.tx_sequence + 1);
-        let published = &mut self.published;
-        let (changed, result) = self.tx.with_buffer(|frame| {
+        let (word, result) = self.tx.with_last(|frame, last| {
             let result = encode(&mut frame.bytes);
-            let changed = differ(&frame.bytes, published);
-            if changed {
-                published.copy_from_slice(&frame.bytes);
+            let changed = differ(&frame.bytes, &last.bytes).then(|| {
                 edges.count(&frame.bytes, &mut frame.edges);
                 frame.sequence = sequence;
-            }
+                as_word(&frame.bytes)
+            });
             (changed, result)
         });
-        if changed {
-            self.published_word = as_word(&self.published);
-            self.tx_sequence = sequence;
-            self.tx.publish();
+        if let Some(word) = word {
+            self.publish(word);
         }
         self.beside.tick_alive.store(now.0, Ordering::Relaxed);
         result
@@ -206,15 +213,32 @@ impl TickStation {
     /// first: a tick that changes nothing then touches no frame.
     #[inline]
     pub fn write_word(&mut self, now: Nanos, word: u64) {
-        if word == self.published_word {
-            self.beside.tick_alive.store(now.0, Ordering::Relaxed);
-        } else {
-            self.write(now, |bytes| {
-                for (to, from) in bytes.iter_mut().zip(word.to_le_bytes()) {
-                    *to = from;
-                }
-            });
+        if word != self.published_word {
+            self.publish_word(word);
         }
+        self.beside.tick_alive.store(now.0, Ordering::Relaxed);
+    }
+
+    /// Publishes another frame than the last one.
+    #[inline(never)]
+    fn publish_word(&mut self, word: u64) {
+        let (edges, sequence) = (&mut self.tx_edges, self.tx_sequence + 1);
+        self.tx.with_buffer(|frame| {
+            for (to, from) in frame.bytes.iter_mut().zip(word.to_le_bytes()) {
+                *to = from;
+            }
+            edges.count(&frame.bytes, &mut frame.edges);
+            frame.sequence = sequence;
+        });
+        self.publish(word);
+    }
+
+    /// Hands the frame over, whose first bytes are these.
+    #[inline]
+    fn publish(&mut self, word: u64) {
+        self.published_word = word;
+        self.tx_sequence += 1;
+        self.tx.publish();
     }
 
     /// The age of the peer and the sequence number of the frame shown, if [`read`](Self::read) would find nothing to show.
@@ -323,23 +347,25 @@ impl BusStation {
     /// A pulse counts as sent only when [`sent`](Self::sent) is called.
     pub fn outgoing(&mut self, now: Nanos, watchdog: Option<Nanos>) -> &[u8] {
         self.tx.update();
-        if watchdog.is_some_and(|limit| self.tick_age(now) > limit) {
+        self.last_outgoing = if watchdog.is_some_and(|limit| self.tick_age(now) > limit) {
             self.tx_shaper.pass_instead(&self.tx_fail_safe);
-            return &self.tx_fail_safe;
-        }
-        let (shaper, outgoing) = (&mut self.tx_shaper, &mut self.outgoing);
-        self.tx.with(|frame| {
-            outgoing.copy_from_slice(&frame.bytes);
+            Outgoing::FailSafe
+        } else {
+            let (shaper, shaped, frame) = (&mut self.tx_shaper, &mut self.shaped, self.tx.value());
             if shaper.needs_shaping(&frame.edges) {
-                shaper.shape(&frame.edges, now, outgoing);
+                shaped.copy_from_slice(&frame.bytes);
+                shaper.shape(&frame.edges, now, shaped);
+                Outgoing::Shaped
             } else {
-                shaper.pass(outgoing);
+                shaper.pass(&frame.bytes);
+                Outgoing::Frame
             }
-        });
-        &self.outgoing
+        };
+        self.last_outgoing()
     }
 
     /// The exchange that carried the bytes of [`outgoing`](Self::outgoing) was completed.
+    #[inline]
     pub fn sent(&mut self) {
         self.tx_shaper.confirm();
     }
@@ -351,11 +377,13 @@ impl BusStation {
     }
 
     /// Time since the last tick of the simulation; [`Nanos::MAX`] before the first one.
+    #[inline]
     pub fn tick_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.tick_alive.load(Ordering::Relaxed))
     }
 
     /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
+    #[inline]
     pub fn peer_age(&self, now: Nanos) -> Nanos {
         age(now, self.beside.peer_alive.load(Ordering::Relaxed))
     }
@@ -381,10 +409,13 @@ impl BusStation {
         // The time first, so that no reader of the frame thinks it old.
         self.touch(now);
         self.rx.publish();
-        self.beside.cycles.fetch_add(1, Ordering::Relaxed);
+        // Nobody else counts.
+        let cycles = self.beside.cycles.load(Ordering::Relaxed);
+        self.beside.cycles.store(cycles + 1, Ordering::Relaxed);
     }
 
     /// The peer is alive, though it sent no new data.
+    #[inline]
     pub fn touch(&mut self, now: Nanos) {
         self.beside.peer_alive.store(now.0, Ordering::Relaxed);
     }
@@ -396,8 +427,13 @@ impl BusStation {
     }
 
     /// The bytes sent last, or about to be sent.
+    #[inline]
     pub fn last_outgoing(&self) -> &[u8] {
-        &self.outgoing
+        match self.last_outgoing {
+            Outgoing::Frame => &self.tx.value().bytes,
+            Outgoing::Shaped => &self.shaped,
+            Outgoing::FailSafe => &self.tx_fail_safe,
+        }
     }
 
     /// The latched bits of outgoing frames.
@@ -412,7 +448,7 @@ impl BusStation {
 
     /// Size of outgoing frames, in bytes.
     pub fn tx_len(&self) -> usize {
-        self.outgoing.len()
+        self.shaped.len()
     }
 }
 
@@ -555,6 +591,22 @@ mod tests {
         assert_eq!(bus.outgoing(Nanos(11), watchdog), [0x80]);
         tick.write(Nanos(12), |bytes| bytes[0] = 2);
         assert_eq!(bus.outgoing(Nanos(13), watchdog), [2]);
+    }
+
+    #[test]
+    fn the_bytes_sent_last_stay_at_hand_however_they_came_about() {
+        let (mut tick, mut bus) = one_latched_byte();
+        assert_eq!(bus.last_outgoing(), [0x80]);
+        for level in [1, 0] {
+            tick.write(Nanos(1), |bytes| bytes[0] = level);
+        }
+        // The pulse, what the tick writes meanwhile, and the fail-safe bytes at the end.
+        for (now, expected, next) in [(2, 1, 0x42), (3, 0x42, 0x44), (20, 0x80, 0x46)] {
+            assert_eq!(bus.outgoing(Nanos(now), Some(Nanos(10))), [expected]);
+            bus.sent();
+            tick.write(Nanos(5), |bytes| bytes[0] = next);
+            assert_eq!(bus.last_outgoing(), [expected], "at {now}");
+        }
     }
 
     #[test]

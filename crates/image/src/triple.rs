@@ -40,6 +40,8 @@ unsafe impl<T: Send> Sync for Shared<T> {}
 pub struct Writer<T> {
     shared: Arc<Shared<T>>,
     index: u8,
+    /// The buffer published last; before the first one, the initial value that waits to be taken back.
+    last: u8,
 }
 
 /// The reading side of a triple buffer.
@@ -62,6 +64,7 @@ pub fn triple_buffer<T: Clone + Send>(initial: &T) -> (Writer<T>, Reader<T>) {
         Writer {
             shared: Arc::clone(&shared),
             index: 0,
+            last: 1,
         },
         Reader { shared, index: 2 },
     )
@@ -86,7 +89,26 @@ impl<T> Writer<T> {
     /// Publishes the writer's buffer.
     #[inline]
     pub fn publish(&mut self) {
+        self.last = self.index;
         self.index = self.shared.state.swap(self.index | FRESH, Ordering::AcqRel) & INDEX;
+    }
+}
+
+impl<T: Sync> Writer<T> {
+    /// As [`with_buffer`](Self::with_buffer), beside the value published last, or the initial one: what did not change
+    /// need not be published, and need not be kept once more to see that.
+    #[inline]
+    pub fn with_last<R>(&mut self, write: impl FnOnce(&mut T, &T) -> R) -> R {
+        self.shared.buffer(self.last).with(|last| {
+            self.shared.buffer(self.index).with_mut(|buffer| {
+                // SAFETY: the writer holds `self.index`, as above. `self.last` is another one: publishing exchanges the
+                // two for an index that was the other side's or in between. Only a writer writes, and this one not
+                // there before it gets that index back, which needs `publish` and so `&mut self`. The reader may hold
+                // the index and read at the same time, which `T: Sync` allows.
+                let (buffer, last) = unsafe { (&mut *buffer, &*last) };
+                write(buffer, last)
+            })
+        })
     }
 }
 
@@ -116,6 +138,15 @@ impl<T> Reader<T> {
             read(unsafe { &*buffer })
         })
     }
+
+    /// The value that was last taken over.
+    #[inline]
+    pub fn value(&self) -> &T {
+        self.shared.buffer(self.index).with(|buffer| {
+            // SAFETY: as in `with`; the borrow of `self` lasts as long as the reference.
+            unsafe { &*buffer }
+        })
+    }
 }
 
 #[cfg(all(test, not(loom)))]
@@ -137,12 +168,37 @@ mod tests {
     }
 
     #[test]
+    fn the_writer_sees_what_it_published_last() {
+        let (mut writer, mut reader) = triple_buffer(&7);
+        let mut last = 7;
+        for step in 0..100 {
+            let value = 100 + step;
+            writer.with_last(|buffer, seen| {
+                assert_eq!(*seen, last, "step {step}");
+                *buffer = value;
+            });
+            // Some are not published, and some not read.
+            if step % 3 != 0 {
+                writer.publish();
+                last = value;
+            }
+            if step % 5 < 3 {
+                reader.update();
+                assert_eq!(*reader.value(), last);
+            }
+        }
+    }
+
+    #[test]
     fn nothing_is_torn_between_threads() {
         const LAST: u64 = if cfg!(miri) { 200 } else { 200_000 };
         let (mut writer, mut reader) = triple_buffer(&[0_u64; 32]);
         let writing = std::thread::spawn(move || {
             for value in 1..=LAST {
-                writer.with_buffer(|buffer| buffer.fill(value));
+                writer.with_last(|buffer, last| {
+                    assert_eq!(*last, [value - 1; 32]);
+                    buffer.fill(value);
+                });
                 writer.publish();
             }
         });
@@ -176,7 +232,10 @@ mod loom_tests {
             let (mut writer, mut reader) = triple_buffer(&[0_u8; 2]);
             let writing = loom::thread::spawn(move || {
                 for value in 1..=3 {
-                    writer.with_buffer(|buffer| *buffer = [value; 2]);
+                    writer.with_last(|buffer, last| {
+                        assert_eq!(*last, [value - 1; 2]);
+                        *buffer = [value; 2];
+                    });
                     writer.publish();
                 }
             });

@@ -40,12 +40,26 @@ impl TimeHistogram {
 
     /// Counts one span; one below zero counts as zero.
     pub fn record(&mut self, span: Nanos) {
+        self.record_times(span, 1);
+    }
+
+    /// Counts a span that came this many times.
+    pub fn record_times(&mut self, span: Nanos, times: u64) {
+        if times == 0 {
+            return;
+        }
         let span = Nanos(span.0.clamp(0, LONGEST));
         let nanos = span.0.unsigned_abs();
-        self.histogram.saturating_record(nanos);
+        let mut rest = times;
+        while rest > 0 {
+            // Its bins count in 32 bits.
+            let some = u32::try_from(rest).unwrap_or(u32::MAX);
+            self.histogram.saturating_record_n(nanos, some);
+            rest -= u64::from(some);
+        }
         self.shortest = self.shortest.min(span);
-        self.sum += u128::from(nanos);
-        self.squares += u128::from(nanos) * u128::from(nanos);
+        self.sum += u128::from(nanos) * u128::from(times);
+        self.squares += u128::from(nanos) * u128::from(nanos) * u128::from(times);
     }
 
     /// Becomes a copy of `other`, without allocating memory.

@@ -8,6 +8,7 @@ mod clock;
 mod histogram;
 mod nanos;
 mod pace;
+mod shared_histogram;
 mod stop;
 mod wall;
 
@@ -15,5 +16,6 @@ pub use clock::{Clock, Manual, Monotonic};
 pub use histogram::TimeHistogram;
 pub use nanos::Nanos;
 pub use pace::Pace;
+pub use shared_histogram::SharedHistogram;
 pub use stop::{Stop, Waker};
 pub use wall::{WallClock, system_time};

@@ -15,6 +15,7 @@ use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
 use super::faults::FrameFaults;
+use super::scan_counters::CountedArea;
 use super::watched::{ScannedStation, WatchedScans};
 
 /// A program with the tick's end of its process image: a PLC without its bus.
@@ -38,6 +39,8 @@ pub(super) struct Cpu {
 pub(super) struct Unit {
     pub(super) program: Box<dyn Program>,
     station: usize,
+    /// Where the edges of its outputs and inputs are counted.
+    counted: (Option<CountedArea>, Option<CountedArea>),
     pub(super) inputs: Inputs,
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
@@ -50,12 +53,21 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    fn new(program: Box<dyn Program>, config: &Config, role: Role, station: usize) -> Self {
+    fn new(
+        program: Box<dyn Program>,
+        (config, role): (&Config, Role),
+        station: usize,
+        scan_counters: &ScanCounters,
+    ) -> Self {
         let (writes, reads) = role.areas();
         let outputs = frame(config, station, writes);
         Self {
             program,
             station,
+            counted: (
+                scan_counters.place(station, writes),
+                scan_counters.place(station, reads),
+            ),
             inputs: Inputs::new(frame(config, station, reads)),
             outputs_before: outputs.clone(),
             outputs,
@@ -67,17 +79,10 @@ impl Unit {
     }
 
     /// Takes over the inputs.
-    fn read(
-        &mut self,
-        now: Nanos,
-        image: &mut TickStation,
-        scan_counters: &ScanCounters,
-        reads: Area,
-        tape: Option<&mut ScanRecorder>,
-    ) {
+    fn read(&mut self, now: Nanos, image: &mut TickStation, tape: Option<&mut ScanRecorder>) {
         self.is_valid = image.is_valid();
         let inputs = &mut self.inputs;
-        scan_counters.keep((self.station, reads), &mut inputs.before, &inputs.bytes);
+        ScanCounters::keep(self.counted.1, &mut inputs.before, &inputs.bytes);
         self.arrival = Some(image.read(now, &mut Taking { inputs, tape }));
     }
 
@@ -87,11 +92,10 @@ impl Unit {
         (now, in_time, max_age): (Nanos, bool, Nanos),
         image: &TickStation,
         scan_counters: &ScanCounters,
-        (writes, reads): (Area, Area),
     ) {
         let Self {
             program,
-            station,
+            counted: (written, read),
             inputs,
             outputs,
             outputs_before,
@@ -101,11 +105,11 @@ impl Unit {
         let Some(arrival) = self.arrival else {
             return;
         };
-        scan_counters.count((*station, reads), &inputs.before, &inputs.bytes);
+        scan_counters.count(*read, &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
         self.is_alive = in_time && self.is_valid && image.is_valid() && arrival.age <= max_age;
-        scan_counters.keep((*station, writes), outputs_before, outputs);
+        ScanCounters::keep(*written, outputs_before, outputs);
         program.scan(&mut Scan {
             now,
             alive: self.is_alive,
@@ -114,7 +118,29 @@ impl Unit {
             outputs,
         });
         beats.beat(now, outputs);
-        scan_counters.count((*station, writes), outputs_before, outputs);
+        scan_counters.count(*written, outputs_before, outputs);
+    }
+
+    /// Hands its outputs over, as `bend` leaves them, and records the scan.
+    fn write(
+        &self,
+        now: Nanos,
+        image: &mut TickStation,
+        tape: Option<&mut ScanRecorder>,
+        bend: impl FnOnce(&mut [u8]),
+    ) {
+        image.write(now, |frame| {
+            frame.copy_from_slice(&self.outputs);
+            bend(frame);
+        });
+        if let Some(tape) = tape {
+            tape.scan(now, self.code(), &self.inputs.bytes, &self.outputs);
+        }
+    }
+
+    /// The age of its data.
+    fn age(&self) -> Nanos {
+        self.arrival.map_or(Nanos::ZERO, |arrival| arrival.age)
     }
 
     /// How its last scan went.
@@ -169,50 +195,58 @@ impl Cpu {
     /// has received fail-safe values in the meantime: the program must then start over as after a broken
     /// line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
-        let (_, reads) = self.areas;
-        let scan_counters = &*self.scan_counters;
-        if let Some(faults) = &mut self.faults {
-            let units = self.units.iter_mut();
-            faults.begin_scan(
-                now,
-                units.map(|unit| (&mut *unit.inputs.bytes, &*unit.outputs)),
-            );
-        }
-        let images = &mut self.tick.stations;
-        for (unit, image) in self.units.iter_mut().zip(&mut *images) {
-            let tape = self.tape.as_mut().filter(|_| unit.station == 0);
-            unit.read(now, image, scan_counters, reads, tape);
-        }
-        if let Some(faults) = &mut self.faults {
-            let units = self.units.iter_mut();
-            faults.received(units.map(|unit| &mut *unit.inputs.bytes));
-        }
         let (mut age, mut alive) = (Nanos::ZERO, true);
-        for (unit, image) in self.units.iter_mut().zip(&*images) {
-            let time = (now, in_time, self.max_age);
-            unit.run(time, image, scan_counters, self.areas);
-            age = age.max(unit.arrival.map_or(Nanos::ZERO, |arrival| arrival.age));
-            alive &= unit.is_alive;
-        }
-        if let Some(faults) = &mut self.faults {
-            faults.sending(self.units.iter().map(|unit| &*unit.outputs));
-        }
-        for (unit, image) in self.units.iter_mut().zip(images) {
-            image.write(now, |frame| {
-                frame.copy_from_slice(&unit.outputs);
-                if let Some(faults) = &mut self.faults {
-                    faults.bend_outputs(unit.station, frame);
-                }
-            });
-            if let Some(tape) = self.tape.as_mut().filter(|_| unit.station == 0) {
-                tape.scan(now, unit.code(), &unit.inputs.bytes, &unit.outputs);
+        if self.faults.is_some() {
+            self.scan_with_faults(now, in_time);
+            for unit in &self.units {
+                age = age.max(unit.age());
+                alive &= unit.is_alive;
             }
-        }
-        if let Some(faults) = &mut self.faults {
-            faults.sent();
+        } else {
+            let time = (now, in_time, self.max_age);
+            for (unit, image) in self.units.iter_mut().zip(&mut self.tick.stations) {
+                let mut tape = self.tape.as_mut().filter(|_| unit.station == 0);
+                unit.read(now, image, tape.as_deref_mut());
+                unit.run(time, image, &self.scan_counters);
+                unit.write(now, image, tape, |_| {});
+                age = age.max(unit.age());
+                alive &= unit.is_alive;
+            }
         }
         self.scan_counters.scanned(age, alive);
         self.serve_watch(now);
+    }
+
+    /// The same while faults are injected or were: they look at the stations together, before and after each part of the
+    /// scan.
+    fn scan_with_faults(&mut self, now: Nanos, in_time: bool) {
+        let Some(faults) = &mut self.faults else {
+            return;
+        };
+        let (units, images) = (&mut self.units, &mut self.tick.stations);
+        let tape = &mut self.tape;
+        let frames = units.iter_mut();
+        faults.begin_scan(
+            now,
+            frames.map(|unit| (&mut *unit.inputs.bytes, &*unit.outputs)),
+        );
+        for (unit, image) in units.iter_mut().zip(&mut *images) {
+            let tape = tape.as_mut().filter(|_| unit.station == 0);
+            unit.read(now, image, tape);
+        }
+        faults.received(units.iter_mut().map(|unit| &mut *unit.inputs.bytes));
+        for (unit, image) in units.iter_mut().zip(&*images) {
+            let time = (now, in_time, self.max_age);
+            unit.run(time, image, &self.scan_counters);
+        }
+        faults.sending(units.iter().map(|unit| &*unit.outputs));
+        for (unit, image) in units.iter().zip(images) {
+            let tape = tape.as_mut().filter(|_| unit.station == 0);
+            unit.write(now, image, tape, |frame| {
+                faults.bend_outputs(unit.station, frame);
+            });
+        }
+        faults.sent();
     }
 
     /// Does what another thread wants that looks at the image.
@@ -251,7 +285,7 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
     let units = std::iter::once((program, 0)).chain(others);
     let cpu = Cpu {
         units: units
-            .map(|(program, station)| Unit::new(program, config, role, station))
+            .map(|(program, station)| Unit::new(program, (config, role), station, &scan_counters))
             .collect(),
         tick,
         max_age: config.timing.max_age,

@@ -1,20 +1,20 @@
 //! The counters of a hosted program.
 
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::statistics::{Key, Statistics};
-use tickbus_base::time::{Nanos, TimeHistogram};
+use tickbus_base::time::{Nanos, SharedHistogram};
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
-/// What the hosted program has seen and sent, to be compared with the other end.
+/// What the hosted program has seen and sent, to be compared with the other end. One thread counts, that of the scans;
+/// others only look.
 #[derive(Debug)]
 pub(crate) struct ScanCounters {
     scans: AtomicU64,
     /// Scans with stale data.
     stale: AtomicU64,
     /// Age of the data in the scans.
-    age: Mutex<TimeHistogram>,
+    age: SharedHistogram,
     /// In the order of the signal table.
     bits: Box<[Bit]>,
     frames: Box<[Frame]>,
@@ -32,6 +32,16 @@ struct Frame {
     station: usize,
     area: Area,
     bytes: Box<[Octet]>,
+}
+
+/// The place of a counted area among all of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CountedArea(usize);
+
+/// Counts one in a counter that no other thread changes.
+#[inline]
+fn count_one(counter: &AtomicU64) {
+    counter.store(counter.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
 }
 
 /// Bytes that are looked at one by one sooner than compared.
@@ -89,29 +99,35 @@ impl ScanCounters {
         Self {
             scans: AtomicU64::new(0),
             stale: AtomicU64::new(0),
-            age: Mutex::new(TimeHistogram::new()),
+            age: SharedHistogram::new(),
             bits: bits.into(),
             frames: frames.into(),
         }
     }
 
-    fn frame(&self, (station, area): (usize, Area)) -> Option<&Frame> {
-        let here = |frame: &&Frame| (frame.station, frame.area) == (station, area);
-        self.frames.iter().find(here)
+    /// The place of an area of a station, if that has anything to count.
+    pub(super) fn place(&self, station: usize, area: Area) -> Option<CountedArea> {
+        let here = |frame: &Frame| (frame.station, frame.area) == (station, area);
+        self.frames.iter().position(here).map(CountedArea)
     }
 
     /// Keeps in `before` what [`count`](Self::count) will compare with, where there is anything to count.
-    pub(super) fn keep(&self, of: (usize, Area), before: &mut [u8], now: &[u8]) {
-        if self.frame(of).is_some() {
+    #[inline]
+    pub(super) fn keep(of: Option<CountedArea>, before: &mut [u8], now: &[u8]) {
+        if of.is_some() {
             before.copy_from_slice(now);
         }
     }
 
-    /// Counts the rising edges from `before` to `now` in an area of a station.
-    pub(super) fn count(&self, of: (usize, Area), before: &[u8], now: &[u8]) {
-        let Some(frame) = self.frame(of) else {
-            return;
-        };
+    /// Counts the rising edges from `before` to `now` in an area.
+    #[inline]
+    pub(super) fn count(&self, of: Option<CountedArea>, before: &[u8], now: &[u8]) {
+        if let Some(CountedArea(place)) = of {
+            self.count_in(&self.frames[place], before, now);
+        }
+    }
+
+    fn count_in(&self, frame: &Frame, before: &[u8], now: &[u8]) {
         // Most scans change nothing.
         if frame.bytes.len() > FEW && before == now {
             return;
@@ -121,26 +137,21 @@ impl ScanCounters {
             while rises != 0 {
                 let bit = octet.bits[rises.trailing_zeros() as usize];
                 let count = &self.bits[bit as usize].rises;
-                // One thread counts, others only look.
-                count.store(count.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
+                count_one(count);
                 rises &= rises - 1;
             }
         }
     }
 
     /// Records a scan whose data were of `age`.
+    #[inline]
     pub(super) fn scanned(&self, age: Nanos, alive: bool) {
-        self.scans.fetch_add(1, Ordering::Relaxed);
+        count_one(&self.scans);
         if alive {
-            self.lock_age().record(age);
+            self.age.record(age);
         } else {
-            self.stale.fetch_add(1, Ordering::Relaxed);
+            count_one(&self.stale);
         }
-    }
-
-    fn lock_age(&self) -> MutexGuard<'_, TimeHistogram> {
-        // A histogram is consistent after every change, so a poisoned lock is safe to use.
-        self.age.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The number of scans so far, and of those with stale data.
@@ -153,7 +164,7 @@ impl ScanCounters {
     pub(crate) fn write(&self, statistics: &mut Statistics) {
         statistics.count("plc.scans", self.scans.load(Ordering::Relaxed));
         statistics.count("plc.stale", self.stale.load(Ordering::Relaxed));
-        statistics.distribution("plc.age", &self.lock_age());
+        statistics.distribution("plc.age", &self.age.read());
         for bit in &self.bits {
             let rises = bit.rises.load(Ordering::Relaxed);
             statistics.count(Key::of("plc.rises", &bit.name, ""), rises);

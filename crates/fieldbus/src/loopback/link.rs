@@ -50,6 +50,8 @@ pub struct End {
     offered: Option<Receipt>,
     /// Whether the other end has been present.
     met: bool,
+    /// Whether both ends belong to one driver, which closes them one after the other: that is no peer that leaves.
+    is_private: bool,
 }
 
 /// Creates a link without a name, with both its ends: the Device's and the Controller's.
@@ -57,8 +59,11 @@ pub struct End {
 /// `sizes` are the numbers of bytes that the Device sends and receives, per station.
 pub fn private_link(sizes: &[(usize, usize)]) -> (End, End) {
     let line = Arc::default();
-    let attach =
-        |role, sizes| End::attach(&line, role, sizes, "").expect("a new line has two free places");
+    let attach = |role, sizes| {
+        let mut end = End::attach(&line, role, sizes, "").expect("a new line has two free places");
+        end.is_private = true;
+        end
+    };
     (
         attach(Role::Device, sizes.to_vec()),
         attach(Role::Controller, swapped(sizes)),
@@ -122,6 +127,7 @@ impl End {
             role,
             offered: None,
             met: false,
+            is_private: false,
         })
     }
 
@@ -185,7 +191,7 @@ impl End {
         line.lanes[lane(self.role)].waiting = false;
         self.offered = None;
         drop(line);
-        if std::mem::take(&mut self.met) {
+        if std::mem::take(&mut self.met) && !self.is_private {
             let left = BusError::Left("the other end of the link was closed".to_owned());
             port.lost(&left, "waiting for the next");
         }
@@ -202,4 +208,49 @@ impl Drop for End {
 fn lock(line: &Mutex<SharedLanes>) -> MutexGuard<'_, SharedLanes> {
     // Frames are copied whole under the lock, so they are readable even after a panic of the other end.
     line.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Cause, LinkStatus};
+    use tickbus_base::time::Manual;
+    use tickbus_image::{StationStreams, image};
+
+    fn port(role: Role) -> (Port, LinkStatus) {
+        let streams = StationStreams {
+            tx_fail_safe: Box::new([0]),
+            tx_latched: Box::new([]),
+            rx_fail_safe: Box::new([0]),
+            rx_latched: Box::new([]),
+        };
+        let (_, bus) = image(vec![streams]);
+        let status = LinkStatus::new("x", Nanos::from_millis(100));
+        let port = Port::new(bus, Manual::new(), role, None, status.clone());
+        (port, status)
+    }
+
+    #[test]
+    fn a_peer_that_leaves_is_told_unless_both_ends_are_one_drivers() {
+        for is_private in [false, true] {
+            let mut ports = [Role::Device, Role::Controller].map(port);
+            let (mut device, mut controller) = if is_private {
+                private_link(&[(1, 1)])
+            } else {
+                [0, 1]
+                    .map(|end| End::join("left", &ports[end].0).expect("a free place"))
+                    .into()
+            };
+            let [(port, status), (peer, _)] = &mut ports;
+            for _ in 0..2 {
+                controller.cycle(Nanos(1), peer);
+                device.cycle(Nanos(1), port);
+            }
+            assert_eq!(status.link().cause, Cause::Running);
+            drop(controller);
+            device.cycle(Nanos(2), port);
+            let cause = status.link().cause;
+            assert_eq!(cause == Cause::Left, !is_private, "{cause:?}");
+        }
+    }
 }

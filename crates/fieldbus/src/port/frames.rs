@@ -28,6 +28,7 @@ impl Frames<'_> {
     }
 
     /// The stations that were taken.
+    #[inline]
     pub fn stations(&self) -> Range<usize> {
         self.stations.clone()
     }

@@ -114,7 +114,7 @@ impl Plan {
 
     /// The frame that [`encode`](Self::encode) would make, as a number whose least significant byte comes first, of up to
     /// eight bytes that are all BOOLs, eight to a byte in the order of the slots. `None` for other frames, and if a value
-    /// has to be looked at by itself.
+    /// is NaN.
     ///
     /// # Panics
     ///

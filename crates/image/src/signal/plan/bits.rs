@@ -1,6 +1,6 @@
 //! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
 
-use wide::{CmpNe, f64x2};
+use wide::{CmpEq, i16x8, i32x8, i64x2};
 
 use super::run::{Member, Run};
 use super::{Conversions, index};
@@ -78,33 +78,49 @@ impl Octets {
         self.in_word.is_some()
     }
 
-    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN, or if there are
-    /// infinite ones of both signs.
+    /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN.
     #[inline]
     pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
-        let (mut word, mut sum) = (0, f64x2::ZERO);
+        let (mut word, mut seen) = (0, i64x2::ZERO);
         let (eights, _) = slots.get(self.first..)?.as_chunks::<8>();
         for (at, bit) in self.in_word.as_deref()? {
-            word |= u64::from(pack(eights.get(*at)?, &mut sum)) << bit;
+            word |= u64::from(pack(eights.get(*at)?, &mut seen)) << bit;
         }
-        (!has_nan(sum)).then_some(word)
+        if are_plain(seen) {
+            Some(word)
+        } else {
+            self.word_of_any(slots)
+        }
+    }
+
+    /// The same of any values.
+    #[cold]
+    #[inline(never)]
+    fn word_of_any(&self, slots: &[Slot]) -> Option<u64> {
+        let (mut word, mut conversions) = (0, Conversions::default());
+        for octet in &self.all {
+            let slots = slots.get(octet.slot as usize..)?.first_chunk()?;
+            let byte = pack_any(slots, octet.fail_safe, &mut conversions);
+            word |= u64::from(byte) << (8 * octet.byte);
+        }
+        (conversions == Conversions::default()).then_some(word)
     }
 
     /// Encodes the slots into their bytes of the frame.
     #[inline]
     pub(super) fn encode(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
-        let mut sum = f64x2::ZERO;
+        let mut seen = i64x2::ZERO;
         for octet in &self.all {
             if let Some(slots) = slots[octet.slot as usize..].first_chunk() {
-                frame[octet.byte as usize] = pack(slots, &mut sum);
+                frame[octet.byte as usize] = pack(slots, &mut seen);
             }
         }
-        if has_nan(sum) {
+        if !are_plain(seen) {
             self.encode_any(slots, frame, conversions);
         }
     }
 
-    /// Encodes values some of which may be NaN.
+    /// Encodes any values.
     #[cold]
     #[inline(never)]
     fn encode_any(&self, slots: &[Slot], frame: &mut [u8], conversions: &mut Conversions) {
@@ -190,26 +206,32 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     }
 }
 
-/// Eight slots as one byte, the first slot as bit 0. Adds them to `sum`: that is NaN when one of them is, and then the byte
-/// is wrong.
+/// The bits of 1.0.
+const ONE: u64 = 1.0_f64.to_bits();
+
+/// Eight slots as one byte, the first slot as bit 0: right if they [are plain](are_plain), for which their bits are added to
+/// `seen`. One operation has several slots then, and none of their values is looked at.
 #[inline]
-fn pack(slots: &[Slot; 8], sum: &mut f64x2) -> u8 {
-    let pair = |first: usize| f64x2::new([slots[first].real(), slots[first + 1].real()]);
+fn pack(slots: &[Slot; 8], seen: &mut i64x2) -> u8 {
+    let pair = |first: usize| i64x2::new([slots[first].signed(), slots[first + 1].signed()]);
     let pairs = [pair(0), pair(2), pair(4), pair(6)];
-    *sum += (pairs[0] + pairs[1]) + (pairs[2] + pairs[3]);
-    let [a, b, c, d] = pairs.map(|pair| pair.cmp_ne(f64x2::ZERO).move_mask());
-    let [byte, ..] = (a | b << 2 | c << 4 | d << 6).to_le_bytes();
+    *seen |= (pairs[0] | pairs[1]) | (pairs[2] | pairs[3]);
+    // Zero or not is to be seen in the upper halves.
+    let upper = slots.map(|slot| (slot.signed() >> 32) as i32);
+    let words = i16x8::from_i32x8_saturate(i32x8::new(upper));
+    let [byte, ..] = (!words.cmp_eq(i16x8::ZERO).move_mask()).to_le_bytes();
     byte
 }
 
-/// Whether one of the values that were added is NaN. Infinities of both signs also make one: rare enough to be looked at
-/// value by value.
+/// Whether all of the slots whose bits are in `seen` are 0.0 or 1.0, as BOOLs mostly are; or other powers of two below, which
+/// are packed as well: they have no bits but those of 1.0 either.
 #[inline]
-fn has_nan(sum: f64x2) -> bool {
-    sum.is_nan().move_mask() != 0
+fn are_plain(seen: i64x2) -> bool {
+    let [one, other] = seen.to_array();
+    (one | other).cast_unsigned() & !ONE == 0
 }
 
-/// As [`pack`], checking each value; NaN slots take their bit from `fail_safe` and are counted.
+/// As [`pack`], of any values; NaN slots take their bit from `fail_safe` and are counted.
 fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
     (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
         let fail_safe = fail_safe >> bit & 1 == 1;
@@ -261,22 +283,23 @@ mod tests {
     }
 
     #[test]
-    fn the_word_of_a_frame_has_its_bytes() {
-        for bytes in 1..=9 {
+    fn a_bool_is_high_for_every_value_but_zero() {
+        let plain = &[1.0, 0.0, 0.5, f64::MIN_POSITIVE][..];
+        let any = &[1.0, 0.0, -0.0, 2.0, -3.5, 1e-300, 5e-324, f64::INFINITY][..];
+        for (bytes, values) in (1..=9).flat_map(|bytes| [(bytes, plain), (bytes, any)]) {
             let plan = bools(bytes);
             let mut slots = vec![Slot::from_real(0.0); 8 * bytes];
+            let mut expected = [0_u8; 9];
             for step in 0..200_usize {
-                let values = [1.0, 0.0, -0.0, -3.5, 1e-300, f64::INFINITY];
-                slots[step * 7 % (8 * bytes)] = Slot::from_real(values[step % values.len()]);
+                let (at, value) = (step * 7 % (8 * bytes), values[step % values.len()]);
+                slots[at] = Slot::from_real(value);
+                expected[at / 8] &= !(1 << (at % 8));
+                expected[at / 8] |= u8::from(value != 0.0) << (at % 8);
                 let mut frame = vec![0; bytes];
                 plan.encode(&slots, &mut frame);
-                let mut expected = [0; 8];
-                if bytes <= 8 {
-                    expected[..bytes].copy_from_slice(&frame);
-                    assert_eq!(plan.word(&slots), Some(u64::from_le_bytes(expected)));
-                } else {
-                    assert_eq!(plan.word(&slots), None, "it has more than a word");
-                }
+                assert_eq!(frame, expected[..bytes], "step {step}");
+                let word = expected[..8].try_into().map(u64::from_le_bytes);
+                assert_eq!(plan.word(&slots), word.ok().filter(|_| bytes <= 8));
             }
         }
     }
@@ -315,7 +338,6 @@ mod tests {
         assert_eq!(plan.word(&slots), None);
         assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 1);
         assert_eq!(frame, [0xFF; 2], "the fail-safe value is 1");
-        // Their sum is NaN, though neither is.
         slots[9] = Slot::from_real(f64::INFINITY);
         slots[3] = Slot::from_real(f64::NEG_INFINITY);
         assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 0);

@@ -8,9 +8,6 @@
     reason = "exported names and the pointers that an importing tool hands in"
 )]
 
-mod three;
-mod two;
-
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
@@ -22,6 +19,62 @@ use tickbus_binding::{Handles, closing, panic_message};
 use tickbus_driver::Code;
 use tickbus_fmi::made::{Instance, folder_of};
 use tickbus_fmi::{Status, Version};
+
+/// Functions that are one call of the instance.
+macro_rules! calls {
+    ($($name:ident: $work:expr;)+) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(instance: *mut c_void) -> c_int {
+            call(instance, $work)
+        }
+    )+};
+}
+
+/// The two functions for variables of a type: ours, and as it stands in the lists. FMI 3.0 tells the number of values beside
+/// that of the variables.
+macro_rules! numbers {
+    ($($get:ident, $set:ident: $own:ty as $outer:ty $(, $length:ident)?;)+) => {$(
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $get(
+            instance: *mut c_void, references: *const u32, count: usize, values: *mut $outer $(, $length: usize)?
+        ) -> c_int {
+            let [.., length] = [count $(, $length)?];
+            // SAFETY: by the standard's header, these are null or lists as long as the call says.
+            let (references, values) = unsafe { (list(references, count), room(values, length)) };
+            call(instance, |instance| {
+                same(references.len(), count, values.len())?;
+                instance.get(references, |at, value: $own| values[at] = value.into())
+            })
+        }
+
+        #[unsafe(no_mangle)]
+        unsafe extern "C" fn $set(
+            instance: *mut c_void, references: *const u32, count: usize, values: *const $outer $(, $length: usize)?
+        ) -> c_int {
+            let [.., length] = [count $(, $length)?];
+            // SAFETY: as above.
+            let (references, values) = unsafe { (list(references, count), list(values, length)) };
+            call(instance, |instance| {
+                same(references.len(), count, values.len())?;
+                instance.set(references, values.iter().map(|&value| <$own as Inner<$outer>>::inner(value)))
+            })
+        }
+    )+};
+}
+
+/// Functions that the model description does without. Those of C that have more parameters than this one are called all the
+/// same: the caller removes them.
+macro_rules! lacking {
+    ($($name:ident,)+) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(instance: *mut c_void) -> c_int {
+            lacking(instance, stringify!($name))
+        }
+    )+};
+}
+
+mod three;
+mod two;
 
 /// Every instance of FMUs that this library is in.
 static INSTANCES: Handles<Box<Tenant>> = Handles::new();
@@ -264,6 +317,18 @@ fn set_logging(handle: *mut c_void, all: bool) -> c_int {
     done.map_or_else(unknown, |()| Status::Ok as c_int)
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "all calls have this form")]
+fn terminate(instance: &mut Instance) -> Result<(), String> {
+    instance.terminate();
+    Ok(())
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "all calls have this form")]
+fn reset(instance: &mut Instance) -> Result<(), String> {
+    instance.reset();
+    Ok(())
+}
+
 /// Answers a call of a function that this FMU says it has not.
 fn lacking(handle: *mut c_void, name: &str) -> c_int {
     call(handle, |_| {
@@ -325,19 +390,46 @@ fn same(references: usize, asked: usize, values: usize) -> Result<(), String> {
     ))
 }
 
+/// A value, of how it stands in a list.
+trait Inner<O> {
+    fn inner(outer: O) -> Self;
+}
+
+impl<T> Inner<T> for T {
+    #[inline]
+    fn inner(outer: T) -> T {
+        outer
+    }
+}
+
+/// Of FMI 2.0.
+impl Inner<c_int> for bool {
+    #[inline]
+    fn inner(outer: c_int) -> Self {
+        outer != 0
+    }
+}
+
+/// Of FMI 3.0. It is read as a byte: what a caller hands in need not be 0 or 1, as a `bool` of Rust has to be.
+impl Inner<u8> for bool {
+    #[inline]
+    fn inner(outer: u8) -> Self {
+        outer != 0
+    }
+}
+
 /// Sets texts.
 ///
 /// # Safety
 ///
-/// `references` and `values` must be null or point to `count` of them, each value null or a C string.
+/// `references` and `values` must be null or point to as many of them, each value null or a C string.
 unsafe fn set_texts(
     handle: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *const *const c_char,
+    (references, count): (*const u32, usize),
+    (values, value_count): (*const *const c_char, usize),
 ) -> c_int {
     // SAFETY: the caller's promise, here and below.
-    let (references, values) = unsafe { (list(references, count), list(values, count)) };
+    let (references, values) = unsafe { (list(references, count), list(values, value_count)) };
     call(handle, |instance| {
         same(references.len(), count, values.len())?;
         for (&reference, &value) in references.iter().zip(values) {
@@ -356,15 +448,14 @@ unsafe fn set_texts(
 ///
 /// # Safety
 ///
-/// `references` and `values` must be null or point to `count` of them.
+/// `references` and `values` must be null or point to as many of them.
 unsafe fn get_texts(
     handle: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *mut *const c_char,
+    (references, count): (*const u32, usize),
+    (values, value_count): (*mut *const c_char, usize),
 ) -> c_int {
     // SAFETY: the caller's promise.
-    let (references, values) = unsafe { (list(references, count), room(values, count)) };
+    let (references, values) = unsafe { (list(references, count), room(values, value_count)) };
     call(handle, |instance| {
         same(references.len(), count, values.len())?;
         for (&reference, value) in references.iter().zip(values) {

@@ -6,7 +6,7 @@ mod fixture;
 mod foreign;
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::{Child, Command, ExitCode, Stdio};
 use std::sync::OnceLock;
 
 use fixture::{library, tanks};
@@ -25,6 +25,7 @@ fn main() -> ExitCode {
         ("fmpy_validates_and_runs_both_versions", in_fmpy),
         ("every_misuse_of_the_functions_has_an_answer", misuse),
         ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
+        ("vdmcheck2_finds_nothing_but_in_a_wrong_one", in_vdmcheck),
         ("the_example_s_tank_is_one_for_others_too", tank),
         ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
         ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
@@ -114,6 +115,59 @@ fn in_toolbox() -> Result<(), Absent> {
     types()
         .into_iter()
         .try_for_each(|fmu| tool(&["toolbox", fmu]))
+}
+
+/// `VDMCheck2`: a formal model of FMI 2.0 is asked whether an FMU, or its modelDescription.xml alone, is right. What it says.
+fn ask_vdmcheck(asked: &[&Path]) -> Result<Vec<String>, Absent> {
+    let folder = Path::new(ROOT).join("target/peers/java/vdmcheck");
+    if !folder.join("fmi2-rule-model").exists() {
+        return Err(Absent("VDMCheck2 is not there; run tools/peers".to_owned()));
+    }
+    let rules = std::fs::read_dir(folder.join("fmi2-rule-model/Rules")).expect("its rules");
+    let rules = rules.map(|rule| rule.expect("a rule").path());
+    let rules: Vec<_> = rules
+        .filter(|rule| rule.extension().is_some_and(|ending| ending == "adoc"))
+        .collect();
+    let start =
+        |file: &&Path| {
+            Command::new("java")
+            // It runs for a few seconds.
+            .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"])
+            .args(["-Dvdmj.parser.merge_comments=true"])
+            .args(["-Dfmureader.noschema=true", "-Dfmureader.xsd=fmi2schema/fmi2.xsd"])
+            .args(["-cp", "lib/*", "com.fujitsu.vdmj.VDMJ", "-vdmsl", "-q", "-annotations", "-e"])
+            .arg("isValidFMIConfigurations(modelDescription, buildDescription, terminalsAndIcons)")
+            .arg("fmi2-rule-model")
+            .args(&rules)
+            .arg(file)
+            .current_dir(&folder)
+            .stdout(Stdio::piped())
+            .spawn()
+            .map_err(|why| Absent(format!("there is no java: {why}")))
+        };
+    let running = asked.iter().map(start).collect::<Result<Vec<_>, _>>()?;
+    let ended = running.into_iter().map(Child::wait_with_output);
+    Ok(ended
+        .map(|output| text(&output.expect("it ends").stdout))
+        .collect())
+}
+
+fn in_vdmcheck() -> Result<(), Absent> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let wrong = folder.path().join("modelDescription.xml");
+    let right = std::fs::read_to_string(Path::new(ROOT).join("examples/fmu-tank/fmi2.xml"));
+    let bent = right.expect("a file").replace("\"output\"", "\"input\"");
+    std::fs::write(&wrong, bent).expect("a file");
+    let tank = tanks().join("tank2.fmu");
+    let told = ask_vdmcheck(&[Path::new(types()[0]), &tank, &wrong])?;
+    assert_eq!(told[..2], ["true", "true"]);
+    let causality = "Variable \"low\" causality/variability/initial/start <input>";
+    assert!(
+        told[2].contains(causality) && told[2].ends_with("false"),
+        "{}",
+        told[2]
+    );
+    Ok(())
 }
 
 fn tank() -> Result<(), Absent> {

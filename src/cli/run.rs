@@ -128,6 +128,11 @@ fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
     let stop = Stop::new();
     catch_interrupts(&stop, fmu.folder())?;
     let step = arguments.step.or(proposed(fmu.model.step)).unwrap_or(STEP);
+    if let Some(duration) = arguments.duration.filter(|duration| *duration < step) {
+        return Err(wrong(format!(
+            "--duration {duration} is shorter than one step of {step}; give it a longer one, or shorter steps (--step)"
+        )));
+    }
     let default = if is_stepped(&config) { 0.0 } else { 1.0 };
     let pace = arguments.pace.unwrap_or(default);
     say(&told(&fmu, &join, step, pace));

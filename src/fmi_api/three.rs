@@ -5,11 +5,12 @@ use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::PathBuf;
 use std::ptr::null_mut;
 
+use tickbus_fmi::made::{Instance, folder_of_uri};
 use tickbus_fmi::{Status, Version};
 
 use super::{
-    Journal, Logger, LoggerOfThree, call, free, get_texts, instantiate, lacking, list, room, same,
-    set_logging, set_texts, text,
+    Inner, Journal, Logger, LoggerOfThree, call, free, get_texts, instantiate, lacking, list,
+    reset, room, same, set_logging, set_texts, terminate, text,
 };
 
 #[unsafe(no_mangle)]
@@ -47,7 +48,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     // A path, by the standard; some tools hand in a URI, as in 2.0.
     let folder = resources.map(|path| {
         if path.starts_with("file:") {
-            tickbus_fmi::made::folder_of_uri(path)
+            folder_of_uri(path)
         } else {
             PathBuf::from(path)
         }
@@ -98,99 +99,24 @@ extern "C" fn fmi3EnterInitializationMode(
     call(instance, |instance| instance.begin_at(start))
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi3ExitInitializationMode(instance: *mut c_void) -> c_int {
-    call(instance, tickbus_fmi::made::Instance::open)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3Terminate(instance: *mut c_void) -> c_int {
-    call(instance, |instance| {
-        instance.terminate();
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3Reset(instance: *mut c_void) -> c_int {
-    call(instance, |instance| {
-        instance.reset();
-        Ok(())
-    })
-}
-
-macro_rules! numbers {
-    ($($get:ident, $set:ident: $own:ty;)+) => {$(
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $get(
-            instance: *mut c_void, references: *const u32, count: usize, values: *mut $own, value_count: usize,
-        ) -> c_int {
-            // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
-            let (references, values) = unsafe { (list(references, count), room(values, value_count)) };
-            call(instance, |instance| {
-                same(references.len(), count, values.len())?;
-                instance.get(references, |at, value: $own| values[at] = value)
-            })
-        }
-
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $set(
-            instance: *mut c_void, references: *const u32, count: usize, values: *const $own, value_count: usize,
-        ) -> c_int {
-            // SAFETY: as above.
-            let (references, values) = unsafe { (list(references, count), list(values, value_count)) };
-            call(instance, |instance| {
-                same(references.len(), count, values.len())?;
-                instance.set(references, values.iter().copied())
-            })
-        }
-    )+};
+calls! {
+    fmi3ExitInitializationMode: Instance::open;
+    fmi3Terminate: terminate;
+    fmi3Reset: reset;
 }
 
 numbers! {
-    fmi3GetFloat32, fmi3SetFloat32: f32;
-    fmi3GetFloat64, fmi3SetFloat64: f64;
-    fmi3GetInt8, fmi3SetInt8: i8;
-    fmi3GetUInt8, fmi3SetUInt8: u8;
-    fmi3GetInt16, fmi3SetInt16: i16;
-    fmi3GetUInt16, fmi3SetUInt16: u16;
-    fmi3GetInt32, fmi3SetInt32: i32;
-    fmi3GetUInt32, fmi3SetUInt32: u32;
-    fmi3GetInt64, fmi3SetInt64: i64;
-    fmi3GetUInt64, fmi3SetUInt64: u64;
-}
-
-/// A Boolean is read as a byte: what a caller hands in need not be 0 or 1, as a `bool` of Rust has to be.
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3SetBoolean(
-    instance: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *const u8,
-    value_count: usize,
-) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
-    let (references, values) = unsafe { (list(references, count), list(values, value_count)) };
-    call(instance, |instance| {
-        same(references.len(), count, values.len())?;
-        instance.set(references, values.iter().map(|&value| value != 0))
-    })
-}
-
-#[unsafe(no_mangle)]
-unsafe extern "C" fn fmi3GetBoolean(
-    instance: *mut c_void,
-    references: *const u32,
-    count: usize,
-    values: *mut u8,
-    value_count: usize,
-) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
-    let (references, values) = unsafe { (list(references, count), room(values, value_count)) };
-    call(instance, |instance| {
-        same(references.len(), count, values.len())?;
-        instance.get(references, |at, value: bool| values[at] = value.into())
-    })
+    fmi3GetFloat32, fmi3SetFloat32: f32 as f32, value_count;
+    fmi3GetFloat64, fmi3SetFloat64: f64 as f64, value_count;
+    fmi3GetInt8, fmi3SetInt8: i8 as i8, value_count;
+    fmi3GetUInt8, fmi3SetUInt8: u8 as u8, value_count;
+    fmi3GetInt16, fmi3SetInt16: i16 as i16, value_count;
+    fmi3GetUInt16, fmi3SetUInt16: u16 as u16, value_count;
+    fmi3GetInt32, fmi3SetInt32: i32 as i32, value_count;
+    fmi3GetUInt32, fmi3SetUInt32: u32 as u32, value_count;
+    fmi3GetInt64, fmi3SetInt64: i64 as i64, value_count;
+    fmi3GetUInt64, fmi3SetUInt64: u64 as u64, value_count;
+    fmi3GetBoolean, fmi3SetBoolean: bool as u8, value_count;
 }
 
 #[unsafe(no_mangle)]
@@ -201,11 +127,8 @@ unsafe extern "C" fn fmi3GetString(
     values: *mut *const c_char,
     value_count: usize,
 ) -> c_int {
-    if value_count != count {
-        return call(instance, |_| same(count, count, value_count));
-    }
     // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
-    unsafe { get_texts(instance, references, count, values) }
+    unsafe { get_texts(instance, (references, count), (values, value_count)) }
 }
 
 #[unsafe(no_mangle)]
@@ -216,11 +139,8 @@ unsafe extern "C" fn fmi3SetString(
     values: *const *const c_char,
     value_count: usize,
 ) -> c_int {
-    if value_count != count {
-        return call(instance, |_| same(count, count, value_count));
-    }
     // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
-    unsafe { set_texts(instance, references, count, values) }
+    unsafe { set_texts(instance, (references, count), (values, value_count)) }
 }
 
 /// # Safety
@@ -254,17 +174,6 @@ unsafe extern "C" fn fmi3DoStep(
         unsafe { last.write(done) };
     }
     status
-}
-
-/// Functions that the model description does without. Those of C that have more parameters than this one are called all the
-/// same: the caller removes them.
-macro_rules! lacking {
-    ($($name:ident,)+) => {$(
-        #[unsafe(no_mangle)]
-        extern "C" fn $name(instance: *mut c_void) -> c_int {
-            lacking(instance, stringify!($name))
-        }
-    )+};
 }
 
 lacking! {

@@ -4,12 +4,12 @@
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::ptr::null_mut;
 
-use tickbus_fmi::made::folder_of_uri;
+use tickbus_fmi::made::{Instance, folder_of_uri};
 use tickbus_fmi::{Status, Version};
 
 use super::{
-    Journal, Logger, LoggerOfTwo, call, free, get_texts, instantiate, lacking, list, room, same,
-    set_logging, set_texts, text,
+    Inner, Journal, Logger, LoggerOfTwo, call, free, get_texts, instantiate, lacking, list, reset,
+    room, same, set_logging, set_texts, terminate, text,
 };
 
 /// `fmi2Error`.
@@ -99,80 +99,11 @@ extern "C" fn fmi2SetupExperiment(
     call(instance, |instance| instance.begin_at(start))
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2EnterInitializationMode(instance: *mut c_void) -> c_int {
-    call(instance, |_| Ok(()))
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2ExitInitializationMode(instance: *mut c_void) -> c_int {
-    call(instance, tickbus_fmi::made::Instance::open)
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Terminate(instance: *mut c_void) -> c_int {
-    call(instance, |instance| {
-        instance.terminate();
-        Ok(())
-    })
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Reset(instance: *mut c_void) -> c_int {
-    call(instance, |instance| {
-        instance.reset();
-        Ok(())
-    })
-}
-
-macro_rules! numbers {
-    ($($get:ident, $set:ident: $own:ty as $outer:ty;)+) => {$(
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $get(instance: *mut c_void, references: *const c_uint, count: usize, values: *mut $outer) -> c_int {
-            // SAFETY: the caller's promises, as for `fmi2Instantiate`.
-            let (references, values) = unsafe { (list(references, count), room(values, count)) };
-            call(instance, |instance| {
-                same(references.len(), count, values.len())?;
-                instance.get(references, |at, value: $own| values[at] = value.into())
-            })
-        }
-
-        #[unsafe(no_mangle)]
-        unsafe extern "C" fn $set(instance: *mut c_void, references: *const c_uint, count: usize, values: *const $outer) -> c_int {
-            // SAFETY: as above.
-            let (references, values) = unsafe { (list(references, count), list(values, count)) };
-            call(instance, |instance| {
-                same(references.len(), count, values.len())?;
-                instance.set(references, values.iter().map(|&value| <$own as Inner<$outer>>::inner(value)))
-            })
-        }
-    )+};
-}
-
-/// A value as the standard's type has it.
-trait Inner<O> {
-    fn inner(outer: O) -> Self;
-}
-
-impl Inner<f64> for f64 {
-    #[inline]
-    fn inner(outer: f64) -> Self {
-        outer
-    }
-}
-
-impl Inner<c_int> for i32 {
-    #[inline]
-    fn inner(outer: c_int) -> Self {
-        outer
-    }
-}
-
-impl Inner<c_int> for bool {
-    #[inline]
-    fn inner(outer: c_int) -> Self {
-        outer != 0
-    }
+calls! {
+    fmi2EnterInitializationMode: |_| Ok(());
+    fmi2ExitInitializationMode: Instance::open;
+    fmi2Terminate: terminate;
+    fmi2Reset: reset;
 }
 
 numbers! {
@@ -189,7 +120,7 @@ unsafe extern "C" fn fmi2GetString(
     values: *mut *const c_char,
 ) -> c_int {
     // SAFETY: the caller's promises, as for `fmi2Instantiate`.
-    unsafe { get_texts(instance, references, count, values) }
+    unsafe { get_texts(instance, (references, count), (values, count)) }
 }
 
 #[unsafe(no_mangle)]
@@ -200,7 +131,7 @@ unsafe extern "C" fn fmi2SetString(
     values: *const *const c_char,
 ) -> c_int {
     // SAFETY: the caller's promises, as for `fmi2Instantiate`.
-    unsafe { set_texts(instance, references, count, values) }
+    unsafe { set_texts(instance, (references, count), (values, count)) }
 }
 
 #[unsafe(no_mangle)]
@@ -226,17 +157,6 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
     // SAFETY: the caller's promise, as for `fmi2Instantiate`.
     unsafe { value.write(0) };
     Status::Ok as c_int
-}
-
-/// Functions that the model description does without. Those of C that have more parameters than this one are called all the
-/// same: the caller removes them.
-macro_rules! lacking {
-    ($($name:ident,)+) => {$(
-        #[unsafe(no_mangle)]
-        extern "C" fn $name(instance: *mut c_void) -> c_int {
-            lacking(instance, stringify!($name))
-        }
-    )+};
 }
 
 lacking! {

@@ -155,12 +155,10 @@ fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
         .by_ref()
         .map(|line| line.expect("text"))
         .find_map(|line| {
-            line.rsplit_once("127.0.0.1:").map(|(_, port)| {
-                port.split(|c: char| !c.is_ascii_digit())
-                    .next()
-                    .expect("digits")
-                    .to_owned()
-            })
+            let (_, rest) = line.rsplit_once("127.0.0.1:")?;
+            let port = rest.split(|c: char| !c.is_ascii_digit()).next()?;
+            // 0 until it listens.
+            (port != "0").then(|| port.to_owned())
         })
         .expect("it says where it listens");
     let address = format!("127.0.0.1:{address}");
@@ -186,18 +184,42 @@ fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
     let told = out(&output);
     assert_eq!(output.status.code(), Some(0), "{told}{}", err(&output));
     assert!(
-        told.contains("run: running:") || told.contains("run: ok ticks=400"),
+        told.contains("run: running:") && told.contains("run: ok ticks=400 time=2s"),
         "{told}"
     );
     let record = fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
-    // The mirror brings back what the FMU has written: the time.
-    let last = record.lines().last().expect("a tick");
-    let values: Vec<f64> = last
-        .rsplit(',')
-        .take(2)
-        .map(|value| value.parse().expect("a number"))
+    // The FMU writes the time; the mirror, whose machine is beside it in another process, brings it back: a while later, and
+    // never what was not written.
+    let mut lines = record.lines();
+    let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+    let column = |name: &str| {
+        let found = header.iter().position(|title| title.starts_with(name));
+        found.unwrap_or_else(|| panic!("{name} in {header:?}"))
+    };
+    let (level, speed) = (column("Level"), column("Speed"));
+    let ticks: Vec<(f64, f64)> = lines
+        .map(|line| {
+            let values: Vec<&str> = line.split(',').collect();
+            let value = |at: usize| values[at].parse().expect("a number");
+            (value(level), value(speed))
+        })
         .collect();
-    assert!(values[0] > 0.5 && values[1] > 1.5, "{last}");
+    assert_eq!(ticks.len(), 400);
+    let mut before = 0.0;
+    for (at, (written, back)) in (1_i32..).zip(&ticks) {
+        let time = f64::from(at) * 0.005;
+        assert!((written - time).abs() < 1e-4, "{written} at {time}");
+        assert!(
+            *back >= before && *back < *written,
+            "{back} at {time}, after {before}"
+        );
+        // As a REAL has it.
+        let is_it = |(one, _): &(f64, f64)| (one - back).abs() < 1e-6;
+        let is_written = *back == 0.0 || ticks.iter().any(is_it);
+        assert!(is_written, "{back} at {time}");
+        before = *back;
+    }
+    assert!(before > 0.5, "it came back: {before}");
 }
 
 #[test]

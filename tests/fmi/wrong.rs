@@ -205,6 +205,11 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "error",
             "it.fmu: the step of 0.01 s at 0.03 s failed, and does not say why; ask whoever made it",
         ),
+        // What it has said of earlier steps is not why this one failed.
+        (
+            "grumbles",
+            "it.fmu: the step of 0.01 s at 0.03 s failed, and does not say why; ask whoever made it",
+        ),
         (
             "fatal",
             "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal); it says: the solver has lost its matrix",
@@ -223,6 +228,114 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             assert!(told.contains(words), "{how} {isolated:?}: {told}");
         }
     }
+}
+
+/// By the standards, nothing of an FMU may be called after a fatal answer, in no instance.
+#[test]
+fn an_fmu_that_has_failed_for_good_is_not_begun_again_in_the_same_process() {
+    for (isolated, second) in [
+        (
+            "",
+            "it.fmu: an earlier run of it in this process has failed for good (fatal), and it must not be called any more; \
+             give each run a process of its own (isolated = true)",
+        ),
+        (
+            "isolated = true\n",
+            "failed for good (fatal); it says: the solver has lost its matrix",
+        ),
+    ] {
+        let folder = misbehaving_as("fatal");
+        let text = format!(
+            "config = \"it.cfg\"\nstep = \"10ms\"\n[machine]\nfmu = \"it.fmu\"\n{isolated}\
+             [[test]]\nname = \"first\"\nsteps = [{{ run = \"1s\" }}]\n\
+             [[test]]\nname = \"second\"\nsteps = [{{ run = \"1s\" }}]\n"
+        );
+        fs::write(folder.path().join("it.test.toml"), text).expect("a file");
+        let output = tickbus(folder.path(), &["test", "it.test.toml"]);
+        let told = out(&output) + err(&output).as_str();
+        assert!(!output.status.success(), "{told}");
+        let (first, rest) = told.split_once("second").expect("two tests");
+        assert!(
+            first.contains("failed for good (fatal); it says: "),
+            "{told}"
+        );
+        assert!(rest.contains(second), "{told}");
+    }
+}
+
+#[test]
+fn all_but_documentation_and_sources_is_unpacked_whatever_the_names_begin_with() {
+    let folder = misbehaving_as("looks");
+    let library = fs::read(misbehaving()).expect("the library");
+    let description = description("looks");
+    for prefix in ["", "./"] {
+        let names = [
+            "modelDescription.xml",
+            "binaries/linux64/it.so",
+            "documentation/it.html",
+        ];
+        let names = names.map(|name| format!("{prefix}{name}"));
+        archive(
+            &folder.path().join("it.fmu"),
+            &[
+                Entry::File(&names[0], description.as_bytes()),
+                Entry::File(&names[1], &library),
+                Entry::File(&names[2], b"<p>"),
+                // As programs that pack write a folder.
+                Entry::File(&format!("{prefix}resources/a"), b"x"),
+            ],
+        );
+        let output = tickbus(folder.path(), &RUN);
+        assert_eq!(
+            output.status.code(),
+            Some(0),
+            "{prefix}: {}{}",
+            out(&output),
+            err(&output)
+        );
+    }
+}
+
+#[test]
+fn an_archive_with_the_same_file_twice_is_refused() {
+    let description = description("ok");
+    for twin in ["resources/./a", "./resources/a", "resources//a"] {
+        let told = told(&[
+            Entry::File("modelDescription.xml", description.as_bytes()),
+            Entry::File("resources/a", b"x"),
+            Entry::File(twin, b"y"),
+        ]);
+        assert!(
+            told.contains("it.fmu: it has \"resources/a\" twice; do not use this FMU"),
+            "{twin}: {told}"
+        );
+    }
+}
+
+#[test]
+fn a_duration_below_one_step_is_refused() {
+    let folder = misbehaving_as("ok");
+    let output = tickbus(
+        folder.path(),
+        &[
+            "run",
+            "it.fmu",
+            "--config",
+            "it.cfg",
+            "--duration",
+            "4ms",
+            "--step",
+            "5ms",
+        ],
+    );
+    assert_eq!(output.status.code(), Some(1), "{}", out(&output));
+    let told = err(&output);
+    assert!(
+        told.starts_with(
+            "--duration 4ms is shorter than one step of 5ms; give it a longer one, or shorter steps (--step)\n"
+        ),
+        "{told}"
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! What it has is checked before a byte is written: nothing leaves the folder, nothing is a link, and it is not larger than a
 //! computer can bear.
 
+use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::{self, Read as _};
 use std::path::{Component, Path, PathBuf};
@@ -51,10 +52,10 @@ impl Unpacked {
         let file = path.display().to_string();
         let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
         let mut archive = open(path).map_err(refused)?;
-        check(&mut archive).map_err(refused)?;
-        let text = description(&mut archive).map_err(refused)?;
+        let entries = check(&mut archive).map_err(refused)?;
+        let text = description(&mut archive, &entries).map_err(refused)?;
         let model = Model::parse(&format!("{file}/{DESCRIPTION}"), &text)?;
-        let library = library(&archive, &model).map_err(refused)?;
+        let library = library(&entries, &model).map_err(refused)?;
         let folder = tempfile::Builder::new().prefix("tickbus-fmu-").tempdir();
         let folder = folder.map_err(|error| {
             refused(Mistake::new(
@@ -62,7 +63,7 @@ impl Unpacked {
                 "make room in the folder for temporary files, which TMPDIR names",
             ))
         })?;
-        unpack(&mut archive, folder.path()).map_err(refused)?;
+        unpack(&mut archive, &entries, folder.path()).map_err(refused)?;
         let library = folder.path().join(library);
         Ok(Self {
             file,
@@ -103,8 +104,11 @@ fn open(path: &Path) -> Result<ZipArchive<File>, Mistake> {
     ZipArchive::new(file).map_err(damaged)
 }
 
+/// What an archive has: each name with its index.
+type Entries = BTreeMap<String, usize>;
+
 /// Refuses an archive that would harm.
-fn check(archive: &mut ZipArchive<File>) -> Result<(), Mistake> {
+fn check(archive: &mut ZipArchive<File>) -> Result<Entries, Mistake> {
     let hostile = |what: String| Mistake::new(what, "do not use this FMU; ask whoever made it");
     if archive.len() > MOST_FILES {
         return Err(hostile(format!(
@@ -113,6 +117,7 @@ fn check(archive: &mut ZipArchive<File>) -> Result<(), Mistake> {
         )));
     }
     let mut bytes = 0_u64;
+    let mut entries = Entries::new();
     for index in 0..archive.len() {
         let entry = archive.by_index_raw(index).map_err(damaged)?;
         if !is_inside(entry.name()) {
@@ -125,6 +130,10 @@ fn check(archive: &mut ZipArchive<File>) -> Result<(), Mistake> {
             return Err(hostile(format!("\"{}\" is a link", shown(entry.name()))));
         }
         bytes = bytes.saturating_add(entry.size());
+        let name = plain(entry.name());
+        if !entry.is_dir() && entries.insert(name.clone(), index).is_some() {
+            return Err(hostile(format!("it has \"{}\" twice", shown(&name))));
+        }
     }
     if bytes > MOST_BYTES {
         return Err(hostile(format!(
@@ -133,7 +142,13 @@ fn check(archive: &mut ZipArchive<File>) -> Result<(), Mistake> {
             MOST_BYTES >> 20
         )));
     }
-    Ok(())
+    Ok(entries)
+}
+
+/// A name that is inside, without the "." that some programs put into it.
+fn plain(name: &str) -> String {
+    let parts = name.split('/').filter(|part| !matches!(*part, "" | "."));
+    parts.collect::<Vec<_>>().join("/")
 }
 
 /// Whether a name stays in the folder on every system.
@@ -144,13 +159,14 @@ fn is_inside(name: &str) -> bool {
     !name.is_empty() && !name.contains(['\\', ':', '\0']) && parts.into_iter().all(plain)
 }
 
-fn description(archive: &mut ZipArchive<File>) -> Result<String, Mistake> {
-    let entry = archive.by_name(DESCRIPTION).map_err(|_| {
+fn description(archive: &mut ZipArchive<File>, entries: &Entries) -> Result<String, Mistake> {
+    let index = entries.get(DESCRIPTION).ok_or_else(|| {
         Mistake::new(
             format!("there is no {DESCRIPTION} at the top of the archive"),
             "name an FMU; if it was packed by hand, pack its contents and not its folder",
         )
     })?;
+    let entry = archive.by_index(*index).map_err(damaged)?;
     let mut bytes = Vec::new();
     let read = entry.take(MOST_DESCRIPTION + 1).read_to_end(&mut bytes);
     read.map_err(damaged)?;
@@ -169,31 +185,28 @@ fn description(archive: &mut ZipArchive<File>) -> Result<String, Mistake> {
 }
 
 /// The path of the library for this platform.
-fn library(archive: &ZipArchive<File>, model: &Model) -> Result<PathBuf, Mistake> {
+fn library(entries: &Entries, model: &Model) -> Result<PathBuf, Mistake> {
     let own = Platform::own();
     let folder = own.and_then(|own| own.folder(model.version));
     let ending = own.map_or("so", |own| own.ending);
     if let Some(folder) = folder {
         let name = format!("binaries/{folder}/{}.{ending}", model.identifier);
-        if archive.index_for_name(&name).is_some() {
+        if entries.contains_key(&name) {
             return Ok(name.into());
         }
     }
-    let mut there: Vec<&str> = archive
-        .file_names()
-        .filter_map(|name| name.strip_prefix("binaries/")?.split('/').next())
-        .filter(|name| !name.is_empty())
-        .collect();
-    there.sort_unstable();
+    let of_libraries = |name: &'_ String| {
+        let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
+        Some(folder.to_owned())
+    };
+    let mut there: Vec<String> = entries.keys().filter_map(of_libraries).collect();
     there.dedup();
     let wanted = folder.unwrap_or("this platform, which FMI 2.0 has no name for");
-    let has_sources = archive
-        .file_names()
-        .any(|name| name.starts_with("sources/"));
+    let has_sources = entries.keys().any(|name| name.starts_with("sources/"));
     let what = match &there[..] {
         [] if has_sources => format!("it has sources, and no library for {wanted}"),
         [] => format!("it has no library at all, and needs one for {wanted}"),
-        all if folder.is_some_and(|folder| all.contains(&folder)) => {
+        all if folder.is_some_and(|folder| all.iter().any(|one| one == folder)) => {
             format!("it has no binaries/{wanted}/{}.{ending}", model.identifier)
         }
         all => format!(
@@ -210,9 +223,9 @@ fn library(archive: &ZipArchive<File>, model: &Model) -> Result<PathBuf, Mistake
     Err(Mistake::new(what, right))
 }
 
-/// Unpacks what a run needs: all but documentation and sources. The sizes that the archive states were checked; those that it
-/// has are checked here.
-fn unpack(archive: &mut ZipArchive<File>, folder: &Path) -> Result<(), Mistake> {
+/// Unpacks all but documentation and sources. By the standards an FMU is handed its resources alone, and yet some look from there
+/// for their model description. The sizes that the archive states were checked; those that it has are checked here.
+fn unpack(archive: &mut ZipArchive<File>, entries: &Entries, folder: &Path) -> Result<(), Mistake> {
     let mut room = MOST_BYTES;
     let unwritable = |name: &str, error: &io::Error| {
         Mistake::new(
@@ -220,14 +233,11 @@ fn unpack(archive: &mut ZipArchive<File>, folder: &Path) -> Result<(), Mistake> 
             "make room in the folder for temporary files, which TMPDIR names; or get the FMU anew, it may be cut",
         )
     };
-    for index in 0..archive.len() {
-        let mut entry = archive.by_index(index).map_err(damaged)?;
-        let name = entry.name().to_owned();
-        if entry.is_dir() || !(name.starts_with("binaries/") || name.starts_with("resources/")) {
-            continue;
-        }
-        let to = folder.join(&name);
-        let written = write(&mut entry, &to, room).map_err(|error| unwritable(&name, &error))?;
+    let idle = |name: &str| name.starts_with("documentation/") || name.starts_with("sources/");
+    for (name, index) in entries.iter().filter(|(name, _)| !idle(name)) {
+        let mut entry = archive.by_index(*index).map_err(damaged)?;
+        let to = folder.join(name);
+        let written = write(&mut entry, &to, room).map_err(|error| unwritable(name, &error))?;
         room -= written;
     }
     Ok(())

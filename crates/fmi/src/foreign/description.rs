@@ -202,7 +202,7 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         start: seconds("startTime")
             .filter(|start| start.is_finite())
             .unwrap_or(0.0),
-        needs_tool: kind.attribute("needsExecutionTool") == Some("true"),
+        needs_tool: matches!(kind.attribute("needsExecutionTool"), Some("true" | "1")),
         variables,
     })
 }

@@ -6,10 +6,11 @@
 mod functions;
 mod journal;
 
+use std::collections::BTreeSet;
 use std::ffi::{CString, c_int, c_void};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::ptr::{null, null_mut};
-use std::sync::PoisonError;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::Library;
 
@@ -33,13 +34,29 @@ pub(super) struct StepEnd {
     pub(super) reached: Option<f64>,
 }
 
+/// The libraries of FMUs that have answered "fatal" in this process. By the standards nothing of them may be called any more, in no
+/// instance; they stay loaded, for to unload one runs its finalisers.
+static DEAD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn dead() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    DEAD.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// One instance of an FMU, with its library.
 #[derive(Debug)]
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
-    /// After a fatal answer, nothing of it may be called.
+    /// Whether it has answered "fatal".
     is_dead: bool,
+    path: PathBuf,
+    /// There until it is dropped.
+    kept: Option<Kept>,
+}
+
+/// What has to stay as long as the FMU may use it.
+#[derive(Debug)]
+struct Kept {
     /// Dropped before what follows, which its finalisers may still use: they may log.
     _library: Library,
     journal: Box<Journal>,
@@ -55,6 +72,10 @@ impl Instance {
         library: &Path,
         resources: &Path,
     ) -> Result<Self, String> {
+        if dead().contains(library) {
+            return Err("an earlier run of it in this process has failed for good (fatal), and it must not be called any more; \
+                        give each run a process of its own (isolated = true)".to_owned());
+        }
         let loaded = Library::load(library).map_err(|error| {
             format!("its library cannot be loaded: {error}; install what it needs, which its documentation should tell")
         })?;
@@ -118,10 +139,13 @@ impl Instance {
         let instance = Self {
             handle,
             functions,
-            journal,
-            _callbacks: callbacks,
             is_dead: false,
-            _library: loaded,
+            path: library.to_owned(),
+            kept: Some(Kept {
+                _library: loaded,
+                journal,
+                _callbacks: callbacks,
+            }),
         };
         if handle.is_null() {
             return Err(instance.said("it makes no instance of itself"));
@@ -129,17 +153,21 @@ impl Instance {
         Ok(instance)
     }
 
-    /// A sentence, with what the FMU has said last.
+    /// A sentence, with what the FMU has said in its last call.
     pub(super) fn said(&self, what: &str) -> String {
-        let last = self
-            .journal
-            .last
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let kept = self.kept.as_ref();
+        let last = kept.map_or_else(String::new, |kept| kept.journal.said());
         if last.is_empty() {
             format!("{what}, and does not say why; ask whoever made it")
         } else {
             format!("{what}; it says: {last}")
+        }
+    }
+
+    /// It is about to be called.
+    fn begin_call(&self) {
+        if let Some(kept) = &self.kept {
+            kept.journal.begin_call();
         }
     }
 
@@ -151,6 +179,7 @@ impl Instance {
 
     /// Enters the initialisation, for a run that begins at `start` seconds.
     pub(super) fn enter(&mut self, start: f64) -> Status {
+        self.begin_call();
         let status = match &self.functions {
             // SAFETY: the handle is of this library, and alive, here and below.
             Functions::Two(two) => unsafe {
@@ -171,6 +200,7 @@ impl Instance {
 
     /// Leaves the initialisation.
     pub(super) fn exit(&mut self) -> Status {
+        self.begin_call();
         let status = match &self.functions {
             // SAFETY: as in `enter`.
             Functions::Two(two) => unsafe { (two.exit)(self.handle) },
@@ -182,6 +212,7 @@ impl Instance {
 
     /// Ends the run.
     pub(super) fn terminate(&mut self) -> Status {
+        self.begin_call();
         let status = match &self.functions {
             // SAFETY: as in `enter`.
             Functions::Two(two) => unsafe { (two.terminate)(self.handle) },
@@ -193,6 +224,7 @@ impl Instance {
 
     /// One step.
     pub(super) fn step(&mut self, from: f64, length: f64) -> StepEnd {
+        self.begin_call();
         let (mut terminate, mut reached) = (false, None);
         let status = match &self.functions {
             Functions::Two(two) => {
@@ -241,6 +273,7 @@ impl Instance {
     /// Sets variables of one type.
     pub(super) fn set(&mut self, kind: ValueType, references: &[u32], values: &[Value]) -> Status {
         debug_assert_eq!(references.len(), values.len());
+        self.begin_call();
         let status = match &self.functions {
             Functions::Two(two) => match kind {
                 ValueType::Boolean => self.set_two(two.set_boolean, references, values, |value| {
@@ -319,6 +352,7 @@ impl Instance {
         values: &mut [Value],
     ) -> Status {
         debug_assert_eq!(references.len(), values.len());
+        self.begin_call();
         let status = match &self.functions {
             Functions::Two(two) => match kind {
                 ValueType::Boolean => self.get_two(two.get_boolean, references, values, |value| {
@@ -416,7 +450,13 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
-        if self.is_dead || self.handle.is_null() {
+        if self.is_dead {
+            dead().insert(std::mem::take(&mut self.path));
+            // Threads of it may still run, and log.
+            std::mem::forget(self.kept.take());
+            return;
+        }
+        if self.handle.is_null() {
             return;
         }
         // SAFETY: the handle is of this library, alive, and used no more.

@@ -67,7 +67,9 @@ impl Instance {
         let own = token(&bytes);
         if own != given {
             return Err(format!(
-                "{} is not the one that this FMU was made of (token {own}, and modelDescription.xml has {given}); export it again",
+                "{} and the modelDescription.xml beside its folder do not belong together: of this driver.cfg an FMU has the token \
+                 {own}, and the importing tool hands in \"{given}\"; do not edit either within an FMU, but edit your own driver.cfg \
+                 and export it again",
                 path.display()
             ));
         }
@@ -185,8 +187,7 @@ impl Instance {
         if !is_next || length <= 0.0 || !to.is_finite() {
             return Err(not_next(self.time, from, length));
         }
-        #[expect(clippy::cast_possible_truncation, reason = "it saturates")]
-        let at = Nanos(((to - self.origin) * 1e9).round() as i64);
+        let at = nanos(to - self.origin);
         self.found = driver.exchange(at, &mut self.slots);
         self.time = to;
         if self.found.code.code() < 0 {
@@ -388,6 +389,20 @@ impl Drop for Instance {
     fn drop(&mut self) {
         self.terminate();
     }
+}
+
+/// The nearest nanosecond, of seconds from 0 on; 292 years at most.
+#[inline]
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    reason = "it saturates, and a number with a fraction is exact as a double"
+)]
+fn nanos(seconds: f64) -> Nanos {
+    let exact = seconds * 1e9;
+    let whole = exact as i64;
+    // What `round` does, which is a call of the C library where the processor need not have the instruction.
+    Nanos(whole.saturating_add(i64::from(exact - whole as f64 >= 0.5)))
 }
 
 #[cold]

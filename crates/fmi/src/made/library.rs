@@ -235,3 +235,108 @@ fn in_jar(jar: &Path) -> Result<Vec<NativeLibrary>, Mistake> {
     found.sort_by_key(|library| library.platform);
     Ok(found)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::fs::{self, File};
+    use std::io::Write as _;
+
+    use zip::ZipWriter;
+    use zip::write::SimpleFileOptions;
+
+    use super::*;
+
+    /// The head of a library in ELF for this processor, with the name of a function of FMI.
+    fn elf(machine: u8, function: &str) -> Vec<u8> {
+        let mut bytes = b"\x7fELF\x02\x01\x01".to_vec();
+        bytes.resize(18, 0);
+        bytes.extend([machine, 0]);
+        bytes.extend(function.as_bytes());
+        bytes
+    }
+
+    fn jar(path: &Path, entries: &[(&str, &[u8])]) {
+        let mut zip = ZipWriter::new(File::create(path).expect("a file"));
+        for (name, bytes) in entries {
+            let options = SimpleFileOptions::default();
+            zip.start_file(*name, options).expect("a name");
+            zip.write_all(bytes).expect("room");
+        }
+        zip.finish().expect("room");
+    }
+
+    /// Which libraries are found in a folder: their platforms, and where they came from.
+    fn found(folder: &Path) -> Result<Vec<(&'static str, String)>, String> {
+        let found = find_libraries(&[], Some(folder)).map_err(|mistake| mistake.to_string())?;
+        let place = format!("{}/", folder.display());
+        let tell = |one: NativeLibrary| (one.platform.tuple, one.origin.replace(&place, ""));
+        Ok(found.into_iter().map(tell).collect())
+    }
+
+    #[test]
+    fn the_libraries_are_those_in_a_jar_where_none_is_beside_the_command() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path();
+        let file = format!("{DLL_PREFIX}tickbus{DLL_SUFFIX}");
+        let why = found(folder).expect_err("there is nothing");
+        let missing = format!("no {}", folder.join(&file).display());
+        assert!(why.contains(&missing) && why.contains("--library"), "{why}");
+
+        // A jar of somebody else's comes first, and has none.
+        jar(&folder.join("another.jar"), &[("x/Y.class", b"class")]);
+        let why = found(folder).expect_err("there is still nothing");
+        assert!(
+            why.contains("none in ") && why.contains("another.jar"),
+            "{why}"
+        );
+
+        let name = FUNCTION.concat();
+        let (x86, arm) = (elf(62, &name), elf(183, &name));
+        jar(
+            &folder.join("tickbus-0.1.0.jar"),
+            &[
+                ("tickbus/Tickbus.class", b"class"),
+                ("tickbus/native/linux-x86_64/libtickbus.so", &x86),
+                ("tickbus/native/linux-aarch64/libtickbus.so", &arm),
+            ],
+        );
+        assert_eq!(
+            found(folder).expect("two libraries"),
+            [
+                (
+                    "aarch64-linux",
+                    "tickbus/native/linux-aarch64/libtickbus.so in tickbus-0.1.0.jar".to_owned()
+                ),
+                (
+                    "x86_64-linux",
+                    "tickbus/native/linux-x86_64/libtickbus.so in tickbus-0.1.0.jar".to_owned()
+                ),
+            ]
+        );
+
+        // The one beside the command is the one of this build.
+        fs::write(folder.join(&file), &arm).expect("a file");
+        assert_eq!(
+            found(folder).expect("one library"),
+            [("aarch64-linux", file)]
+        );
+    }
+
+    #[test]
+    fn a_jar_of_an_earlier_version_or_a_cut_one_says_so() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path();
+        let old = elf(62, "tb_open");
+        let file = folder.join("tickbus.jar");
+        jar(
+            &file,
+            &[("tickbus/native/linux-x86_64/libtickbus.so", &old)],
+        );
+        let why = found(folder).expect_err("it cannot be used");
+        assert!(why.contains("has no functions of FMI"), "{why}");
+        let whole = fs::read(&file).expect("a file");
+        fs::write(&file, &whole[..whole.len() / 2]).expect("a file");
+        let why = found(folder).expect_err("it cannot be read");
+        assert!(why.contains("tickbus.jar cannot be read: "), "{why}");
+    }
+}

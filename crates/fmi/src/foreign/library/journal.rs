@@ -5,7 +5,7 @@
 use std::borrow::Cow;
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::is_told;
 
@@ -17,7 +17,8 @@ use crate::value::Status;
 pub(super) struct Journal {
     file: String,
     lines: AtomicU64,
-    pub(super) last: Mutex<String>,
+    /// What it has said since its last call began.
+    last: Mutex<String>,
 }
 
 impl Journal {
@@ -29,11 +30,24 @@ impl Journal {
         }
     }
 
+    fn last(&self) -> MutexGuard<'_, String> {
+        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The FMU is about to be called: what it has said before is not about this call.
+    pub(super) fn begin_call(&self) {
+        self.last().clear();
+    }
+
+    /// What it has said last in the present call, of what is not right; empty for nothing.
+    pub(super) fn said(&self) -> String {
+        self.last().clone()
+    }
+
     fn take(&self, status: c_int, text: &str) {
         let text = text.trim();
         if status > Status::Ok as c_int {
-            let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-            text.clone_into(&mut last);
+            text.clone_into(&mut self.last());
         }
         let times = self.lines.fetch_add(1, Ordering::Relaxed) + 1;
         if is_told(times) {

@@ -1,4 +1,4 @@
-/* exchange FILE: exchanges through the door of C, as the benchmark exchangeFree makes them through that of Java; and a library's
+/* exchange FILE: exchanges through the door of C, as tickbus.bench.ByTurns makes them through that of Java; and a library's
  * function that does nothing, for ctypes. Prints lines for tools/bench-table. */
 #include <stdio.h>
 #include <stdlib.h>

@@ -13,11 +13,10 @@ import org.openjdk.jmh.annotations.Setup;
 import org.openjdk.jmh.annotations.State;
 import org.openjdk.jmh.annotations.TearDown;
 import org.openjdk.jmh.annotations.Warmup;
-import tickbus.NativeBaseline;
 import tickbus.Signal;
 import tickbus.Tickbus;
 
-/** The rig's tick, 16 bits in each direction, compared with a native call that does nothing. */
+/** The rig's tick, 16 bits in each direction. What is compared with it is in {@link ByTurns}. */
 @BenchmarkMode(Mode.AverageTime)
 @OutputTimeUnit(TimeUnit.NANOSECONDS)
 @Fork(value = 3, jvmArgsAppend = "--enable-native-access=ALL-UNNAMED")
@@ -28,20 +27,6 @@ public class RigTickBench {
 
     /** Made by JMH. */
     public RigTickBench() {
-    }
-
-    /** The native library, loaded. */
-    @State(Scope.Thread)
-    public static class Library {
-        /** Made by JMH. */
-        public Library() {
-        }
-
-        /** Loads it. */
-        @Setup
-        public void load() {
-            NativeBaseline.load();
-        }
     }
 
     /** An open driver with 16 BOOL signals each way. */
@@ -175,39 +160,6 @@ public class RigTickBench {
             }
             return sum;
         }
-    }
-
-    /**
-     * The baseline.
-     *
-     * @param library loaded
-     * @return for JMH
-     */
-    @Benchmark
-    public int emptyNativeCall(Library library) {
-        return NativeBaseline.call();
-    }
-
-    /**
-     * The exchange alone.
-     *
-     * @param bits the signals
-     * @return for JMH
-     */
-    @Benchmark
-    public int exchangeFree(Free bits) {
-        return bits.exchange();
-    }
-
-    /**
-     * Set 16 bits from an array, exchange, get 16 bits into an array.
-     *
-     * @param bits the signals
-     * @return for JMH
-     */
-    @Benchmark
-    public double rigTickArrays(Free bits) {
-        return bits.tickByArray();
     }
 
     /**

@@ -1,2 +1,2 @@
-/** Benchmarks of the tick as seen from Java. Those to be compared run in a single JMH run. */
+/** Benchmarks of the tick as seen from Java. Those to be compared run by turns in one process, the others under JMH. */
 package tickbus.bench;

@@ -104,6 +104,21 @@ without_debug_tables() {
     fi
 }
 
+# One pip for all environments under target/: to install one into each takes longer than what they are to have.
+PIP=target/peers/pip
+
+has_pip() {
+    [ -x "$PIP/bin/pip" ] && return
+    rm -rf "$PIP"
+    # Since 22.3 it installs into other environments.
+    python3 -m venv "$PIP" && "$PIP/bin/pip" install --quiet --disable-pip-version-check 'pip>=22.3'
+}
+
+# pip_into FOLDER COMMAND...: for the environment in FOLDER.
+pip_into() {
+    "$PIP/bin/pip" --quiet --disable-pip-version-check --python "$1/bin/python" "${@:2}"
+}
+
 # Whether there is an iec2c: named by IEC2C, on the PATH, or in shared/peers beside the checkout. Sets IEC2C to it.
 has_iec2c() {
     if [ -z "${IEC2C:-}" ] && ! have iec2c && [ -x "$ROOT/../shared/peers/iec2c/iec2c" ]; then

@@ -86,9 +86,9 @@ fn reads_and_writes() -> Result<(), Absent> {
     let mut plc = plc(address, &json!({}))?;
     let mut device = Device::plain(address);
     device.until("the first values", |end| {
-        end.get("speed") == 7.0 && end.get("torque") == 1.5
+        let state = end.link().state;
+        end.get("speed") == 7.0 && end.get("torque") == 1.5 && state == LinkState::Running
     });
-    assert_eq!(device.end.link().state, LinkState::Running);
     plc.ask(&json!({"set": {"speed": -1234, "torque": 0.25, "run": true}}));
     device.until("new values", |end| {
         end.get("speed") == -1234.0 && end.get("torque") == 0.25 && end.get("run") == 1.0

@@ -3,9 +3,7 @@ using System;
 using System.Runtime.InteropServices;
 
 static class Tank {
-    // tb_signal; and where tb_buffer has the simulation time and its slots.
-    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; }
-    const int SimulationTime = 32, Slots = 64;
+    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; } // tb_signal
 
     [DllImport("tickbus")] static extern int tb_open(string path, string tables, out long driver);
     [DllImport("tickbus")] static extern int tb_find(long driver, string name, out Signal signal);
@@ -15,47 +13,25 @@ static class Tank {
     [DllImport("tickbus")] static extern int tb_close(long driver);
     [DllImport("tickbus")] static extern IntPtr tb_last_error();
 
-    static int Check(int status) {
-        if (status < 0) throw new Exception(Marshal.PtrToStringAnsi(tb_last_error()));
-        return status;
-    }
+    static int Check(int status) => status < 0 ? throw new Exception(Marshal.PtrToStringAnsi(tb_last_error())) : status;
 
-    static double Get(IntPtr values, Signal signal) {
-        return BitConverter.Int64BitsToDouble(Marshal.ReadInt64(values, Slots + 8 * signal.Slot));
-    }
-
-    static void Set(IntPtr values, Signal signal, double value) {
-        Marshal.WriteInt64(values, Slots + 8 * signal.Slot, BitConverter.DoubleToInt64Bits(value));
-    }
-
-    static void Run(string path) {
-        long plc;
-        Signal valve, low, level;
-        Check(tb_open(path, null, out plc));
-        Check(tb_find(plc, "Valve", out valve));
-        Check(tb_find(plc, "Level low", out low));
-        Check(tb_find(plc, "Level", out level));
+    static void Main(string[] arguments) {
+        Check(tb_open(arguments.Length > 0 ? arguments[0] : "tank.cfg", null, out long plc));
+        Func<string, int> slot = name => { Check(tb_find(plc, name, out Signal signal)); return 64 + 8 * signal.Slot; };
+        int valve = slot("Valve"), low = slot("Level low"), level = slot("Level"), time = 32; // bytes of the tb_buffer
         IntPtr values = tb_buffer_of(plc);
+        Func<int, double> get = at => BitConverter.Int64BitsToDouble(Marshal.ReadInt64(values, at));
+        Action<int, double> set = (at, value) => Marshal.WriteInt64(values, at, BitConverter.DoubleToInt64Bits(value));
         double mm = 100;
         for (int tick = 0; tick < 500; tick++) {
-            Marshal.WriteInt64(values, SimulationTime, tick * 10000000L); // 10 ms a tick; needed on a stepped bus alone
+            Marshal.WriteInt64(values, time, tick * 10000000L); // 10 ms a tick; needed on a stepped bus alone
             int status = Check(tb_receive(plc));
-            mm += Get(values, valve) != 0 ? 2 : -1; // your machine model
-            Set(values, low, mm < 150 ? 1 : 0);
-            Set(values, level, mm);
+            mm += get(valve) != 0 ? 2 : -1; // your machine model
+            set(low, mm < 150 ? 1 : 0);
+            set(level, mm);
             Check(tb_send(plc));
-            if (tick % 50 == 0) Console.WriteLine("{0,3}  {1,5:0.0} mm  valve {2}  status {3}", tick, mm, Get(values, valve), status);
+            if (tick % 50 == 0) Console.WriteLine("{0,3}  {1,5:0.0} mm  valve {2}  status {3}", tick, mm, get(valve), status);
         }
         Check(tb_close(plc));
-    }
-
-    static int Main(string[] arguments) {
-        try {
-            Run(arguments.Length > 0 ? arguments[0] : "tank.cfg");
-            return 0;
-        } catch (Exception error) {
-            Console.Error.WriteLine("tank: " + error.Message);
-            return 1;
-        }
     }
 }

@@ -5,6 +5,7 @@ mod server;
 
 use std::num::NonZeroU32;
 use std::sync::Arc;
+use std::sync::mpsc::channel;
 use std::thread::{self, JoinHandle};
 
 use server::Server;
@@ -61,15 +62,19 @@ struct Plc {
 }
 
 impl Plc {
-    /// It has finished steps up to `done` before, and hangs in the step after `last`.
+    /// It has finished steps up to `done` before, and hangs in the step after `last`. Its outputs say so when this returns: a
+    /// gateway that is opened afterwards never sees the zeros of a bus that has begun before its PLC.
     fn start(link: &'static str, done: u32, last: u32, seed: u64) -> Self {
         let stop = Stop::new();
+        let (says, is_said) = channel();
         let stopped = stop.clone();
         let thread = thread::spawn(move || {
             let clock = Monotonic::shared();
             let mut end = End::open(&text(link, "controller"), &clock);
             let (mut last_go, mut count, mut random) = (done, 0_u32, seed);
             end.set("sync.done", f64::from(done));
+            end.tick();
+            says.send(()).expect("it waits");
             while !stopped.is_stopped() {
                 end.tick();
                 let go = end.slots[0].real();
@@ -93,6 +98,7 @@ impl Plc {
             }
             count
         });
+        is_said.recv().expect("it has begun");
         Self { stop, thread }
     }
 
@@ -154,8 +160,8 @@ fn a_plc_that_answers_at_random_times_is_in_step_and_the_trace_is_the_same() {
     // The second PLC was not restarted: it goes on to count where it was.
     let runs = [("one", 0, 1), ("other", 4711, 99)].map(|(link, done, seed)| {
         thread::spawn(move || {
-            let mut gateway = open(link, Nanos::from_secs(20), &Stop::new());
             let plc = Plc::start(link, done, u32::MAX, seed);
+            let mut gateway = open(link, Nanos::from_secs(20), &Stop::new());
             gateway.await_plc().expect("it is there");
             let outcome = run(&mut gateway, 10_000).expect("as planned");
             assert_eq!(plc.end(), 1000, "steps");

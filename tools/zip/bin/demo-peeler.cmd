@@ -6,7 +6,7 @@ cd /d "%~dp0.."
 if exist demo\run\peeler rmdir /s /q demo\run\peeler
 mkdir demo\run\peeler\DeviceDriver
 copy /y DeviceDriver\*.jar demo\run\peeler\DeviceDriver >nul
-copy /y demo\peeler\*.cfg demo\run\peeler\DeviceDriver >nul
+copy /y demo\peeler\*.* demo\run\peeler\DeviceDriver >nul
 if not defined TICKBUS_LOG set TICKBUS_LOG=error
 java --enable-native-access=ALL-UNNAMED -cp "simulator/*" tickbus.demo.peeling.PeelingDemo ^
     --drivers demo/run/peeler/DeviceDriver --control simulator/peeler.table --plc DeviceDriver/tickbus.exe ^

@@ -6,7 +6,7 @@ cd /d "%~dp0.."
 if exist demo\run\rig rmdir /s /q demo\run\rig
 mkdir demo\run\rig\DeviceDriver
 copy /y DeviceDriver\*.jar demo\run\rig\DeviceDriver >nul
-copy /y demo\rig\*.cfg demo\run\rig\DeviceDriver >nul
+copy /y demo\rig\*.* demo\run\rig\DeviceDriver >nul
 if not defined TICKBUS_LOG set TICKBUS_LOG=error
 java --enable-native-access=ALL-UNNAMED -cp "simulator/*" tickbus.demo.Demo ^
     --drivers demo/run/rig/DeviceDriver --control simulator/rig.table --plc DeviceDriver/tickbus.exe ^

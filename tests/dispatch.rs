@@ -93,8 +93,10 @@ fn a_laboratory_is_served_interrupted_and_found_again() {
         }
         ask(&pump, "P Q1=24\r\nPING", "OK PING");
         assert_eq!(ask(&logo, "", "P "), ["P I1=24"]);
+        // The value may have been on its way before that empty line was read.
+        ask(&logo, "PING", "OK PING");
         let (last, code) = dispatch.interrupt();
-        let lines = [6, 5][round];
+        let lines = [7, 6][round];
         assert_eq!(
             last,
             format!("dispatch: ok lines={lines} values=1 overtaken=0 refused=0 connections=1")

@@ -13,7 +13,11 @@ static class Tank {
     [DllImport("tickbus")] static extern int tb_close(long driver);
     [DllImport("tickbus")] static extern IntPtr tb_last_error();
 
-    static int Check(int status) => status < 0 ? throw new Exception(Marshal.PtrToStringAnsi(tb_last_error())) : status;
+    static int Check(int status) {
+        if (status < 0) Console.Error.WriteLine("tank: " + Marshal.PtrToStringAnsi(tb_last_error()));
+        if (status < 0) Environment.Exit(1);
+        return status;
+    }
 
     static void Main(string[] arguments) {
         Check(tb_open(arguments.Length > 0 ? arguments[0] : "tank.cfg", null, out long plc));

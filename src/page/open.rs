@@ -71,7 +71,8 @@ pub(crate) fn show(
     };
     let picture = wanted.picture.as_deref();
     let picture = picture.map(|file| read_picture(config, file)).transpose()?;
-    let open = open(&config.name, &wanted.listen, announce)?;
+    let any = "listen = \"127.0.0.1:0\" in [page]";
+    let open = open(&config.name, (&wanted.listen, any), announce)?;
     let Some(watch) = watch() else {
         return Ok(None);
     };
@@ -92,15 +93,19 @@ pub(crate) fn show_run(
     controls: Controls,
     announce: impl FnOnce(&str),
 ) -> Result<Place, PageError> {
-    let open = open(name, listen, announce)?;
+    let open = open(name, (listen, "--page 127.0.0.1:0"), announce)?;
     Ok(Place {
         member: Some(open.page.join_run(name, controls)),
         open: Some(open),
     })
 }
 
-/// The page that there is, or a new one at `asked`.
-fn open(name: &str, asked: &Address, announce: impl FnOnce(&str)) -> Result<Arc<Open>, PageError> {
+/// The page that there is, or a new one at `asked`; `any` is what asks for any port.
+fn open(
+    name: &str,
+    (asked, any): (&Address, &str),
+    announce: impl FnOnce(&str),
+) -> Result<Arc<Open>, PageError> {
     let mut present = present();
     if let Some(open) = present.upgrade() {
         if open.asked != *asked {
@@ -114,7 +119,7 @@ fn open(name: &str, asked: &Address, announce: impl FnOnce(&str)) -> Result<Arc<
     let refused = |error: std::io::Error| {
         PageError::NotServed(format!(
             "the page cannot be served on {asked} ({error}); end the program that has this port, or choose another one: \
-             listen = \"127.0.0.1:0\" in [page] takes any"
+             {any} takes any"
         ))
     };
     let room = Room::bind(asked, Limits::default()).map_err(refused)?;

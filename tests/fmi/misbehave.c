@@ -84,7 +84,7 @@ int fmi2DoStep(void *it, double from, double length, int prior) {
         abort();
     } else if (is("exit")) {
         exit(7);
-    } else if (is("discard") || is("ended")) {
+    } else if (is("discard") || is("ended") || is("lost")) {
         return 2;
     } else if (is("fatal")) {
         say(4, "the solver has lost its matrix");
@@ -106,5 +106,11 @@ int fmi2DoStep(void *it, double from, double length, int prior) {
     return 0;
 }
 
-int fmi2GetBooleanStatus(void *it, int kind, int *value) { return (void)it, (void)kind, *value = is("ended"), 0; }
-int fmi2GetRealStatus(void *it, int kind, double *value) { return (void)it, (void)kind, *value = now, 0; }
+int fmi2GetBooleanStatus(void *it, int kind, int *value) { return (void)it, (void)kind, *value = is("ended"), is("lost") ? 4 : 0; }
+
+int fmi2GetRealStatus(void *it, int kind, double *value) {
+    if (is("lost")) {
+        abort(); /* nothing may be called after a fatal answer */
+    }
+    return (void)it, (void)kind, *value = now, 0;
+}

@@ -214,6 +214,11 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "fatal",
             "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal); it says: the solver has lost its matrix",
         ),
+        // When it is asked how far it got.
+        (
+            "lost",
+            "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal), and does not say why",
+        ),
         (
             "null",
             "it.fmu: it makes no instance of itself; it says: no licence on this computer",
@@ -310,6 +315,43 @@ fn an_archive_with_the_same_file_twice_is_refused() {
             "{twin}: {told}"
         );
     }
+}
+
+/// Nobody can tell which of the two another program would load.
+#[test]
+fn an_archive_with_the_very_same_name_twice_is_refused() {
+    let folder = misbehaving_as("ok");
+    let path = folder.path().join("it.fmu");
+    let description = description("ok");
+    archive(
+        &path,
+        &[
+            Entry::File("modelDescription.xml", description.as_bytes()),
+            Entry::File("resources/a", b"x"),
+            Entry::File("resources/b", b"y"),
+        ],
+    );
+    // Programs that pack do not do that.
+    let mut bytes = fs::read(&path).expect("a file");
+    let other = b"resources/b";
+    for at in 0..bytes.len() - other.len() {
+        if bytes[at..].starts_with(other) {
+            bytes[at + other.len() - 1] = b'a';
+        }
+    }
+    fs::write(&path, bytes).expect("room");
+    let output = tickbus(folder.path(), &RUN);
+    assert_eq!(output.status.code(), Some(1));
+    let told = err(&output);
+    let words = "it.fmu: its directory has 3 entries, and 2 names: it has a file twice; do not use this FMU";
+    assert!(told.contains(words), "{told}");
+}
+
+#[test]
+fn a_model_that_looks_for_its_description_finds_it_though_it_has_no_resources() {
+    let folder = misbehaving_as("looks");
+    let output = tickbus(folder.path(), &RUN);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
 }
 
 #[test]

@@ -15,7 +15,8 @@ const STREAM: u32 = 16;
 ///
 /// On a core that it shares with the dispatcher, each of its writes wakes the dispatcher, and the system soon prefers the one
 /// that has just slept: two switches and a turn for four lines or so. If the dispatcher lets it run on, it finds hundreds of
-/// lines at once, and both get more done. At rates where a delay would be noticed nothing changes.
+/// lines at once, and both get more done. Whoever else says something at that moment waits as well, for as long as the system
+/// gives the core to others; below such rates nothing changes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trickle {
     /// When the last turn began.

@@ -4,7 +4,9 @@ use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 
-use super::{EdgeCounter, Frame, LatchedBit, PulseShaper, Reader, Writer, triple_buffer};
+use super::{
+    EdgeCounter, Frame, LatchedBit, PulseShaper, Reader, Writer, copy_frame, triple_buffer,
+};
 use tickbus_base::time::Nanos;
 
 /// The frames of one station's two streams; tx and rx are as seen from the tick.
@@ -401,7 +403,7 @@ impl BusStation {
         );
         let (edges, sequence) = (&mut self.rx_edges, self.rx_sequence + 1);
         self.rx.with_buffer(|frame| {
-            frame.bytes.copy_from_slice(bytes);
+            copy_frame(&mut frame.bytes, bytes);
             edges.count(bytes, &mut frame.edges);
             frame.sequence = sequence;
         });

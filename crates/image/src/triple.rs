@@ -28,12 +28,12 @@ struct Shared<T> {
     state: AtomicU8,
 }
 
-// SAFETY: a buffer is accessed only by the side that holds its index. The three indices are a
+// SAFETY: a buffer is written only by the side that holds its index. The three indices are a
 // permutation at any time, and an index changes sides only through the exchange on `state`, whose
 // release half orders the accesses before it, and whose acquire half those after it. So a `T` is
-// never accessed by two threads at once, but it is accessed by both in turn: `T: Send` is needed and
-// enough.
-unsafe impl<T: Send> Sync for Shared<T> {}
+// accessed by both sides in turn, for which it has to be `Send`; and it is read by both at once, when the
+// writer looks at what it published last, or by threads that share a reader, for which it has to be `Sync`.
+unsafe impl<T: Send + Sync> Sync for Shared<T> {}
 
 /// The writing side of a triple buffer.
 #[derive(Debug)]

@@ -26,6 +26,9 @@ const LATE: Nanos = Nanos::from_millis(500);
 /// How often it looks whether a copy has come.
 const LOOK: Nanos = Nanos::from_micros(500);
 
+/// Where the pictures of the machines are.
+const PICTURE: &str = "/picture/";
+
 const JSON: &str = "application/json";
 const SVG: &str = "image/svg+xml";
 const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -105,7 +108,9 @@ impl Keeper {
             }
             let asked = looks.into_iter().map(|wish| (now, wish));
             for (since, wish) in std::mem::take(&mut waiting).into_iter().chain(asked) {
-                if matches!(wish, Wish::Get(..)) && self.is_to_wait(since) {
+                let is_of_values =
+                    matches!(&wish, Wish::Get(path, _) if !path.starts_with(PICTURE));
+                if is_of_values && self.is_to_wait(since) {
                     waiting.push((since, wish));
                     due = self.clock.now();
                 } else {
@@ -131,9 +136,9 @@ impl Keeper {
         let begin = self.clock.now();
         self.model.with(|model| {
             for driver in model.drivers_mut() {
-                // One that came late is there, and may be old by now.
-                let is_slow = driver.sheet().is_missing();
+                // One that came late is there, and may be old by now: another one is waited for.
                 take(&mut **driver);
+                let is_slow = driver.sheet().is_missing();
                 driver.ask(begin);
                 driver.sheet_mut().ask(begin, is_slow);
             }
@@ -204,6 +209,10 @@ impl Keeper {
 
     fn obey(&self, order: &Order) -> Result<(), Refused> {
         self.model.with(|model| {
+            // Whoever has shown something since the last look is not silent.
+            for driver in model.drivers_mut() {
+                take(&mut **driver);
+            }
             let done = model.obey(order);
             // What is forced shows at once, and not with the next tick.
             model.update(self.clock.now(), false);
@@ -231,7 +240,7 @@ fn document(model: &Model, path: &str, now: Nanos) -> Option<Document> {
 }
 
 fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, String)> {
-    if let Some(file) = path.strip_prefix("/picture/") {
+    if let Some(file) = path.strip_prefix(PICTURE) {
         let (id, ending) = file.split_once('.')?;
         let picture = model.driver(id.parse().ok()?)?.picture()?;
         return match ending {
@@ -253,4 +262,115 @@ fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, Str
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
     let json = serde_json::json!({ "ms": millis, "values": values });
     Some((JSON, json.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sheet::Sheet;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use tickbus_base::statistics::Statistics;
+    use tickbus_base::time::Monotonic;
+    use tickbus_fieldbus::LinkState;
+    use tickbus_image::signal::Signal;
+
+    /// A driver that ticks only while it is let, and whose tick comes after the first look for it.
+    #[derive(Debug)]
+    struct Fake {
+        sheet: Sheet,
+        statistics: Statistics,
+        is_let: Arc<std::sync::atomic::AtomicBool>,
+        /// How often it was looked for since it was asked.
+        looks: usize,
+        is_asked: bool,
+        taken: Arc<AtomicUsize>,
+    }
+
+    impl Exhibit for Fake {
+        fn id(&self) -> i32 {
+            1
+        }
+
+        fn name(&self) -> &'static str {
+            "fake"
+        }
+
+        fn signals(&self) -> &[Signal] {
+            &[]
+        }
+
+        fn sheet(&self) -> &Sheet {
+            &self.sheet
+        }
+
+        fn sheet_mut(&mut self) -> &mut Sheet {
+            &mut self.sheet
+        }
+
+        fn ask(&mut self, _now: Nanos) {
+            (self.is_asked, self.looks) = (true, 0);
+        }
+
+        fn take(&mut self) -> bool {
+            self.looks += 1;
+            let has_come = self.is_asked && self.looks > 1 && self.is_let.load(Ordering::Relaxed);
+            if has_come {
+                self.is_asked = false;
+                self.taken.fetch_add(1, Ordering::Relaxed);
+            }
+            has_come
+        }
+
+        fn update(&mut self, _now: Nanos, _number: u64, _with_line: bool) -> bool {
+            false
+        }
+
+        fn json(&self) -> String {
+            String::new()
+        }
+
+        fn state(&self) -> LinkState {
+            LinkState::Running
+        }
+
+        fn statistics(&self) -> &Statistics {
+            &self.statistics
+        }
+
+        fn force(&mut self, _signal: &str, _value: &str) -> Result<(), Refused> {
+            Ok(())
+        }
+
+        fn release(&mut self, _signal: &str) -> Result<(), Refused> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_driver_that_was_late_once_is_waited_for_again() {
+        let clock: Arc<dyn Clock> = Monotonic::shared();
+        let (is_let, taken) = (Arc::default(), Arc::<AtomicUsize>::default());
+        let fake = Fake {
+            sheet: Sheet::new(clock.now(), &[], &[]),
+            statistics: Statistics::default(),
+            is_let: Arc::clone(&is_let),
+            looks: 0,
+            is_asked: false,
+            taken: Arc::clone(&taken),
+        };
+        let keeper = Keeper {
+            inbox: Arc::default(),
+            model: Arc::default(),
+            heard: clock.now(),
+            holders: 0,
+            clock,
+        };
+        keeper.model.with(|model| model.join(1, |_| Box::new(fake)));
+        keeper.look(true);
+        assert_eq!(taken.load(Ordering::Relaxed), 0, "it does not tick");
+        is_let.store(true, Ordering::Relaxed);
+        keeper.look(true);
+        let words = "the copy that came late, and one of now";
+        assert_eq!(taken.load(Ordering::Relaxed), 2, "{words}");
+    }
 }

@@ -179,7 +179,12 @@ impl ShownRun {
     }
 
     fn update_line(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
-        let state = told(self.view.as_ref());
+        let silent = self.sheet.missing_for(now);
+        let state = if silent > LATE {
+            hung(silent)
+        } else {
+            told(self.view.as_ref())
+        };
         let is_other =
             (state.state, &state.cause) != (self.state.state, &self.state.cause) || self.is_other;
         let is_due = with_line && self.sheet.is_line_due(now);
@@ -190,8 +195,6 @@ impl ShownRun {
             self.since = now;
         }
         self.state = state;
-        let step = self.view.as_ref().and_then(|view| view.step);
-        self.pace.go_on(now, step);
         self.count();
         let line = self.line_json(now);
         self.sheet.set_line(now, number, line);
@@ -301,6 +304,18 @@ fn owing(view: &RunView) -> String {
     format!("{what} for {waited}; the run ends after {hang}")
 }
 
+/// The state of a run whose server does not go on.
+fn hung(silent: Nanos) -> Told {
+    Told {
+        state: LinkState::Stale,
+        cause: Cause::Silent,
+        reason: format!(
+            "the server has shown nothing for {}; it waits for whoever reads its output, or hangs",
+            silent.rounded()
+        ),
+    }
+}
+
 /// The state of a run, of which there may be no copy yet.
 fn told(view: Option<&RunView>) -> Told {
     let told = |state, cause, reason| Told {
@@ -372,6 +387,8 @@ impl Exhibit for ShownRun {
 
     fn update(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
         self.take_members(now);
+        let step = self.view.as_ref().and_then(|view| view.step);
+        self.pace.go_on(now, step);
         let is_new = self.take_values(number);
         self.sheet.go_on(now, number, &self.signals);
         self.update_line(now, number, with_line) || is_new

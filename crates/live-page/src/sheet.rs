@@ -104,6 +104,11 @@ impl Sheet {
         self.asked.is_some_and(|asked| asked < time)
     }
 
+    /// How long a copy has been asked for that has not come.
+    pub(crate) fn missing_for(&self, now: Nanos) -> Nanos {
+        self.asked.map_or(Nanos::ZERO, |asked| now - asked)
+    }
+
     /// Takes a signal over as it was seen; tells whether that is new.
     pub(crate) fn put(&mut self, index: usize, seen: Row) -> bool {
         let row = &mut self.rows[index];

@@ -294,6 +294,7 @@ impl Exhibit for Shown {
     }
 
     fn force(&mut self, name: &str, value: &str) -> Result<(), Refused> {
+        self.look_at_forced();
         let index = self.position(name)?;
         let signal = &self.watch.config().table.signals[index];
         let value = parse(value, signal).map_err(|text| Refused { status: 400, text })?;

@@ -1,5 +1,6 @@
 //! The program "mirror": a loop-back plug in the form of a PLC.
 
+use tickbus_image::copy_frame;
 use tickbus_plc::{Program, ProgramError, Scan};
 
 /// Copies every `%I` byte to the `%Q` byte at the same offset, as far as both images reach.
@@ -48,7 +49,7 @@ impl Program for Mirror {
 
     fn scan(&mut self, scan: &mut Scan<'_>) {
         let bytes = scan.inputs.len().min(scan.outputs.len());
-        scan.outputs[..bytes].copy_from_slice(&scan.inputs[..bytes]);
+        copy_frame(&mut scan.outputs[..bytes], &scan.inputs[..bytes]);
     }
 }
 

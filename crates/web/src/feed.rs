@@ -228,6 +228,7 @@ impl Feed {
                 self.wanted.notified().await;
             }
             let changes = self.changes.load(Ordering::Relaxed);
+            let asked = self.clock.now();
             let (answer, state) = Answer::new();
             site.look(answer);
             let Ok(state) = state.await else {
@@ -259,9 +260,13 @@ impl Feed {
             });
             let rest = Duration::from_nanos(taken).saturating_mul(REST);
             let rest = rest.min(LONGEST_REST).saturating_sub(PERIOD);
-            tokio::time::sleep(PERIOD).await;
-            // A change during the look is remembered, and is looked at as soon.
-            let _ = timeout(rest, self.hurry.notified()).await;
+            // What the site took to answer is part of the period.
+            let passed = (self.clock.now() - asked).to_duration();
+            tokio::time::sleep(PERIOD.saturating_sub(passed)).await;
+            if !rest.is_zero() {
+                // A change during the look is remembered, and is looked at as soon.
+                let _ = timeout(rest, self.hurry.notified()).await;
+            }
         }
     }
 }

@@ -10,7 +10,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::Area;
-use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, TickStation, image};
+use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, TickStation, copy_frame, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
@@ -130,7 +130,7 @@ impl Unit {
         bend: impl FnOnce(&mut [u8]),
     ) {
         image.write(now, |frame| {
-            frame.copy_from_slice(&self.outputs);
+            copy_frame(frame, &self.outputs);
             bend(frame);
         });
         if let Some(tape) = tape {
@@ -180,7 +180,7 @@ struct Taking<'a> {
 
 impl Receiver for Taking<'_> {
     fn levels(&mut self, bytes: &[u8]) {
-        self.inputs.bytes.copy_from_slice(bytes);
+        copy_frame(&mut self.inputs.bytes, bytes);
     }
 
     fn edges(&mut self, signal: usize, count: u32) {

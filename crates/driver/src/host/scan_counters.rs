@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, SharedHistogram};
+use tickbus_image::copy_frame;
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
 /// What the hosted program has seen and sent, to be compared with the other end. One thread counts, that of the scans;
@@ -115,7 +116,7 @@ impl ScanCounters {
     #[inline]
     pub(super) fn keep(of: Option<CountedArea>, before: &mut [u8], now: &[u8]) {
         if of.is_some() {
-            before.copy_from_slice(now);
+            copy_frame(before, now);
         }
     }
 

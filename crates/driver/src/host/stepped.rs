@@ -88,6 +88,9 @@ impl Stepped for SteppedHost {
         // one was.
         let scans = if late < Nanos::ZERO {
             0
+        } else if late < self.interval {
+            // Nearly always, and a division takes its time.
+            1
         } else {
             late.0 / self.interval.0 + 1
         };

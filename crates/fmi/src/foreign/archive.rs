@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Read as _};
+use std::io::{self, BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
 use tempfile::TempDir;
@@ -52,6 +52,7 @@ impl Unpacked {
         let file = path.display().to_string();
         let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
         let mut archive = open(path).map_err(refused)?;
+        check_twins(path, &archive).map_err(refused)?;
         let entries = check(&mut archive).map_err(refused)?;
         let text = description(&mut archive, &entries).map_err(refused)?;
         let model = Model::parse(&format!("{file}/{DESCRIPTION}"), &text)?;
@@ -83,7 +84,7 @@ impl Unpacked {
         &self.library
     }
 
-    /// The folder of its resources, which need not be there.
+    /// The folder of its resources, of which there need not be any.
     pub fn resources(&self) -> PathBuf {
         self.folder.path().join("resources")
     }
@@ -104,12 +105,52 @@ fn open(path: &Path) -> Result<ZipArchive<File>, Mistake> {
     ZipArchive::new(file).map_err(damaged)
 }
 
+/// Before a file's entry in the directory of an archive.
+const ENTRY: &[u8] = b"PK\x01\x02";
+
+/// Refuses an archive that has two files of the very same name: of these `zip` shows the last alone, others the first.
+fn check_twins(path: &Path, archive: &ZipArchive<File>) -> Result<(), Mistake> {
+    let listed = listed(path, archive.central_directory_start()).map_err(damaged)?;
+    if listed == archive.len() {
+        return Ok(());
+    }
+    let what = format!(
+        "its directory has {listed} entries, and {} names: it has a file twice",
+        archive.len()
+    );
+    Err(hostile(what))
+}
+
+/// The number of entries in the directory of an archive, which begins at `start`.
+fn listed(path: &Path, start: u64) -> io::Result<usize> {
+    let mut directory = BufReader::new(File::open(path)?);
+    directory.seek(SeekFrom::Start(start))?;
+    let mut count = 0;
+    loop {
+        let mut entry = [0; 46];
+        match directory.read_exact(&mut entry) {
+            Ok(()) if entry.starts_with(ENTRY) => count += 1,
+            // Behind the last one.
+            Ok(()) => return Ok(count),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(count),
+            Err(error) => return Err(error),
+        }
+        // The lengths of its name, of what is beside it, and of its comment.
+        let lengths =
+            [28, 30, 32].map(|at| i64::from(u16::from_le_bytes([entry[at], entry[at + 1]])));
+        directory.seek_relative(lengths.iter().sum())?;
+    }
+}
+
+fn hostile(what: String) -> Mistake {
+    Mistake::new(what, "do not use this FMU; ask whoever made it")
+}
+
 /// What an archive has: each name with its index.
 type Entries = BTreeMap<String, usize>;
 
 /// Refuses an archive that would harm.
 fn check(archive: &mut ZipArchive<File>) -> Result<Entries, Mistake> {
-    let hostile = |what: String| Mistake::new(what, "do not use this FMU; ask whoever made it");
     if archive.len() > MOST_FILES {
         return Err(hostile(format!(
             "it has {} files, and the most is {MOST_FILES}",
@@ -233,6 +274,9 @@ fn unpack(archive: &mut ZipArchive<File>, entries: &Entries, folder: &Path) -> R
             "make room in the folder for temporary files, which TMPDIR names; or get the FMU anew, it may be cut",
         )
     };
+    // Where it looks from, even without any.
+    let resources = folder.join("resources");
+    fs::create_dir_all(&resources).map_err(|error| unwritable("resources", &error))?;
     let idle = |name: &str| name.starts_with("documentation/") || name.starts_with("sources/");
     for (name, index) in entries.iter().filter(|(name, _)| !idle(name)) {
         let mut entry = archive.by_index(*index).map_err(damaged)?;

@@ -7,8 +7,8 @@ mod functions;
 mod journal;
 
 use std::collections::BTreeSet;
-use std::ffi::{CString, c_int, c_void};
-use std::path::{Path, PathBuf};
+use std::ffi::{CString, OsString, c_int, c_void};
+use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -34,11 +34,14 @@ pub(super) struct StepEnd {
     pub(super) reached: Option<f64>,
 }
 
-/// The libraries of FMUs that have answered "fatal" in this process. By the standards nothing of them may be called any more, in no
-/// instance; they stay loaded, for to unload one runs its finalisers.
-static DEAD: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+/// An FMU, wherever it was unpacked to: its token, and the name of its library.
+type Identity = (String, OsString);
 
-fn dead() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+/// The FMUs that have answered "fatal" in this process. By the standards nothing of them may be called any more, in no instance;
+/// their libraries stay loaded, for to unload one runs its finalisers.
+static DEAD: Mutex<BTreeSet<Identity>> = Mutex::new(BTreeSet::new());
+
+fn dead() -> MutexGuard<'static, BTreeSet<Identity>> {
     DEAD.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
@@ -49,7 +52,7 @@ pub(super) struct Instance {
     functions: Functions,
     /// Whether it has answered "fatal".
     is_dead: bool,
-    path: PathBuf,
+    identity: Identity,
     /// There until it is dropped.
     kept: Option<Kept>,
 }
@@ -72,7 +75,9 @@ impl Instance {
         library: &Path,
         resources: &Path,
     ) -> Result<Self, String> {
-        if dead().contains(library) {
+        let own_name = library.file_name().unwrap_or_default();
+        let identity = (token.to_owned(), own_name.to_owned());
+        if dead().contains(&identity) {
             return Err("an earlier run of it in this process has failed for good (fatal), and it must not be called any more; \
                         give each run a process of its own (isolated = true)".to_owned());
         }
@@ -87,7 +92,6 @@ impl Instance {
         let env = std::ptr::from_ref(&*journal).cast_mut().cast::<c_void>();
         let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
         let (name, token) = (c(name), c(token));
-        let has_resources = resources.is_dir();
         let mut callbacks = None;
         let handle = match &functions {
             Functions::Two(two) => {
@@ -116,13 +120,12 @@ impl Instance {
                 // With a separator at its end, as the standard says.
                 let path = resources.join("");
                 let path = c(&path.to_string_lossy());
-                let path = if has_resources { path.as_ptr() } else { null() };
                 // SAFETY: as above.
                 unsafe {
                     (three.instantiate)(
                         name.as_ptr(),
                         token.as_ptr(),
-                        path,
+                        path.as_ptr(),
                         false,
                         false,
                         false,
@@ -140,7 +143,7 @@ impl Instance {
             handle,
             functions,
             is_dead: false,
-            path: library.to_owned(),
+            identity,
             kept: Some(Kept {
                 _library: loaded,
                 journal,
@@ -232,15 +235,25 @@ impl Instance {
                 let status = unsafe { (two.step)(self.handle, from, length, 1) };
                 if status == Status::Discard as c_int {
                     let (mut ended, mut last) = (0, from);
-                    // SAFETY: as above; 3 is fmi2Terminated, 2 fmi2LastSuccessfulTime.
-                    unsafe {
-                        let known = (two.boolean_status)(self.handle, 3, &raw mut ended);
-                        terminate = known == 0 && ended != 0;
-                        let known = (two.real_status)(self.handle, 2, &raw mut last);
-                        reached = (known == 0).then_some(last);
+                    // SAFETY: as above; 3 is fmi2Terminated.
+                    let known = unsafe { (two.boolean_status)(self.handle, 3, &raw mut ended) };
+                    terminate = known == 0 && ended != 0;
+                    let known = if known == Status::Fatal as c_int {
+                        known
+                    } else {
+                        // SAFETY: as above; 2 is fmi2LastSuccessfulTime.
+                        unsafe { (two.real_status)(self.handle, 2, &raw mut last) }
+                    };
+                    reached = (known == 0).then_some(last);
+                    // Then nothing may be called any more, whatever the step was.
+                    if known == Status::Fatal as c_int {
+                        known
+                    } else {
+                        status
                     }
+                } else {
+                    status
                 }
-                status
             }
             Functions::Three(three) => {
                 let (mut event, mut early, mut last) = (0_u8, 0_u8, from);
@@ -451,7 +464,7 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         if self.is_dead {
-            dead().insert(std::mem::take(&mut self.path));
+            dead().insert(std::mem::take(&mut self.identity));
             // Threads of it may still run, and log.
             std::mem::forget(self.kept.take());
             return;

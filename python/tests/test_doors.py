@@ -160,4 +160,4 @@ def test_the_example_in_c_sharp_runs_a_tank(tmp_path):
     assert all(145 < float(line[3:].split()[0]) < 155 for line in lines[2:]), result.stdout
     result = subprocess.run([*command, "nothing.cfg"], cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert result.returncode == 1
-    assert "System.Exception: BAD_CONFIG (-4): " in result.stderr
+    assert result.stderr.startswith("tank: BAD_CONFIG (-4): "), result.stderr

@@ -29,7 +29,7 @@ public final class Demo {
     private static final Verdict VERDICT = new Verdict("demo");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
-    private static final int ATTEMPTS = 3;
+    private static final int ATTEMPTS = 5;
 
     /** The step, and the time in it, at which a picture of the rig shows most: both lifts up, the lamp on. */
     private static final int PICTURE_STEP = 5;

@@ -39,7 +39,7 @@ public final class CellDemo {
     private static final Verdict VERDICT = new Verdict("demo-cell");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
-    private static final int ATTEMPTS = 3;
+    private static final int ATTEMPTS = 5;
 
     /** How often the nets' process reports. */
     private static final long REPORT_NANOS = 100_000_000L;

@@ -30,7 +30,7 @@ public final class LabDemo {
     private static final Verdict VERDICT = new Verdict("demo-lab");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
-    private static final int ATTEMPTS = 3;
+    private static final int ATTEMPTS = 5;
 
     /** How the driver says that the dispatcher has taken it: it is not running yet, because nothing is connected. */
     private static final String JOINED = "joined the dispatcher";

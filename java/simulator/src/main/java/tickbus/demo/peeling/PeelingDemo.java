@@ -38,7 +38,7 @@ public final class PeelingDemo {
     private static final Verdict VERDICT = new Verdict("demo-peeler");
 
     /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
-    private static final int ATTEMPTS = 3;
+    private static final int ATTEMPTS = 5;
 
     /** The position of the knife at which the picture of a block that is not round shows most. */
     private static final double PICTURE_MM = 138;

@@ -65,6 +65,8 @@ impl Peer {
         let separator = if cfg!(windows) { ";" } else { ":" };
         let jars = format!("java-peers-0.jar{separator}lib/*");
         let mut child = Command::new("java")
+            // It ends before a thorough compiler of its code would pay.
+            .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"])
             .args(["-cp", &jars, &format!("peers.{class}")])
             .args(arguments)
             .current_dir(&folder)

@@ -128,9 +128,12 @@ has_iec2c() {
     have "$IEC2C"
 }
 
-# Runs Maven on the Java reactor, quietly and without colours. It ends before a thorough compiler of its own code would pay.
+# For what ends before a thorough compiler would pay.
+SHORT_JVM="-XX:TieredStopAtLevel=1 -XX:+UseSerialGC"
+
+# Runs Maven on the Java reactor, quietly and without colours.
 maven() {
-    MAVEN_OPTS="${MAVEN_OPTS:--XX:TieredStopAtLevel=1 -XX:+UseSerialGC}" \
+    MAVEN_OPTS="${MAVEN_OPTS:-$SHORT_JVM}" \
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 

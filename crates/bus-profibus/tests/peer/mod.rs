@@ -153,16 +153,15 @@ fn run(mut phy: Pty, project: &Project, seen: &Mutex<Vec<Seen>>, over: &AtomicBo
             } else {
                 seen.events.push(event);
             }
-            if event == PeripheralEvent::Diagnostics
-                && let Some(told) = slave.last_diagnostics()
-            {
+            // One that it reads while it begins anew is no event.
+            if let Some(told) = slave.last_diagnostics() {
                 let extended = told.extended_diagnostics.raw_diag_buffer();
                 // It keeps the last one beyond its end.
                 let is_there = told.flags.contains(DiagnosticFlags::EXT_DIAG);
                 let extended = extended.filter(|_| is_there);
                 seen.diagnosis = (told.flags.bits(), extended.unwrap_or_default().to_vec());
-                seen.diagnoses += 1;
             }
+            seen.diagnoses += usize::from(event == PeripheralEvent::Diagnostics);
             slave.pi_q_mut().copy_from_slice(&seen.outputs);
         }
         std::thread::sleep(std::time::Duration::from_micros(50));

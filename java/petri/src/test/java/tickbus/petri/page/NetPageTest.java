@@ -238,11 +238,7 @@ class NetPageTest {
                 }
                 int asked = net.copies.get() - before;
                 assertTrue(asked > 0 && asked <= 31, asked + " in a second");
-                String event = viewer.event();
-                while (event.contains("[null]")) {
-                    // Nobody had run the net yet.
-                    event = viewer.event();
-                }
+                String event = firstOfARunNet(viewer);
                 assertTrue(event.contains("\"tokens\":[1,0,0,7]"), event);
             }
         }
@@ -260,12 +256,21 @@ class NetPageTest {
         }
     }
 
+    /** The first event after somebody has run the net. */
+    private static String firstOfARunNet(Client viewer) throws IOException {
+        String event = viewer.event();
+        while (event.contains("[null]")) {
+            event = viewer.event();
+        }
+        return event;
+    }
+
     @Test
     void aPageIsClosedWhileSomebodyLooks() throws IOException {
         try (Scanning scanning = new Scanning()) {
             NetPage page = NetPage.open("127.0.0.1:0", "t", scanning.watch);
             try (Client viewer = Client.get(page, "/events")) {
-                assertTrue(viewer.event().contains("\"nets\":[{"));
+                assertTrue(firstOfARunNet(viewer).contains("\"nets\":[{"));
                 page.close();
                 String line = "";
                 while (line != null) {

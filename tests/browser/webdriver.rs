@@ -22,26 +22,10 @@ impl Browser {
     /// Starts a browser with a window of this many CSS pixels.
     pub(crate) fn start(width: u32, height: u32) -> Self {
         let folder = tempfile::tempdir().expect("there is room for a browser");
-        let started = Command::new("chromedriver")
-            .env("TMPDIR", folder.path())
-            .arg("--port=0")
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn();
-        let mut driver = started.expect("chromedriver is there (Debian's package chromium-driver)");
-        let mut lines = BufReader::new(driver.stdout.take().expect("it is piped")).lines();
-        let port = loop {
-            let line = lines
-                .next()
-                .expect("it tells its port")
-                .expect("it writes text");
-            if let Some((_, port)) = line.split_once("started successfully on port ") {
-                break port
-                    .trim_end_matches('.')
-                    .parse()
-                    .expect("a port is a number");
-            }
-        };
+        // It looks for a port that is free for IPv4, and ends where IPv6 has another program on it by then.
+        let (driver, port) = (0..5)
+            .find_map(|_| start_driver(folder.path()))
+            .expect("chromedriver tells its port");
         let mut browser = Self {
             driver,
             port,
@@ -233,4 +217,29 @@ pub(crate) fn save(folder: Option<&Path>, name: &str, data: &Value) {
     fs::create_dir_all(folder)
         .and_then(|()| fs::write(folder.join(name), bytes))
         .expect("screenshots can be saved");
+}
+
+/// Starts chromedriver with a folder for its temporary files, and takes its port from what it says. If it ends at once,
+/// what it said is in the test's output.
+fn start_driver(folder: &Path) -> Option<(Child, u16)> {
+    let started = Command::new("chromedriver")
+        .env("TMPDIR", folder)
+        .arg("--port=0")
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn();
+    let mut driver = started.expect("chromedriver is there (Debian's package chromium-driver)");
+    let lines = BufReader::new(driver.stdout.take().expect("it is piped")).lines();
+    let mut said = Vec::new();
+    for line in lines {
+        let line = line.expect("it writes text");
+        if let Some((_, port)) = line.split_once("started successfully on port ") {
+            let port = port.trim_end_matches('.').parse();
+            return Some((driver, port.expect("a port is a number")));
+        }
+        said.push(line);
+    }
+    let ended = driver.wait().expect("it can be waited for");
+    eprintln!("chromedriver ended ({ended}): {}", said.join("\n"));
+    None
 }

@@ -11,6 +11,9 @@
  * With LOOP it comes back from no scan but the first.
  */
 #include <stdint.h>
+#ifdef LOOP
+#include <unistd.h>
+#endif
 
 typedef struct {
     long int tv_sec;
@@ -47,6 +50,8 @@ void config_run__(unsigned long tick)
 #ifdef LOOP
     volatile int looping = tick > 0;
     while (looping) {
+        /* Without the processor, of which other tests are to have some. */
+        pause();
     }
 #endif
     now = (int64_t)__CURRENT_TIME.tv_sec * 1000000000 + __CURRENT_TIME.tv_nsec;

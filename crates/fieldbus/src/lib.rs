@@ -38,5 +38,5 @@ pub use port::{CallWatch, Frames, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use role::Role;
 pub use staleness::is_stale;
-pub use validity::PlcState;
+pub use validity::{PlcState, Validity};
 pub use write_guard::WriteGuard;

@@ -26,9 +26,9 @@ impl PlcState {
     }
 }
 
-/// The stations' signs of life, in addition to frames.
+/// The stations' signs of life, in addition to frames. A [`Port`](super::Port) has one.
 #[derive(Debug)]
-pub(super) struct Validity {
+pub struct Validity {
     stations: Vec<Station>,
     watched: Vec<Watched>,
 }
@@ -86,7 +86,8 @@ impl Watched {
 }
 
 impl Validity {
-    pub(super) fn new(stations: usize) -> Self {
+    /// Of a driver with this many stations, all of whose data are valid.
+    pub fn new(stations: usize) -> Self {
         let stations = (0..stations).map(|number| Station {
             name: match stations {
                 1 => String::new(),
@@ -101,7 +102,7 @@ impl Validity {
     }
 
     /// Watches these signals, starting from their first frame.
-    pub(super) fn watch(&mut self, watches: Vec<Watch>) {
+    pub fn watch(&mut self, watches: Vec<Watch>) {
         let watched = watches.into_iter().map(|watch| Watched {
             watch,
             last: Vec::new(),
@@ -136,7 +137,7 @@ impl Validity {
 
     /// A whole frame of `station` arrived at `now`. Returns whether the validity of its data changes.
     #[inline]
-    pub(super) fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
+    pub fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
         let mut changes = false;
         for watched in &mut self.watched {
             if watched.watch.station == station {
@@ -171,7 +172,7 @@ impl Validity {
     }
 
     /// Whether the data of `station` are valid.
-    pub(super) fn is_valid(&self, station: usize) -> bool {
+    pub fn is_valid(&self, station: usize) -> bool {
         let is_frozen = |watched: &Watched| watched.watch.station == station && watched.is_frozen;
         !self.stations[station].is_stopped && !self.watched.iter().any(is_frozen)
     }

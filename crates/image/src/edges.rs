@@ -167,7 +167,8 @@ impl EdgeCounter {
     }
 
     /// Counts the edges between the last levels and those in `bytes`.
-    fn observe(&mut self, bytes: &[u8]) {
+    #[inline]
+    pub fn observe(&mut self, bytes: &[u8]) {
         for (word, last) in self.words.iter().zip(&mut self.last) {
             let now = word.levels(bytes);
             let edges = word.edges(now ^ *last, now);

@@ -12,8 +12,9 @@
 //! ```
 //!
 //! "tx" and "rx" are as seen from the tick. In a Device tx is `%I` and rx is `%Q`; in a Controller it
-//! is the other way round.
+//! is the other way round. Where both sides are on one thread, a [`DirectStream`] does for each of them.
 
+mod direct;
 mod edges;
 mod event_ring;
 mod row_ring;
@@ -23,6 +24,7 @@ mod triple;
 
 pub mod signal;
 
+pub use direct::DirectStream;
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
 pub use event_ring::{Consumer, Event, Producer, event_ring};
 pub use row_ring::{RowReader, RowWriter, row_ring};

@@ -80,17 +80,27 @@ impl Unit {
 
     /// Takes over the inputs.
     fn read(&mut self, now: Nanos, image: &mut TickStation, tape: Option<&mut ScanRecorder>) {
-        self.is_valid = image.is_valid();
-        let inputs = &mut self.inputs;
-        ScanCounters::keep(self.counted.1, &mut inputs.before, &inputs.bytes);
-        self.arrival = Some(image.read(now, &mut Taking { inputs, tape }));
+        let is_valid = image.is_valid();
+        self.take(is_valid, |inputs| {
+            image.read(now, &mut Taking { inputs, tape })
+        });
     }
 
-    /// Runs the program on them.
-    fn run(
+    /// Lets `take` take over the inputs, which were valid or not before that.
+    #[inline]
+    pub(super) fn take(&mut self, is_valid: bool, take: impl FnOnce(&mut Inputs) -> Arrival) {
+        let inputs = &mut self.inputs;
+        ScanCounters::keep(self.counted.1, &mut inputs.before, &inputs.bytes);
+        self.is_valid = is_valid;
+        self.arrival = Some(take(inputs));
+    }
+
+    /// Runs the program on them, which are still valid or not.
+    #[inline]
+    pub(super) fn run(
         &mut self,
         (now, in_time, max_age): (Nanos, bool, Nanos),
-        image: &TickStation,
+        is_still_valid: bool,
         scan_counters: &ScanCounters,
     ) {
         let Self {
@@ -108,7 +118,7 @@ impl Unit {
         scan_counters.count(*read, &inputs.before, &inputs.bytes);
         // The PLC may have stopped between the check and the read, and the frame may be from after that:
         // checked again.
-        self.is_alive = in_time && self.is_valid && image.is_valid() && arrival.age <= max_age;
+        self.is_alive = in_time && self.is_valid && is_still_valid && arrival.age <= max_age;
         ScanCounters::keep(*written, outputs_before, outputs);
         program.scan(&mut Scan {
             now,
@@ -138,8 +148,21 @@ impl Unit {
         }
     }
 
+    /// Its outputs as the program left them.
+    #[inline]
+    pub(super) fn outputs(&self) -> &[u8] {
+        &self.outputs
+    }
+
+    /// Whether the program was told in its last scan that its peer is there.
+    #[inline]
+    pub(super) fn is_alive(&self) -> bool {
+        self.is_alive
+    }
+
     /// The age of its data.
-    fn age(&self) -> Nanos {
+    #[inline]
+    pub(super) fn age(&self) -> Nanos {
         self.arrival.map_or(Nanos::ZERO, |arrival| arrival.age)
     }
 
@@ -207,7 +230,7 @@ impl Cpu {
             for (unit, image) in self.units.iter_mut().zip(&mut self.tick.stations) {
                 let mut tape = self.tape.as_mut().filter(|_| unit.station == 0);
                 unit.read(now, image, tape.as_deref_mut());
-                unit.run(time, image, &self.scan_counters);
+                unit.run(time, image.is_valid(), &self.scan_counters);
                 unit.write(now, image, tape, |_| {});
                 age = age.max(unit.age());
                 alive &= unit.is_alive;
@@ -237,7 +260,7 @@ impl Cpu {
         faults.received(units.iter_mut().map(|unit| &mut *unit.inputs.bytes));
         for (unit, image) in units.iter_mut().zip(&*images) {
             let time = (now, in_time, self.max_age);
-            unit.run(time, image, &self.scan_counters);
+            unit.run(time, image.is_valid(), &self.scan_counters);
         }
         faults.sending(units.iter().map(|unit| &*unit.outputs));
         for (unit, image) in units.iter().zip(images) {
@@ -273,20 +296,28 @@ impl Cpu {
     }
 }
 
+/// The program, and an instance of it for each further station that it can serve.
+pub(super) fn units(
+    program: Box<dyn Program>,
+    (config, role): (&Config, Role),
+    scan_counters: &ScanCounters,
+) -> Vec<Unit> {
+    let others = (1..config.table.stations.len())
+        .filter_map(|station| Some((program.for_another_station()?, station)))
+        .collect::<Vec<_>>();
+    std::iter::once((program, 0))
+        .chain(others)
+        .map(|(program, station)| Unit::new(program, (config, role), station, scan_counters))
+        .collect()
+}
+
 /// Creates the program's half of a line: the CPU, the bus's end of its image, its counters. A program that can
 /// serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
-    let table = &config.table;
-    let scan_counters = Arc::new(ScanCounters::new(table));
-    let (tick, bus) = image(directions(table, role));
-    let others = (1..table.stations.len())
-        .filter_map(|station| Some((program.for_another_station()?, station)))
-        .collect::<Vec<_>>();
-    let units = std::iter::once((program, 0)).chain(others);
+    let scan_counters = Arc::new(ScanCounters::new(&config.table));
+    let (tick, bus) = image(directions(&config.table, role));
     let cpu = Cpu {
-        units: units
-            .map(|(program, station)| Unit::new(program, (config, role), station, &scan_counters))
-            .collect(),
+        units: units(program, (config, role), &scan_counters),
         tick,
         max_age: config.timing.max_age,
         areas: role.areas(),

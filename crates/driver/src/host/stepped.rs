@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
-use tickbus_base::time::{Manual, Nanos};
+use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::{BusError, LinkStatus, Port, Role, Stepped};
+use tickbus_fieldbus::{BusError, Port, Role, Stepped, Validity};
+use tickbus_image::{Arrival, DirectStream, StationStreams, copy_frame};
 use tickbus_plc::Program;
 
 use super::ScanCounters;
-use super::cpu::{Cpu, half};
+use super::cpu::{Unit, units};
+use crate::frames::directions;
 
 /// The most scans that one exchange catches up on: 1,000 s of scans every 10 ms. A longer step is taken for a
 /// wrong time; scanning through it would block the tick for as long as that takes.
@@ -16,13 +18,34 @@ const MOST_SCANS: i64 = 100_000;
 
 /// A hosted program scanned by the tick, in simulation time.
 pub(crate) struct SteppedHost {
-    cpu: Cpu,
-    port: Port,
+    /// The program, and further instances of it for the other stations, each with its end of the line.
+    stations: Vec<(Unit, Line)>,
+    validity: Validity,
+    max_age: Nanos,
+    scan_counters: Arc<ScanCounters>,
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
-    /// Whether the program was sent the machine's latest values.
-    is_delivered: bool,
+    delivered: Delivered,
+}
+
+/// The streams of one station. Machine and program are on one thread, and hand nothing over.
+struct Line {
+    inputs: DirectStream,
+    outputs: DirectStream,
+}
+
+/// What the program was sent.
+#[derive(Default)]
+struct Delivered {
+    /// How many frames.
+    frames: u64,
+    /// When the machine was heard from.
+    heard: Option<Nanos>,
+    /// Whether the machine's latest values are among them.
+    is_latest: bool,
+    /// Whether no scan has seen the last frame yet.
+    is_fresh: bool,
 }
 
 impl SteppedHost {
@@ -31,45 +54,92 @@ impl SteppedHost {
         config: &Config,
         interval: Nanos,
     ) -> (Self, Arc<ScanCounters>) {
-        let max_age = config.timing.max_age;
-        let (cpu, bus) = half(program, config, Role::Controller);
-        let scan_counters = Arc::clone(&cpu.scan_counters);
-        let status = LinkStatus::new(cpu.units[0].program.name(), max_age);
-        let watches = config
-            .life_signs
-            .watches(&config.table, Role::Controller, max_age);
-        let port =
-            Port::new(bus, Manual::new(), Role::Controller, None, status).with_life_signs(watches);
-        (
-            Self {
-                cpu,
-                port,
-                interval,
-                due: None,
-                is_delivered: false,
-            },
-            scan_counters,
-        )
+        let (role, max_age, table) = (Role::Controller, config.timing.max_age, &config.table);
+        let scan_counters = Arc::new(ScanCounters::new(table));
+        let units = units(program, (config, role), &scan_counters);
+        let lines = directions(table, role).into_iter().map(Line::new);
+        let mut validity = Validity::new(table.stations.len());
+        validity.watch(config.life_signs.watches(table, role, max_age));
+        let host = Self {
+            stations: units.into_iter().zip(lines).collect(),
+            validity,
+            max_age,
+            scan_counters: Arc::clone(&scan_counters),
+            interval,
+            due: None,
+            delivered: Delivered::default(),
+        };
+        (host, scan_counters)
+    }
+
+    /// Inputs, program, outputs: one scan at `now`.
+    #[inline]
+    fn scan(&mut self, now: Nanos) {
+        let Delivered {
+            frames,
+            heard,
+            is_latest,
+            is_fresh,
+        } = &mut self.delivered;
+        if *is_latest {
+            // Between two ticks only simulation time passes: the machine is there all along, however large the
+            // steps are.
+            *heard = Some(now);
+        }
+        let arrival = Arrival {
+            fresh: std::mem::take(is_fresh),
+            changed: true,
+            age: heard.map_or(Nanos::MAX, |heard| (now - heard).max(Nanos::ZERO)),
+            sequence: *frames,
+        };
+        let mut alive = true;
+        for (station, (unit, line)) in self.stations.iter_mut().enumerate() {
+            let is_valid = self.validity.is_valid(station);
+            unit.take(is_valid, |inputs| {
+                if heard.is_some() {
+                    copy_frame(&mut inputs.bytes, line.inputs.read(now));
+                }
+                arrival
+            });
+            unit.run((now, true, self.max_age), is_valid, &self.scan_counters);
+            line.outputs
+                .write(|frame| copy_frame(frame, unit.outputs()));
+            alive &= unit.is_alive();
+        }
+        self.scan_counters.scanned(arrival.age, alive);
     }
 }
 
-/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
-fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
-    let Some(mut frames) = from.take_all(now) else {
-        return false;
-    };
-    for station in frames.stations() {
-        to.received(station, now, frames.frame(station));
+impl Line {
+    fn new(streams: StationStreams) -> Self {
+        Self {
+            inputs: DirectStream::new(streams.rx_fail_safe, streams.rx_latched),
+            outputs: DirectStream::new(streams.tx_fail_safe, streams.tx_latched),
+        }
     }
-    let receipt = frames.receipt();
-    from.sent(&receipt);
-    true
 }
 
 impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
-        self.is_delivered = carry(port, &mut self.port, now);
+        self.delivered.is_latest = false;
+        // An injected fault may swallow them.
+        let Some(mut frames) = port.take_all(now) else {
+            return Ok(());
+        };
+        for (station, (_, line)) in self.stations.iter_mut().enumerate() {
+            let frame = frames.frame(station);
+            self.validity.arrived(station, now, frame);
+            line.inputs.write(|bytes| copy_frame(bytes, frame));
+        }
+        let receipt = frames.receipt();
+        port.sent(&receipt);
+        self.delivered = Delivered {
+            frames: self.delivered.frames + 1,
+            heard: Some(now),
+            is_latest: true,
+            is_fresh: true,
+        };
         Ok(())
     }
 
@@ -95,18 +165,18 @@ impl Stepped for SteppedHost {
             late.0 / self.interval.0 + 1
         };
         for _ in 0..scans {
-            if self.is_delivered {
-                // Between two ticks only simulation time passes: the machine is there all along, however
-                // large the steps are.
-                (0..self.port.stations()).for_each(|station| self.port.touch(station, due));
-            }
-            self.cpu.scan(due, true);
+            self.scan(due);
             due += self.interval;
         }
         self.due = Some(due);
         if port.is_up(now) {
-            carry(&mut self.port, port, now);
+            for (station, (_, line)) in self.stations.iter_mut().enumerate() {
+                port.received(station, now, line.outputs.read(now));
+            }
         }
         Ok(due)
     }
 }
+
+#[cfg(test)]
+mod tests;

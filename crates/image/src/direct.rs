@@ -1,0 +1,112 @@
+//! A stream of frames whose writer and reader take turns on one thread.
+
+use tickbus_base::time::Nanos;
+
+use crate::{EdgeCounter, LatchedBit, PulseShaper};
+
+/// A stream of frames whose writer and reader take turns on one thread: as through the two ends of a
+/// [`station`](crate::station), no edge of a latched signal is lost, but nothing has to be handed over.
+#[derive(Debug)]
+pub struct DirectStream {
+    bytes: Box<[u8]>,
+    edges: EdgeCounter,
+    shaper: PulseShaper,
+    /// The frame with its pulses shaped, if they need it.
+    shaped: Box<[u8]>,
+}
+
+impl DirectStream {
+    /// A stream whose frame is `fail_safe` until the first one is written.
+    pub fn new(fail_safe: Box<[u8]>, latched: Box<[LatchedBit]>) -> Self {
+        Self {
+            edges: EdgeCounter::new(&latched, &fail_safe),
+            shaper: PulseShaper::new(latched, &fail_safe),
+            shaped: fail_safe.clone(),
+            bytes: fail_safe,
+        }
+    }
+
+    /// Lets `write` change the frame, and counts the edges of that.
+    #[inline]
+    pub fn write<R>(&mut self, write: impl FnOnce(&mut [u8]) -> R) -> R {
+        let result = write(&mut self.bytes);
+        self.edges.observe(&self.bytes);
+        result
+    }
+
+    /// What the reader sees at `now`: the frame, with every edge since the last call made visible.
+    #[inline]
+    pub fn read(&mut self, now: Nanos) -> &[u8] {
+        let edges = self.edges.counts();
+        let shapes = self.shaper.needs_shaping(edges);
+        if shapes {
+            self.shaped.copy_from_slice(&self.bytes);
+            self.shaper.shape(edges, now, &mut self.shaped);
+        } else {
+            self.shaper.pass(&self.bytes);
+        }
+        self.shaper.confirm();
+        if shapes { &self.shaped } else { &self.bytes }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use super::*;
+    use crate::signal::Latch;
+    use crate::{Receiver, StationStreams, station};
+
+    struct Shown(u8);
+
+    impl Receiver for Shown {
+        fn levels(&mut self, bytes: &[u8]) {
+            self.0 = bytes[0];
+        }
+
+        fn edges(&mut self, _: usize, _: u32) {}
+    }
+
+    #[test]
+    fn it_shows_what_two_ends_show_between_threads() {
+        let latches = [Latch::Rising, Latch::Falling, Latch::Both, Latch::Rising];
+        let latched: Box<[LatchedBit]> = (0..4)
+            .map(|bit| LatchedBit {
+                signal: bit,
+                byte: 0,
+                mask: 1 << bit,
+                latch: latches[bit],
+                hold: Nanos(if bit == 3 { 7 } else { 0 }),
+            })
+            .collect();
+        let fail_safe: Box<[u8]> = Box::new([0x05]);
+        let mut direct = DirectStream::new(fail_safe.clone(), latched.clone());
+        let (mut tick, mut bus) = station(StationStreams {
+            tx_fail_safe: fail_safe.clone(),
+            tx_latched: latched.clone(),
+            rx_fail_safe: fail_safe.clone(),
+            rx_latched: latched,
+        });
+        let (mut shown, mut random, mut shaped) = (Shown(fail_safe[0]), 1_u64, 0);
+        let mut written = fail_safe[0];
+        for step in 0..20_000 {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let (now, level) = (Nanos(2 * step), (random >> 40).to_le_bytes()[0]);
+            if random >> 60 < 9 {
+                written = level;
+                direct.write(|frame| frame[0] = level);
+                tick.write(now, |frame| frame[0] = level);
+                bus.received(now, &[level]);
+            } else {
+                let seen = direct.read(now);
+                assert_eq!(seen, bus.outgoing(now, None), "step {step}");
+                bus.sent();
+                tick.read(now, &mut shown);
+                assert_eq!(seen, [shown.0], "step {step}");
+                shaped += u32::from(seen != [written]);
+            }
+        }
+        assert!(shaped > 100, "pulses were shaped {shaped} times");
+    }
+}

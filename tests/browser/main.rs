@@ -469,13 +469,14 @@ fn screenshots_are_taken_at_every_size() {
         ..contents(&run)
     });
     let path = std::env::var_os("TICKBUS_REPORT").map_or_else(|| page.path(), PathBuf::from);
+    let browser = Browser::start(1280, 900);
     for (name, width, height, scheme) in [
         ("desktop", 1280, 900, "light"),
         ("dark", 1280, 900, "dark"),
         ("phone", 390, 844, "light"),
         ("phone-dark", 390, 844, "dark"),
     ] {
-        let browser = Browser::start(width, height);
+        browser.resize(width, height);
         let scheme = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
         browser.devtools("Emulation.setEmulatedMedia", &scheme);
         browser.open(&path);

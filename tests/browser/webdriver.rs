@@ -53,10 +53,16 @@ impl Browser {
             .as_str()
             .expect("a session has a name")
             .clone_into(&mut browser.session);
-        // Headless windows have a frame even so, unless their size is set like this.
-        let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 640});
-        browser.devtools("Emulation.setDeviceMetricsOverride", &metrics);
+        browser.resize(width, height);
         browser
+    }
+
+    /// Leaves the page, for a window of this many CSS pixels: sooner there than another browser.
+    pub(crate) fn resize(&self, width: u32, height: u32) {
+        self.go("about:blank");
+        // Headless windows have a frame, whatever they are begun with, unless their size is set like this.
+        let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 640});
+        self.devtools("Emulation.setDeviceMetricsOverride", &metrics);
     }
 
     /// Opens a file, and waits until it is loaded.

@@ -529,13 +529,14 @@ fn ten_thousand_signals_are_scrolled_filtered_and_chosen() {
 fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
     let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
     let machine = Machine::rig();
+    let browser = Browser::start(1280, 900);
     for (name, width, height, scheme) in [
         ("live-wide", 1280, 860, "light"),
         ("live-wide-dark", 1280, 860, "dark"),
         ("live-phone", 390, 844, "light"),
         ("live-phone-dark", 390, 844, "dark"),
     ] {
-        let browser = Browser::start(width, height);
+        browser.resize(width, height);
         let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
         browser.devtools("Emulation.setEmulatedMedia", &media);
         browser.go(&machine.url);

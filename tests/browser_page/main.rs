@@ -441,13 +441,14 @@ fn names_are_shown_and_a_board_with_many_fits_every_screen() {
     board.say("P Q1=24 Q2=0");
     one.say("P Q1=24 Q3=24");
     two.say("P Q1=24 Q2=0");
+    let browser = Browser::start(1280, 900);
     for (name, width, height, scheme) in [
         ("wide", 1180, 800, "light"),
         ("wide-dark", 1180, 800, "dark"),
         ("phone", 390, 844, "light"),
         ("phone-dark", 390, 844, "dark"),
     ] {
-        let browser = Browser::start(width, height);
+        browser.resize(width, height);
         let media = json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
         browser.devtools("Emulation.setEmulatedMedia", &media);
         browser.go(&lab.url);

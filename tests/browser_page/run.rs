@@ -115,8 +115,9 @@ impl Participant for Client {
 fn a_run_shows_its_clients_and_their_variables_on_every_screen() {
     let folder = std::env::var_os("TICKBUS_SCREENSHOTS").map(PathBuf::from);
     let run = Run::start();
+    let browser = Browser::start(1280, 900);
     for (name, width, height) in [("run-wide", 1280, 720), ("run-phone", 390, 844)] {
-        let browser = Browser::start(width, height);
+        browser.resize(width, height);
         browser.go(&run.url);
         browser.wait("document.getElementById('found').textContent === '9 signals'");
         browser.wait("document.querySelectorAll('.row.station:not([hidden])').length === 2");

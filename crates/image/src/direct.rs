@@ -30,13 +30,18 @@ impl DirectStream {
     #[inline]
     pub fn write<R>(&mut self, write: impl FnOnce(&mut [u8]) -> R) -> R {
         let result = write(&mut self.bytes);
-        self.edges.observe(&self.bytes);
+        if self.has_latched() {
+            self.edges.observe(&self.bytes);
+        }
         result
     }
 
     /// What the reader sees at `now`: the frame, with every edge since the last call made visible.
     #[inline]
     pub fn read(&mut self, now: Nanos) -> &[u8] {
+        if !self.has_latched() {
+            return &self.bytes;
+        }
         let edges = self.edges.counts();
         let shapes = self.shaper.needs_shaping(edges);
         if shapes {
@@ -47,6 +52,12 @@ impl DirectStream {
         }
         self.shaper.confirm();
         if shapes { &self.shaped } else { &self.bytes }
+    }
+
+    /// Whether there is an edge to count and to show.
+    #[inline]
+    fn has_latched(&self) -> bool {
+        !self.shaper.bits().is_empty()
     }
 }
 

@@ -388,6 +388,9 @@ impl PulseShaper {
     /// Confirms those bits of each word that `seen` gives.
     #[inline]
     fn confirm_words(&mut self, seen: impl Fn(&Word) -> u64) {
+        if self.words.is_empty() {
+            return;
+        }
         let next = self.words.iter().zip(&self.next);
         for ((word, next), shown) in next.zip(&mut self.shown) {
             shown.merge(*next, seen(word));

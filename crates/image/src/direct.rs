@@ -5,7 +5,7 @@ use tickbus_base::time::Nanos;
 use crate::{EdgeCounter, LatchedBit, PulseShaper};
 
 /// A stream of frames whose writer and reader take turns on one thread: as through the two ends of a
-/// [`station`](crate::station), no edge of a latched signal is lost, but nothing has to be handed over.
+/// [`station`](fn@crate::station), no edge of a latched signal is lost, but nothing has to be handed over.
 #[derive(Debug)]
 pub struct DirectStream {
     bytes: Box<[u8]>,

@@ -157,14 +157,16 @@ impl Inputs {
         if !port.is_up(now) {
             return;
         }
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            if std::mem::take(&mut station.is_changed) {
-                self.raw.give(index, &mut station.frame);
-                port.received(index, now, &station.frame);
-            } else if station.alive > 0 || station.inputs == 0 {
-                port.touch(index, now);
+        port.together(|port| {
+            for (index, station) in self.stations.iter_mut().enumerate() {
+                if std::mem::take(&mut station.is_changed) {
+                    self.raw.give(index, &mut station.frame);
+                    port.received(index, now, &station.frame);
+                } else if station.alive > 0 || station.inputs == 0 {
+                    port.touch(index, now);
+                }
             }
-        }
+        });
     }
 }
 

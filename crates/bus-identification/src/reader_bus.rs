@@ -171,10 +171,12 @@ impl Serving<'_> {
         if !std::mem::take(&mut self.is_heard) {
             return;
         }
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            show(self.reader.head(station.head), &mut station.frame);
-            port.received(index, now, &station.frame);
-        }
+        port.together(|port| {
+            for (index, station) in self.stations.iter_mut().enumerate() {
+                show(self.reader.head(station.head), &mut station.frame);
+                port.received(index, now, &station.frame);
+            }
+        });
         port.running("a client is asking");
     }
 

@@ -233,18 +233,22 @@ impl Values {
     /// Hands in what was read in a step.
     fn deliver(&mut self, now: Nanos, reads: &[u64], port: &mut Port) {
         self.reads.set(reads);
-        for (station, frame) in self.frames.iter_mut().enumerate() {
-            self.reads.give(station, frame);
-            if port.is_up(now) {
-                port.received(station, now, frame);
+        port.together(|port| {
+            for (station, frame) in self.frames.iter_mut().enumerate() {
+                self.reads.give(station, frame);
+                if port.is_up(now) {
+                    port.received(station, now, frame);
+                }
             }
-        }
+        });
     }
 
     /// Nobody can have written anything since: between two steps only the simulation's own time passes.
     fn touch(&self, now: Nanos, port: &mut Port) {
         if port.is_up(now) {
-            (0..self.frames.len()).for_each(|station| port.touch(station, now));
+            port.together(|port| {
+                (0..self.frames.len()).for_each(|station| port.touch(station, now));
+            });
         }
     }
 }

@@ -78,11 +78,13 @@ impl ConnectionFrames {
             port.received(self.stations.start, now, frame);
             return Ok(());
         }
-        for station in self.stations() {
-            let (frame, rest) = record.split_at(port.sizes(station).1);
-            port.received(station, now, frame);
-            record = rest;
-        }
+        port.together(|port| {
+            for station in self.stations() {
+                let (frame, rest) = record.split_at(port.sizes(station).1);
+                port.received(station, now, frame);
+                record = rest;
+            }
+        });
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Link, LinkStatus};
 use tickbus_image::signal::Slot;
-use tickbus_image::{Consumer, Event};
+use tickbus_image::{Event, TickEnd};
 use tickbus_record::Recorder;
 
 use super::bus_handle::BusHandle;
@@ -25,6 +25,7 @@ use tickbus_driver_cfg::Config;
 pub struct Driver {
     pub(super) config: Arc<Config>,
     pub(super) slots: SlotMap,
+    pub(super) image: TickEnd,
     pub(super) stations: Vec<Station>,
     pub(super) line: BusHandle,
     pub(super) clock: Arc<dyn Clock>,
@@ -48,7 +49,6 @@ pub struct Driver {
     /// A free bus, one station, no extras and no recorder.
     pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
-    pub(super) events: Consumer,
     pub(super) program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
     /// Where another thread looks at it.
@@ -94,14 +94,11 @@ impl Driver {
     /// A copy of the data for the statistics, to be formatted when the driver is no longer locked.
     pub fn snapshot(&self) -> Snapshot {
         let now = self.clock.now();
-        let stations = self.stations.iter();
         Snapshot {
             config: Arc::clone(&self.config),
             counters: self.counters,
-            stations: stations
-                .map(|station| (station.peer_age(now), station.is_valid(), station.cycles()))
-                .collect(),
-            events_lost: self.events.lost(),
+            stations: self.told(now).collect(),
+            events_lost: self.image.events.lost(),
             now,
             samples: self.samples.clone(),
             status: self.status.clone(),
@@ -114,10 +111,23 @@ impl Driver {
         }
     }
 
+    /// Per station, what the bus says of it: the time since its peer was heard from, whether its data are valid, and how
+    /// many frames were received.
+    fn told(&self, now: Nanos) -> impl Iterator<Item = (Nanos, bool, u64)> + Clone {
+        let image = &self.image;
+        (0..image.stations()).map(move |station| {
+            (
+                image.peer_age(station, now),
+                image.is_valid(station),
+                image.received(station),
+            )
+        })
+    }
+
     /// Checks the line from outside, in case the bus cannot.
     fn observe(&self) {
         let now = self.clock.now();
-        let ages = self.stations.iter().map(|station| station.peer_age(now));
+        let ages = self.told(now).map(|(age, ..)| age);
         self.status.observe(now, ages);
         self.status.observe_call(now);
     }
@@ -126,7 +136,7 @@ impl Driver {
     pub fn poll_events(&mut self, into: &mut [Event]) -> usize {
         let mut taken = 0;
         while let Some(place) = into.get_mut(taken) {
-            match self.events.pop() {
+            match self.image.events.pop() {
                 Some(event) => *place = event,
                 None => break,
             }

@@ -14,12 +14,14 @@
 use tickbus_base::time::{Clock as _, Nanos};
 use tickbus_fieldbus::faults::TickTime;
 use tickbus_fieldbus::{BusError, LinkState};
-use tickbus_image::signal::Slot;
+use tickbus_image::TickEnd;
+use tickbus_image::signal::{Conversions, Slot};
 
 use super::bus_handle::BusHandle;
+use super::station::Station;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
-use super::{Code, Driver, Exchange};
+use super::{Code, Driver, Exchange, TickCounters};
 
 impl Driver {
     /// Exchanges the process image, as one tick: sends this end's values from `slots`, and puts the received
@@ -61,11 +63,22 @@ impl Driver {
         };
         self.given = asked.or(self.given);
         self.counters.ticks = tick;
-        station.send(now, slots, &mut self.counters);
-        let arrival = station.receive(now, self.max_age, slots, &self.slots);
+        let image = &mut self.image;
+        match station.encode.word(slots) {
+            Some(word) if image.is_published(0, word) => image.ticks(now),
+            _ => write(
+                image,
+                std::slice::from_ref(station),
+                now,
+                slots,
+                &mut self.counters,
+            ),
+        }
+        image.update();
+        let arrival = station.receive(image, (now, self.max_age), slots, &self.slots);
         let found = Exchange {
             code: station.status,
-            sequence: arrival.sequence,
+            sequence: image.cycles(),
             age: arrival.age,
             granted: self.given.unwrap_or_else(|| now - self.first_now),
         };
@@ -225,13 +238,13 @@ impl Driver {
             self.end_unanswered(slots);
         }
         let before = self.now();
-        self.given = asked.or(self.given);
+        let given = asked.or(self.given);
         self.counters.ticks += 1;
         let is_first = self.counters.ticks == 1;
         if is_first {
             self.first_now = before;
         }
-        let time = self.given.unwrap_or(match &self.line {
+        let time = given.unwrap_or(match &self.line {
             BusHandle::Free(_) => before - self.first_now,
             BusHandle::Stepped { .. } => self.last.granted,
         });
@@ -242,12 +255,19 @@ impl Driver {
             time,
             taken: Nanos::ZERO,
         });
-        let BusHandle::Stepped { time: shown, .. } = &self.line else {
+        let BusHandle::Stepped {
+            bus, time: shown, ..
+        } = &mut self.line
+        else {
+            self.given = given;
             return Ok(before);
         };
         if time < before {
             return Err(went_back(before, time));
         }
+        // Asked first: a time that is refused must not become the one before which no other counts.
+        bus.accepts(time)?;
+        self.given = given;
         shown.set(time);
         Ok(time)
     }
@@ -269,8 +289,21 @@ impl Driver {
         if let Some(extras) = &mut self.extras {
             extras.sending(now, slots);
         }
-        for station in &mut self.stations {
-            station.send(now, slots, &mut self.counters);
+        let stations = self.stations.iter().enumerate();
+        let is_published = stations.rev().all(|(index, station)| {
+            let word = station.encode.word(slots);
+            word.is_some_and(|word| self.image.is_published(index, word))
+        });
+        if is_published {
+            self.image.ticks(now);
+        } else {
+            write(
+                &mut self.image,
+                &self.stations,
+                now,
+                slots,
+                &mut self.counters,
+            );
         }
         if let Some(extras) = &mut self.extras {
             extras.sent(slots);
@@ -291,10 +324,11 @@ impl Driver {
                 Err(error) => (now, Err(error)),
             },
         };
-        let (mut code, mut sequence, mut age) = (Code::Fresh, 0, Nanos::ZERO);
+        let (mut code, mut age) = (Code::Fresh, Nanos::ZERO);
+        let image = &mut self.image;
+        image.update();
         for station in &mut self.stations {
-            let arrival = station.receive(now, self.max_age, slots, &self.slots);
-            sequence += arrival.sequence;
+            let arrival = station.receive(image, (now, self.max_age), slots, &self.slots);
             age = age.max(arrival.age);
             code = code.worse(station.status);
         }
@@ -303,7 +337,7 @@ impl Driver {
         }
         let found = Exchange {
             code,
-            sequence,
+            sequence: self.image.cycles(),
             age,
             granted,
         };
@@ -366,6 +400,24 @@ impl Driver {
             recorder.record(self.counters.ticks, tick.time, code.code(), stations, slots);
         }
     }
+}
+
+/// Encodes the values of all stations, and hands them to the bus at once.
+#[inline(never)]
+fn write(
+    image: &mut TickEnd,
+    stations: &[Station],
+    now: Nanos,
+    slots: &[Slot],
+    counters: &mut TickCounters,
+) {
+    image.write(now, |index, frame| {
+        let bent = stations[index].encode.encode(slots, frame);
+        if bent != Conversions::default() {
+            counters.saturated += u64::from(bent.saturated);
+            counters.not_a_number += u64::from(bent.not_a_number);
+        }
+    });
 }
 
 #[cold]
@@ -432,7 +484,7 @@ mod tests {
             let now = self.clock.now();
             let (tick, port, end) = &mut self.peer;
             if let Some(sent) = sent {
-                tick.stations[0].write(now, |bytes| bytes.copy_from_slice(&[sent, !sent]));
+                tick.write(now, |_, bytes| bytes.copy_from_slice(&[sent, !sent]));
                 end.cycle(now, port);
             }
             self.clock.advance(pause);

@@ -79,9 +79,8 @@ impl Driver {
                 time: simulation_time,
             },
         };
-        let stations = tick.stations.into_iter().enumerate();
-        let stations = stations
-            .map(|(index, tick)| Station::new(tick, &config.table, index, (tx, rx)))
+        let stations = (0..config.table.stations.len())
+            .map(|index| Station::new(&config.table, index, (tx, rx)))
             .collect();
         // They are the machine's: a PLC has its own.
         let reflexes = match config.role {
@@ -92,6 +91,7 @@ impl Driver {
         let mut driver = Self {
             slots,
             recorder,
+            image: tick,
             stations,
             line,
             quick,
@@ -108,7 +108,6 @@ impl Driver {
             extras: Extras::new(reflexes, Beat::all(&config, config.role)),
             is_simple: false,
             board,
-            events: tick.events,
             program,
             watched: None,
             config: Arc::new(config),

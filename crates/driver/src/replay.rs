@@ -269,7 +269,9 @@ impl Stepped for Replay {
             }
         } else if self.more && self.present.status != STALE {
             // The peer was also there between two recorded ticks.
-            (0..self.stations.len()).for_each(|station| port.touch(station, now));
+            port.together(|port| {
+                (0..self.stations.len()).for_each(|station| port.touch(station, now));
+            });
         }
         if let Some(due) = self.due(now) {
             return Ok(due.max(now));

@@ -155,22 +155,24 @@ impl Driver {
     ) {
         let signals = view.slots.len();
         view.slots.copy_from_slice(&slots[..signals]);
-        for (seen, station) in view.stations.iter_mut().zip(&self.stations) {
+        let stations = view.stations.iter_mut().zip(&self.stations);
+        for (index, (seen, station)) in stations.enumerate() {
             *seen = StationView {
                 status: station.status,
-                age: station.peer_age(now),
-                is_valid: station.is_valid(),
+                age: self.image.peer_age(index, now),
+                is_valid: self.image.is_valid(index),
                 is_fail_safe: station.stale,
-                cycles: station.cycles(),
+                cycles: self.image.received(index),
             };
-            station.edges(|signal, count| view.edges[signal] = count);
+            self.image
+                .edges(index, |signal, count| view.edges[signal] = count);
         }
         view.now = now;
         view.tick = self.counters.ticks;
         view.time = time;
         view.code = code;
         view.counters = self.counters;
-        view.events_lost = self.events.lost();
+        view.events_lost = self.image.events.lost();
         view.has_times = with_times;
         if with_times {
             view.times.copy_from(&self.samples);

@@ -45,6 +45,17 @@ pub trait Free: Send {
 /// both at once, sending first; a tick that answers within itself receives, computes, and sends at the same
 /// time.
 pub trait Stepped: Send {
+    /// Whether a cycle can be made at `now`, before anything is done at that time: what is refused here leaves the line
+    /// as it was.
+    ///
+    /// # Errors
+    ///
+    /// Why not.
+    fn accepts(&mut self, now: Nanos) -> Result<(), BusError> {
+        let _ = now;
+        Ok(())
+    }
+
     /// Sends what the simulation has written, at `now`.
     ///
     /// # Errors

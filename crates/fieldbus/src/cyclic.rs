@@ -131,16 +131,18 @@ impl Cycles {
         if is_taken {
             port.sent(receipt);
         }
-        let mut rest = line.output();
-        for station in 0..port.stations() {
-            let (frame, after) = rest.split_at(port.sizes(station).1);
-            if is_fresh {
-                port.received(station, now, frame);
-            } else if is_alive {
-                port.touch(station, now);
+        port.together(|port| {
+            let mut rest = line.output();
+            for station in 0..port.stations() {
+                let (frame, after) = rest.split_at(port.sizes(station).1);
+                if is_fresh {
+                    port.received(station, now, frame);
+                } else if is_alive {
+                    port.touch(station, now);
+                }
+                rest = after;
             }
-            rest = after;
-        }
+        });
         Ok(exchanged)
     }
 }

@@ -14,7 +14,6 @@ mod link;
 mod port;
 mod rarely;
 mod role;
-mod staleness;
 mod validity;
 mod write_guard;
 
@@ -37,6 +36,6 @@ pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Frames, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use role::Role;
-pub use staleness::is_stale;
+pub use tickbus_image::is_stale;
 pub use validity::{PlcState, Validity};
 pub use write_guard::WriteGuard;

@@ -11,7 +11,7 @@ use tickbus_base::time::{Nanos, SharedHistogram};
 
 use super::BusError;
 use super::rarely::Rarely;
-use super::staleness::is_stale;
+use tickbus_image::is_stale;
 
 /// The state of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

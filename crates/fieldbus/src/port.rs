@@ -47,12 +47,13 @@ impl Port {
     ) -> Self {
         Self {
             image: ImagePort {
-                validity: Validity::new(image.stations.len()),
+                validity: Validity::new(image.stations()),
                 image,
                 watchdog,
                 changes: Vec::new(),
                 status,
                 last_cycle: None,
+                is_held: false,
             },
             faults: FaultLayer::default(),
             clock,
@@ -116,8 +117,8 @@ impl Port {
 
     /// Sizes in bytes of the frames that a station sends and receives.
     pub fn sizes(&self, station: usize) -> (usize, usize) {
-        let station = &self.image.image.stations[station];
-        (station.tx_len(), station.rx_len())
+        let image = &self.image.image;
+        (image.tx_len(station), image.rx_len(station))
     }
 
     /// Whether the line can carry anything at `now`. While it cannot, nothing that the peer says is to be answered, and
@@ -135,6 +136,7 @@ impl Port {
         if !self.is_up(now) {
             return None;
         }
+        self.image.attend(now);
         if self.faults.loses_cycle() {
             self.lose(stations, now);
             return None;
@@ -158,7 +160,11 @@ impl Port {
     /// The frames of these stations at `now`, to see whether there is anything to send, or for a peer that reads
     /// whenever it likes; `None` while the line is not [up](Self::is_up).
     pub fn look(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
-        self.is_up(now).then_some(Frames {
+        if !self.is_up(now) {
+            return None;
+        }
+        self.image.attend(now);
+        Some(Frames {
             port: self,
             stations,
             now,
@@ -190,7 +196,18 @@ impl Port {
         }
     }
 
-    /// Hands in a whole frame that arrived at `now`.
+    /// Hands in what belongs together: the frames of all stations that one message of the peer carries, its signs of
+    /// life. A tick sees all that `hand_in` hands in, or nothing of it.
+    pub fn together<R>(&mut self, hand_in: impl FnOnce(&mut Self) -> R) -> R {
+        let is_part = std::mem::replace(&mut self.image.is_held, true);
+        let result = hand_in(self);
+        self.image.is_held = is_part;
+        self.image.hand_over();
+        result
+    }
+
+    /// Hands in a whole frame that arrived at `now`. Frames of several stations that arrived in one message are handed in
+    /// [together](Self::together).
     ///
     /// # Panics
     ///
@@ -284,7 +301,7 @@ impl Port {
 
     /// The time since the peer of a station was heard from; [`Nanos::MAX`] if it never was.
     pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
-        self.image.image.stations[station].peer_age(now)
+        self.image.image.peer_age(station, now)
     }
 
     /// When the next station becomes stale if it stays silent; [`Nanos::MAX`] if all are stale.
@@ -297,8 +314,8 @@ impl Port {
     }
 
     /// The time since the last tick of the simulation; [`Nanos::MAX`] if there was none.
-    pub fn tick_age(&self, station: usize, now: Nanos) -> Nanos {
-        self.image.image.stations[station].tick_age(now)
+    pub fn tick_age(&self, now: Nanos) -> Nanos {
+        self.image.image.tick_age(now)
     }
 
     /// How long the simulation may pause before fail-safe bytes are sent; `None` for any time.
@@ -309,6 +326,8 @@ impl Port {
     /// The bus connects, or waits for its peer.
     pub fn opening(&mut self, reason: &str) {
         self.image.last_cycle = None;
+        // A bus that panicked may have left something half handed in.
+        self.image.is_held = false;
         self.enter(LinkState::Opening, Cause::Waiting, reason);
     }
 

@@ -4,8 +4,8 @@ use tickbus_base::time::Nanos;
 
 use crate::{EdgeCounter, LatchedBit, PulseShaper};
 
-/// A stream of frames whose writer and reader take turns on one thread: as through the two ends of a
-/// [`station`](fn@crate::station), no edge of a latched signal is lost, but nothing has to be handed over.
+/// A stream of frames whose writer and reader take turns on one thread: as through the two ends of an
+/// [`image`](fn@crate::image), no edge of a latched signal is lost, but nothing has to be handed over.
 #[derive(Debug)]
 pub struct DirectStream {
     bytes: Box<[u8]>,
@@ -65,7 +65,7 @@ impl DirectStream {
 mod tests {
     use super::*;
     use crate::signal::Latch;
-    use crate::{Receiver, StationStreams, station};
+    use crate::{Receiver, StationStreams, image};
 
     const STEPS: i64 = if cfg!(miri) { 100 } else { 20_000 };
 
@@ -93,12 +93,12 @@ mod tests {
             .collect();
         let fail_safe: Box<[u8]> = Box::new([0x05]);
         let mut direct = DirectStream::new(fail_safe.clone(), latched.clone());
-        let (mut tick, mut bus) = station(StationStreams {
+        let (mut tick, mut bus) = image(vec![StationStreams {
             tx_fail_safe: fail_safe.clone(),
             tx_latched: latched.clone(),
             rx_fail_safe: fail_safe.clone(),
             rx_latched: latched,
-        });
+        }]);
         let (mut shown, mut random, mut shaped) = (Shown(fail_safe[0]), 1_u64, 0_i64);
         let mut written = fail_safe[0];
         for step in 0..STEPS {
@@ -109,13 +109,16 @@ mod tests {
             if random >> 60 < 9 {
                 written = level;
                 direct.write(|frame| frame[0] = level);
-                tick.write(now, |frame| frame[0] = level);
-                bus.received(now, &[level]);
+                tick.write(now, |_, frame| frame[0] = level);
+                bus.received(0, now, &[level], true);
+                bus.hand_over();
             } else {
                 let seen = direct.read(now);
-                assert_eq!(seen, bus.outgoing(now, None), "step {step}");
-                bus.sent();
-                tick.read(now, &mut shown);
+                bus.attend(now, None);
+                assert_eq!(seen, bus.outgoing(0, now), "step {step}");
+                bus.sent(0);
+                tick.update();
+                tick.read(0, (now, Nanos::MAX), &mut shown);
                 assert_eq!(seen, [shown.0], "step {step}");
                 shaped += i64::from(seen != [written]);
             }

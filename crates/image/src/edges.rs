@@ -166,6 +166,13 @@ impl EdgeCounter {
         }
     }
 
+    /// Takes over the levels in `bytes`, whose edges do not count.
+    pub fn pass(&mut self, bytes: &[u8]) {
+        for (word, last) in self.words.iter().zip(&mut self.last) {
+            *last = word.levels(bytes);
+        }
+    }
+
     /// Counts the edges between the last levels and those in `bytes`.
     #[inline]
     pub fn observe(&mut self, bytes: &[u8]) {

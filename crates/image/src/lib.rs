@@ -1,46 +1,49 @@
 //! The process image: wait-free hand-over, edge counters, age, event ring.
 //!
-//! Two clocks meet here: the simulation's tick and the bus's cycle. Each station has two streams of
-//! frames, one per direction, each through a [triple buffer](triple_buffer), so that neither side
-//! ever waits for the other and no frame is ever torn. The two sides are [`TickEnd`] and [`BusEnd`].
+//! Two clocks meet here: the simulation's tick and the bus's cycle. Two streams of frames, one per direction, each pass
+//! through a [triple buffer](triple_buffer), so that neither side ever waits for the other and no frame is ever torn. A
+//! frame carries all that belongs together: the bytes and edge counters of all stations, and for each of them when its
+//! peer was heard from, and whether its data are valid. The two sides are [`TickEnd`] and [`BusEnd`].
 //!
 //! ```text
 //!   tick thread                                          bus thread
-//!   TickStation::write ──── tx frames, edge counters ───▶ BusStation::outgoing … sent
-//!   TickStation::read  ◀─── rx frames, edge counters ──── BusStation::received, touch
-//!   TickEnd::events    ◀────────── event ring ─────────── BusEnd::event
+//!   TickEnd::write  ──────── tx frames, edge counters ───────▶ BusEnd::attend, outgoing … sent
+//!   TickEnd::update, read ◀─ rx frames, times, validity ────── BusEnd::received, touch … hand_over
+//!   TickEnd::events ◀──────────── event ring ───────────────── BusEnd::events
 //! ```
 //!
 //! "tx" and "rx" are as seen from the tick. In a Device tx is `%I` and rx is `%Q`; in a Controller it
 //! is the other way round. Where both sides are on one thread, a [`DirectStream`] does for each of them.
 
+mod bus_end;
 mod direct;
 mod edges;
 mod event_ring;
+mod frame;
 mod row_ring;
-mod station;
 mod sync;
+mod tick_end;
 mod triple;
+
+#[cfg(all(test, not(loom)))]
+mod ends_tests;
+#[cfg(all(test, loom))]
+mod loom_tests;
+#[cfg(all(test, not(loom)))]
+mod model_tests;
 
 pub mod signal;
 
+use frame::{NEVER, Place};
+
+pub use bus_end::BusEnd;
 pub use direct::DirectStream;
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
 pub use event_ring::{Consumer, Event, Producer, event_ring};
+pub use frame::{StationStreams, is_stale};
 pub use row_ring::{RowReader, RowWriter, row_ring};
-pub use station::{Arrival, BusStation, Receiver, StationStreams, TickStation, station};
+pub use tick_end::{Arrival, Receiver, TickEnd};
 pub use triple::{Reader, Writer, triple_buffer};
-
-/// One frame of the process image: its bytes and what belongs to them.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
-    /// The station's `%I` or `%Q`.
-    pub bytes: Box<[u8]>,
-    /// Cumulative, wrapping edge counters of the latched signals, in the order of [`latched_bits`].
-    pub edges: Box<[u32]>,
-    /// Counts the frames of this stream, from 1; 0 is the frame before the first.
-    pub sequence: u64,
-}
 
 /// Copies the bytes of a frame: small ones, as many machines have, without a call. The pieces of those may overlap.
 ///
@@ -72,38 +75,48 @@ pub fn copy_frame(to: &mut [u8], from: &[u8]) {
 /// Capacity of a driver's event ring.
 pub const EVENT_CAPACITY: usize = 4096;
 
-/// The tick's end of a driver's image.
+/// What the bus says of each station, for statistics, which are asked for between ticks. A tick takes the same from its
+/// frame.
+type Told = std::sync::Arc<[ToldStation]>;
+
+/// See [`Told`].
 #[derive(Debug)]
-pub struct TickEnd {
-    /// In the order of the signal table.
-    pub stations: Vec<TickStation>,
-    /// The peer's writes, for applications to which every write matters.
-    pub events: Consumer,
+struct ToldStation {
+    heard: std::sync::atomic::AtomicI64,
+    sequence: std::sync::atomic::AtomicU64,
+    is_valid: std::sync::atomic::AtomicBool,
 }
 
-/// The bus's end of a driver's image.
-#[derive(Debug)]
-pub struct BusEnd {
-    /// In the order of the signal table.
-    pub stations: Vec<BusStation>,
-    /// Where a bus reports the peer's writes.
-    pub events: Producer,
-}
-
-/// Creates the image of a driver, given the directions of each station.
+/// Creates the two ends of a driver's image, given the streams of each station.
 pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
     let (producer, consumer) = event_ring(EVENT_CAPACITY);
-    let (tick, bus) = stations.into_iter().map(station).unzip();
-    (
-        TickEnd {
-            stations: tick,
-            events: consumer,
-        },
-        BusEnd {
-            stations: bus,
-            events: producer,
-        },
-    )
+    let (sent, tx) = Place::all(stations.iter().map(|s| (&*s.tx_fail_safe, &*s.tx_latched)));
+    let (received, rx) = Place::all(stations.iter().map(|s| (&*s.rx_fail_safe, &*s.rx_latched)));
+    let (tx_writer, tx_reader) = triple_buffer(&tx);
+    let (rx_writer, rx_reader) = triple_buffer(&rx);
+    let told = stations.iter().map(|_| ToldStation {
+        heard: NEVER.into(),
+        sequence: 0.into(),
+        is_valid: true.into(),
+    });
+    let (alive, told) = (tick_end::never(), told.collect::<Told>());
+    let tick = TickEnd::new(
+        &stations,
+        (tx_writer, sent.clone()),
+        (rx_reader, received.clone()),
+        (
+            sync::Arc::clone(&alive),
+            std::sync::Arc::clone(&told),
+            consumer,
+        ),
+    );
+    let bus = BusEnd::new(
+        stations,
+        (tx_reader, sent),
+        (rx_writer, received, rx),
+        (alive, told, producer),
+    );
+    (tick, bus)
 }
 
 #[cfg(all(test, not(loom)))]

@@ -131,11 +131,13 @@ fn take(
     own.seen = peers.sequence;
     port.running("the peer writes its file");
     let mut rest = &peers.image[..];
-    for (station, (_, rx)) in sizes.iter().enumerate() {
-        let (bytes, behind) = rest.split_at(*rx);
-        port.received(station, now, bytes);
-        rest = behind;
-    }
+    port.together(|port| {
+        for (station, (_, rx)) in sizes.iter().enumerate() {
+            let (bytes, behind) = rest.split_at(*rx);
+            port.received(station, now, bytes);
+            rest = behind;
+        }
+    });
 }
 
 impl Free for Mailbox {

@@ -207,7 +207,7 @@ impl<'a> Session<'a> {
             }
             let is_paused = port
                 .watchdog()
-                .is_some_and(|limit| port.tick_age(index, now) > limit);
+                .is_some_and(|limit| port.tick_age(now) > limit);
             let Some(mut frames) = port.look(index..index + 1, now) else {
                 return;
             };

@@ -161,28 +161,32 @@ impl Readings {
     /// Hands in the stations whose values are complete.
     pub(super) fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
         debug_assert_eq!(fields.len(), self.quality.len(), "one per signal");
-        for station in 0..self.frames.len() {
-            if !self.is_sound(station) {
-                continue;
+        port.together(|port| {
+            for station in 0..self.frames.len() {
+                if !self.is_sound(station) {
+                    continue;
+                }
+                let frame = &mut self.frames[station];
+                if frame.is_empty() {
+                    // None of its signals is read, but its server is there.
+                    port.touch(station, now);
+                } else {
+                    self.values.give(station, frame);
+                    port.received(station, now, frame);
+                }
             }
-            let frame = &mut self.frames[station];
-            if frame.is_empty() {
-                // None of its signals is read, but its server is there.
-                port.touch(station, now);
-            } else {
-                self.values.give(station, frame);
-                port.received(station, now, frame);
-            }
-        }
+        });
     }
 
     /// The server sent a sign of life.
     pub(super) fn touch(&mut self, port: &mut Port, now: Nanos) {
-        for station in 0..self.frames.len() {
-            if self.is_sound(station) {
-                port.touch(station, now);
+        port.together(|port| {
+            for station in 0..self.frames.len() {
+                if self.is_sound(station) {
+                    port.touch(station, now);
+                }
             }
-        }
+        });
     }
 
     /// Whether everything that is read is present and usable.

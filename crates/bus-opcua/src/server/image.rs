@@ -172,11 +172,13 @@ impl Image {
             self.put_scaled(signal);
             touched[self.table.signals[signal].station] = true;
         }
-        for (station, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
-            let frame = &mut self.frames[station];
-            self.receives.give(station, frame);
-            port.received(station, now, frame);
-        }
+        port.together(|port| {
+            for (station, _) in touched.iter().enumerate().filter(|(_, touched)| **touched) {
+                let frame = &mut self.frames[station];
+                self.receives.give(station, frame);
+                port.received(station, now, frame);
+            }
+        });
     }
 
     /// Updates all nodes. Pulses that every subscriber has had time to see count as sent.
@@ -283,7 +285,7 @@ impl Image {
 
 /// The quality of the simulation's values.
 fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
-    let age = port.tick_age(station, now);
+    let age = port.tick_age(now);
     match port.watchdog() {
         _ if age == Nanos::MAX => StatusCode::BadWaitingForInitialData,
         Some(limit) if age > limit => StatusCode::UncertainSubstituteValue,

@@ -197,36 +197,38 @@ impl<'a> Connection<'a> {
             let [is_written, is_read] = station.has;
             station.resume.is_none() && (is_read || is_written && may_write)
         });
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            if station.resume.is_some() {
-                continue;
+        port.together(|port| {
+            for (index, station) in self.stations.iter_mut().enumerate() {
+                if station.resume.is_some() {
+                    continue;
+                }
+                if let Some(refusal) = self.session.refusal(index) {
+                    port.count("s7.refused");
+                    station.resume = Some(now + RETRY);
+                    station.refusal = Some(refusal.clone());
+                    continue;
+                }
+                let [is_written, is_read] = station.has;
+                if is_read {
+                    port.received(index, now, self.session.frame_read(index));
+                } else if is_heard {
+                    port.touch(index, now);
+                }
+                if is_written
+                    && may_write
+                    && let Some(receipt) = &self.receipt
+                {
+                    port.sent(&receipt.of(index));
+                }
+                station.refusal = None;
+                // It may have been reported during an earlier connection.
+                let told = &mut self.bus.told_refusals[index];
+                if !told.is_empty() {
+                    told.clear();
+                    port.tell("refused", &refusals(&self.bus.told_refusals));
+                }
             }
-            if let Some(refusal) = self.session.refusal(index) {
-                port.count("s7.refused");
-                station.resume = Some(now + RETRY);
-                station.refusal = Some(refusal.clone());
-                continue;
-            }
-            let [is_written, is_read] = station.has;
-            if is_read {
-                port.received(index, now, self.session.frame_read(index));
-            } else if is_heard {
-                port.touch(index, now);
-            }
-            if is_written
-                && may_write
-                && let Some(receipt) = &self.receipt
-            {
-                port.sent(&receipt.of(index));
-            }
-            station.refusal = None;
-            // It may have been reported during an earlier connection.
-            let told = &mut self.bus.told_refusals[index];
-            if !told.is_empty() {
-                told.clear();
-                port.tell("refused", &refusals(&self.bus.told_refusals));
-            }
-        }
+        });
         self.put_off(port)
     }
 

@@ -312,24 +312,26 @@ impl Memory for Jobs<'_> {
 
     fn done(&mut self) {
         let alone = self.shared.stations.len() == 1;
-        for (index, station) in self.shared.stations.iter_mut().enumerate() {
-            let addressed = std::mem::take(&mut station.addressed);
-            if !station.changed.is_empty() {
-                station.has_writer = true;
-                self.writes[index] = true;
-                let written = station.changed.drain(..);
-                if self.shared.every_write {
-                    self.port
-                        .received_parts(index, self.now, &station.written, written);
-                } else {
-                    drop(written);
-                    self.port.received(index, self.now, &station.written);
+        let (now, writes, shared) = (self.now, &mut self.writes, &mut *self.shared);
+        self.port.together(|port| {
+            for (index, station) in shared.stations.iter_mut().enumerate() {
+                let addressed = std::mem::take(&mut station.addressed);
+                if !station.changed.is_empty() {
+                    station.has_writer = true;
+                    writes[index] = true;
+                    let written = station.changed.drain(..);
+                    if shared.every_write {
+                        port.received_parts(index, now, &station.written, written);
+                    } else {
+                        drop(written);
+                        port.received(index, now, &station.written);
+                    }
+                } else if (addressed || alone) && (writes[index] || !station.has_writer) {
+                    // A client that only reads must not make the values of one that writes look recent.
+                    port.touch(index, now);
                 }
-            } else if (addressed || alone) && (self.writes[index] || !station.has_writer) {
-                // A client that only reads must not make the values of one that writes look recent.
-                self.port.touch(index, self.now);
             }
-        }
+        });
     }
 
     fn blocks(&self) -> &[(u16, usize)] {

@@ -10,7 +10,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::Area;
-use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, TickStation, copy_frame, image};
+use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, copy_frame, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
@@ -45,9 +45,8 @@ pub(super) struct Unit {
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
     beats: FrameBeats,
-    /// What came for the present scan, and whether it was valid before it was read.
+    /// What came for the present scan.
     arrival: Option<Arrival>,
-    is_valid: bool,
     /// Whether the program was told that its peer is there.
     is_alive: bool,
 }
@@ -73,36 +72,40 @@ impl Unit {
             outputs,
             beats: FrameBeats::new(config, role, station),
             arrival: None,
-            is_valid: false,
             is_alive: false,
         }
     }
 
-    /// Takes over the inputs.
-    fn read(&mut self, now: Nanos, image: &mut TickStation, tape: Option<&mut ScanRecorder>) {
-        let is_valid = image.is_valid();
-        self.take(is_valid, |inputs| {
-            image.read(now, &mut Taking { inputs, tape })
+    /// Takes over the inputs. A program is told when they are stale, and sees what came last.
+    fn read(
+        &mut self,
+        (now, max_age): (Nanos, Nanos),
+        image: &mut TickEnd,
+        tape: Option<&mut ScanRecorder>,
+    ) {
+        let station = self.station;
+        self.take(|inputs| {
+            let mut taking = Taking { inputs, tape };
+            let arrival = image.read(station, (now, max_age), &mut taking);
+            if arrival.stale {
+                image.shown_instead(station, &mut taking);
+                taking.levels(image.latest(station));
+            }
+            arrival
         });
     }
 
-    /// Lets `take` take over the inputs, which were valid or not before that.
+    /// Lets `take` take over the inputs.
     #[inline]
-    pub(super) fn take(&mut self, is_valid: bool, take: impl FnOnce(&mut Inputs) -> Arrival) {
+    pub(super) fn take(&mut self, take: impl FnOnce(&mut Inputs) -> Arrival) {
         let inputs = &mut self.inputs;
         ScanCounters::keep(self.counted.1, &mut inputs.before, &inputs.bytes);
-        self.is_valid = is_valid;
         self.arrival = Some(take(inputs));
     }
 
-    /// Runs the program on them, which are still valid or not.
+    /// Runs the program on them.
     #[inline]
-    pub(super) fn run(
-        &mut self,
-        (now, in_time, max_age): (Nanos, bool, Nanos),
-        is_still_valid: bool,
-        scan_counters: &ScanCounters,
-    ) {
+    pub(super) fn run(&mut self, now: Nanos, in_time: bool, scan_counters: &ScanCounters) {
         let Self {
             program,
             counted: (written, read),
@@ -116,9 +119,7 @@ impl Unit {
             return;
         };
         scan_counters.count(*read, &inputs.before, &inputs.bytes);
-        // The PLC may have stopped between the check and the read, and the frame may be from after that:
-        // checked again.
-        self.is_alive = in_time && self.is_valid && is_still_valid && arrival.age <= max_age;
+        self.is_alive = in_time && !arrival.stale;
         ScanCounters::keep(*written, outputs_before, outputs);
         program.scan(&mut Scan {
             now,
@@ -129,23 +130,6 @@ impl Unit {
         });
         beats.beat(now, outputs);
         scan_counters.count(*written, outputs_before, outputs);
-    }
-
-    /// Hands its outputs over, as `bend` leaves them, and records the scan.
-    fn write(
-        &self,
-        now: Nanos,
-        image: &mut TickStation,
-        tape: Option<&mut ScanRecorder>,
-        bend: impl FnOnce(&mut [u8]),
-    ) {
-        image.write(now, |frame| {
-            copy_frame(frame, &self.outputs);
-            bend(frame);
-        });
-        if let Some(tape) = tape {
-            tape.scan(now, self.code(), &self.inputs.bytes, &self.outputs);
-        }
     }
 
     /// Its outputs as the program left them.
@@ -226,15 +210,15 @@ impl Cpu {
                 alive &= unit.is_alive;
             }
         } else {
-            let time = (now, in_time, self.max_age);
-            for (unit, image) in self.units.iter_mut().zip(&mut self.tick.stations) {
-                let mut tape = self.tape.as_mut().filter(|_| unit.station == 0);
-                unit.read(now, image, tape.as_deref_mut());
-                unit.run(time, image.is_valid(), &self.scan_counters);
-                unit.write(now, image, tape, |_| {});
+            self.tick.update();
+            for unit in &mut self.units {
+                let tape = self.tape.as_mut().filter(|_| unit.station == 0);
+                unit.read((now, self.max_age), &mut self.tick, tape);
+                unit.run(now, in_time, &self.scan_counters);
                 age = age.max(unit.age());
                 alive &= unit.is_alive;
             }
+            self.write(now);
         }
         self.scan_counters.scanned(age, alive);
         self.serve_watch(now);
@@ -246,30 +230,42 @@ impl Cpu {
         let Some(faults) = &mut self.faults else {
             return;
         };
-        let (units, images) = (&mut self.units, &mut self.tick.stations);
-        let tape = &mut self.tape;
+        let (units, tape) = (&mut self.units, &mut self.tape);
         let frames = units.iter_mut();
         faults.begin_scan(
             now,
             frames.map(|unit| (&mut *unit.inputs.bytes, &*unit.outputs)),
         );
-        for (unit, image) in units.iter_mut().zip(&mut *images) {
+        self.tick.update();
+        for unit in &mut *units {
             let tape = tape.as_mut().filter(|_| unit.station == 0);
-            unit.read(now, image, tape);
+            unit.read((now, self.max_age), &mut self.tick, tape);
         }
         faults.received(units.iter_mut().map(|unit| &mut *unit.inputs.bytes));
-        for (unit, image) in units.iter_mut().zip(&*images) {
-            let time = (now, in_time, self.max_age);
-            unit.run(time, image.is_valid(), &self.scan_counters);
+        for unit in &mut *units {
+            unit.run(now, in_time, &self.scan_counters);
         }
         faults.sending(units.iter().map(|unit| &*unit.outputs));
-        for (unit, image) in units.iter().zip(images) {
-            let tape = tape.as_mut().filter(|_| unit.station == 0);
-            unit.write(now, image, tape, |frame| {
-                faults.bend_outputs(unit.station, frame);
-            });
+        self.write(now);
+        if let Some(faults) = &mut self.faults {
+            faults.sent();
         }
-        faults.sent();
+    }
+
+    /// Hands the outputs of all stations over, as injected faults leave them, and records the scan.
+    fn write(&mut self, now: Nanos) {
+        let (units, faults) = (&self.units, &mut self.faults);
+        self.tick.write(now, |station, frame| {
+            if let Some(unit) = units.get(station) {
+                copy_frame(frame, &unit.outputs);
+                if let Some(faults) = faults {
+                    faults.bend_outputs(station, frame);
+                }
+            }
+        });
+        if let (Some(tape), Some(unit)) = (&mut self.tape, units.first()) {
+            tape.scan(now, unit.code(), &unit.inputs.bytes, &unit.outputs);
+        }
     }
 
     /// Does what another thread wants that looks at the image.
@@ -283,15 +279,14 @@ impl Cpu {
             watched.obey(&mut self.faults, inputs);
         }
         if wanted.values() {
-            let stations = self.units.iter().zip(&self.tick.stations);
-            let stations = stations.map(|(unit, image)| ScannedStation {
-                image,
+            let stations = self.units.iter().map(|unit| ScannedStation {
+                station: unit.station,
                 status: unit.code(),
                 inputs: &unit.inputs.bytes,
                 outputs: &unit.outputs,
             });
             let (scans, _) = self.scan_counters.scans();
-            watched.show((now, scans), stations);
+            watched.show((now, scans), &self.tick, stations);
         }
     }
 }
@@ -379,9 +374,10 @@ mod tests {
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
             // The peer is faster than the delayed scan.
-            for station in &mut bus.stations {
-                station.received(now, &[1]);
+            for station in 0..bus.stations() {
+                bus.received(station, now, &[1], true);
             }
+            bus.hand_over();
             cpu.scan(now, in_time);
         }
         assert_eq!(

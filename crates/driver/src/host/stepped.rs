@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, Port, Role, Stepped, Validity};
-use tickbus_image::{Arrival, DirectStream, StationStreams, copy_frame};
+use tickbus_image::{Arrival, DirectStream, StationStreams, copy_frame, is_stale};
 use tickbus_plc::Program;
 
 use super::ScanCounters;
@@ -26,6 +26,8 @@ pub(crate) struct SteppedHost {
     interval: Nanos,
     /// When the next scan is due; `None` before the first exchange.
     due: Option<Nanos>,
+    /// A time that was refused because it is too far ahead. The next one near it shows that it was meant.
+    refused: Option<Nanos>,
     delivered: Delivered,
 }
 
@@ -67,6 +69,7 @@ impl SteppedHost {
             scan_counters: Arc::clone(&scan_counters),
             interval,
             due: None,
+            refused: None,
             delivered: Delivered::default(),
         };
         (host, scan_counters)
@@ -88,20 +91,23 @@ impl SteppedHost {
         }
         let arrival = Arrival {
             fresh: std::mem::take(is_fresh),
-            changed: true,
+            stale: false,
             age: heard.map_or(Nanos::MAX, |heard| (now - heard).max(Nanos::ZERO)),
             sequence: *frames,
         };
         let mut alive = true;
         for (station, (unit, line)) in self.stations.iter_mut().enumerate() {
             let is_valid = self.validity.is_valid(station);
-            unit.take(is_valid, |inputs| {
+            unit.take(|inputs| {
                 if heard.is_some() {
                     copy_frame(&mut inputs.bytes, line.inputs.read(now));
                 }
-                arrival
+                Arrival {
+                    stale: is_stale(arrival.age, self.max_age, is_valid),
+                    ..arrival
+                }
             });
-            unit.run((now, true, self.max_age), is_valid, &self.scan_counters);
+            unit.run(now, true, &self.scan_counters);
             line.outputs
                 .write(|frame| copy_frame(frame, unit.outputs()));
             alive &= unit.is_alive();
@@ -143,17 +149,29 @@ impl Stepped for SteppedHost {
         Ok(())
     }
 
+    fn accepts(&mut self, now: Nanos) -> Result<(), BusError> {
+        let most = self.interval.times(MOST_SCANS);
+        let due = self.due.unwrap_or(now);
+        let refused = self.refused.take();
+        if now - due <= most {
+            return Ok(());
+        }
+        if refused.is_some_and(|before| before <= now && now - before <= most) {
+            // The simulation means it.
+            self.due = Some(now);
+            return Ok(());
+        }
+        self.refused = Some(now);
+        Err(BusError::Refused(format!(
+            "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
+             hosted program; hand in the nanoseconds since the simulation began, tick by tick",
+        )))
+    }
+
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
         port.running("the hosted program is there");
         let mut due = self.due.unwrap_or(now);
         let late = now - due;
-        if late > self.interval.times(MOST_SCANS) {
-            self.due = Some(now);
-            return Err(BusError::Refused(format!(
-                "simulation time jumped from {due} to {now}, over more than {MOST_SCANS} scans of the \
-                 hosted program; hand in the nanoseconds since the simulation began, tick by tick",
-            )));
-        }
         // Counted rather than compared, since at the largest time the next scan would be due when the last
         // one was.
         let scans = if late < Nanos::ZERO {
@@ -170,9 +188,11 @@ impl Stepped for SteppedHost {
         }
         self.due = Some(due);
         if port.is_up(now) {
-            for (station, (_, line)) in self.stations.iter_mut().enumerate() {
-                port.received(station, now, line.outputs.read(now));
-            }
+            port.together(|port| {
+                for (station, (_, line)) in self.stations.iter_mut().enumerate() {
+                    port.received(station, now, line.outputs.read(now));
+                }
+            });
         }
         Ok(due)
     }

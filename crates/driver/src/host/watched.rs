@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Role, is_stale};
-use tickbus_image::TickStation;
+use tickbus_image::TickEnd;
 use tickbus_image::signal::{Plan, Slot};
 
 use crate::Code;
@@ -27,7 +27,7 @@ pub(super) struct WatchedScans {
 
 /// A station after a scan.
 pub(super) struct ScannedStation<'a> {
-    pub(super) image: &'a TickStation,
+    pub(super) station: usize,
     pub(super) status: Code,
     pub(super) inputs: &'a [u8],
     pub(super) outputs: &'a [u8],
@@ -78,6 +78,7 @@ impl WatchedScans {
     pub(super) fn show<'a>(
         &mut self,
         (now, scans): (Nanos, u64),
+        image: &TickEnd,
         stations: impl Iterator<Item = ScannedStation<'a>>,
     ) {
         let (plans, max_age) = (&self.plans, self.config.timing.max_age);
@@ -86,7 +87,8 @@ impl WatchedScans {
             for ((station, seen), [writes, reads]) in stations.zip(&mut view.stations).zip(plans) {
                 reads.decode(station.inputs, &mut view.slots);
                 writes.decode(station.outputs, &mut view.slots);
-                let (age, is_valid) = (station.image.peer_age(now), station.image.is_valid());
+                let index = station.station;
+                let (age, is_valid) = (image.peer_age(index, now), image.is_valid(index));
                 *seen = StationView {
                     // A scan that comes late is told that the line was down, and its data are good.
                     status: if is_stale(age, max_age, is_valid) {
@@ -98,12 +100,10 @@ impl WatchedScans {
                     is_valid,
                     // A program is told, and sees what came last.
                     is_fail_safe: false,
-                    cycles: station.image.cycles(),
+                    cycles: image.received(index),
                 };
                 code = code.worse(seen.status);
-                station
-                    .image
-                    .edges(|signal, count| view.edges[signal] = count);
+                image.edges(index, |signal, count| view.edges[signal] = count);
             }
             view.now = now;
             view.tick = scans;

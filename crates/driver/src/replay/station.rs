@@ -4,7 +4,7 @@ use crate::frames::{area_bytes, directions};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, Latch, Plan, Slot};
-use tickbus_image::{BusStation, LatchedBit, TickStation, latched_bits, station};
+use tickbus_image::{DirectStream, LatchedBit, latched_bits};
 use tickbus_record::{Tick, ValueKind};
 
 use super::UNCHANGED;
@@ -36,8 +36,8 @@ pub(super) struct Station {
     frame: Box<[u8]>,
     /// The last frame that this end sent.
     seen: Box<[u8]>,
-    /// An image of its own that turns recorded values into the expected frame, with pulses and hold times.
-    expected: (TickStation, BusStation),
+    /// Turns recorded values into the expected frame, with pulses and hold times.
+    expected: DirectStream,
     /// Bits with edges in the current tick: byte, mask, number of toggles, previous level.
     toggling: Vec<(usize, u8, usize, bool)>,
     /// Slots for the comparison.
@@ -77,7 +77,7 @@ impl Station {
                     fed: directions.rx_fail_safe.clone(),
                     frame: frame(rx),
                     seen: frame(tx),
-                    expected: station(directions),
+                    expected: DirectStream::new(directions.tx_fail_safe, directions.tx_latched),
                     toggling: Vec::new(),
                     slots: [(); 2].map(|()| vec![Slot::default(); table.signals.len()]),
                 }
@@ -166,9 +166,8 @@ impl Station {
         slots: &[Slot],
         mut differs: impl FnMut(usize, ValueKind, &str, Slot, Slot),
     ) {
-        let (tick, bus) = &mut self.expected;
-        tick.write(now, |frame| self.send.encode(slots, frame));
-        let frame = bus.outgoing(now, None);
+        self.expected.write(|frame| self.send.encode(slots, frame));
+        let frame = self.expected.read(now);
         if *frame != *self.seen {
             let [expected, seen] = &mut self.slots;
             self.send.decode(frame, expected);
@@ -179,7 +178,6 @@ impl Station {
                 }
             }
         }
-        bus.sent();
     }
 }
 

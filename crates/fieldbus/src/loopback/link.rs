@@ -145,9 +145,11 @@ impl End {
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
         if std::mem::take(&mut theirs.waiting) {
-            for (station, frame) in theirs.frames.iter().enumerate() {
-                port.received(station, now, frame);
-            }
+            port.together(|port| {
+                for (station, frame) in theirs.frames.iter().enumerate() {
+                    port.received(station, now, frame);
+                }
+            });
         }
         drop(line);
         port.running("the other end is there");

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
-use tickbus_image::{BusStation, Event};
+use tickbus_image::{BusEnd, Event};
 
 use super::image::{ImagePort, Report};
 use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape};
@@ -61,11 +61,14 @@ impl FaultLayer {
         let Some(line) = &mut self.line else {
             return;
         };
+        let is_part = std::mem::replace(&mut port.is_held, true);
         for (station, frame) in self.frames.iter_mut().enumerate() {
             while line.release(station, now, frame) {
                 port.received(station, now, frame);
             }
         }
+        port.is_held = is_part;
+        port.hand_over();
     }
 
     /// Reads the board: adopts new faults, logs, and updates the state of the line.
@@ -79,11 +82,11 @@ impl FaultLayer {
         self.board.tell(status.driver());
         for fault in self.board.take_line_faults() {
             let line = self.line.get_or_insert_with(|| {
-                let shapes = image.stations.iter().map(shape);
+                let shapes = (0..image.stations()).map(|station| shape(image, station));
                 Box::new(LineFaults::new(Arc::clone(&self.board), shapes))
             });
             line.adopt(fault);
-            let sizes = image.stations.iter().map(BusStation::rx_len);
+            let sizes = (0..image.stations()).map(|station| image.rx_len(station));
             self.frames = sizes.map(|size| vec![0; size].into()).collect();
         }
         let Some(line) = &mut self.line else {
@@ -271,14 +274,14 @@ fn say_down(now: Nanos, active: &str, status: &LinkStatus) {
     status.enter(now, LinkState::Failed, Cause::Injected, &reason);
 }
 
-fn shape(station: &BusStation) -> Shape {
-    let mut latched = vec![0; station.tx_len()];
-    for bit in station.tx_latched() {
+fn shape(image: &BusEnd, station: usize) -> Shape {
+    let mut latched = vec![0; image.tx_len(station)];
+    for bit in image.tx_latched(station) {
         latched[bit.byte] |= bit.mask;
     }
     Shape {
-        last_sent: station.last_outgoing().into(),
+        last_sent: image.last_outgoing(station).into(),
         latched: latched.into(),
-        rx_len: station.rx_len(),
+        rx_len: image.rx_len(station),
     }
 }

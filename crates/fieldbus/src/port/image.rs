@@ -19,27 +19,28 @@ pub(super) struct ImagePort {
     pub(super) validity: Validity,
     /// When the first station's last frame arrived while the line was running.
     pub(super) last_cycle: Option<Nanos>,
+    /// What is handed in belongs together with what is still to come.
+    pub(super) is_held: bool,
 }
 
 impl ImagePort {
     #[inline]
     pub(super) fn stations(&self) -> usize {
-        self.image.stations.len()
+        self.image.stations()
     }
 
     /// The bytes that a station sends at `now`.
     #[inline]
     pub(super) fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
-        self.image.stations[station].outgoing(now, self.watchdog)
+        self.image.outgoing(station, now)
     }
 
     /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
     #[inline]
     pub(super) fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) {
-        let station = &mut self.image.stations[station];
         match bits {
-            None => station.sent(),
-            Some(bits) => station.sent_bits(bits),
+            None => self.image.sent(station),
+            Some(bits) => self.image.sent_bits(station, bits),
         }
     }
 
@@ -50,10 +51,14 @@ impl ImagePort {
         {
             self.status.cycle(now - last);
         }
-        self.image.stations[station].received(now, bytes);
-        if self.validity.arrived(station, now, bytes) {
+        // Before the frame: edges of data that are not valid do not count.
+        let is_news = self.validity.arrived(station, now, bytes);
+        let is_valid = self.validity.is_valid(station);
+        self.image.received(station, now, bytes, is_valid);
+        if is_news {
             self.update_validity(station, now);
         }
+        self.hand_over();
         if let Some(changes) = self.changes.get_mut(station) {
             changes.observe(now, bytes, &mut self.image.events);
         }
@@ -69,9 +74,24 @@ impl ImagePort {
     /// The peer of a station was alive.
     #[inline]
     pub(super) fn touch(&mut self, station: usize, now: Nanos) {
-        self.image.stations[station].touch(now);
+        self.image.touch(station, now);
         if self.validity.heard(station) {
             self.update_validity(station, now);
+        }
+        self.hand_over();
+    }
+
+    /// Takes over what the simulation wrote last.
+    #[inline]
+    pub(super) fn attend(&mut self, now: Nanos) {
+        self.image.attend(now, self.watchdog);
+    }
+
+    /// Hands over to the tick what was handed in, unless more belongs to it.
+    #[inline]
+    pub(super) fn hand_over(&mut self) {
+        if !self.is_held {
+            self.image.hand_over();
         }
     }
 
@@ -82,6 +102,7 @@ impl ImagePort {
         self.tell_facts();
         if state == PlcState::Stop {
             self.update_validity(station, now);
+            self.hand_over();
         }
     }
 
@@ -91,6 +112,7 @@ impl ImagePort {
         self.validity.station_left(station, cause, why);
         self.tell_facts();
         self.update_validity(station, now);
+        self.hand_over();
     }
 
     fn tell_facts(&self) {
@@ -108,18 +130,26 @@ impl ImagePort {
         while let Some(station) = self.validity.look(now) {
             self.update_validity(station, now);
         }
-        let stations = self.image.stations.iter();
-        let ages = stations.map(|station| station.peer_age(now));
-        self.status.observe(now, ages);
+        self.hand_over();
+        let (status, ages) = self.ages(now);
+        status.observe(now, ages);
     }
 
     /// Passes the validity of `station`'s data on to image and line.
     fn update_validity(&mut self, station: usize, now: Nanos) {
         let is_valid = self.validity.is_valid(station);
-        self.image.stations[station].set_valid(is_valid);
-        let stations = self.image.stations.iter();
-        let ages = stations.map(|station| station.peer_age(now));
-        self.status.doubt(now, self.validity.doubt(), ages);
+        self.image.set_valid(station, is_valid);
+        let (status, ages) = self.ages(now);
+        status.doubt(now, self.validity.doubt(), ages);
+    }
+
+    /// The line, and the age of each station's data.
+    fn ages(&self, now: Nanos) -> (&LinkStatus, impl Iterator<Item = Nanos> + Clone) {
+        let stations = 0..self.stations();
+        (
+            &self.status,
+            stations.map(move |station| self.image.peer_age(station, now)),
+        )
     }
 
     /// The bus reports this of its line.

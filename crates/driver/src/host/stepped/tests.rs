@@ -73,9 +73,11 @@ fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
     let Some(mut frames) = from.take_all(now) else {
         return false;
     };
-    for station in frames.stations() {
-        to.received(station, now, frames.frame(station));
-    }
+    to.together(|to| {
+        for station in frames.stations() {
+            to.received(station, now, frames.frame(station));
+        }
+    });
     let receipt = frames.receipt();
     from.sent(&receipt);
     true

@@ -1,0 +1,413 @@
+//! The hand-over against a model: slow, one bit at a time, and without any part of what it judges.
+
+use super::*;
+use crate::signal::Latch;
+use tickbus_base::time::Nanos;
+
+/// One latched bit, from the end that writes it to the end that reads it.
+#[derive(Clone, Debug)]
+struct Bit {
+    latch: Latch,
+    hold: i64,
+    /// At the writing end: the level, and the edges so far.
+    level: bool,
+    edges: u32,
+    /// What the reader took over last.
+    taken: (bool, u32),
+    /// What the reader has seen, and what it is about to see if the exchange completes.
+    seen: Reading,
+    next: Reading,
+    counted: u32,
+    /// Totals: edges that were shown as edges, and edges that were reported as counts.
+    shown: u32,
+    reported: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Reading {
+    level: bool,
+    is_waiting: bool,
+    held_until: i64,
+}
+
+impl Bit {
+    fn new(latch: Latch, hold: i64, level: bool) -> Self {
+        let seen = Reading {
+            level,
+            is_waiting: false,
+            held_until: i64::MIN,
+        };
+        Self {
+            latch,
+            hold,
+            level,
+            edges: 0,
+            taken: (level, 0),
+            seen,
+            next: seen,
+            counted: 0,
+            shown: 0,
+            reported: 0,
+        }
+    }
+
+    fn is_edge(&self, from: bool, to: bool) -> bool {
+        from != to
+            && match self.latch {
+                Latch::Rising => to,
+                Latch::Falling => !to,
+                Latch::Both => true,
+            }
+    }
+
+    fn write(&mut self, level: bool, counts: bool) {
+        self.edges += u32::from(counts && self.is_edge(self.level, level));
+        self.level = level;
+    }
+
+    fn take_over(&mut self) {
+        self.taken = (self.level, self.edges);
+    }
+
+    /// The level that the reader is about to see, and how many edges are new.
+    fn read(&mut self, now: i64) -> (bool, u32) {
+        let (level, edges) = self.taken;
+        let news = edges - self.counted;
+        self.counted = edges;
+        self.reported += news;
+        self.seen.is_waiting |= news > 0;
+        let Reading {
+            level: seen,
+            is_waiting,
+            held_until,
+        } = self.seen;
+        let next = match (now < held_until, is_waiting) {
+            (true, _) => seen,
+            (false, true) => !seen,
+            (false, false) => level,
+        };
+        let shows = is_waiting && self.is_edge(seen, next);
+        self.next = Reading {
+            level: next,
+            is_waiting: is_waiting && !shows,
+            held_until: if shows && self.hold > 0 {
+                now + self.hold
+            } else {
+                held_until
+            },
+        };
+        (next, news)
+    }
+
+    fn pass_instead(&mut self, level: bool) {
+        self.next = Reading { level, ..self.seen };
+    }
+
+    fn confirm(&mut self) {
+        self.shown += u32::from(self.is_edge(self.seen.level, self.next.level));
+        self.seen = self.next;
+    }
+}
+
+/// The numbers of a generator of Knuth's.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, below: u64) -> u64 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 33) % below
+    }
+}
+
+const STATIONS: usize = 3;
+const STEPS: usize = if cfg!(miri) { 200 } else { 20_000 };
+const MAX_AGE: i64 = 40;
+const WATCHDOG: i64 = 14;
+
+/// Latched bits of a station of two bytes.
+fn latched(random: &mut Random) -> Vec<LatchedBit> {
+    let places = [(0, 0), (0, 3), (1, 1), (1, 7)];
+    let bits = places.iter().enumerate().map(|(signal, (byte, bit))| {
+        let latches = [Latch::Rising, Latch::Falling, Latch::Both];
+        let holds = [0, 0, 3, 11];
+        LatchedBit {
+            signal,
+            byte: *byte,
+            mask: 1 << bit,
+            latch: latches[usize::try_from(random.below(3)).expect("small")],
+            hold: Nanos(holds[usize::try_from(random.below(4)).expect("small")]),
+        }
+    });
+    bits.collect()
+}
+
+fn models(latched: &[LatchedBit], fail_safe: [u8; 2]) -> Vec<Bit> {
+    let bits = latched.iter().map(|bit| {
+        let level = fail_safe[bit.byte] & bit.mask != 0;
+        Bit::new(bit.latch, bit.hold.0, level)
+    });
+    bits.collect()
+}
+
+/// `raw`, with these levels of the latched bits.
+fn with_levels(raw: [u8; 2], latched: &[LatchedBit], levels: &[bool]) -> [u8; 2] {
+    let mut bytes = raw;
+    for (bit, level) in latched.iter().zip(levels) {
+        bytes[bit.byte] = bytes[bit.byte] & !bit.mask | if *level { bit.mask } else { 0 };
+    }
+    bytes
+}
+
+fn is_on(bytes: [u8; 2], bit: &LatchedBit) -> bool {
+    bytes[bit.byte] & bit.mask != 0
+}
+
+struct Shown {
+    bytes: [u8; 2],
+    edges: [u32; 4],
+}
+
+impl Receiver for Shown {
+    fn levels(&mut self, bytes: &[u8]) {
+        self.bytes.copy_from_slice(bytes);
+    }
+
+    fn edges(&mut self, signal: usize, count: u32) {
+        self.edges[signal] = count;
+    }
+}
+
+/// What came from the peer of a station, as the model has it.
+#[derive(Clone, Copy, Debug)]
+struct Peer {
+    bytes: [u8; 2],
+    heard: Option<i64>,
+    is_valid: bool,
+}
+
+#[test]
+fn what_the_tick_sees_is_what_the_model_says() {
+    for seed in 1..=if cfg!(miri) { 1 } else { 8 } {
+        received(Random(seed));
+    }
+}
+
+fn received(mut random: Random) {
+    let fail_safe = [0x81, 0x02];
+    let bits: Vec<_> = (0..STATIONS).map(|_| latched(&mut random)).collect();
+    let streams = bits.iter().map(|bits| StationStreams {
+        tx_fail_safe: Box::new([]),
+        tx_latched: Box::new([]),
+        rx_fail_safe: Box::new(fail_safe),
+        rx_latched: bits.clone().into(),
+    });
+    let (mut tick, mut bus) = image(streams.collect());
+    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, fail_safe)).collect();
+    let first = Peer {
+        bytes: fail_safe,
+        heard: None,
+        is_valid: true,
+    };
+    // What is staged, what was handed over, and what the tick has.
+    let (mut staged, mut handed, mut taken) =
+        ([first; STATIONS], [first; STATIONS], [first; STATIONS]);
+    let mut shown = [(); STATIONS].map(|()| Shown {
+        bytes: fail_safe,
+        edges: [0; 4],
+    });
+    let (mut now, mut codes) = (0, [0_usize; 3]);
+    let mut handed_models = models.clone();
+    for step in 0..STEPS {
+        now += i64::try_from(random.below(6) * random.below(4)).expect("small");
+        let station = usize::try_from(random.below(3)).expect("small");
+        match random.below(9) {
+            0..=2 => {
+                let bytes = [0, 1].map(|_| random.below(256).to_le_bytes()[0]);
+                let is_valid = random.below(5) != 0;
+                bus.received(station, Nanos(now), &bytes, is_valid);
+                staged[station] = Peer {
+                    bytes,
+                    heard: Some(now),
+                    is_valid,
+                };
+                for (model, bit) in models[station].iter_mut().zip(&bits[station]) {
+                    model.write(is_on(bytes, bit), is_valid);
+                }
+            }
+            3 => {
+                bus.touch(station, Nanos(now));
+                staged[station].heard = Some(now);
+            }
+            4 => {
+                let is_valid = random.below(3) != 0;
+                bus.set_valid(station, is_valid);
+                staged[station].is_valid = is_valid;
+            }
+            5 | 6 => {
+                bus.hand_over();
+                handed = staged;
+                for (handed, model) in handed_models
+                    .iter_mut()
+                    .flatten()
+                    .zip(models.iter().flatten())
+                {
+                    (handed.level, handed.edges) = (model.level, model.edges);
+                }
+            }
+            _ => {
+                tick.update();
+                taken = handed;
+                handed_models.iter_mut().flatten().for_each(Bit::take_over);
+                for station in 0..STATIONS {
+                    let Peer {
+                        bytes,
+                        heard,
+                        is_valid,
+                    } = taken[station];
+                    let arrival =
+                        tick.read(station, (Nanos(now), Nanos(MAX_AGE)), &mut shown[station]);
+                    let age = heard.map_or(Nanos::MAX, |heard| Nanos(now - heard));
+                    let is_stale = !is_valid || heard.is_none_or(|heard| now - heard > MAX_AGE);
+                    assert_eq!((arrival.age, arrival.stale), (age, is_stale), "step {step}");
+                    codes[usize::from(is_stale) + usize::from(!arrival.fresh && !is_stale) * 2] +=
+                        1;
+                    if is_stale {
+                        tick.shown_instead(station, &mut shown[station]);
+                        assert_eq!(shown[station].edges, [0; 4], "step {step}");
+                        continue;
+                    }
+                    let models = &mut handed_models[station];
+                    let expected: Vec<_> = models.iter_mut().map(|model| model.read(now)).collect();
+                    models.iter_mut().for_each(Bit::confirm);
+                    let levels: Vec<bool> = expected.iter().map(|(level, _)| *level).collect();
+                    let counts: Vec<u32> = expected.iter().map(|(_, count)| *count).collect();
+                    let bytes = with_levels(bytes, &bits[station], &levels);
+                    assert_eq!(shown[station].bytes, bytes, "step {step} at {now}");
+                    assert_eq!(shown[station].edges, *counts, "step {step} at {now}");
+                }
+            }
+        }
+    }
+    assert!(codes.iter().all(|count| *count > STEPS / 100), "{codes:?}");
+    for model in handed_models.iter().flatten() {
+        assert_eq!(model.reported, model.counted, "each edge is reported once");
+        assert!(
+            model.shown > 0 && model.shown <= model.edges + 1,
+            "{model:?}"
+        );
+    }
+}
+
+#[test]
+fn what_the_peer_gets_is_what_the_model_says() {
+    for seed in 1..=if cfg!(miri) { 1 } else { 8 } {
+        sent(Random(100 + seed));
+    }
+}
+
+fn sent(mut random: Random) {
+    let fail_safe = [0x81, 0x02];
+    let bits: Vec<_> = (0..STATIONS).map(|_| latched(&mut random)).collect();
+    let streams = bits.iter().map(|bits| StationStreams {
+        tx_fail_safe: Box::new(fail_safe),
+        tx_latched: bits.clone().into(),
+        rx_fail_safe: Box::new([]),
+        rx_latched: Box::new([]),
+    });
+    let (mut tick, mut bus) = image(streams.collect());
+    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, fail_safe)).collect();
+    let (mut written, mut taken) = ([fail_safe; STATIONS], [fail_safe; STATIONS]);
+    let (mut now, mut ticked, mut is_dead) = (0, None, false);
+    let mut given = [0; 3];
+    for step in 0..STEPS {
+        now += i64::try_from(random.below(5) * random.below(4)).expect("small");
+        let station = usize::try_from(random.below(3)).expect("small");
+        let (bits, models) = (&bits, &mut models);
+        match random.below(8) {
+            0..=2 => {
+                let mut drawn = written;
+                for bytes in &mut drawn {
+                    if random.below(2) == 0 {
+                        *bytes = [0, 1].map(|_| random.below(256).to_le_bytes()[0]);
+                    }
+                }
+                let word = |bytes: [u8; 2]| u64::from(u16::from_le_bytes(bytes));
+                let is_same =
+                    (0..STATIONS).all(|index| tick.is_published(index, word(drawn[index])));
+                assert_eq!(is_same, drawn == written, "step {step}");
+                if is_same {
+                    tick.ticks(Nanos(now));
+                } else {
+                    tick.write(Nanos(now), |index, bytes| {
+                        bytes.copy_from_slice(&drawn[index])
+                    });
+                }
+                (written, ticked) = (drawn, Some(now));
+                for (index, bytes) in drawn.into_iter().enumerate() {
+                    for (model, bit) in models[index].iter_mut().zip(&bits[index]) {
+                        model.write(is_on(bytes, bit), true);
+                    }
+                }
+            }
+            3 | 4 => {
+                bus.attend(Nanos(now), Some(Nanos(WATCHDOG)));
+                taken = written;
+                is_dead = ticked.is_none_or(|ticked| now - ticked > WATCHDOG);
+                models.iter_mut().flatten().for_each(Bit::take_over);
+            }
+            5 | 6 => {
+                let models = &mut models[station];
+                let bytes = if is_dead {
+                    for (model, bit) in models.iter_mut().zip(&bits[station]) {
+                        model.pass_instead(is_on(fail_safe, bit));
+                    }
+                    fail_safe
+                } else {
+                    let levels: Vec<bool> =
+                        models.iter_mut().map(|model| model.read(now).0).collect();
+                    with_levels(taken[station], &bits[station], &levels)
+                };
+                given[usize::from(is_dead)] += 1;
+                assert_eq!(
+                    bus.outgoing(station, Nanos(now)),
+                    bytes,
+                    "step {step} at {now}"
+                );
+                match random.below(4) {
+                    // The exchange fails.
+                    0 => {}
+                    1 => {
+                        // The peer reads some of the bits.
+                        let (one, other) = (random.below(17), random.below(17));
+                        let read = usize::try_from(one.min(other)).expect("small")
+                            ..usize::try_from(one.max(other)).expect("small");
+                        bus.sent_bits(station, &read);
+                        for (model, bit) in models.iter_mut().zip(&bits[station]) {
+                            let place = 8 * bit.byte + bit.mask.trailing_zeros() as usize;
+                            if read.contains(&place) {
+                                model.confirm();
+                            }
+                        }
+                        given[2] += 1;
+                    }
+                    _ => {
+                        bus.sent(station);
+                        models.iter_mut().for_each(Bit::confirm);
+                    }
+                }
+            }
+            _ => assert_eq!(
+                bus.tick_age(Nanos(now)),
+                ticked.map_or(Nanos::MAX, |ticked| Nanos(now - ticked))
+            ),
+        }
+    }
+    assert!(given.iter().all(|count| *count > STEPS / 100), "{given:?}");
+    for model in models.iter().flatten() {
+        assert_eq!(model.reported, model.counted);
+        assert!(model.shown > 0, "{model:?}");
+    }
+}

@@ -1,0 +1,323 @@
+//! The tick's end of the image.
+
+use super::frame::{Frame, Head, NEVER, Place, StationStreams, age, is_stale};
+use super::sync::{Arc, AtomicI64, Ordering};
+use super::{Consumer, EdgeCounter, PulseShaper, Reader, Told, Writer};
+use tickbus_base::time::Nanos;
+
+/// Bytes of a frame that are fewer than what a comparison of memory begins to pay for.
+const SMALL: usize = 8;
+
+/// The tick's end of a driver's image: of all its stations, so that a tick hands over, and takes over, what belongs
+/// together.
+#[derive(Debug)]
+pub struct TickEnd {
+    tx: Writer<Frame>,
+    sent: Vec<Sent>,
+    /// When the simulation last ticked.
+    alive: Arc<AtomicI64>,
+    rx: Reader<Frame>,
+    shown: Vec<Shown>,
+    /// Of the frame taken over last.
+    cycles: u64,
+    told: Told,
+    /// The peer's writes, for applications to which every write matters.
+    pub events: Consumer,
+}
+
+/// The outgoing half of a station.
+#[derive(Debug)]
+struct Sent {
+    place: Place,
+    edges: EdgeCounter,
+    /// The signals of the bits whose edges are counted.
+    signals: Box<[usize]>,
+    /// The bytes published last, up to eight, as a number whose least significant byte comes first.
+    word: u64,
+}
+
+/// The incoming half of a station.
+#[derive(Debug)]
+struct Shown {
+    place: Place,
+    /// Of the frame taken over last.
+    head: Head,
+    /// The sequence number of the bytes that the simulation was shown last.
+    sequence: u64,
+    shaper: PulseShaper,
+    shaped: Box<[u8]>,
+    /// Whether the simulation sees anything else than the frame: shaped levels, or fail-safe values.
+    forced: bool,
+}
+
+/// Receives what [`TickEnd::read`] shows.
+pub trait Receiver {
+    /// The station's bytes, with every edge made visible; called when they may have changed.
+    fn levels(&mut self, bytes: &[u8]);
+
+    /// How many edges of the latched signal with this index in the signal table have arrived since the last
+    /// read; called for every latched signal whenever any count may have changed.
+    fn edges(&mut self, signal: usize, count: u32);
+}
+
+/// The result of [`TickEnd::read`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Arrival {
+    /// A whole new bus cycle has arrived since data were last shown.
+    pub fresh: bool,
+    /// The data do not count, and nothing was shown.
+    pub stale: bool,
+    /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
+    pub age: Nanos,
+    /// Frames received for this station so far.
+    pub sequence: u64,
+}
+
+/// The first eight bytes, or as many as there are, as a number whose least significant byte comes first.
+fn as_word(bytes: &[u8]) -> u64 {
+    let mut word = [0; size_of::<u64>()];
+    for (to, from) in word.iter_mut().zip(bytes) {
+        *to = *from;
+    }
+    u64::from_le_bytes(word)
+}
+
+/// Whether two frames differ. Small frames were just written byte by byte; a word-wide load would stall on store
+/// forwarding.
+#[inline]
+fn differ(one: &[u8], other: &[u8]) -> bool {
+    if one.len() == other.len() && one.len() <= SMALL {
+        return one.iter().zip(other).any(|(one, other)| one != other);
+    }
+    one != other
+}
+
+impl TickEnd {
+    pub(super) fn new(
+        stations: &[StationStreams],
+        (tx, sent): (Writer<Frame>, Vec<Place>),
+        (rx, shown): (Reader<Frame>, Vec<Place>),
+        (alive, told, events): (Arc<AtomicI64>, Told, Consumer),
+    ) -> Self {
+        let sent = stations.iter().zip(sent).map(|(streams, place)| Sent {
+            place,
+            edges: EdgeCounter::new(&streams.tx_latched, &streams.tx_fail_safe),
+            signals: streams.tx_latched.iter().map(|bit| bit.signal).collect(),
+            word: as_word(&streams.tx_fail_safe),
+        });
+        let shown = stations.iter().zip(shown).map(|(streams, place)| Shown {
+            place,
+            head: Head::NONE,
+            sequence: 0,
+            shaper: PulseShaper::new(streams.rx_latched.clone(), &streams.rx_fail_safe),
+            shaped: streams.rx_fail_safe.clone(),
+            forced: false,
+        });
+        Self {
+            tx,
+            sent: sent.collect(),
+            alive,
+            rx,
+            shown: shown.collect(),
+            cycles: 0,
+            told,
+            events,
+        }
+    }
+
+    /// The number of stations.
+    pub fn stations(&self) -> usize {
+        self.shown.len()
+    }
+
+    /// Lets `encode` write the whole bytes of each station; if that changed any, counts the edges and hands all of them
+    /// to the bus at once. Most ticks change nothing, and need no hand-over.
+    #[inline]
+    pub fn write(&mut self, now: Nanos, mut encode: impl FnMut(usize, &mut [u8])) {
+        let sent = &mut self.sent;
+        let changed = self.tx.with_last(|frame, last| {
+            for (index, Sent { place, .. }) in sent.iter().enumerate() {
+                encode(index, &mut frame.bytes[place.bytes.clone()]);
+            }
+            let changed = differ(&frame.bytes, &last.bytes);
+            if changed {
+                count(sent, frame);
+            }
+            changed
+        });
+        if changed {
+            self.tx.publish();
+        }
+        self.ticks(now);
+    }
+
+    /// Whether the bytes of a station published last, which are up to eight, are this number, the least significant byte
+    /// first. If so for all stations, a tick has nothing to [`write`](Self::write), and only [`ticks`](Self::ticks).
+    #[inline]
+    pub fn is_published(&self, station: usize, word: u64) -> bool {
+        self.sent[station].word == word
+    }
+
+    /// The simulation has ticked. What it wrote in this tick was handed over before.
+    #[inline]
+    pub fn ticks(&self, now: Nanos) {
+        // After the frame: a bus that sees this time and then looks for a frame finds one that is as young.
+        self.alive.store(now.0, Ordering::Release);
+    }
+
+    /// Takes over the newest frame of the peer, for all stations.
+    #[inline]
+    pub fn update(&mut self) {
+        if self.rx.update() {
+            self.take_over();
+        }
+    }
+
+    #[inline(never)]
+    fn take_over(&mut self) {
+        let (shown, cycles) = (&mut self.shown, &mut self.cycles);
+        self.rx.with(|frame| {
+            *cycles = frame.cycles;
+            for (station, head) in shown.iter_mut().zip(&frame.heads) {
+                station.head = *head;
+            }
+        });
+    }
+
+    /// Shows the data of a station in the frame that was [taken over](Self::update) last, if they count at `now` and
+    /// there is anything new to show.
+    ///
+    /// Stale data are not shown, and their edges wait until data count again.
+    #[inline]
+    pub fn read(
+        &mut self,
+        station: usize,
+        (now, max_age): (Nanos, Nanos),
+        receiver: &mut impl Receiver,
+    ) -> Arrival {
+        let shown = &self.shown[station];
+        let Head {
+            heard,
+            sequence,
+            is_valid,
+        } = shown.head;
+        let age = age(now, heard);
+        let arrival = Arrival {
+            fresh: sequence != shown.sequence,
+            stale: is_stale(age, max_age, is_valid),
+            age,
+            sequence,
+        };
+        // The most common tick finds nothing: the simulation ticks faster than the bus.
+        if !arrival.stale && (arrival.fresh || shown.forced || shown.shaper.is_busy()) {
+            self.show(station, now, receiver);
+        }
+        arrival
+    }
+
+    #[inline(never)]
+    fn show(&mut self, station: usize, now: Nanos, receiver: &mut impl Receiver) {
+        let shown = &mut self.shown[station];
+        shown.sequence = shown.head.sequence;
+        let (shaper, shaped, forced) = (&mut shown.shaper, &mut shown.shaped, &mut shown.forced);
+        let place = &shown.place;
+        self.rx.with(|frame| {
+            let bytes = &frame.bytes[place.bytes.clone()];
+            let edges = &frame.edges[place.edges.clone()];
+            let shapes = shaper.needs_shaping(edges);
+            if shapes {
+                for (bit, count) in shaper.bits().iter().zip(shaper.new_edges(edges)) {
+                    receiver.edges(bit.signal, count);
+                }
+                shaped.copy_from_slice(bytes);
+                shaper.shape(edges, now, shaped);
+                shaper.confirm();
+                receiver.levels(shaped);
+            } else {
+                if *forced {
+                    // No edge now, but there were some at the last read.
+                    no_edges(shaper, receiver);
+                }
+                shaper.pass(bytes);
+                shaper.confirm();
+                receiver.levels(bytes);
+            }
+            *forced = shapes;
+        });
+    }
+
+    /// Records that the simulation sees levels other than the frame's (fail-safe values), without edges, so that the next
+    /// [`read`](Self::read) of data that count shows the frame again.
+    ///
+    /// The shaper continues from what the peer showed last: if a level is on by its fail-safe value, and the
+    /// peer switches it on when it returns, it must not drop in between to show that edge.
+    pub fn shown_instead(&mut self, station: usize, receiver: &mut impl Receiver) {
+        let shown = &mut self.shown[station];
+        shown.forced = true;
+        no_edges(&shown.shaper, receiver);
+    }
+
+    /// The bytes of a station as they came last, whether they count or not.
+    pub fn latest(&self, station: usize) -> &[u8] {
+        &self.rx.value().bytes[self.shown[station].place.bytes.clone()]
+    }
+
+    /// Time since the peer of a station was last heard from; [`Nanos::MAX`] if it never was. For statistics: the age of
+    /// the data that a tick shows is in its [`Arrival`].
+    pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
+        age(now, self.told[station].heard.load(Ordering::Relaxed))
+    }
+
+    /// Whether the data of a station's peer are valid, for statistics.
+    pub fn is_valid(&self, station: usize) -> bool {
+        self.told[station].is_valid.load(Ordering::Relaxed)
+    }
+
+    /// Frames received for a station so far, for statistics.
+    pub fn received(&self, station: usize) -> u64 {
+        self.told[station].sequence.load(Ordering::Relaxed)
+    }
+
+    /// Bus cycles whose data arrived up to the frame taken over last: one for all stations that a cycle carries.
+    #[inline]
+    pub fn cycles(&self) -> u64 {
+        self.cycles
+    }
+
+    /// Tells of every latched signal of a station, by its index in the signal table, how many edges there were so far, in
+    /// both directions; the counts wrap.
+    pub fn edges(&self, station: usize, mut tell: impl FnMut(usize, u32)) {
+        let (sent, shown) = (&self.sent[station], &self.shown[station]);
+        for (signal, count) in sent.signals.iter().zip(sent.edges.counts()) {
+            tell(*signal, *count);
+        }
+        self.rx.with(|frame| {
+            let counts = &frame.edges[shown.place.edges.clone()];
+            for (bit, count) in shown.shaper.bits().iter().zip(counts) {
+                tell(bit.signal, *count);
+            }
+        });
+    }
+}
+
+/// Counts the edges of a frame that is about to be published.
+fn count(sent: &mut [Sent], frame: &mut Frame) {
+    for Sent {
+        place, edges, word, ..
+    } in sent
+    {
+        let bytes = &frame.bytes[place.bytes.clone()];
+        edges.count(bytes, &mut frame.edges[place.edges.clone()]);
+        *word = as_word(bytes);
+    }
+}
+
+fn no_edges(shaper: &PulseShaper, receiver: &mut impl Receiver) {
+    let bits = shaper.bits().iter();
+    bits.for_each(|bit| receiver.edges(bit.signal, 0));
+}
+
+/// Before the first tick.
+pub(super) fn never() -> Arc<AtomicI64> {
+    Arc::new(AtomicI64::new(NEVER))
+}

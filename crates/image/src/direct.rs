@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
-use crate::{EdgeCounter, LatchedBit, PulseShaper};
+use crate::{EdgeCounter, LatchedBit, PulseShaper, copy_frame};
 
 /// A stream of frames whose writer and reader take turns on one thread: as through the two ends of an
 /// [`image`](fn@crate::image), no edge of a latched signal is lost, but nothing has to be handed over.
@@ -34,6 +34,17 @@ impl DirectStream {
             self.edges.observe(&self.bytes);
         }
         result
+    }
+
+    /// Takes over a frame whose edges do not count, since its writer's data are not valid.
+    pub fn pass(&mut self, bytes: &[u8]) {
+        copy_frame(&mut self.bytes, bytes);
+        self.edges.pass(bytes);
+    }
+
+    /// The frame as it was written, for a reader to which its edges do not count: they wait.
+    pub fn latest(&self) -> &[u8] {
+        &self.bytes
     }
 
     /// What the reader sees at `now`: the frame, with every edge since the last call made visible.

@@ -212,8 +212,7 @@ fn received(mut random: Random) {
         is_valid: true,
     };
     // What is staged, what was handed over, and what the tick has.
-    let (mut staged, mut handed, mut taken) =
-        ([first; STATIONS], [first; STATIONS], [first; STATIONS]);
+    let (mut staged, mut handed) = ([first; STATIONS], [first; STATIONS]);
     let mut shown = [(); STATIONS].map(|()| Shown {
         bytes: fail_safe,
         edges: [0; 4],
@@ -259,7 +258,7 @@ fn received(mut random: Random) {
             }
             _ => {
                 tick.update();
-                taken = handed;
+                let taken = handed;
                 handed_models.iter_mut().flatten().for_each(Bit::take_over);
                 for station in 0..STATIONS {
                     let Peer {

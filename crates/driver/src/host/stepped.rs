@@ -98,14 +98,17 @@ impl SteppedHost {
         let mut alive = true;
         for (station, (unit, line)) in self.stations.iter_mut().enumerate() {
             let is_valid = self.validity.is_valid(station);
+            let stale = is_stale(arrival.age, self.max_age, is_valid);
             unit.take(|inputs| {
                 if heard.is_some() {
-                    copy_frame(&mut inputs.bytes, line.inputs.read(now));
+                    let bytes = if stale {
+                        line.inputs.latest()
+                    } else {
+                        line.inputs.read(now)
+                    };
+                    copy_frame(&mut inputs.bytes, bytes);
                 }
-                Arrival {
-                    stale: is_stale(arrival.age, self.max_age, is_valid),
-                    ..arrival
-                }
+                Arrival { stale, ..arrival }
             });
             unit.run(now, true, &self.scan_counters);
             line.outputs
@@ -136,7 +139,11 @@ impl Stepped for SteppedHost {
         for (station, (_, line)) in self.stations.iter_mut().enumerate() {
             let frame = frames.frame(station);
             self.validity.arrived(station, now, frame);
-            line.inputs.write(|bytes| copy_frame(bytes, frame));
+            if self.validity.is_valid(station) {
+                line.inputs.write(|bytes| copy_frame(bytes, frame));
+            } else {
+                line.inputs.pass(frame);
+            }
         }
         let receipt = frames.receipt();
         port.sent(&receipt);

@@ -23,9 +23,9 @@ final class CellNets {
         return all(heads, 1, 3, 4);
     }
 
-    /** The controller of the nets. The emergency stop cuts air and motors: what does not move then is not stuck. */
+    /** The controller of the nets. After an emergency stop they continue where they were, once Rearm is pressed. */
     static NetController controller(Tickbus bus, BoundNet... all) {
-        return NetController.of(bus, all).stopClockWhile("S1 emergency");
+        return NetController.of(bus, all).failSafeWhile("S1 emergency", "S1 rearm");
     }
 
     private static BoundNet[] all(Heads heads, int... pallets) {
@@ -64,7 +64,6 @@ final class CellNets {
             bound.when("arrives at " + stop).on("Pallet at stop " + stop)
                 .when("opens " + stop).marked("cell", "sending from " + stop)
                 .when("leaves " + stop).off("Pallet at stop " + stop)
-                .when("stuck before " + stop).off("S1 emergency")
                 .during("leaving " + stop).set("Open stop " + stop);
         }
         return bound;

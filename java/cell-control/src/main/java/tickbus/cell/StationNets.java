@@ -79,7 +79,6 @@ final class StationNets {
         BoundNet bound = BoundNet.of(net.build())
             .when("feed").marked("cell", "running").on("S1 loader back")
             .when("loaded").on("S1 loader forward")
-            .when("loader jams").off("S1 emergency")
             .when("try again").on("S1 loader back")
             .when("sleeve known").on("S1 capacitive")
             .when("magazine empty").off("S1 capacitive")

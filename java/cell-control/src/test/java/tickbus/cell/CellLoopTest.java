@@ -321,15 +321,32 @@ class CellLoopTest {
         assertEquals(begun, cell.delivered().size());
     }
 
+    /** Lets the emergency stop go, which starts nothing, and presses Rearm. */
+    private void letGo() {
+        cell.emergency(false);
+        Map<String, Integer> before = Map.copyOf(fired);
+        for (int i = 0; i < 100; i++) {
+            tick();
+        }
+        assertEquals(before, fired);
+        assertEquals(List.of("S1 gripper", "S4 vacuum valve"), plc.signals().stream()
+            .filter(one -> one.isWritten() && one.get() != 0).map(Signal::name).toList(), "the fail-safe values");
+        cell.rearm(true);
+        for (int i = 0; i < 20; i++) {
+            tick();
+        }
+        cell.rearm(false);
+    }
+
     @Test
-    void theEmergencyStopHaltsEverythingAndWorkGoesOnAfterIt() {
+    void theEmergencyStopHaltsEverythingAndWorkGoesOnAfterRearm() {
         delivers(1);
         cell.emergency(true);
         for (int i = 0; i < 1000; i++) {
             tick();
         }
         assertEquals(1, cell.delivered().size());
-        cell.emergency(false);
+        letGo();
         delivers(12);
         assertEquals(0, times("station 1.loader jams"));
         assertEquals(0, cell.counters().palletJams());
@@ -346,7 +363,7 @@ class CellLoopTest {
             for (int i = 0; i < 400; i++) {
                 tick();
             }
-            cell.emergency(false);
+            letGo();
             assertTrue(nanos < 400_000_000_000L, this::state);
         }
         assertEquals(List.of(), nets.stops());

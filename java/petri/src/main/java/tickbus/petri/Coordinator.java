@@ -10,8 +10,9 @@ import java.util.concurrent.atomic.AtomicReference;
  * Runs a net as a control program, one {@link #scan} after the other.
  *
  * <p>A scan reads the inputs once. Then it fires until no transition is enabled, due and true: conditions are tested
- * before one is chosen, so a false one starves nobody; the greatest priority fires first; among ready transitions of
- * one priority that are in conflict, chance decides, by a seed; others fire in the order of the net. Then it runs the
+ * before one is chosen, so a false one starves nobody; the greatest priority fires first, and among those what was due first;
+ * among ready transitions that are in conflict and equal in both, chance decides, by a seed; others fire in the order
+ * of the net. Then it runs the
  * continuous actions of the marked places and writes the outputs. The same seed, times and inputs give the same
  * firings. A scan allocates nothing in the steady state.
  *
@@ -22,7 +23,7 @@ public final class Coordinator implements RunningNet {
     /** How many of the last firings a livelock report looks at. */
     private static final int RECENT = 256;
 
-    private enum Step { READER, CONDITION, FIRING, ENTRY, EXIT, CONTINUOUS, WRITER }
+    private enum Step { CLOCK, READER, CONDITION, FIRING, ENTRY, EXIT, CONTINUOUS, WRITER }
 
     private final PetriNet net;
     private final CoordinatorBuilder bound;
@@ -30,20 +31,25 @@ public final class Coordinator implements RunningNet {
     private final Outputs outputs;
     private final double[] failSafe;
     private final SplitMix random;
-    private final int[] cluster;
-    private final int[] priority;
     final Enabling enabling;
     private final boolean[] timed;
     /** Whether the delay of an enabled transition is over. */
     private final boolean[] ripe;
     /** Enabled, ripe, and true in this scan. */
-    private final IndexSet ready;
+    private final Ready ready;
+    /** When a delay made it possible to fire, in the scan of that number. */
+    private final long[] releasedAt;
+    private final long[] releasedIn;
+    /** Since which scan it has been enabled, and its edge has not been used: such an edge counts from the next one on. */
+    private final long[] enabledIn;
+    /** The due time that led to what happens now; {@link Ready#UNTIMED} where inputs did. */
+    private long moment = Ready.UNTIMED;
+    private boolean firing;
     /** The scan in which the condition was last tested. */
     private final long[] testedIn;
     private final boolean[] holds;
     /** A bit for each place that is marked and has a continuous action. */
     private final long[] active;
-    private final int[] candidates;
     private final int[] recent = new int[RECENT];
     /** How often each transition has fired, and when it did last. */
     private final long[] fired;
@@ -57,6 +63,7 @@ public final class Coordinator implements RunningNet {
     private Step step = Step.READER;
     private int at;
     private Stop stop;
+    private int[] beginning;
 
     Coordinator(CoordinatorBuilder bound) {
         this.bound = bound;
@@ -66,19 +73,20 @@ public final class Coordinator implements RunningNet {
         failSafe = bound.failSafe.stream().mapToDouble(Double::doubleValue).toArray();
         System.arraycopy(failSafe, 0, outputs.signals.values, 0, failSafe.length);
         random = new SplitMix(bound.seed);
-        cluster = Conflicts.clusters(net);
+        beginning = net.initialMarking().tokens;
         int transitions = net.transitions().size();
-        priority = net.transitions().stream().mapToInt(Transition::priority).toArray();
         timed = new boolean[transitions];
         for (Transition transition : net.transitions()) {
             timed[transition.index()] = transition.delay().kind() != Delay.Kind.NONE;
         }
         ripe = new boolean[transitions];
-        ready = new IndexSet(transitions);
+        ready = new Ready(net.transitions().stream().mapToInt(Transition::priority).toArray(), Conflicts.clusters(net));
+        releasedAt = new long[transitions];
+        releasedIn = new long[transitions];
+        enabledIn = new long[transitions];
         testedIn = new long[transitions];
         holds = new boolean[transitions];
         active = new long[(net.places().size() + 63) / 64];
-        candidates = new int[transitions];
         fired = new long[transitions];
         lastFired = new long[transitions];
         conjunctions = new Conjunction[transitions];
@@ -88,6 +96,7 @@ public final class Coordinator implements RunningNet {
         enabling = new Enabling(net, new Enabling.Watcher() {
             @Override
             public void enabled(int t) {
+                enabledIn[t] = firing ? scans : scans - 1;
                 arm(t);
             }
 
@@ -133,14 +142,28 @@ public final class Coordinator implements RunningNet {
         return fired[transition];
     }
 
-    /** The marking now, as a copy; before the first scan, the initial one. */
-    public Marking marking() {
-        return scans == 0 ? net.initialMarking() : new Marking(net, enabling.tokens.clone());
+    /**
+     * Begins with this marking in place of the initial one, such as that of a run that ended. The entry actions of its
+     * marked places run in the first scan, and delays begin there. Only before the first scan.
+     */
+    public void resume(Marking marking) {
+        if (scans > 0) {
+            throw new IllegalStateException("net " + net.name() + " has been scanned; resume it before its first scan");
+        }
+        if (marking.net() != net) {
+            throw new IllegalArgumentException("a marking of net " + marking.net().name() + "; expected one of net " + net.name());
+        }
+        beginning = marking.toArray();
     }
 
-    /** The tokens in the place with this index now; before the first scan, those of the initial marking. */
+    /** The marking now, as a copy; before the first scan, the one with which it begins. */
+    public Marking marking() {
+        return new Marking(net, scans == 0 ? beginning.clone() : enabling.tokens.clone());
+    }
+
+    /** The tokens in the place with this index now; before the first scan, those with which it begins. */
     public int tokens(int place) {
-        return scans == 0 ? net.place(place).initial() : enabling.tokens[place];
+        return scans == 0 ? beginning[place] : enabling.tokens[place];
     }
 
     /** How many scans there have been, with the one that stopped it. */
@@ -164,16 +187,12 @@ public final class Coordinator implements RunningNet {
     }
 
     /**
-     * One scan at the time {@code nanos}, which must not go back. The clock may begin anywhere: tokens of the initial
-     * marking arrive with the first scan.
+     * One scan at the time {@code nanos}. The clock may begin anywhere: tokens of the initial marking arrive with the
+     * first scan. A clock that goes back stops the controller.
      *
      * @return how many transitions fired; 0 after the controller has stopped
      */
     public int scan(long nanos) {
-        if (nanos < now) {
-            throw new IllegalArgumentException("a scan at " + nanos + " ns after one at " + now
-                + "; expected a time that does not go back");
-        }
         if (scanning) {
             throw new IllegalStateException("a scan within a scan; an action must not call scan");
         }
@@ -186,16 +205,22 @@ public final class Coordinator implements RunningNet {
     }
 
     private int guarded(long nanos) {
-        now = nanos;
         scans++;
         scanning = true;
         try {
+            step = Step.CLOCK;
+            if (nanos < now) {
+                throw new IllegalArgumentException("a scan at " + nanos + " ns after one at " + now
+                    + "; expected a time that does not go back");
+            }
+            now = nanos;
             return run();
         } catch (Throwable thrown) {
             fail(thrown);
             return 0;
         } finally {
             scanning = false;
+            firing = false;
         }
     }
 
@@ -204,7 +229,7 @@ public final class Coordinator implements RunningNet {
         bound.reader.read(inputs.signals.values);
         ready.clear();
         if (scans == 1) {
-            enabling.start(now);
+            enabling.start(beginning, now);
             for (int p = 0; p < enabling.tokens.length; p++) {
                 if (enabling.tokens[p] > 0) {
                     act(bound.entry, Step.ENTRY, p);
@@ -212,14 +237,8 @@ public final class Coordinator implements RunningNet {
                 }
             }
         }
-        while (enabling.due.isDue(now)) {
-            int index = enabling.due.pop();
-            if (index < timed.length) {
-                ripe[index] = true;
-            } else {
-                enabling.release(index - timed.length, now);
-            }
-        }
+        release();
+        firing = true;
         for (int i = 0; i < enabling.enabled.size(); i++) {
             consider(enabling.enabled.get(i));
         }
@@ -229,8 +248,8 @@ public final class Coordinator implements RunningNet {
                 livelock();
                 return 0;
             }
-            int choices = choose();
-            int t = choices == 1 ? candidates[0] : candidates[random.below(choices)];
+            int choices = ready.choices();
+            int t = ready.choice(choices == 1 ? 0 : random.below(choices));
             recent[count++ % RECENT] = t;
             fire(t, choices);
         }
@@ -242,6 +261,22 @@ public final class Coordinator implements RunningNet {
         step = Step.WRITER;
         bound.writer.write(outputs.signals.values);
         return count;
+    }
+
+    /** Everything that is due, with its own time each: what was due first fires first. */
+    private void release() {
+        while (enabling.due.isDue(now)) {
+            moment = enabling.due.next();
+            int index = enabling.due.pop();
+            if (index < timed.length) {
+                ripe[index] = true;
+                releasedAt[index] = moment;
+                releasedIn[index] = scans;
+            } else {
+                enabling.release(index - timed.length, moment);
+            }
+        }
+        moment = Ready.UNTIMED;
     }
 
     private void act(Action[] actions, Step of, int index) {
@@ -264,11 +299,13 @@ public final class Coordinator implements RunningNet {
         } else {
             ripe[t] = true;
         }
+        releasedAt[t] = moment;
+        releasedIn[t] = scans;
         consider(t);
     }
 
     private void consider(int t) {
-        if (!ripe[t]) {
+        if (!ripe[t] || isEdgeOver(t)) {
             return;
         }
         if (testedIn[t] != scans) {
@@ -279,39 +316,27 @@ public final class Coordinator implements RunningNet {
             testedIn[t] = scans;
         }
         if (holds[t]) {
-            ready.add(t);
+            ready.add(t, releasedIn[t] == scans ? releasedAt[t] : Ready.UNTIMED);
         }
     }
 
-    /** Fills in the candidates: of the ready ones of the greatest priority the first one, and those in conflict with it. */
-    private int choose() {
-        int first = ready.get(0);
-        for (int i = 1; i < ready.size(); i++) {
-            int t = ready.get(i);
-            if (priority[t] > priority[first] || priority[t] == priority[first] && t < first) {
-                first = t;
-            }
-        }
-        candidates[0] = first;
-        int count = 1;
-        if (cluster[first] >= 0) {
-            for (int i = 0; i < ready.size(); i++) {
-                int t = ready.get(i);
-                if (t != first && cluster[t] == cluster[first] && priority[t] == priority[first]) {
-                    candidates[count++] = t;
-                }
-            }
-        }
-        return count;
+    /** An edge is for what was enabled when the scan began, and for one firing. */
+    private boolean isEdgeOver(int t) {
+        return bound.edge[t] && enabledIn[t] == scans;
     }
 
     private void fire(int t, int choices) {
         Effects effects = net.effects;
         step = Step.FIRING;
         at = t;
+        moment = ready.since(t);
         enabling.fire(t, now);
         fired[t]++;
         lastFired[t] = now;
+        if (bound.edge[t]) {
+            enabledIn[t] = scans;
+            ready.remove(t);
+        }
         if (timed[t] && enabling.enabled.contains(t)) {
             arm(t);
         }
@@ -360,10 +385,8 @@ public final class Coordinator implements RunningNet {
         System.arraycopy(fired, 0, state.fired, 0, fired.length);
         System.arraycopy(lastFired, 0, state.lastFired, 0, fired.length);
         if (scans == 0) {
-            for (int p = 0; p < state.tokens.length; p++) {
-                state.tokens[p] = net.place(p).initial();
-                state.available[p] = state.tokens[p];
-            }
+            System.arraycopy(beginning, 0, state.tokens, 0, beginning.length);
+            System.arraycopy(beginning, 0, state.available, 0, beginning.length);
         } else {
             enabling.copyTokens(state);
         }
@@ -384,7 +407,7 @@ public final class Coordinator implements RunningNet {
         if (!ripe[t]) {
             return NetState.Phase.DELAYED;
         }
-        return testedIn[t] == scans && !holds[t] ? NetState.Phase.HELD : NetState.Phase.READY;
+        return testedIn[t] == scans && !holds[t] || isEdgeOver(t) ? NetState.Phase.HELD : NetState.Phase.READY;
     }
 
     private void livelock() {
@@ -399,6 +422,7 @@ public final class Coordinator implements RunningNet {
 
     private void fail(Throwable thrown) {
         String element = switch (step) {
+            case CLOCK -> "clock";
             case READER -> "reader of the inputs";
             case CONDITION -> "condition of transition " + net.transition(at).name();
             case FIRING -> "firing of transition " + net.transition(at).name();

@@ -7,6 +7,8 @@ import java.util.List;
 public final class CoordinatorBuilder {
     final PetriNet net;
     final Condition[] conditions;
+    /** Whether the condition is an edge. */
+    final boolean[] edge;
     final Action[] firing;
     final Action[] entry;
     final Action[] exit;
@@ -24,6 +26,7 @@ public final class CoordinatorBuilder {
     private CoordinatorBuilder(CoordinatorBuilder of) {
         net = of.net;
         conditions = of.conditions.clone();
+        edge = of.edge.clone();
         firing = of.firing.clone();
         entry = of.entry.clone();
         exit = of.exit.clone();
@@ -41,6 +44,7 @@ public final class CoordinatorBuilder {
     CoordinatorBuilder(PetriNet net) {
         this.net = net;
         conditions = new Condition[net.transitions().size()];
+        edge = new boolean[net.transitions().size()];
         firing = new Action[net.transitions().size()];
         entry = new Action[net.places().size()];
         exit = new Action[net.places().size()];
@@ -89,7 +93,19 @@ public final class CoordinatorBuilder {
 
     /** The condition of a transition; without one it is always true. */
     public CoordinatorBuilder when(String transition, Condition condition) {
-        conditions[net.transition(transition).index()] = condition;
+        int index = net.transition(transition).index();
+        conditions[index] = condition;
+        edge[index] = false;
+        return this;
+    }
+
+    /**
+     * The condition of a transition that waits for an edge. As in Grafcet, an edge counts for the transitions that were
+     * enabled when the scan began, and each of them fires once by it.
+     */
+    public CoordinatorBuilder whenEdge(String transition, Condition condition) {
+        when(transition, condition);
+        edge[net.transition(transition).index()] = true;
         return this;
     }
 

@@ -19,6 +19,9 @@ public final class Coverability {
     /** No bound: for any number there is a reachable marking with more tokens than that. */
     public static final int OMEGA = Integer.MAX_VALUE;
 
+    /** For each marking beside its tokens: array, key, entry and slot of the map. */
+    private static final long BYTES_BESIDE = 120;
+
     private final PetriNet net;
     private final PetriNet plain;
     private final int limit;
@@ -35,7 +38,7 @@ public final class Coverability {
         bounds = new int[net.places().size()];
     }
 
-    /** Explores at most {@code limit} markings with or without omega, 1 or more. */
+    /** Explores at most {@code limit} markings with or without omega, 1 or more, and fewer if the heap has no room for them. */
     public static Coverability explore(PetriNet net, int limit) {
         if (limit < 1) {
             throw new IllegalArgumentException("a limit of " + limit + " markings; expected 1 or more");
@@ -47,7 +50,6 @@ public final class Coverability {
 
     /** The same net without capacities and inhibitor arcs, the complements after the places. */
     private static PetriNet withComplements(PetriNet net) {
-        int places = net.places().size();
         NetBuilder builder = new NetBuilder(net.name());
         net.places().forEach(place -> builder.place("p" + place.index(), place.initial()));
         for (Place place : net.places()) {
@@ -55,8 +57,6 @@ public final class Coverability {
                 builder.place("c" + place.index(), place.capacity() - place.initial());
             }
         }
-        int[][] needed = new int[places][net.transitions().size()];
-        int[][] gain = net.incidence();
         net.transitions().forEach(transition -> builder.transition("t" + transition.index()));
         for (Arc arc : net.arcs()) {
             Place place = net.place(arc.place());
@@ -67,21 +67,21 @@ public final class Coverability {
                         + "places without a capacity; give " + place.name() + " one, or explore with Reachability");
                 }
                 // Fewer than w tokens are at least K - w + 1 in the complement.
-                needed[arc.place()][arc.transition()] = Math.max(0, place.capacity() - arc.weight() + 1);
+                int needed = place.capacity() - arc.weight() + 1;
+                if (needed > 0) {
+                    builder.arc(ArcKind.TEST, "c" + arc.place(), "t" + arc.transition(), needed);
+                }
             } else {
                 builder.arc(arc.kind(), "p" + arc.place(), "t" + arc.transition(), arc.weight());
             }
         }
-        for (Place place : net.places()) {
-            int p = place.index();
-            for (int t = 0; place.isLimited() && t < gain[p].length; t++) {
-                if (gain[p][t] > 0) {
-                    builder.arc(ArcKind.INPUT, "c" + p, "t" + t, gain[p][t]);
-                } else if (gain[p][t] < 0) {
-                    builder.arc(ArcKind.OUTPUT, "c" + p, "t" + t, -gain[p][t]);
-                }
-                if (needed[p][t] > 0) {
-                    builder.arc(ArcKind.TEST, "c" + p, "t" + t, needed[p][t]);
+        Effects effects = net.effects;
+        for (int t = 0; t < net.transitions().size(); t++) {
+            for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+                int p = effects.changePlace[i];
+                int gain = effects.changePuts[i] - effects.changeTakes[i];
+                if (gain != 0 && net.place(p).isLimited()) {
+                    builder.arc(gain > 0 ? ArcKind.INPUT : ArcKind.OUTPUT, "c" + p, "t" + t, Math.abs(gain));
                 }
             }
         }
@@ -105,7 +105,7 @@ public final class Coverability {
                 int[] next = fire(tokens, t);
                 accelerate(next, number);
                 if (!numbers.containsKey(new Key(next))) {
-                    if (markings.size() == limit) {
+                    if (markings.size() == limit || !Memory.has(markings.size() * (4L * next.length + BYTES_BESIDE))) {
                         return;
                     }
                     add(next, number, numbers);

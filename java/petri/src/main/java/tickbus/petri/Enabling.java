@@ -45,8 +45,8 @@ final class Enabling {
         due = new DueHeap(transitions + places);
     }
 
-    /** Puts the initial marking, whose tokens arrive now. */
-    void start(long now) {
+    /** Puts a marking, whose tokens arrive now. */
+    void start(int[] marking, long now) {
         for (int t = 0; t < unmet.length; t++) {
             unmet[t] = 0;
             for (int i = effects.needFirst[t]; i < effects.needFirst[t + 1]; i++) {
@@ -55,7 +55,7 @@ final class Enabling {
             touched.add(t);
         }
         for (Place place : net.places()) {
-            arrive(place.index(), place.initial(), now);
+            arrive(place.index(), marking[place.index()], now);
         }
         settle();
     }

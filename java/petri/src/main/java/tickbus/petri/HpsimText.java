@@ -48,6 +48,9 @@ public final class HpsimText {
     }
 
     private Imported net(Map<String, Delay> delays) {
+        if (source.text().indexOf('\0') >= 0) {
+            throw source.mistake(1, "", "a binary file; if it is a .hps of HPSim, open it there and export it as .hpx");
+        }
         split();
         List<String> transitions = names(Section.TRANSITIONS);
         List<String> places = names(Section.PLACES);

@@ -26,11 +26,23 @@ final class Ints {
         return values[--size];
     }
 
+    Ints copy() {
+        Ints copy = new Ints();
+        copy.values = values.clone();
+        copy.size = size;
+        return copy;
+    }
+
     int size() {
         return size;
     }
 
     long bytes() {
         return 4L * values.length;
+    }
+
+    /** The bytes while a longer array takes the place of the one that is full. */
+    long bytesToGrow() {
+        return size < values.length ? 0 : bytes() / 2 * 3;
     }
 }

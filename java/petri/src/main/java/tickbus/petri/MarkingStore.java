@@ -35,6 +35,12 @@ final class MarkingStore {
         return 8L * packed.length + 4L * table.length;
     }
 
+    /** The bytes while longer arrays take the place of those that are full; 0 if another marking fits in. */
+    long bytesToGrow() {
+        return ((size + 1L) * words > packed.length ? 12L * packed.length : 0)
+            + (size + 1 > table.length / 2 ? 8L * table.length : 0);
+    }
+
     /** The number of this marking, which is the size before if it is new. */
     int add(int[] tokens) {
         fit(tokens);

@@ -7,9 +7,9 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * Builds a net step by step. {@link #capacity} and {@link #delay(long)} belong to the place named last,
- * {@link #priority}, {@link #delay(Delay)} and the arcs to the transition named last. Arcs may name places that come
- * later. {@link #build} reports all mistakes at once.
+ * Builds a net step by step. {@link #capacity} and the delays belong to the place or transition named last,
+ * {@link #priority} and the arcs to the transition named last. Arcs may name places that come later. {@link #build}
+ * reports all mistakes at once.
  */
 public final class NetBuilder {
     private final String name;
@@ -22,6 +22,7 @@ public final class NetBuilder {
     private final Map<String, double[][]> bends = new HashMap<>();
     private String place;
     private String transition;
+    private boolean placeIsLast;
 
     private record Pending(ArcKind kind, String place, String transition, int weight) {
         String text() {
@@ -51,13 +52,15 @@ public final class NetBuilder {
         checkName("place", name, places);
         places.put(name, new Place(places.size(), name, initial, Place.UNLIMITED, 0));
         place = name;
+        placeIsLast = true;
         return this;
     }
 
-    /** The most tokens that the last place may hold, 1 or more. */
+    /** The most tokens that the place named last may hold, 1 or more. A transition has no capacity. */
     public NetBuilder capacity(int most) {
-        if (place == null) {
-            mistakes.add("capacity " + most + ": there is no place yet; call place(...) before capacity(...)");
+        if (!placeIsLast) {
+            mistakes.add("capacity " + most + (transition == null ? ": there is no place yet" : " of transition " + transition)
+                + "; call place(...) before capacity(...)");
             return this;
         }
         if (most < 1) {
@@ -68,14 +71,21 @@ public final class NetBuilder {
         return this;
     }
 
-    /** How many nanoseconds a token that arrives in the last place is unavailable, 0 or more. */
+    /**
+     * A fixed delay in nanoseconds, 0 or more, of what was named last: how long a token that arrives in that place is
+     * unavailable, or how long that transition must be enabled before it fires.
+     */
     public NetBuilder delay(long nanos) {
-        if (place == null) {
-            mistakes.add("delay " + nanos + ": there is no place yet; call place(...) before delay(long)");
+        if (place == null && transition == null) {
+            mistakes.add("delay " + nanos + ": there is no place or transition yet; call place(...) or transition(...) before delay");
             return this;
         }
         if (nanos < 0) {
-            mistakes.add("place " + place + ": delay " + nanos + " ns; expected 0 or more");
+            mistakes.add((placeIsLast ? "place " + place : "transition " + transition) + ": delay " + nanos + " ns; expected 0 or more");
+            return this;
+        }
+        if (!placeIsLast) {
+            return delay(Delay.fixed(nanos));
         }
         places.computeIfPresent(place, (key, old) ->
             new Place(old.index(), key, old.initial(), old.capacity(), nanos));
@@ -87,6 +97,7 @@ public final class NetBuilder {
         checkName("transition", name, transitions);
         transitions.put(name, new Transition(transitions.size(), name, 0, Delay.NONE));
         transition = name;
+        placeIsLast = false;
         return this;
     }
 
@@ -99,8 +110,15 @@ public final class NetBuilder {
         return this;
     }
 
-    /** How long the last transition must be enabled before it fires. */
+    /** The delay of what was named last, as {@link #delay(long)}; that of a place is fixed or {@link Delay#NONE}. */
     public NetBuilder delay(Delay delay) {
+        if (placeIsLast) {
+            if (delay.kind() == Delay.Kind.FIXED || delay.kind() == Delay.Kind.NONE) {
+                return delay(delay.first());
+            }
+            mistakes.add("place " + place + ": a delay of kind " + delay.kind() + "; expected a fixed one");
+            return this;
+        }
         if (isTransition("delay(Delay)")) {
             transitions.computeIfPresent(transition, (key, old) ->
                 new Transition(old.index(), key, old.priority(), delay));

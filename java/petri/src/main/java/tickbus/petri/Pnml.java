@@ -10,8 +10,9 @@ import java.nio.file.Path;
 /**
  * Reads and writes place/transition nets in PNML (ISO/IEC 15909-2). Pages are flattened and references resolved.
  *
- * <p>The standard's P/T nets have no test or inhibitor arcs. They are written as {@code <type value="test"/>} and
- * {@code <type value="inhibitor"/>}, which several tools read; capacities, priorities and delays are written in
+ * <p>The standard's P/T nets have no test or inhibitor arcs. Both are written in three ways at once, as no two tools
+ * look at the same place: the attribute {@code type}, which TAPAAL reads, {@code <type value="inhibitor"/>}, which PIPE
+ * reads, and {@code <arctype>}, which pm4py and ProM read. Capacities, priorities and delays are written in
  * {@code toolspecific} elements of the tool {@code tickbus}.
  */
 public final class Pnml {
@@ -24,15 +25,25 @@ public final class Pnml {
 
     /** Reads a file with one net; a {@link NetException} says what is wrong with it. */
     public static PetriNet read(Path file) throws IOException {
+        return read(file, Dialect.STANDARD).net();
+    }
+
+    /** Reads a file with one net in a dialect; warnings name what was left out, a {@link NetException} what is wrong. */
+    public static Imported read(Path file, Dialect dialect) throws IOException {
         // From bytes, as the document itself says how it is encoded.
         try (InputStream bytes = new BufferedInputStream(Files.newInputStream(file))) {
-            return new PnmlReader(file.toString(), factory -> factory.createXMLStreamReader(bytes)).net();
+            return new PnmlReader(file.toString(), dialect, factory -> factory.createXMLStreamReader(bytes)).net();
         }
     }
 
     /** Reads a text with one net; {@code source} is its name in messages. */
     public static PetriNet parse(String source, String text) {
-        return new PnmlReader(source, factory -> factory.createXMLStreamReader(new StringReader(text))).net();
+        return parse(source, text, Dialect.STANDARD).net();
+    }
+
+    /** Reads a text with one net in a dialect; {@code source} is its name in messages. */
+    public static Imported parse(String source, String text, Dialect dialect) {
+        return new PnmlReader(source, dialect, factory -> factory.createXMLStreamReader(new StringReader(text))).net();
     }
 
     /** The net as a PNML document. */

@@ -1,11 +1,8 @@
 package tickbus.petri;
 
-import java.util.ArrayDeque;
 import java.util.ArrayList;
-import java.util.Deque;
 import java.util.HashMap;
 import java.util.HashSet;
-import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
 import java.util.Set;
@@ -14,73 +11,38 @@ import javax.xml.stream.XMLStreamConstants;
 import javax.xml.stream.XMLStreamException;
 import javax.xml.stream.XMLStreamReader;
 
-/** Reads one net from PNML; what it does not know it refuses, so that no net loses what it means. */
+/**
+ * Reads one net from PNML. The reader refuses elements and attributes that it does not know, so that no net loses what
+ * it means.
+ */
 final class PnmlReader {
     /** Pages in pages. */
     private static final int MOST_DEPTH = 100;
 
     private final SourceText source;
-    private final Map<String, Node> nodes = new LinkedHashMap<>();
-    private final List<Link> links = new ArrayList<>();
+    private final Dialect dialect;
+    private final PnmlGraph graph;
     private final Set<String> ids = new HashSet<>();
+    private final List<String> warnings = new ArrayList<>();
     private final Opening opening;
     private XMLStreamReader xml;
-    private String netName = "";
     private int nets;
-    /** Pages with nodes; each has coordinates of its own. */
-    private final Set<String> drawnOn = new HashSet<>();
-
-    /** A place, a transition, or a reference to one. */
-    private static final class Node {
-        final String id;
-        final String tag;
-        final int line;
-        final String refers;
-        String name = "";
-        int initial;
-        double[] at;
-        final Map<String, String> own = new HashMap<>();
-
-        Node(String id, String tag, int line, String refers) {
-            this.id = id;
-            this.tag = tag;
-            this.line = line;
-            this.refers = refers;
-        }
-
-        boolean isPlace() {
-            return tag.equals("place") || tag.equals("referencePlace");
-        }
-    }
-
-    private static final class Link {
-        final String id;
-        final int line;
-        final String from;
-        final String to;
-        int weight = 1;
-        ArcKind kind = ArcKind.INPUT;
-        double[][] bends = {};
-
-        Link(String id, int line, String from, String to) {
-            this.id = id;
-            this.line = line;
-            this.from = from;
-            this.to = to;
-        }
-    }
+    /** The colour of PIPE's tokens; more than one make a coloured net. */
+    private String token;
 
     /** Opens the document. */
     interface Opening {
         XMLStreamReader open(XMLInputFactory factory) throws XMLStreamException;
     }
 
-    PnmlReader(String source, Opening opening) {
+    PnmlReader(String source, Dialect dialect, Opening opening) {
         this.source = new SourceText(source, "");
+        this.dialect = dialect;
         this.opening = opening;
+        graph = new PnmlGraph(this.source);
     }
 
-    PetriNet net() {
+    Imported net() {
         XMLInputFactory factory = XMLInputFactory.newDefaultFactory();
         factory.setProperty(XMLInputFactory.SUPPORT_DTD, false);
         factory.setProperty(XMLInputFactory.IS_SUPPORTING_EXTERNAL_ENTITIES, false);
@@ -95,7 +57,7 @@ final class PnmlReader {
             int line = broken.getLocation() == null ? 0 : broken.getLocation().getLineNumber();
             throw source.mistake(line, "", "not well-formed XML: " + lastLine(broken.getMessage()));
         }
-        return build();
+        return new Imported(graph.net(), List.copyOf(warnings));
     }
 
     private static String lastLine(String message) {
@@ -155,17 +117,42 @@ final class PnmlReader {
         }
         String type = xml.getAttributeValue(null, "type");
         String element = "net " + id();
+        attributes(element, "id", "type");
         if (!Pnml.TYPE.equals(type)) {
-            throw mistake(element, "type '" + type + "'; expected " + Pnml.TYPE);
+            if (dialect == Dialect.STANDARD || !isOfPlacesAndTransitions(type)) {
+                throw mistake(element, "type '" + type + "'; expected " + Pnml.TYPE
+                    + (isOfPlacesAndTransitions(type) ? "; Dialect.ANY reads this one" : ""));
+            }
+            warn(element, "type '" + type + "' is read as that of a place/transition net");
         }
-        netName = id();
+        graph.name = id();
         children(element, tag -> {
             if (tag.equals("name")) {
-                netName = label(element, tag);
+                graph.name = label(element, tag);
+            } else if (dialect == Dialect.ANY && tag.equals("finalmarkings")) {
+                warn(element, "the final markings are left out");
+                skip();
+            } else if (dialect == Dialect.ANY && tag.equals("token")) {
+                token(element);
+            } else if (dialect == Dialect.ANY && tag.equals("labels")) {
+                skip();
             } else {
                 pageChild(element, tag, 0);
             }
         });
+    }
+
+    /** The standard's core model, which ProM and pm4py name; the type of 2003, which WoPeD and LoLA name; PIPE's. */
+    private static boolean isOfPlacesAndTransitions(String type) {
+        return type != null && (type.equals("P/T net") || type.matches("(.*/)?(?i:pnmlcoremodel|ptnetb)"));
+    }
+
+    private void token(String element) throws XMLStreamException {
+        if (token != null && !token.equals(id())) {
+            throw mistake(element, "tokens '" + token + "' and '" + id() + "'; expected one kind, as colours are not read");
+        }
+        token = id();
+        skip();
     }
 
     private void pageChild(String within, String tag, int depth) throws XMLStreamException {
@@ -176,14 +163,16 @@ final class PnmlReader {
                 }
                 String element = "page " + id();
                 claim(element);
+                attributes(element, "id");
                 children(element, inner -> pageChild(element, inner, depth + 1));
             }
             case "place", "transition" -> {
-                drawnOn.add(within);
+                graph.drawnOn.add(within);
                 node(tag, null);
             }
             case "referencePlace", "referenceTransition" -> node(tag, attribute(tag + " " + id(), "ref"));
-            case "arc" -> arc();
+            case "arc" -> arc(null);
+            case "inhibitorArc" -> arc(ArcKind.INHIBITOR);
             case "name", "graphics", "toolspecific" -> skip();
             default -> throw unexpected(within, tag);
         }
@@ -191,66 +180,164 @@ final class PnmlReader {
 
     private void node(String tag, String refers) throws XMLStreamException {
         String element = tag + " " + id();
+        boolean place = tag.equals("place");
         claim(element);
-        Node node = new Node(id(), tag, line(), refers);
-        nodes.put(node.id, node);
+        attributes(element, "id", place ? "initialMarking" : tag.equals("transition") ? "priority" : "ref");
+        PnmlGraph.Node node = new PnmlGraph.Node(id(), tag, line(), refers);
+        graph.nodes.put(node.id, node);
+        Figure initial = new Figure(element, "initial marking", 0, xml.getAttributeValue(null, "initialMarking"));
+        String priority = xml.getAttributeValue(null, "priority");
+        if (priority != null && tag.equals("transition")) {
+            node.own.put("priority", priority);
+        }
         children(element, inner -> {
             switch (inner) {
                 case "name" -> node.name = label(element, inner).strip().replaceAll("\\s+", " ");
                 case "initialMarking" -> {
-                    if (!tag.equals("place")) {
+                    if (!place) {
                         throw unexpected(element, inner);
                     }
-                    int at = line();
-                    node.initial = source.number(at, element, "initial marking", label(element, inner), 0);
+                    initial.read(line(), count(element, inner));
                 }
                 case "toolspecific" -> toolspecific(element, node);
                 case "graphics" -> {
                     double[][] points = points();
                     node.at = points.length == 1 ? points[0] : null;
                 }
-                default -> throw unexpected(element, inner);
+                default -> {
+                    if (dialect == Dialect.STANDARD || !pipe(element, inner, node)) {
+                        throw unexpected(element, inner);
+                    }
+                }
             }
         });
+        if (node.isTimedByRate) {
+            // PIPE fires immediate transitions first, whose priority is 1 or more.
+            node.own.remove("priority");
+            warn(element, "timed by a rate, and read as an immediate transition of priority 0");
+        }
+        node.initial = initial.value(0);
     }
 
-    private void toolspecific(String element, Node node) throws XMLStreamException {
+    /** Reads what PIPE says of a node in elements of its own; false if this one is not known. */
+    private boolean pipe(String element, String tag, PnmlGraph.Node node) throws XMLStreamException {
+        boolean place = node.tag.equals("place");
+        boolean transition = node.tag.equals("transition");
+        if (place && tag.equals("capacity")) {
+            int capacity = source.number(line(), element, tag, label(element, tag), 0);
+            // PIPE writes 0 for no capacity.
+            if (capacity > 0) {
+                own(element, node, tag, Integer.toString(capacity));
+            }
+        } else if (transition && tag.equals("priority")) {
+            own(element, node, tag, label(element, tag).strip());
+        } else if (transition && tag.equals("timed")) {
+            node.isTimedByRate = label(element, tag).strip().equals("true");
+        } else if (transition && (tag.equals("orientation") || tag.equals("rate") || tag.equals("infiniteServer"))) {
+            skip();
+        } else {
+            return false;
+        }
+        return true;
+    }
+
+    private void own(String element, PnmlGraph.Node node, String tag, String value) {
+        String other = node.own.put(tag, value);
+        if (other != null && !other.equals(value)) {
+            throw mistake(element, tag + " '" + SourceText.shortened(value) + "' and '" + SourceText.shortened(other)
+                + "'; expected one");
+        }
+    }
+
+    /** A number that an attribute or an element gives; where both do, they must agree. */
+    private final class Figure {
+        private final String element;
+        private final String what;
+        private final int least;
+        private Integer found;
+
+        Figure(String element, String what, int least, String attribute) {
+            this.element = element;
+            this.what = what;
+            this.least = least;
+            if (attribute != null) {
+                read(line(), attribute);
+            }
+        }
+
+        void read(int line, String digits) {
+            int number = source.number(line, element, what, digits, least);
+            if (found != null && found != number) {
+                throw source.mistake(line, element, what + " " + found + " and " + number + "; expected one");
+            }
+            found = number;
+        }
+
+        int value(int unless) {
+            return found == null ? unless : found;
+        }
+    }
+
+    private void toolspecific(String element, PnmlGraph.Node node) throws XMLStreamException {
         if (!Pnml.TOOL.equals(xml.getAttributeValue(null, "tool"))) {
             skip();
             return;
         }
-        children(element, tag -> node.own.put(tag, xml.getElementText().strip()));
+        children(element, tag -> own(element, node, tag, xml.getElementText().strip()));
     }
 
-    private void arc() throws XMLStreamException {
+    private void arc(ArcKind given) throws XMLStreamException {
         String element = "arc " + id();
         claim(element);
-        Link link = new Link(id(), line(), attribute(element, "source"), attribute(element, "target"));
-        links.add(link);
+        attributes(element, "id", "source", "target", "type", "inscription", "weight");
+        PnmlGraph.Link link = new PnmlGraph.Link(id(), line(), attribute(element, "source"), attribute(element, "target"));
+        graph.links.add(link);
+        link.kind = given;
+        String type = xml.getAttributeValue(null, "type");
+        if (type != null) {
+            kind(element, link, type);
+        }
+        Figure weight = new Figure(element, "weight", 1, xml.getAttributeValue(null, "inscription"));
+        String further = xml.getAttributeValue(null, "weight");
+        if (further != null) {
+            weight.read(line(), further);
+        }
         children(element, tag -> {
-            int at = line();
             switch (tag) {
-                case "inscription" -> link.weight = source.number(at, element, "weight", label(element, tag), 1);
+                case "inscription" -> weight.read(line(), count(element, tag));
                 case "type" -> {
-                    link.kind = kind(element, attribute(element, "value"));
+                    kind(element, link, attribute(element, "value"));
                     skip();
                 }
-                case "arctype" -> link.kind = kind(element, label(element, tag).strip());
+                case "arctype" -> kind(element, link, label(element, tag).strip());
                 case "graphics" -> link.bends = points();
                 case "name", "toolspecific" -> skip();
-                default -> throw unexpected(element, tag);
+                default -> {
+                    // PIPE's bends and its tagged tokens, which fire as others do.
+                    if (dialect == Dialect.STANDARD || !tag.equals("arcpath") && !tag.equals("tagged")) {
+                        throw unexpected(element, tag);
+                    }
+                    skip();
+                }
             }
         });
+        link.weight = weight.value(1);
+        link.kind = link.kind == null ? ArcKind.INPUT : link.kind;
     }
 
-    private ArcKind kind(String element, String value) {
-        return switch (value) {
+    /** Takes the kind of an arc from one of the places where tools write it. */
+    private void kind(String element, PnmlGraph.Link link, String value) {
+        ArcKind kind = switch (value) {
             case "normal" -> ArcKind.INPUT;
             case "inhibitor" -> ArcKind.INHIBITOR;
             case "test", "read" -> ArcKind.TEST;
             default -> throw mistake(element, "arc type '" + SourceText.shortened(value)
                 + "'; expected normal, inhibitor, test or read");
         };
+        if (link.kind != null && link.kind != kind) {
+            throw mistake(element, "arc type '" + value + "' beside another one; expected one");
+        }
+        link.kind = kind;
     }
 
     /** The text of a label such as name or inscription. */
@@ -261,13 +348,24 @@ final class PnmlReader {
             switch (inner) {
                 case "text" -> text[0] = xml.getElementText();
                 case "graphics", "toolspecific" -> skip();
-                default -> throw unexpected(tag + " of " + element, inner);
+                default -> {
+                    if (dialect == Dialect.STANDARD || !inner.equals("value")) {
+                        throw unexpected(tag + " of " + element, inner);
+                    }
+                    text[0] = xml.getElementText();
+                }
             }
         });
         if (text[0] == null) {
             throw source.mistake(at, element, tag + " without <text>");
         }
         return text[0];
+    }
+
+    /** The text of a label with a number, without the colour that PIPE writes before it. */
+    private String count(String element, String tag) throws XMLStreamException {
+        String text = label(element, tag).strip();
+        return dialect == Dialect.STANDARD ? text : text.replaceFirst("^[^,]*,", "");
     }
 
     private void skip() throws XMLStreamException {
@@ -316,6 +414,22 @@ final class PnmlReader {
         return value;
     }
 
+    /** Refuses attributes that are not known here, without those of other namespaces. */
+    private void attributes(String element, String... known) {
+        for (int i = 0; i < xml.getAttributeCount(); i++) {
+            String namespace = xml.getAttributeNamespace(i);
+            if ((namespace == null || namespace.isEmpty()) && !List.of(known).contains(xml.getAttributeLocalName(i))) {
+                throw mistake(element, "attribute " + xml.getAttributeLocalName(i) + "=\""
+                    + SourceText.shortened(xml.getAttributeValue(i)) + "\"; expected " + String.join(", ", known)
+                    + " and no other");
+            }
+        }
+    }
+
+    private void warn(String element, String message) {
+        warnings.add(mistake(element, message).getMessage());
+    }
+
     private void claim(String element) {
         if (!ids.add(id())) {
             throw mistake(element, "id " + id() + " is given twice; expected one of its own");
@@ -332,164 +446,5 @@ final class PnmlReader {
 
     private NetException unexpected(String element, String tag) {
         return mistake(element, "<" + tag + ">, which a place/transition net does not have");
-    }
-
-    private Node resolve(Link link, String end, String id) {
-        Deque<String> seen = new ArrayDeque<>();
-        Node node = nodes.get(id);
-        boolean place = node != null && node.isPlace();
-        while (node != null && node.refers != null) {
-            if (seen.contains(node.id)) {
-                throw source.mistake(node.line, node.tag + " " + node.id, "refers to itself by way of " + seen);
-            }
-            seen.push(node.id);
-            Node next = nodes.get(node.refers);
-            if (next == null || next.isPlace() != place) {
-                throw source.mistake(node.line, node.tag + " " + node.id, "refers to '" + node.refers + "'; expected the id of "
-                    + (place ? "a place" : "a transition"));
-            }
-            node = next;
-        }
-        if (node == null) {
-            throw source.mistake(link.line, "arc " + link.id, end + " '" + id
-                + "' is not there; expected the id of a place or transition");
-        }
-        return node;
-    }
-
-    private PetriNet build() {
-        // Each reference is resolved, even one without an arc.
-        nodes.values().forEach(node -> resolve(new Link("", node.line, "", ""), "reference", node.id));
-        Map<String, String> names = new HashMap<>();
-        names(names, "place");
-        names(names, "transition");
-        NetBuilder builder = PetriNet.named(netName.isBlank() ? "net" : netName.strip());
-        for (Node node : nodes.values()) {
-            if (node.tag.equals("place")) {
-                place(builder, node, names.get(node.id));
-            }
-        }
-        for (Node node : nodes.values()) {
-            if (node.tag.equals("transition")) {
-                transition(builder, node, names.get(node.id));
-            }
-        }
-        arcs(builder, names);
-        if (drawnOn.size() == 1) {
-            positions(builder, names);
-        }
-        return builder.build();
-    }
-
-    private void positions(NetBuilder builder, Map<String, String> names) {
-        for (Node node : nodes.values()) {
-            if (node.at != null && node.tag.equals("place")) {
-                builder.placeAt(names.get(node.id), node.at);
-            } else if (node.at != null && node.tag.equals("transition")) {
-                builder.transitionAt(names.get(node.id), node.at);
-            }
-        }
-        for (Link link : links) {
-            Ends ends = ends(link, resolve(link, "source", link.from), resolve(link, "target", link.to));
-            if (link.bends.length > 0) {
-                builder.bends(ends.kind, names.get(ends.place), names.get(ends.transition), link.bends);
-            }
-        }
-    }
-
-    /** The names, if all nodes of the kind have one of their own; otherwise their ids. */
-    private void names(Map<String, String> names, String tag) {
-        List<Node> all = nodes.values().stream().filter(node -> node.tag.equals(tag)).toList();
-        Set<String> different = new HashSet<>();
-        boolean named = all.stream().allMatch(node -> !node.name.isEmpty() && different.add(node.name));
-        all.forEach(node -> names.put(node.id, named ? node.name : node.id));
-    }
-
-    private void place(NetBuilder builder, Node node, String name) {
-        String element = "place " + node.id;
-        builder.place(name, node.initial);
-        node.own.forEach((tag, value) -> {
-            switch (tag) {
-                case "capacity" -> {
-                    int capacity = source.number(node.line, element, tag, value, 1);
-                    if (node.initial > capacity) {
-                        throw source.mistake(node.line, element, node.initial + " tokens; expected at most its capacity of "
-                            + capacity);
-                    }
-                    builder.capacity(capacity);
-                }
-                case "delay" -> builder.delay(nanos(node, element, value));
-                default -> throw source.mistake(node.line, element, "<" + tag + ">; expected <capacity> or <delay>");
-            }
-        });
-    }
-
-    private long nanos(Node node, String element, String value) {
-        try {
-            long nanos = Long.parseLong(value);
-            if (nanos >= 0) {
-                return nanos;
-            }
-        } catch (NumberFormatException wrong) {
-            // The mistake below says what was expected.
-        }
-        throw source.mistake(node.line, element, "delay '" + SourceText.shortened(value) + "'; expected nanoseconds, 0 or more");
-    }
-
-    private void transition(NetBuilder builder, Node node, String name) {
-        String element = "transition " + node.id;
-        builder.transition(name);
-        node.own.forEach((tag, value) -> {
-            switch (tag) {
-                case "priority" -> builder.priority(source.number(node.line, element, tag, value, Integer.MIN_VALUE));
-                case "delay" -> {
-                    String[] parts = value.split("\\s+");
-                    try {
-                        builder.delay(new Delay(Delay.Kind.valueOf(parts[0]), Long.parseLong(parts[1]), Long.parseLong(parts[2])));
-                    } catch (IllegalArgumentException | ArrayIndexOutOfBoundsException wrong) {
-                        throw source.mistake(node.line, element, "delay '" + SourceText.shortened(value)
-                            + "'; expected FIXED, EXPONENTIAL or UNIFORM and two figures in nanoseconds");
-                    }
-                }
-                default -> throw source.mistake(node.line, element, "<" + tag + ">; expected <priority> or <delay>");
-            }
-        });
-    }
-
-    private record Ends(ArcKind kind, String place, String transition) {
-    }
-
-    private static Ends ends(Link link, Node from, Node to) {
-        return to.isPlace() ? new Ends(ArcKind.OUTPUT, to.id, from.id) : new Ends(link.kind, from.id, to.id);
-    }
-
-    private void arcs(NetBuilder builder, Map<String, String> names) {
-        Map<Ends, Integer> weights = new LinkedHashMap<>();
-        for (Link link : links) {
-            Node from = resolve(link, "source", link.from);
-            Node to = resolve(link, "target", link.to);
-            String element = "arc " + link.id;
-            if (from.isPlace() == to.isPlace()) {
-                throw source.mistake(link.line, element, "from " + from.tag + " " + from.id + " to " + to.tag + " " + to.id
-                    + "; expected a place at one end and a transition at the other");
-            }
-            if (to.isPlace() && link.kind != ArcKind.INPUT) {
-                throw source.mistake(link.line, element, link.kind + " arc to a place; expected one to a transition");
-            }
-            Ends ends = ends(link, from, to);
-            boolean adds = ends.kind == ArcKind.INPUT || ends.kind == ArcKind.OUTPUT;
-            if (weights.containsKey(ends) && !adds) {
-                throw source.mistake(link.line, element, "a second " + ends.kind + " arc between " + from.id + " and " + to.id);
-            }
-            try {
-                // The standard allows several arcs between the same nodes: their weights add up.
-                weights.merge(ends, link.weight, Math::addExact);
-            } catch (ArithmeticException overflow) {
-                throw source.mistake(link.line, element, "the arcs between " + from.id + " and " + to.id
-                    + " weigh more than " + Integer.MAX_VALUE + " together");
-            }
-        }
-        weights.forEach((ends, weight) ->
-            builder.arc(ends.kind, names.get(ends.place), names.get(ends.transition), weight));
     }
 }

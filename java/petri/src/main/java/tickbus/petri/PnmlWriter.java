@@ -40,15 +40,21 @@ final class PnmlWriter {
             String place = "p" + arc.place();
             String transition = "t" + arc.transition();
             out.append("      <arc id=\"a").append(number++).append("\" source=\"").append(output ? transition : place)
-                .append("\" target=\"").append(output ? place : transition).append("\">");
+                .append("\" target=\"").append(output ? place : transition);
+            String type = switch (arc.kind()) {
+                case TEST -> "test";
+                case INHIBITOR -> "inhibitor";
+                default -> null;
+            };
+            out.append(type == null ? "\">" : "\" type=\"" + type + "\">");
             if (net.positions != null && net.positions.bends().containsKey(arc)) {
                 positions(out, net.positions.bends().get(arc));
             }
             if (arc.weight() > 1) {
                 out.append("<inscription><text>").append(arc.weight()).append("</text></inscription>");
             }
-            if (arc.kind() == ArcKind.TEST || arc.kind() == ArcKind.INHIBITOR) {
-                out.append("<type value=\"").append(arc.kind() == ArcKind.TEST ? "test" : "inhibitor").append("\"/>");
+            if (type != null) {
+                out.append("<type value=\"").append(type).append("\"/><arctype><text>").append(type).append("</text></arctype>");
             }
             out.append("</arc>\n");
         }

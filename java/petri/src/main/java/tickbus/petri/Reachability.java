@@ -38,7 +38,7 @@ public final class Reachability {
         bounds = new int[net.places().size()];
     }
 
-    /** Explores at most {@code limit} markings, 1 or more. */
+    /** Explores at most {@code limit} markings, 1 or more, and fewer if the heap has no room for them. */
     public static Reachability explore(PetriNet net, int limit) {
         if (limit < 1) {
             throw new IllegalArgumentException("a limit of " + limit + " markings; expected 1 or more");
@@ -71,6 +71,11 @@ public final class Reachability {
                 }
                 fired.set(t);
                 int before = store.size();
+                long more = store.bytesToGrow() + targets.bytesToGrow() + labels.bytesToGrow() + parentEdge.bytesToGrow()
+                    + firstEdge.bytesToGrow();
+                if (more > 0 && !Memory.has(bytes() + more)) {
+                    return;
+                }
                 int target = store.add(next);
                 if (target == before) {
                     if (before == limit) {

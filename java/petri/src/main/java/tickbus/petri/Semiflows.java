@@ -1,10 +1,10 @@
 package tickbus.petri;
 
-import java.math.BigInteger;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.BitSet;
 import java.util.List;
+import java.util.TreeMap;
 
 /**
  * Minimal semiflows by Farkas' algorithm, and the rank of the incidence matrix.
@@ -19,56 +19,134 @@ public final class Semiflows {
 
     /** The minimal P-semiflows, a weight for each place; a {@link GaveUpException} at more than {@code limit} rows. */
     public static List<int[]> places(PetriNet net, int limit) {
-        return farkas(net, "P-semiflows", net.incidence(), net.transitions().size(), limit);
+        return farkas(net, "P-semiflows", true, limit);
     }
 
     /** The minimal T-semiflows, a count for each transition; a {@link GaveUpException} at more than {@code limit} rows. */
     public static List<int[]> transitions(PetriNet net, int limit) {
-        int[][] incidence = net.incidence();
-        int[][] transposed = new int[net.transitions().size()][net.places().size()];
-        for (int p = 0; p < incidence.length; p++) {
-            for (int t = 0; t < transposed.length; t++) {
-                transposed[t][p] = incidence[p][t];
+        return farkas(net, "T-semiflows", false, limit);
+    }
+
+    /** Some columns of a row, in ascending order, and what is there. */
+    private record Sparse(int[] at, long[] value) {
+        long get(int column) {
+            int found = Arrays.binarySearch(at, column);
+            return found < 0 ? 0 : value[found];
+        }
+
+        /** {@code a} times this plus {@code b} times the other one. */
+        Sparse combined(long a, Sparse other, long b) {
+            int[] where = new int[at.length + other.at.length];
+            long[] what = new long[where.length];
+            int size = 0;
+            int i = 0;
+            int j = 0;
+            while (i < at.length || j < other.at.length) {
+                int here = i < at.length ? at[i] : Integer.MAX_VALUE;
+                int there = j < other.at.length ? other.at[j] : Integer.MAX_VALUE;
+                long sum = here <= there ? Math.multiplyExact(value[i++], a) : 0;
+                if (there <= here) {
+                    sum = Math.addExact(sum, Math.multiplyExact(other.value[j++], b));
+                }
+                if (sum != 0) {
+                    where[size] = Math.min(here, there);
+                    what[size++] = sum;
+                }
+            }
+            return new Sparse(Arrays.copyOf(where, size), Arrays.copyOf(what, size));
+        }
+
+        void divide(long by) {
+            for (int i = 0; i < value.length; i++) {
+                value[i] /= by;
             }
         }
-        return farkas(net, "T-semiflows", transposed, net.places().size(), limit);
     }
 
     /** What remains to become 0, and the combination of rows that gives it. */
-    private static final class Row {
-        final long[] rest;
-        final long[] weights;
-        final BitSet support = new BitSet();
-
-        Row(long[] rest, long[] weights) {
-            this.rest = rest;
-            this.weights = weights;
-            for (int i = 0; i < weights.length; i++) {
-                support.set(i, weights[i] != 0);
-            }
-        }
-
+    private record Row(Sparse rest, Sparse weights) {
+        /** Whether all that has a weight here has one in the other row. */
         boolean supports(Row other) {
-            BitSet more = (BitSet) support.clone();
-            more.andNot(other.support);
-            return more.isEmpty();
+            int j = 0;
+            for (int one : weights.at) {
+                while (j < other.weights.at.length && other.weights.at[j] < one) {
+                    j++;
+                }
+                if (j == other.weights.at.length || other.weights.at[j] != one) {
+                    return false;
+                }
+            }
+            return true;
         }
     }
 
-    private static List<int[]> farkas(PetriNet net, String what, int[][] matrix, int columns, int limit) {
-        List<Row> rows = new ArrayList<>();
-        for (int i = 0; i < matrix.length; i++) {
-            long[] weights = new long[matrix.length];
-            weights[i] = 1;
-            rows.add(new Row(Arrays.stream(matrix[i]).asLongStream().toArray(), weights));
+    /** How many rows are above and below 0 in each column. */
+    private static final class Columns {
+        final int[] above;
+        final int[] below;
+
+        Columns(int columns) {
+            above = new int[columns];
+            below = new int[columns];
         }
+
+        void count(Row row, int by) {
+            for (int i = 0; i < row.rest.at.length; i++) {
+                (row.rest.value[i] > 0 ? above : below)[row.rest.at[i]] += by;
+            }
+        }
+
+        /** The column that makes the fewest new rows. */
+        int cheapest(BitSet left) {
+            int best = -1;
+            long least = Long.MAX_VALUE;
+            for (int column = left.nextSetBit(0); column >= 0; column = left.nextSetBit(column + 1)) {
+                long made = (long) above[column] * below[column] - above[column] - below[column];
+                if (made < least) {
+                    least = made;
+                    best = column;
+                }
+            }
+            return best;
+        }
+    }
+
+    private static List<Row> rows(PetriNet net, boolean ofPlaces) {
+        Effects effects = net.effects;
+        List<TreeMap<Integer, Long>> gains = new ArrayList<>();
+        for (int i = 0; i < (ofPlaces ? net.places() : net.transitions()).size(); i++) {
+            gains.add(new TreeMap<>());
+        }
+        for (int t = 0; t < net.transitions().size(); t++) {
+            for (int i = effects.changeFirst[t]; i < effects.changeFirst[t + 1]; i++) {
+                int p = effects.changePlace[i];
+                long gain = (long) effects.changePuts[i] - effects.changeTakes[i];
+                if (gain != 0) {
+                    gains.get(ofPlaces ? p : t).put(ofPlaces ? t : p, gain);
+                }
+            }
+        }
+        List<Row> rows = new ArrayList<>();
+        for (TreeMap<Integer, Long> one : gains) {
+            rows.add(new Row(new Sparse(one.keySet().stream().mapToInt(Integer::intValue).toArray(),
+                one.values().stream().mapToLong(Long::longValue).toArray()), new Sparse(new int[] {rows.size()}, new long[] {1})));
+        }
+        return rows;
+    }
+
+    private static List<int[]> farkas(PetriNet net, String what, boolean ofPlaces, int limit) {
+        int columns = (ofPlaces ? net.transitions() : net.places()).size();
+        List<Row> rows = rows(net, ofPlaces);
+        int width = rows.size();
+        Columns counts = new Columns(columns);
+        rows.forEach(row -> counts.count(row, 1));
         BitSet left = new BitSet();
         left.set(0, columns);
         while (!left.isEmpty()) {
-            int column = cheapest(rows, left);
+            int column = counts.cheapest(left);
             left.clear(column);
             try {
-                rows = eliminate(rows, column, limit);
+                rows = eliminate(rows, column, limit, counts);
             } catch (ArithmeticException overflow) {
                 throw new GaveUpException("net " + net.name() + ": " + what + ": gave up, as a weight is greater than "
                     + Long.MAX_VALUE);
@@ -80,53 +158,42 @@ public final class Semiflows {
         }
         List<int[]> flows = new ArrayList<>();
         for (Row row : rows) {
+            int[] flow = new int[width];
             try {
-                flows.add(Arrays.stream(row.weights).mapToInt(Math::toIntExact).toArray());
+                for (int i = 0; i < row.weights.at.length; i++) {
+                    flow[row.weights.at[i]] = Math.toIntExact(row.weights.value[i]);
+                }
             } catch (ArithmeticException overflow) {
                 throw new GaveUpException("net " + net.name() + ": " + what + ": gave up, as a weight is greater than "
                     + Integer.MAX_VALUE);
             }
+            flows.add(flow);
         }
         flows.sort((a, b) -> Arrays.compare(b, a));
         return flows;
     }
 
-    /** The column that makes the fewest new rows. */
-    private static int cheapest(List<Row> rows, BitSet left) {
-        int best = -1;
-        long least = Long.MAX_VALUE;
-        for (int column = left.nextSetBit(0); column >= 0; column = left.nextSetBit(column + 1)) {
-            long positive = 0;
-            long negative = 0;
-            for (Row row : rows) {
-                positive += row.rest[column] > 0 ? 1 : 0;
-                negative += row.rest[column] < 0 ? 1 : 0;
-            }
-            long made = positive * negative - positive - negative;
-            if (made < least) {
-                least = made;
-                best = column;
-            }
-        }
-        return best;
-    }
-
     /** The rows that are 0 in the column, with all positive combinations that become so; null above the limit. */
-    private static List<Row> eliminate(List<Row> rows, int column, int limit) {
+    private static List<Row> eliminate(List<Row> rows, int column, int limit, Columns counts) {
         List<Row> kept = new ArrayList<>();
+        List<Row> above = new ArrayList<>();
+        List<Row> below = new ArrayList<>();
         for (Row row : rows) {
-            if (row.rest[column] == 0) {
-                kept.add(row);
-            }
+            long value = row.rest.get(column);
+            (value == 0 ? kept : value > 0 ? above : below).add(row);
         }
-        for (Row plus : rows) {
-            for (Row minus : plus.rest[column] > 0 ? rows : List.<Row>of()) {
-                if (minus.rest[column] >= 0) {
-                    continue;
-                }
+        for (Row plus : above) {
+            for (Row minus : below) {
                 Row sum = sum(plus, minus, column);
                 if (kept.stream().noneMatch(row -> row.supports(sum))) {
-                    kept.removeIf(row -> sum.supports(row));
+                    kept.removeIf(row -> {
+                        boolean larger = sum.supports(row);
+                        if (larger) {
+                            counts.count(row, -1);
+                        }
+                        return larger;
+                    });
+                    counts.count(sum, 1);
                     kept.add(sum);
                     if (kept.size() > limit) {
                         return null;
@@ -134,71 +201,35 @@ public final class Semiflows {
                 }
             }
         }
+        above.forEach(row -> counts.count(row, -1));
+        below.forEach(row -> counts.count(row, -1));
         return kept;
     }
 
     private static Row sum(Row plus, Row minus, int column) {
-        long a = Math.negateExact(minus.rest[column]);
-        long b = plus.rest[column];
+        long a = Math.negateExact(minus.rest.get(column));
+        long b = plus.rest.get(column);
         long divisor = gcd(a, b);
-        long[] rest = combine(plus.rest, a / divisor, minus.rest, b / divisor);
-        long[] weights = combine(plus.weights, a / divisor, minus.weights, b / divisor);
+        Sparse rest = plus.rest.combined(a / divisor, minus.rest, b / divisor);
+        Sparse weights = plus.weights.combined(a / divisor, minus.weights, b / divisor);
         long common = 0;
-        for (long value : weights) {
+        for (long value : weights.value) {
             common = gcd(common, value);
         }
-        for (long value : rest) {
+        for (long value : rest.value) {
             common = gcd(common, Math.abs(value));
         }
-        for (int i = 0; i < weights.length; i++) {
-            weights[i] /= common;
-        }
-        for (int i = 0; i < rest.length; i++) {
-            rest[i] /= common;
-        }
+        weights.divide(common);
+        rest.divide(common);
         return new Row(rest, weights);
-    }
-
-    private static long[] combine(long[] x, long a, long[] y, long b) {
-        long[] sum = new long[x.length];
-        for (int i = 0; i < x.length; i++) {
-            sum[i] = Math.addExact(Math.multiplyExact(x[i], a), Math.multiplyExact(y[i], b));
-        }
-        return sum;
     }
 
     private static long gcd(long a, long b) {
         return b == 0 ? a : gcd(b, a % b);
     }
 
-    /** The rank of the incidence matrix. */
+    /** The rank of the incidence matrix; a {@link GaveUpException} if that takes too much memory or time. */
     public static int rank(PetriNet net) {
-        BigInteger[][] m = Arrays.stream(net.incidence())
-            .map(row -> Arrays.stream(row).mapToObj(BigInteger::valueOf).toArray(BigInteger[]::new))
-            .toArray(BigInteger[][]::new);
-        int columns = net.transitions().size();
-        int rank = 0;
-        BigInteger last = BigInteger.ONE;
-        for (int column = 0; column < columns && rank < m.length; column++) {
-            int pivot = rank;
-            while (pivot < m.length && m[pivot][column].signum() == 0) {
-                pivot++;
-            }
-            if (pivot == m.length) {
-                continue;
-            }
-            BigInteger[] swapped = m[rank];
-            m[rank] = m[pivot];
-            m[pivot] = swapped;
-            // Bareiss: every division is exact.
-            for (int row = rank + 1; row < m.length; row++) {
-                for (int c = columns - 1; c >= column; c--) {
-                    m[row][c] = m[row][c].multiply(m[rank][column]).subtract(m[row][column].multiply(m[rank][c])).divide(last);
-                }
-            }
-            last = m[rank][column];
-            rank++;
-        }
-        return rank;
+        return new Rank(net).compute();
     }
 }

@@ -11,9 +11,12 @@ import java.util.List;
  * Test and inhibitor arcs do not matter. There may be exponentially many, so there is a limit.
  */
 public final class Siphons {
+    private static final int NONE = -1;
+    private static final int SEVERAL = -2;
+
     private final int places;
     private final int[][] puttersOf;
-    private final BitSet[] takesFrom;
+    private final int[][] takesFrom;
     private final long limit;
     private final String what;
     private final List<BitSet> found = new ArrayList<>();
@@ -23,21 +26,28 @@ public final class Siphons {
         places = net.places().size();
         this.limit = limit;
         what = "net " + net.name() + ": " + (traps ? "traps" : "siphons");
-        int[][] pre = traps ? net.post() : net.pre();
-        int[][] post = traps ? net.pre() : net.post();
         int transitions = net.transitions().size();
-        puttersOf = new int[places][];
-        takesFrom = new BitSet[transitions];
+        List<List<Integer>> putters = new ArrayList<>();
+        List<List<Integer>> takes = new ArrayList<>();
+        for (int p = 0; p < places; p++) {
+            putters.add(new ArrayList<>());
+        }
         for (int t = 0; t < transitions; t++) {
-            takesFrom[t] = new BitSet();
-            for (int p = 0; p < places; p++) {
-                takesFrom[t].set(p, pre[p][t] > 0);
+            takes.add(new ArrayList<>());
+        }
+        for (Arc arc : net.arcs()) {
+            if (arc.kind() == (traps ? ArcKind.INPUT : ArcKind.OUTPUT)) {
+                putters.get(arc.place()).add(arc.transition());
+            } else if (arc.kind() == (traps ? ArcKind.OUTPUT : ArcKind.INPUT)) {
+                takes.get(arc.transition()).add(arc.place());
             }
         }
-        for (int p = 0; p < places; p++) {
-            int[] row = post[p];
-            puttersOf[p] = java.util.stream.IntStream.range(0, transitions).filter(t -> row[t] > 0).toArray();
-        }
+        puttersOf = putters.stream().map(Siphons::sorted).toArray(int[][]::new);
+        takesFrom = takes.stream().map(Siphons::sorted).toArray(int[][]::new);
+    }
+
+    private static int[] sorted(List<Integer> of) {
+        return of.stream().mapToInt(Integer::intValue).sorted().toArray();
     }
 
     /** The minimal siphons as sets of places; a {@link GaveUpException} after {@code limit} steps of the search. */
@@ -52,42 +62,99 @@ public final class Siphons {
 
     private List<BitSet> search() {
         BitSet barred = new BitSet();
-        for (int p = 0; p < places; p++) {
-            BitSet start = new BitSet();
-            start.set(p);
-            extend(start, barred);
-            barred.set(p);
+        try {
+            for (int p = 0; p < places; p++) {
+                BitSet start = new BitSet();
+                start.set(p);
+                Ints open = new Ints();
+                open.add(p);
+                extend(start, barred, open);
+                barred.set(p);
+            }
+        } catch (StackOverflowError deep) {
+            throw new GaveUpException(what + ": gave up at a search of " + steps + " steps that does not fit on the stack, with "
+                + found.size() + " found");
         }
         found.sort(Comparator.comparing(BitSet::toString));
         return found;
     }
 
-    /** Adds places until every putter also takes; all ways, without the barred places. */
-    private void extend(BitSet set, BitSet barred) {
-        if (++steps > limit) {
-            throw new GaveUpException(what + ": gave up at " + limit + " steps, with " + found.size() + " found");
-        }
+    /**
+     * Adds places until every putter also takes; all ways, without the barred places. Only the putters of the open places
+     * are to be looked at: what takes from a set takes from a larger one.
+     */
+    private void extend(BitSet set, BitSet barred, Ints open) {
+        step();
         if (found.stream().anyMatch(smaller -> contains(set, smaller))) {
             return;
         }
-        for (int p = set.nextSetBit(0); p >= 0; p = set.nextSetBit(p + 1)) {
-            for (int t : puttersOf[p]) {
-                if (!takesFrom[t].intersects(set)) {
-                    BitSet without = (BitSet) barred.clone();
-                    for (int q = takesFrom[t].nextSetBit(0); q >= 0; q = takesFrom[t].nextSetBit(q + 1)) {
-                        if (!without.get(q)) {
-                            BitSet larger = (BitSet) set.clone();
-                            larger.set(q);
-                            extend(larger, without);
-                            without.set(q);
-                        }
-                    }
-                    return;
+        while (open.size() > 0) {
+            int t = putter(set, open.get(open.size() - 1));
+            if (t < 0) {
+                open.pop();
+                continue;
+            }
+            int only = only(t, barred);
+            if (only == NONE) {
+                return;
+            }
+            if (only != SEVERAL) {
+                step();
+                set.set(only);
+                open.add(only);
+                continue;
+            }
+            BitSet without = (BitSet) barred.clone();
+            for (int q : takesFrom[t]) {
+                if (!without.get(q)) {
+                    BitSet larger = (BitSet) set.clone();
+                    larger.set(q);
+                    Ints also = open.copy();
+                    also.add(q);
+                    extend(larger, without, also);
+                    without.set(q);
                 }
             }
+            return;
         }
-        found.removeIf(larger -> contains(larger, set));
-        found.add(set);
+        if (found.stream().noneMatch(smaller -> contains(set, smaller))) {
+            found.removeIf(larger -> contains(larger, set));
+            found.add(set);
+        }
+    }
+
+    private void step() {
+        if (++steps > limit) {
+            throw new GaveUpException(what + ": gave up at " + limit + " steps, with " + found.size() + " found");
+        }
+    }
+
+    /** A transition that puts into the place and takes nothing from the set; -1 if there is none. */
+    private int putter(BitSet set, int place) {
+        for (int t : puttersOf[place]) {
+            boolean takes = false;
+            for (int q : takesFrom[t]) {
+                takes |= set.get(q);
+            }
+            if (!takes) {
+                return t;
+            }
+        }
+        return -1;
+    }
+
+    /** The one place that the transition takes from and that is not barred. */
+    private int only(int t, BitSet barred) {
+        int only = NONE;
+        for (int q : takesFrom[t]) {
+            if (!barred.get(q)) {
+                if (only != NONE) {
+                    return SEVERAL;
+                }
+                only = q;
+            }
+        }
+        return only;
     }
 
     private static boolean contains(BitSet larger, BitSet smaller) {

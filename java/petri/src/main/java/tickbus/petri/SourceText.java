@@ -44,7 +44,8 @@ record SourceText(String source, String text) {
         return (int) value;
     }
 
+    /** At most 40 characters for a message, without control characters, which a terminal would obey. */
     static String shortened(String text) {
-        return text.length() > 40 ? text.substring(0, 40) + "…" : text;
+        return (text.length() > 40 ? text.substring(0, 40) + "…" : text).replaceAll("\\p{Cntrl}", "\uFFFD");
     }
 }

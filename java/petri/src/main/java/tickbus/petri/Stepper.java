@@ -65,7 +65,7 @@ public final class Stepper implements RunningNet {
                 enabling.due.remove(t);
             }
         });
-        enabling.start(now);
+        enabling.start(net.initialMarking().tokens, now);
         release();
     }
 

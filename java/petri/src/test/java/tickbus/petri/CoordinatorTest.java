@@ -222,7 +222,22 @@ class CoordinatorTest {
         assertEquals(1250, coordinator.nextDue());
         assertEquals(0, coordinator.scan(1249));
         assertEquals(1, coordinator.scan(1250));
-        assertThrows(IllegalArgumentException.class, () -> coordinator.scan(1249));
+    }
+
+    @Test
+    void aClockThatGoesBackStopsTheControllerWithItsOutputsFailSafe() {
+        double[] motor = {-1};
+        Coordinator coordinator = Coordinator.of(PetriNet.named("n").place("p", 1).build()).output("motor", 0)
+            .writer(values -> motor[0] = values[0]).during("p", (in, out) -> out.set("motor", 1)).build();
+        coordinator.scan(1250);
+        assertEquals(1, motor[0]);
+        assertEquals(0, coordinator.scan(1249));
+        assertEquals(0, motor[0]);
+        Stop stop = coordinator.stop().orElseThrow();
+        assertEquals("clock", stop.element());
+        assertTrue(stop.message().contains("a scan at 1249 ns after one at 1250; expected a time that does not go back"), stop.message());
+        assertEquals(0, coordinator.scan(1300));
+        assertEquals(0, motor[0]);
     }
 
     @Test

@@ -70,6 +70,13 @@ class HpsimTextTest {
     }
 
     @Test
+    void aBinaryFileOfHpsimIsNamedAsSuch() {
+        assertEquals("n.txt:1: a binary file; if it is a .hps of HPSim, open it there and export it as .hpx",
+            mistake("\u00ff\u00ff\u0002\0CObject\u0001\0"));
+        assertTrue(mistake("\u001b[31mno section").contains("'\uFFFD[31mno section' before any section"));
+    }
+
+    @Test
     void aTextThatIsCutOffIsNeverAWrongNet() {
         PetriNet whole = Samples.paper();
         int read = 0;

@@ -86,6 +86,21 @@ class PetriNetTest {
     }
 
     @Test
+    void aDelayBelongsToWhatWasNamedLast() {
+        PetriNet net = PetriNet.named("x").place("p", 1).delay(5).place("q").delay(Delay.fixed(6))
+            .transition("t").delay(500_000_000L).input("p").output("q").build();
+        assertEquals(5, net.place("p").delay());
+        assertEquals(6, net.place("q").delay());
+        assertEquals(Delay.fixed(500_000_000L), net.transition("t").delay());
+        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("x").delay(1).place("p").delay(Delay.exponential(5))
+            .transition("t").delay(-1).capacity(1).build());
+        for (String one : new String[] {"delay 1: there is no place or transition yet", "place p: a delay of kind EXPONENTIAL; expected a fixed one",
+            "transition t: delay -1 ns; expected 0 or more", "capacity 1 of transition t; call place(...) before capacity(...)"}) {
+            assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
+        }
+    }
+
+    @Test
     void anUnknownNameSaysWhichThereAre() {
         String text = assertThrows(IllegalArgumentException.class, () -> Samples.paper().place("P9")).getMessage();
         assertTrue(text.contains("there is no place 'P9'; there are [P0, P1"), text);

@@ -34,6 +34,7 @@ public final class BoundNet {
     final List<String> mistakes = new ArrayList<>();
     FiringListener listener = (scan, nanos, transition, choices) -> { };
     long seed;
+    boolean keepsEdges;
     private List<Term> terms;
     private Step.Moment moment;
     private String node;
@@ -55,6 +56,15 @@ public final class BoundNet {
     /** The seed of every choice and every random delay; 0 unless given. */
     public BoundNet seed(long value) {
         seed = value;
+        return this;
+    }
+
+    /**
+     * Lets an edge count for the whole scan. Without this, as in Grafcet, one evolution uses it: it counts for the
+     * transitions that were enabled when the scan began, and each fires once by it.
+     */
+    public BoundNet keepEdges() {
+        keepsEdges = true;
         return this;
     }
 
@@ -83,7 +93,7 @@ public final class BoundNet {
         return term(Term.of(Term.Kind.OFF, signal, 0));
     }
 
-    /** The signal of the last {@link #on} has become so with this scan; an edge is there for one scan. */
+    /** The signal of the last {@link #on} has become so with this scan: see {@link #keepEdges}. */
     public BoundNet rising() {
         return edge("rising()", Term.Kind.ON, Term.Kind.RISING);
     }

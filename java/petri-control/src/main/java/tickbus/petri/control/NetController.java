@@ -1,10 +1,15 @@
 package tickbus.petri.control;
 
+import java.io.IOException;
+import java.io.UncheckedIOException;
+import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.TimeUnit;
 import java.util.concurrent.locks.LockSupport;
 import java.util.function.BooleanSupplier;
 import tickbus.Signal;
@@ -13,6 +18,8 @@ import tickbus.Tickbus;
 import tickbus.petri.Action;
 import tickbus.petri.Coordinator;
 import tickbus.petri.CoordinatorBuilder;
+import tickbus.petri.Marking;
+import tickbus.petri.MarkingFile;
 import tickbus.petri.NetWatch;
 import tickbus.petri.Stop;
 
@@ -26,9 +33,10 @@ import tickbus.petri.Stop;
  * was. The other nets go on, and see its last marking.
  *
  * <p>While the line is stale no net is scanned: values that nobody sent must not fire anything. Belongs to the driver's
- * ticking thread; the driver stays the caller's, who closes it.
+ * ticking thread; the driver stays the caller's, who closes it, unless {@link #run} ends by an exception or with the JVM.
  */
 public final class NetController {
+    private static final long NANOS_TO_END = 1_000_000_000;
     private static final String STALE = "the line is stale: no net is scanned";
 
     private final Tickbus bus;
@@ -40,6 +48,12 @@ public final class NetController {
     /** The input that stops the nets' clock; -1 if none does. For how long it has. */
     private int stopsClock = -1;
     private long stoodNanos;
+    private final Safety safety;
+    private Path file;
+    /** Whether the marking has changed since it was saved last. */
+    private boolean unsaved = true;
+    /** Whether the JVM ends. */
+    private volatile boolean ending;
     private long scans;
     private long staleScans;
 
@@ -55,7 +69,11 @@ public final class NetController {
             one.conditions.forEach((transition, terms) -> {
                 Conditions condition = new Conditions(terms, latch, byName::get, coordinators);
                 conditions.add(condition);
-                builder.when(transition, condition);
+                if (!one.keepsEdges && terms.stream().anyMatch(term -> term.kind().isEdge())) {
+                    builder.whenEdge(transition, condition);
+                } else {
+                    builder.when(transition, condition);
+                }
             });
             List<String> outputs = List.copyOf(one.outputs());
             Signal[] signals = outputs.stream().map(bus::signal).toArray(Signal[]::new);
@@ -78,6 +96,7 @@ public final class NetController {
         conditions.forEach(Conditions::connect);
         order = coordinators.values().toArray(Coordinator[]::new);
         watch = NetWatch.of(List.of(order));
+        safety = new Safety(latch, nets.stream().flatMap(one -> one.outputs().stream()).map(bus::signal).toList());
     }
 
     /**
@@ -101,11 +120,79 @@ public final class NetController {
      * @throws IllegalArgumentException if there is no such input
      */
     public NetController stopClockWhile(String input) {
-        if (bus.signal(input).isWritten()) {
-            throw new IllegalArgumentException("signal '" + input + "' is an output; the clock stands still while an input is on");
-        }
-        stopsClock = latch.names.indexOf(input);
+        stopsClock = input(input);
         return this;
+    }
+
+    /**
+     * Sends the fail-safe values of the driver.cfg while an input is on, such as that of an emergency stop, and afterwards
+     * until {@code rearm} goes on: letting the emergency stop go starts nothing. Meanwhile no net is scanned, their clock
+     * stands still, and edges pass unseen; that of {@code rearm} too. Then the nets continue with their markings.
+     *
+     * @param input not 0 while the outputs are to be fail-safe
+     * @param rearm the input that has to go on after that
+     * @return this
+     * @throws IllegalArgumentException if there is no such input
+     * @throws IllegalStateException if an input was named before
+     */
+    public NetController failSafeWhile(String input, String rearm) {
+        safety.bind(input(input), true, input, input(rearm), rearm);
+        return this;
+    }
+
+    /** As {@link #failSafeWhile}, while the input is off: for a closed circuit, where a broken wire is a stop, too. */
+    public NetController failSafeUnless(String input, String rearm) {
+        safety.bind(input(input), false, input, input(rearm), rearm);
+        return this;
+    }
+
+    private int input(String name) {
+        if (bus.signal(name).isWritten()) {
+            throw new IllegalArgumentException("signal '" + name + "' is an output; expected an input");
+        }
+        return latch.names.indexOf(name);
+    }
+
+    /**
+     * Saves the markings of all nets in a file, in the first scan and then in each scan that changes them, before its
+     * outputs are sent. The file is replaced as a whole. It survives the end of the process; power that fails in that
+     * moment may lose it. Such a scan allocates. One that cannot save throws an {@link UncheckedIOException}.
+     *
+     * @return this
+     */
+    public NetController keepMarkings(Path in) {
+        file = in;
+        return this;
+    }
+
+    /**
+     * Begins with the markings that {@link #keepMarkings} saved, in place of the initial ones; only before the first scan.
+     * The entry actions of marked places run and delays begin in the first scan. Nobody else knows whether the machine
+     * still is as it was.
+     *
+     * @return this
+     * @throws IOException if the file cannot be read
+     * @throws tickbus.petri.NetException if it is not of these nets
+     */
+    public NetController resume(Path from) throws IOException {
+        List<Marking> markings = MarkingFile.read(from, Arrays.stream(order).map(Coordinator::net).toList());
+        for (int i = 0; i < order.length; i++) {
+            order[i].resume(markings.get(i));
+        }
+        return this;
+    }
+
+    private void save(int fired) {
+        unsaved |= fired > 0;
+        if (file == null || !unsaved) {
+            return;
+        }
+        try {
+            MarkingFile.write(file, Arrays.stream(order).map(Coordinator::marking).toList());
+        } catch (IOException e) {
+            throw new UncheckedIOException("the markings cannot be saved in " + file + ": " + e, e);
+        }
+        unsaved = false;
     }
 
     /** Outputs that are on exactly while a place is marked. */
@@ -183,34 +270,42 @@ public final class NetController {
     /**
      * One scan, which is one exchange of the driver.
      *
-     * @param nanos the time, which must not go back; also the driver's simulation time
+     * @param nanos the time; also the driver's simulation time. If it goes back, all nets stop
      * @return how many transitions fired; 0 if the line is stale
      * @throws tickbus.FieldbusException as {@link Tickbus#exchange()}
      */
     public int scan(long nanos) {
-        int status = bus.receive(nanos);
+        // A driver in simulation time would fail for good at a clock that goes back, and could not send the fail-safe values.
+        long latest = scans == 0 ? nanos : Math.max(nanos, lastNanos);
+        int status = bus.receive(latest);
         int fired = 0;
         scans++;
-        if (status == Status.STALE.code()) {
+        boolean stale = status == Status.STALE.code();
+        if (stale) {
             staleScans++;
         } else {
             latch.take();
-            if (stopsClock >= 0 && latch.now[stopsClock] != 0 && scans > 1) {
-                stoodNanos += nanos - lastNanos;
-            }
+        }
+        boolean held = stale ? safety.isHolding() : safety.holds();
+        if (scans > 1 && (held || !stale && stopsClock >= 0 && latch.now[stopsClock] != 0)) {
+            stoodNanos += latest - lastNanos;
+        }
+        if (!stale && !held) {
             for (Coordinator coordinator : order) {
                 fired += coordinator.scan(nanos - stoodNanos);
             }
+            save(fired);
         }
         bus.send();
-        watch.offer(status == Status.STALE.code() ? STALE : "");
-        lastNanos = nanos;
+        watch.offer(stale ? STALE : held ? safety.note() : "");
+        lastNanos = latest;
         return fired;
     }
 
     /**
      * Scans in real time, until {@code more} says no or the thread is interrupted. The time goes on from the last scan, or
-     * begins at 0; what passed since that scan does not count.
+     * begins at 0; what passed since that scan does not count. If something throws, or if the JVM ends, the driver is
+     * closed, so that its outputs do not stay as they are.
      *
      * @param periodNanos from one scan to the next, above 0; a scan that is late shifts those after it
      * @param more asked once before each scan, when it is due
@@ -219,6 +314,30 @@ public final class NetController {
         if (periodNanos <= 0) {
             throw new IllegalArgumentException("a period of " + periodNanos + " ns; expected more than 0");
         }
+        CountDownLatch ended = new CountDownLatch(1);
+        Thread running = Thread.currentThread();
+        Thread hook = new Thread(() -> end(running, ended), "end of the nets");
+        try {
+            Runtime.getRuntime().addShutdownHook(hook);
+        } catch (IllegalStateException endsAlready) {
+            ending = true;
+        }
+        try {
+            repeat(periodNanos, more);
+        } catch (RuntimeException | Error thrown) {
+            bus.close();
+            throw thrown;
+        } finally {
+            ended.countDown();
+            try {
+                Runtime.getRuntime().removeShutdownHook(hook);
+            } catch (IllegalStateException itRuns) {
+                // The hook closes the driver.
+            }
+        }
+    }
+
+    private void repeat(long periodNanos, BooleanSupplier more) {
         long start = System.nanoTime() - lastNanos;
         long due = lastNanos;
         while (waitUntil(start + due) && more.getAsBoolean()) {
@@ -228,9 +347,21 @@ public final class NetController {
         }
     }
 
-    /** Whether the time has come; otherwise the thread was interrupted. */
-    private static boolean waitUntil(long nanoTime) {
-        while (!Thread.currentThread().isInterrupted()) {
+    /** Ends a run as the JVM ends, and closes the driver, also behind an action that hangs. */
+    void end(Thread running, CountDownLatch ended) {
+        ending = true;
+        LockSupport.unpark(running);
+        try {
+            ended.await(NANOS_TO_END, TimeUnit.NANOSECONDS);
+        } catch (InterruptedException e) {
+            Thread.currentThread().interrupt();
+        }
+        bus.close();
+    }
+
+    /** Whether the time has come; otherwise the thread was interrupted, or the JVM ends. */
+    private boolean waitUntil(long nanoTime) {
+        while (!ending && !Thread.currentThread().isInterrupted()) {
             long wait = nanoTime - System.nanoTime();
             if (wait <= 0) {
                 return true;

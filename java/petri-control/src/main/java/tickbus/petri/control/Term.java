@@ -17,6 +17,10 @@ record Term(Kind kind, String name, String place, double value, Condition code) 
     enum Kind {
         ON, OFF, RISING, FALLING, AT_LEAST, BELOW, EQUAL, MARKED, UNMARKED, CODE;
 
+        boolean isEdge() {
+            return this == RISING || this == FALLING;
+        }
+
         boolean isOfPlace() {
             return this == MARKED || this == UNMARKED;
         }

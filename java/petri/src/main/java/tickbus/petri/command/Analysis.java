@@ -79,7 +79,11 @@ final class Analysis {
             : transitions(graph, "never", graph::canFire).substring(2));
         line("reversible", answer(graph.isReversible()) + (graph.isComplete() ? "; " + count(graph.homeStates().cardinality(),
             "home state") : ""));
-        line("rank", Integer.toString(Semiflows.rank(net)));
+        try {
+            line("rank", Integer.toString(Semiflows.rank(net)));
+        } catch (GaveUpException e) {
+            line("rank", e.getMessage());
+        }
         list("P-semiflows", () -> Semiflows.places(net, MOST_ROWS).stream().map(this::placeFlow).toList());
         list("T-semiflows", () -> Semiflows.transitions(net, MOST_ROWS).stream()
             .map(flow -> sum(flow, t -> net.transition(t).name())).toList());

@@ -12,6 +12,7 @@ import java.util.List;
 import java.util.Locale;
 import java.util.Map;
 import tickbus.petri.Delay;
+import tickbus.petri.Dialect;
 import tickbus.petri.Hpx;
 import tickbus.petri.HpsimText;
 import tickbus.petri.Imported;
@@ -42,10 +43,11 @@ final class NetFile {
         if (!delays.isEmpty() && !format.equals("text")) {
             throw new UsageException("--delay is for HPSim's text; " + file + " has its delays itself");
         }
-        if (format.equals("pnml")) {
-            return Pnml.read(file);
-        }
-        Imported imported = format.equals("hpx") ? Hpx.read(file, nanos) : HpsimText.read(file, delays);
+        Imported imported = switch (format) {
+            case "pnml" -> Pnml.read(file, Dialect.ANY);
+            case "hpx" -> Hpx.read(file, nanos);
+            default -> HpsimText.read(file, delays);
+        };
         imported.warnings().forEach(warning -> err.println("warning: " + warning));
         if (format.equals("hpx") && unit == null
                 && imported.net().transitions().stream().anyMatch(one -> one.delay().kind() != Delay.Kind.NONE)) {

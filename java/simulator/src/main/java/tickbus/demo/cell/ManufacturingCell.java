@@ -15,6 +15,8 @@ import tickbus.simulator.Machine;
  */
 public final class ManufacturingCell implements Machine {
     private static final double ON = 0.5;
+    /** From the button Rearm until air and motors are back: the control's outputs are there before that. */
+    private static final long CONTACTOR_NANOS = 50_000_000;
 
     /** Takes a Boolean variable. */
     private interface Switch {
@@ -35,6 +37,8 @@ public final class ManufacturingCell implements Machine {
     private boolean integrated = true;
     private boolean rearm;
     private boolean emergency;
+    /** How long air and motors have been wanted again since the emergency stop; as long as the contactor takes if never cut. */
+    private long contactorNanos = CONTACTOR_NANOS;
     private boolean partsLamp;
     private boolean capsLamp;
     private boolean runningLamp;
@@ -175,8 +179,7 @@ public final class ManufacturingCell implements Machine {
         if (nanos < 0) {
             throw new IllegalArgumentException("a step of " + nanos + " ns; expected 0 or more");
         }
-        // The emergency stop cuts air and motors, whatever the control wants.
-        if (emergency) {
+        if (!hasPower(nanos)) {
             return;
         }
         boolean loaderJam = one.loader.isJammed();
@@ -187,6 +190,18 @@ public final class ManufacturingCell implements Machine {
         four.step(transport.at(4), nanos);
         counters.loaderJams += loaderJam && !one.loader.isJammed() ? 1 : 0;
         counters.palletJams += palletJam && !transport.isJammed() ? 1 : 0;
+    }
+
+    /** The emergency stop cuts air and motors, whatever the control wants; letting it go brings them back only after Rearm. */
+    private boolean hasPower(long nanos) {
+        if (emergency) {
+            contactorNanos = -1;
+        } else if (contactorNanos < 0 && rearm) {
+            contactorNanos = 0;
+        } else if (contactorNanos >= 0 && contactorNanos < CONTACTOR_NANOS) {
+            contactorNanos += nanos;
+        }
+        return contactorNanos >= CONTACTOR_NANOS;
     }
 
     /** Puts sleeves into the magazine of station 1, which come out in this order. */
@@ -229,12 +244,15 @@ public final class ManufacturingCell implements Machine {
         integrated = on;
     }
 
-    /** Presses the button that tells station 1 that its magazine is filled, or lets it go. */
+    /**
+     * Presses the button Rearm, or lets it go: after an emergency stop it brings air and motors back; otherwise it tells
+     * station 1 that its magazine is filled.
+     */
     public void rearm(boolean on) {
         rearm = on;
     }
 
-    /** Presses the emergency stop, or lets it go. */
+    /** Presses the emergency stop, or lets it go, after which the cell waits for {@link #rearm}. */
     public void emergency(boolean on) {
         emergency = on;
     }

@@ -265,6 +265,12 @@ class ManufacturingCellTest {
         assertEquals(1, get("S1 emergency"));
         assertEquals(1, get("S1 loader back"));
         assertEquals(0, get("Pallet at stop 1"));
+        cell.emergency(false);
+        steps(100);
+        assertEquals(1, get("S1 loader back"), "letting it go starts nothing");
+        cell.rearm(true);
+        steps(100);
+        assertEquals(1, get("S1 loader forward"));
     }
 
     @Test

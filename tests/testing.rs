@@ -75,6 +75,38 @@ fn the_example_of_the_docs_is_green() {
     assert!(out(&output).contains("passed=1 "));
 }
 
+#[test]
+fn other_toml_files_in_a_folder_are_no_tests_and_a_closed_stderr_is_no_crash() {
+    let folder = folder(&format!(
+        "{HEAD}[[test]]\nname = \"green\"\nsteps = [{{ set = {{ Start = true }}, await = \"Run\", within = 10 }}]\n"
+    ));
+    fs::write(
+        folder.path().join("Cargo.toml"),
+        "[package]\nname = \"x\"\n",
+    )
+    .expect("a file");
+    let output = test(folder.path(), &["."]);
+    assert_eq!(err(&output), "");
+    assert!(
+        out(&output).contains("passed=1 failed=0 wrong=0"),
+        "{}",
+        out(&output)
+    );
+    let broken = folder.path().join("broken.toml");
+    fs::write(&broken, "config = 1\n").expect("a file");
+    // The reader of this pipe is gone.
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let status = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(["test", "."])
+        .current_dir(folder.path())
+        .stdout(std::process::Stdio::null())
+        .stderr(writer)
+        .status()
+        .expect("the tickbus program runs");
+    assert_eq!(status.code(), Some(1));
+}
+
 /// Each `tests/wrong-tests/NAME.toml` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is
 /// set, they are written there instead: review the difference before committing it.
 #[test]

@@ -14,11 +14,7 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let reading = ImportOptions {
-        addressing: if choice & 1 == 0 {
-            Addressing::Bytes
-        } else {
-            Addressing::Elements
-        },
+        addressing: (choice & 1 != 0).then_some(Addressing::Elements),
         lenient: choice & 2 != 0,
         client: match choice >> 2 & 3 {
             1 => Some(Client::Modbus),

@@ -4,10 +4,9 @@ mod axes;
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
-use std::io::Write as _;
 use std::path::PathBuf;
 
-use super::Outcome;
+use super::{Outcome, print};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_driver_cfg::Options;
@@ -26,20 +25,10 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    // If the reader of stdout is gone (`| head`), that need not be reported.
     match Config::load(&arguments.file) {
-        Ok(config) => {
-            let _ = std::io::stdout()
-                .lock()
-                .write_all(report(&config).as_bytes());
-            Outcome::Done
-        }
+        Ok(config) => print("check", &report(&config)),
         Err(mistakes) => {
-            let _ = writeln!(
-                std::io::stderr().lock(),
-                "{mistakes}\ncheck: failed mistakes={}",
-                mistakes.len()
-            );
+            eprintln!("{mistakes}\ncheck: failed mistakes={}", mistakes.len());
             Outcome::WrongInput
         }
     }

@@ -1,19 +1,19 @@
 //! `tickbus import TABLE`: makes a driver.cfg from a list of PLC tags.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
-use super::Outcome;
+use super::{Outcome, print};
 use tickbus_base::toml_text::{Mistakes, PlacedMistake};
 use tickbus_image::signal::Addressing;
-use tickbus_import::{Client, ImportOptions, Imported, import};
+use tickbus_import::{Client, ImportOptions, Imported, condensed, import};
 
 /// Make a driver.cfg from a list of PLC tags: name, address, type, comment.
 ///
 /// Takes workbooks (XLSX) and CSV with semicolons, commas or tabs, with or without headings, as spreadsheets and TIA Portal
-/// (XLSX, SDF) write them; PLCopen XML and L5X; and the lists of PLC4X and KEPServer, whose addresses of registers and
+/// (XLSX, SDF, XML) write them; PLCopen XML; L5X and the tag CSV of Studio 5000; TwinCAT's .TcPOU and .TcGVL, Structured
+/// Text, and the mapping export of CODESYS; and the lists of PLC4X and KEPServer, whose addresses of registers and
 /// data blocks become [fieldbus.at] of a client bus. What cannot be used is reported with its place.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
@@ -32,9 +32,14 @@ pub(super) struct Arguments {
     #[arg(long)]
     lenient: bool,
 
-    /// The numbers of the addresses count elements, as CODESYS has it, not bytes.
+    /// The numbers of the addresses count elements, as CODESYS and OpenPLC have it, not bytes [default: as the program
+    /// that wrote the list, where the list tells which].
     #[arg(long)]
     iec: bool,
+
+    /// The numbers of the addresses count bytes, as TIA Portal and TwinCAT have it.
+    #[arg(long, conflicts_with = "iec")]
+    bytes: bool,
 
     /// The client bus whose addresses the list has, where the list alone does not tell: %MW20 can be of either.
     #[arg(long, value_name = "KIND", value_parser = clients())]
@@ -52,32 +57,35 @@ fn clients() -> impl TypedValueParser<Value = Client> {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let mut stderr = std::io::stderr().lock();
     match read(arguments).and_then(|imported| write(arguments, &imported).map(|()| imported)) {
         Ok(imported) => {
             let file = arguments.table.display();
-            for PlacedMistake { place, mistake } in &imported.skipped {
-                let (line, column) = place.unwrap_or((1, 1));
-                let _ = writeln!(stderr, "{file}:{line}:{column}: {mistake}");
+            if !imported.skipped.is_empty() {
+                let skipped = Mistakes::of_list(&file.to_string(), condensed(&imported.skipped));
+                eprintln!("{skipped}");
+            }
+            for note in &imported.notes {
+                eprintln!("{file}: note: {note}");
             }
             let told = format!(
-                "import: ok signals={} skipped={}",
+                "import: ok signals={} assigned={} skipped={}",
                 imported.signals,
+                imported.assigned,
                 imported.skipped.len()
             );
             if arguments.out.is_some() {
-                println!("{told}");
-            } else {
-                let _ = writeln!(stderr, "{told}");
+                return print("import", &format!("{told}\n"));
             }
-            Outcome::Done
+            let outcome = print("import", &imported.text);
+            if outcome == Outcome::Done {
+                eprintln!("{told}");
+            }
+            outcome
         }
         Err(mistakes) => {
-            let _ = writeln!(
-                stderr,
-                "{mistakes}\nimport: failed mistakes={}",
-                mistakes.len()
-            );
+            let list: Vec<PlacedMistake> = mistakes.iter().cloned().collect();
+            let shown = Mistakes::of_list(mistakes.file(), condensed(&list));
+            eprintln!("{shown}\nimport: failed mistakes={}", mistakes.len());
             Outcome::WrongInput
         }
     }
@@ -92,10 +100,10 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
             "check the path and the name",
         )
     })?;
-    let addressing = if arguments.iec {
-        Addressing::Elements
-    } else {
-        Addressing::Bytes
+    let addressing = match (arguments.iec, arguments.bytes) {
+        (true, _) => Some(Addressing::Elements),
+        (_, true) => Some(Addressing::Bytes),
+        _ => None,
     };
     import(
         &file,
@@ -110,8 +118,6 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
 
 fn write(arguments: &Arguments, imported: &Imported) -> Result<(), Mistakes> {
     let Some(out) = &arguments.out else {
-        // If the reader of stdout is gone, that need not be reported.
-        let _ = std::io::stdout().lock().write_all(imported.text.as_bytes());
         return Ok(());
     };
     let file = out.display().to_string();

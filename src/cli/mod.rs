@@ -2,6 +2,14 @@
 //!
 //! One file per subcommand, with its arguments and `run`, which returns an `Outcome`.
 
+/// As the one of `std`, which panics if the reader of stderr is gone (`2>&1 | head`).
+macro_rules! eprintln {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stderr().lock(), $($text)*);
+    }};
+}
+
 mod axes;
 mod bridge;
 mod check;
@@ -88,6 +96,22 @@ impl From<Outcome> for ExitCode {
             Outcome::Usage => 2,
             Outcome::BusFailed => 3,
         })
+    }
+}
+
+/// Writes a report to stdout. A reader that is gone (`| head`) need not be reported; a full disk must be.
+fn print(title: &str, text: &str) -> Outcome {
+    use std::io::Write as _;
+    let mut stdout = std::io::stdout().lock();
+    let written = stdout
+        .write_all(text.as_bytes())
+        .and_then(|()| stdout.flush());
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            eprintln!("{title}: failed: standard output cannot be written: {error}");
+            Outcome::WrongInput
+        }
+        _ => Outcome::Done,
     }
 }
 

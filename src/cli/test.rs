@@ -5,13 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::Outcome;
-use tickbus_base::toml_text::Mistakes;
+use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_report::page_beside;
 use tickbus_testing::{Case, Group, Suite, Test, Verdict, junit_xml};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///
-/// Every *.toml in DIR and in its folders is a test file; docs/testing.md tells what one looks like. Exit code 0
+/// Every *.toml in DIR and in its folders that has a config or a [[test]] is a test file; docs/testing.md tells what one looks like. Exit code 0
 /// when all tests pass, 1 when one fails or a file is wrong.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
@@ -63,7 +63,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
             .map(|path| path.display().to_string())
             .collect();
         eprintln!(
-            "test: there is no *.toml in {}; docs/testing.md tells what a test file looks like",
+            "test: there is no *.toml with tests in {}; docs/testing.md tells what a test file looks like",
             paths.join(", ")
         );
         return Outcome::WrongInput;
@@ -121,11 +121,26 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
         // Links are not followed: one may lead back up. Their targets can be named on the command line.
         if entry.is_dir() && !entry.is_symlink() {
             collect(&entry, files)?;
-        } else if entry.extension().is_some_and(|ending| ending == "toml") {
+        } else if entry.extension().is_some_and(|ending| ending == "toml") && is_test_file(&entry) {
             files.push(entry);
         }
     }
     Ok(())
+}
+
+/// Whether a file in a folder is meant as a test file: it has a driver.cfg or a test. Other TOML files, such as
+/// Cargo.toml, lie beside.
+fn is_test_file(path: &Path) -> bool {
+    let Ok(text) = load_text(path) else {
+        // Running it reports why.
+        return true;
+    };
+    text.lines().map(str::trim_start).any(|line| {
+        let header = line.strip_prefix("[[").map(str::trim_start);
+        let key = line.strip_prefix("config").map(str::trim_start);
+        header.is_some_and(|rest| rest.starts_with("test"))
+            || key.is_some_and(|rest| rest.starts_with('='))
+    })
 }
 
 fn run_file(file: &Path, arguments: &Arguments, count: &mut Count) -> Group {

@@ -2,6 +2,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 mod clients;
+mod foreign;
 mod projects;
 mod workbooks;
 
@@ -189,7 +190,7 @@ fn the_driver_cfg_goes_to_a_file_that_is_not_there_and_check_finds_it_right() {
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     assert_eq!(
         String::from_utf8_lossy(&output.stdout),
-        "import: ok signals=1 skipped=0\n"
+        "import: ok signals=1 assigned=0 skipped=0\n"
     );
     let config = Config::load(&out).expect("a right driver.cfg");
     assert_eq!(
@@ -203,6 +204,32 @@ fn the_driver_cfg_goes_to_a_file_that_is_not_there_and_check_finds_it_right() {
         run(&[&arguments[..], &["--force"]].concat()).status.code(),
         Some(0)
     );
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_behind_stdout_is_a_failure() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = folder.path().join("tags.csv");
+    fs::write(&table, "a;%I0.0;Bool\n").unwrap();
+    let check = repository().join("driver.cfg");
+    for arguments in [
+        ["import", table.to_str().unwrap()],
+        ["check", check.to_str().unwrap()],
+    ] {
+        let full = fs::File::options()
+            .write(true)
+            .open("/dev/full")
+            .expect("a full disk");
+        let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(arguments)
+            .stdout(full)
+            .output()
+            .expect("the tickbus program runs");
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}");
+        let told = err(&output);
+        assert!(told.contains("standard output cannot be written"), "{told}");
+    }
 }
 
 #[test]

@@ -43,8 +43,19 @@ fn variables_of_plcopen_xml_with_an_address_become_signals_and_the_others_are_to
         .collect();
     assert_eq!(
         names,
-        ["Start %IX0.0 BOOL", "Level %IW2 INT", "Speed %QD4 REAL"]
+        [
+            "Start %IX0.0 BOOL",
+            "Level %IW2 INT",
+            "Speed %QD4 REAL",
+            "Later %IX8.0 BOOL"
+        ]
     );
+    assert!(
+        imported.text.contains("\"%IX8.0\"   # %I*"),
+        "{}",
+        imported.text
+    );
+    assert_eq!(imported.assigned, 1);
     assert!(
         imported
             .text
@@ -62,7 +73,6 @@ fn variables_of_plcopen_xml_with_an_address_become_signals_and_the_others_are_to
         [
             "(4, 5) 1 variables without an address, \"Step\" the first, are no inputs or outputs: skipped",
             "(13, 38) \"%MX0.0\" is a marker, no part of the process image: skipped",
-            "(14, 39) \"%I*\" has no place yet: skipped",
         ]
     );
 }

@@ -238,8 +238,13 @@ fn read_events(value: &Value<'_>, has_writes: bool) -> Option<Events> {
 }
 
 fn report_kind(kind: &Value<'_>, name: &str) {
-    kind.wrong(
-        format!("bus kind \"{}\" is unknown", shown(name)),
-        did_you_mean(name, "bus kinds", BUILT),
-    );
+    let right = match name.to_ascii_lowercase().as_str() {
+        "profinet" | "ethercat" | "ethernet-ip" | "ethernetip" | "canopen" | "devicenet" | "powerlink" => {
+            "this bus needs a card: kind = \"hilscher-cifx\" (docs/hilscher.md), or \"plugin\" for another vendor's; \
+             docs/which-bus.md lists what suits each PLC"
+                .to_owned()
+        }
+        _ => did_you_mean(name, "bus kinds", BUILT),
+    };
+    kind.wrong(format!("bus kind \"{}\" is unknown", shown(name)), right);
 }

@@ -1,7 +1,7 @@
 //! Addresses as editors write them.
 
 use tickbus_base::Mistake;
-use tickbus_image::signal::{Address, Addressing};
+use tickbus_image::signal::{Address, Addressing, Area, Width};
 
 /// The contents of an address cell.
 #[derive(Debug)]
@@ -70,6 +70,30 @@ pub(super) fn place(text: &str, addressing: Addressing) -> ParsedAddress {
         Ok(address) => ParsedAddress::Image(address),
         Err(error) => ParsedAddress::Wrong(error),
     }
+}
+
+/// The area of an input or output whose address names no place in the image, and its size if the address states it:
+/// `%I*`, `%QW*`, or one in several levels such as Beremiz' `%IW0.0.1.0`.
+pub(super) fn without_place(text: &str) -> Option<(Area, Option<Width>)> {
+    let upper = text.to_ascii_uppercase();
+    let rest = upper.strip_prefix('%')?;
+    let area = match rest.chars().next()? {
+        'I' => Area::Input,
+        'Q' => Area::Output,
+        _ => return None,
+    };
+    let rest = &rest[1..];
+    let letter = rest.chars().next().filter(char::is_ascii_alphabetic);
+    let width = letter.map(Width::of_letter);
+    if width == Some(None) {
+        return None;
+    }
+    let place = &rest[letter.map_or(0, char::len_utf8)..];
+    let is_levels = place.contains('.')
+        && place
+            .split('.')
+            .all(|level| !level.is_empty() && level.bytes().all(|byte| byte.is_ascii_digit()));
+    (place == "*" || is_levels).then_some((area, width.flatten()))
 }
 
 #[cfg(test)]

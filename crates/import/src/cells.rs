@@ -88,7 +88,8 @@ fn usual(text: &str) -> char {
 fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (Record, usize) {
     let mut record = Vec::new();
     let mut at = start;
-    loop {
+    let mut mistakes = Vec::new();
+    let end = loop {
         let rest = &text[at..];
         let blanks = rest.len()
             - rest
@@ -96,7 +97,7 @@ fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
                 .len();
         let begin = at + blanks;
         let (cell, end) = if text[begin..].starts_with('"') {
-            quoted(text, begin, separator, wrong)
+            quoted(text, begin, separator, &mut mistakes)
         } else {
             let rest = &text[begin..];
             let end = begin + rest.find([separator, '\n']).unwrap_or(rest.len());
@@ -108,23 +109,59 @@ fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
         });
         match text[end..].chars().next() {
             Some(c) if c == separator => at = end + c.len_utf8(),
-            Some(_) => return (record, end + 1),
-            None => return (record, end),
+            Some(_) => break end + 1,
+            None => break end,
         }
+    };
+    if !mistakes.is_empty()
+        && let Some(found) = all_quoted(text, start, separator)
+    {
+        return found;
     }
+    for (at, what, right) in mistakes {
+        wrong.report(at, what, right);
+    }
+    (record, end)
 }
 
+/// The record of a line whose cells are all in quotes. TIA Portal's SDF has quotation marks within them undoubled, so
+/// that only `","` separates cells.
+fn all_quoted(text: &str, start: usize, separator: char) -> Option<(Record, usize)> {
+    let end = text[start..]
+        .find('\n')
+        .map_or(text.len(), |end| start + end);
+    let line = text[start..end]
+        .trim_end()
+        .strip_prefix('"')?
+        .strip_suffix('"')?;
+    let between = format!("\"{separator}\"");
+    let mut at = start + 1;
+    let cells = line.split(&between).map(|cell| {
+        let cell_at = at;
+        at += cell.len() + between.len();
+        Cell {
+            text: cell.trim().to_owned(),
+            at: cell_at - 1,
+        }
+    });
+    let record: Record = cells.collect();
+    (record.len() > 1).then_some((record, text.len().min(end + 1)))
+}
+
+/// A mistake: its offset, what is wrong, and what would be right.
+type Found = (usize, &'static str, &'static str);
+
 /// The quoted cell that begins at `start`, and the position of the separator or line end after it.
-fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (String, usize) {
+fn quoted(text: &str, start: usize, separator: char, wrong: &mut Vec<Found>) -> (String, usize) {
     let mut cell = String::new();
     let mut at = start + 1;
     loop {
         let Some(end) = text[at..].find('"') else {
-            wrong.report(
+            wrong.push((
                 start,
                 "a cell in quotes has no end",
                 "close it with another \"",
-            );
+            ));
             // If the quote is not closed, only the rest of the line can be meant.
             let line = text[start..]
                 .find('\n')
@@ -142,11 +179,11 @@ fn quoted(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
     let rest = &text[at..];
     let end = at + rest.find([separator, '\n']).unwrap_or(rest.len());
     if !text[at..end].trim().is_empty() {
-        wrong.report(
+        wrong.push((
             at,
             "something stands behind a cell in quotes",
             "write quotation marks within a cell twice: \"\"",
-        );
+        ));
     }
     // Spreadsheets permit line breaks within cells; names and comments are one line.
     let cell = cell.split_whitespace().collect::<Vec<_>>().join(" ");
@@ -186,6 +223,28 @@ mod tests {
     fn commas_in_comments_separate_nothing() {
         let (records, _) = read("a;%I0.0;Bool;one, two, three, four, five, six\n");
         assert_eq!(records[0].len(), 4);
+    }
+
+    #[test]
+    fn quotation_marks_that_tia_portal_does_not_double_are_text() {
+        let (records, mistakes) = read(
+            "\"a\",\"%I0.0\",\"Bool\",\"(\"0\" - one layer; \"1\" - two)\",\"True\"\r\n\
+             \"b\",\"%I0.1\",\"Bool\",\"the \"left\"\",\"True\"\r\n\"c\",\"%I0.2\",\"Bool\",\"a \"\"b\"\"\",\"\"\n",
+        );
+        assert_eq!(mistakes, None);
+        let comments: Vec<&str> = records.iter().map(|record| record[3].as_str()).collect();
+        assert_eq!(
+            comments,
+            [
+                "(\"0\" - one layer; \"1\" - two)",
+                "the \"left\"",
+                "a \"b\""
+            ]
+        );
+        assert!(
+            records.iter().all(|record| record.len() == 5),
+            "{records:?}"
+        );
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! Finds the meaning of columns: by their headings, or by their contents.
 
 use super::address::{ParsedAddress, place};
-use super::cells::Record;
+use super::cells::{Cell, Record};
 use super::device;
+use tickbus_base::toml_text::Collector;
 use tickbus_image::signal::Addressing;
 
 /// The columns of a table, and the first record after the headings.
@@ -76,6 +77,44 @@ const SCALES: [&str; 5] = [
     "scaled high",
 ];
 const ORDERS: &[&str] = &["order", "byte order"];
+
+/// The variables that CODESYS maps to channels, by its `//CoDeSys Mapping Export`: name, address, type, comment. `None`
+/// for another table. Channels without a variable are reported to `skipped`.
+pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
+    let head = records.first()?.first()?;
+    if !head
+        .text
+        .to_ascii_lowercase()
+        .starts_with("//codesys mapping")
+    {
+        return None;
+    }
+    let channels = records
+        .iter()
+        .filter(|record| record.len() > 4 && !record[0].text.starts_with("//"));
+    let (mapped, free): (Vec<&Record>, Vec<&Record>) =
+        channels.partition(|record| !record[0].text.is_empty());
+    if let Some(first) = free.first() {
+        skipped.report(
+            first[0].at,
+            format!("{} channels without a variable: skipped", free.len()),
+            "map variables to those that the simulation needs",
+        );
+    }
+    let mapped = mapped.into_iter().map(|record| {
+        let kind = Cell {
+            text: String::new(),
+            at: record[4].at,
+        };
+        vec![
+            record[0].clone(),
+            record[4].clone(),
+            kind,
+            record[3].clone(),
+        ]
+    });
+    Some(mapped.collect())
+}
 
 /// How many records are examined if there are no headings.
 const LOOK: usize = 50;

@@ -115,8 +115,8 @@ pub(super) fn module_side(target: &str) -> Option<Area> {
     let (_, rest) = target.rsplit_once(':')?;
     let side = rest.split(['.', '[']).next()?;
     let area = match side.chars().next()? {
-        'I' => Area::Input,
-        'O' => Area::Output,
+        'I' | 'i' => Area::Input,
+        'O' | 'o' => Area::Output,
         _ => return None,
     };
     let is_numbered = side[1..].bytes().all(|byte| byte.is_ascii_digit());

@@ -1,29 +1,37 @@
 //! Converts lists of PLC tags to a driver.cfg.
 //!
 //! [`import`] takes the bytes of a file as saved by editors and spreadsheets: a workbook (XLSX), a table as
-//! text (CSV, SDF, a list of properties), PLCopen XML or L5X. Tags of the process image keep their addresses.
+//! text (CSV, SDF, a list of properties), PLCopen XML, L5X, files of TwinCAT, or Structured Text. Tags of the process
+//! image keep their addresses.
 //! Clients' lists (PLC4X, KEPServer) have device addresses: these go to `[fieldbus.at]` unchanged, and image
 //! addresses are assigned to the signals. Each line that cannot be used is reported with its position.
 
 mod address;
 mod cells;
 mod columns;
+mod condensed;
+mod declarations;
 mod device;
 mod layout;
+mod logix;
 mod plc_xml;
 mod rows;
 mod text;
 mod workbook;
 mod write;
+mod xml;
 
 use std::path::Path;
 
+pub use condensed::condensed;
 pub use device::Client;
 
 use cells::Record;
 use columns::Columns;
-use rows::{Taken, World};
+use plc_xml::Origin;
+use rows::{Image, Tag, Taken, World};
 use text::FileType;
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Addressing;
@@ -34,8 +42,9 @@ const LONGEST: usize = 64 << 20;
 /// How to read a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// What the numbers of addresses count.
-    pub addressing: Addressing,
+    /// What the numbers of addresses count; `None` for what the program counts that wrote the list, and bytes if it is
+    /// not known.
+    pub addressing: Option<Addressing>,
     /// Skip lines with mistakes instead of refusing the table.
     pub lenient: bool,
     /// The bus of the device addresses in the list; `None` to detect it.
@@ -49,6 +58,10 @@ pub struct Imported {
     pub text: String,
     /// The number of its signals.
     pub signals: usize,
+    /// The number of those whose addresses import assigned, since the list has none in the process image.
+    pub assigned: usize,
+    /// How import read the addresses, where there is a choice.
+    pub notes: Vec<String>,
     /// The lines that were left out, in line order: tags outside the process image, and lines with mistakes
     /// if those are skipped.
     pub skipped: Vec<PlacedMistake>,
@@ -97,7 +110,7 @@ pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Import
         );
     }
     let mut told = Told::default();
-    let mut is_logix = false;
+    let mut origin = Origin::Table;
     let sheets = match text::kind(bytes) {
         FileType::OldWorkbook => {
             return of_file(
@@ -114,23 +127,46 @@ pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Import
             let skipped = Collector::new(file, &text);
             let project = plc_xml::read(file, &text, &skipped)?;
             Told::add(&mut told.skipped, None, skipped);
-            is_logix = project.is_logix;
+            origin = project.origin;
             vec![project.sheet]
         }
         FileType::Table => {
             let text = text::decoded(bytes);
-            let wrong = Collector::new(file, &text);
-            let records = cells::records(&text, &wrong);
-            Told::add(&mut told.wrong, None, wrong);
+            let (records, columns);
+            if declarations::has_any(&text) {
+                origin = if declarations::has_configuration(&text) {
+                    Origin::OpenPlc
+                } else {
+                    Origin::Project
+                };
+                (records, columns) = (
+                    declarations::read(&text, 0, text.len()),
+                    Some(Columns::fixed()),
+                );
+            } else {
+                let (wrong, skipped) = (Collector::new(file, &text), Collector::new(file, &text));
+                let table = cells::records(&text, &wrong);
+                if let Some(points) = logix::table(&table, &skipped) {
+                    origin = Origin::Logix;
+                    (records, columns) = (points, Some(Columns::fixed()));
+                } else if let Some(mapped) = columns::codesys_mapping(&table, &skipped) {
+                    origin = Origin::Codesys;
+                    (records, columns) = (mapped, Some(Columns::fixed()));
+                } else {
+                    (records, columns) = (table, None);
+                }
+                Told::add(&mut told.wrong, None, wrong);
+                Told::add(&mut told.skipped, None, skipped);
+            }
             vec![Sheet {
                 name: None,
                 text,
                 records,
-                columns: None,
+                columns,
             }]
         }
     };
-    tags_of(file, &sheets, reading, is_logix, told)
+    tags_of(file, &sheets, reading, origin, told)
 }
 
 /// The driver.cfg of all tags in `sheets`.
@@ -138,7 +174,7 @@ fn tags_of(
     file: &str,
     sheets: &[Sheet],
     reading: ImportOptions,
-    is_logix: bool,
+    origin: Origin,
     mut told: Told,
 ) -> Result<Imported, Mistakes> {
     let columns: Vec<Option<Columns>> = sheets
@@ -150,18 +186,7 @@ fn tags_of(
                 .or_else(|| columns::find(&sheet.records))
         })
         .collect();
-    let world = if is_logix {
-        World::Modules
-    } else {
-        let lists = sheets.iter().zip(&columns);
-        let addresses = lists.filter_map(|(sheet, columns)| {
-            let columns = columns.as_ref()?;
-            let records = sheet.records[columns.first..].iter();
-            Some(records.filter_map(|record| Some(record.get(columns.address)?.text.as_str())))
-        });
-        let client = reading.client.or_else(|| rows::client(addresses.flatten()));
-        client.map_or(World::Image(reading.addressing), World::Device)
-    };
+    let (image, world) = world_of(sheets, &columns, reading, origin);
     let mut taken = Taken::default();
     let mut tags = Vec::new();
     for (sheet, columns) in sheets.iter().zip(&columns) {
@@ -212,9 +237,11 @@ fn tags_of(
         return Err(nothing(
             file,
             columns.iter().any(Option::is_some),
-            skipped.len(),
+            origin,
+            skipped,
         ));
     }
+    let (assigned, notes) = unplaced(&mut tags, reading, image, world);
     if let Err(mistake) = layout::lay(&mut tags) {
         return Err(Mistakes::of(file, mistake));
     }
@@ -230,23 +257,122 @@ fn tags_of(
     Ok(Imported {
         text,
         signals: tags.len(),
+        assigned,
+        notes,
         skipped,
     })
 }
 
-fn nothing(file: &str, has_columns: bool, skipped: usize) -> Mistakes {
-    if has_columns {
-        Mistakes::of_file(
-            file,
-            format!("none of its lines has a tag in %I or %Q; {skipped} were skipped"),
+/// What the addresses of `sheets` mean.
+fn world_of(
+    sheets: &[Sheet],
+    columns: &[Option<Columns>],
+    reading: ImportOptions,
+    origin: Origin,
+) -> (Image, World) {
+    let image = Image {
+        addressing: reading.addressing.unwrap_or(match origin {
+            Origin::OpenPlc | Origin::Codesys => Addressing::Elements,
+            Origin::Table | Origin::Project | Origin::Logix => Addressing::Bytes,
+        }),
+        is_project: !matches!(origin, Origin::Table | Origin::Logix),
+        is_apart: origin == Origin::OpenPlc,
+    };
+    let world = if origin == Origin::Logix {
+        World::Modules
+    } else if origin == Origin::OpenPlc {
+        // Its levels of addresses look like a client's.
+        World::Image(image)
+    } else {
+        let lists = sheets.iter().zip(columns);
+        let addresses = lists.filter_map(|(sheet, columns)| {
+            let columns = columns.as_ref()?;
+            let records = sheet.records[columns.first..].iter();
+            Some(records.filter_map(|record| Some(record.get(columns.address)?.text.as_str())))
+        });
+        let client = reading.client.or_else(|| rows::client(addresses.flatten()));
+        client.map_or(World::Image(image), World::Device)
+    };
+    (image, world)
+}
+
+/// The number of tags without an address, and notes on how the others were read.
+fn unplaced(
+    tags: &mut [Tag],
+    reading: ImportOptions,
+    image: Image,
+    world: World,
+) -> (usize, Vec<String>) {
+    let mut notes = Vec::new();
+    let is_counted = |tag: &Tag| tag.address.is_some_and(|address| address.width.bytes() > 1);
+    if reading.addressing.is_none()
+        && image.addressing == Addressing::Elements
+        && world == World::Image(image)
+        && tags.iter().any(is_counted)
+    {
+        notes.push(
+            "the numbers of addresses count elements, as in the program that wrote the file: %IW1 is the second word; \
+             --bytes reads them as bytes"
+                .to_owned(),
+        );
+    }
+    if image.is_apart && layout::part(tags) {
+        notes.push(
+            "in this PLC bits and words are separate memories, and their addresses overlap: the wider values stand behind \
+             the bits, each with its own address in its remark"
+                .to_owned(),
+        );
+    }
+    let assigned = tags.iter().filter(|tag| tag.address.is_none()).count();
+    if assigned > 0 && matches!(world, World::Image(_)) {
+        notes.push(format!(
+            "{assigned} inputs and outputs have no place in the process image yet: import assigned places in order; each \
+             signal's remark has its address in the PLC"
+        ));
+    }
+    (assigned, notes)
+}
+
+/// The mistake of a list without inputs and outputs, and why its lines were left out.
+fn nothing(file: &str, has_columns: bool, origin: Origin, skipped: Vec<PlacedMistake>) -> Mistakes {
+    let mistake = match (origin, has_columns) {
+        (Origin::Logix, _) => Mistake::new(
+            format!(
+                "none of its tags is an input or output of a module; {} notes say why",
+                skipped.len()
+            ),
+            "export the whole controller or its modules as L5X, with their data",
+        ),
+        (Origin::Project | Origin::Codesys | Origin::OpenPlc, _) if skipped.is_empty() => {
+            Mistake::new(
+                "no variable in this file is an input or output",
+                "name a file that declares some, such as Start AT %I* : BOOL or Lamp AT %QX0.0 : BOOL",
+            )
+        }
+        (Origin::Project | Origin::Codesys | Origin::OpenPlc, _) => Mistake::new(
+            format!(
+                "none of its variables can be a signal; {} notes say why",
+                skipped.len()
+            ),
+            "declare inputs and outputs with types that signals have; the members of a structure one by one",
+        ),
+        (_, true) => Mistake::new(
+            format!(
+                "none of its lines has a tag in %I or %Q; {} were skipped",
+                skipped.len()
+            ),
             "only inputs and outputs can be connected: %I0.0, %IW4, %QD8; markers and data blocks can by --bus s7-client or \
              --bus modbus-client",
-        )
-    } else {
-        Mistakes::of_file(
-            file,
+        ),
+        (_, false) => Mistake::new(
             "no column of this table has addresses",
             "save it with the columns name; address; type; comment",
-        )
-    }
+        ),
+    };
+    let mut list = vec![PlacedMistake {
+        place: None,
+        mistake,
+    }];
+    list.extend(skipped);
+    Mistakes::of_list(file, list)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::address::{ParsedAddress, place};
+use super::address::{ParsedAddress, place, without_place};
 use super::cells::{Cell, Record};
 use super::columns::Columns;
 use super::device::{self, Client, kepserver_type};
@@ -12,7 +12,10 @@ use tickbus_image::signal::section::NAME_LIMIT;
 use tickbus_image::signal::{AREA_LIMIT, Address, Addressing, Area, ByteOrder, DataType, Width};
 
 /// The most signals of one driver.cfg.
-const MOST: usize = 100_000;
+pub(super) const MOST: usize = 100_000;
+
+/// The sizes of values: a bit, and 1, 2, 4 and 8 bytes.
+const SIZES: usize = 5;
 
 /// The longest unit, in characters.
 const LONGEST_UNIT: usize = 40;
@@ -24,11 +27,23 @@ const LONGEST_ADDRESS: usize = 200;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum World {
     /// Addresses in the process image.
-    Image(Addressing),
+    Image(Image),
     /// Addresses in a device, for a client.
     Device(Client),
     /// Names of module inputs and outputs.
     Modules,
+}
+
+/// How the addresses of a process image are read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Image {
+    /// What the numbers of addresses count.
+    pub(super) addressing: Addressing,
+    /// The list is a PLC project. Its author did not write it for tickbus: variables that cannot be signals are left
+    /// out instead of refused.
+    pub(super) is_project: bool,
+    /// Values of each size have a memory of their own, as in OpenPLC: `%IX0.0` is no part of `%IW0`.
+    pub(super) is_apart: bool,
 }
 
 /// A tag that becomes a signal.
@@ -38,7 +53,7 @@ pub(super) struct Tag {
     pub(super) area: Area,
     /// Its address in the process image, once assigned.
     pub(super) address: Option<Address>,
-    /// Its place in the device; empty if that is its address.
+    /// Its place in the device or in the PLC; empty if that is its address.
     pub(super) at: String,
     pub(super) data_type: DataType,
     pub(super) order: ByteOrder,
@@ -53,8 +68,9 @@ pub(super) struct Tag {
 pub(super) struct Taken {
     /// Line of each name.
     names: HashMap<String, usize>,
-    /// For each bit of %I and %Q, the line of the tag that occupies it; 0 if free.
-    bits: [Vec<u32>; 2],
+    /// For each bit of %I and %Q, the line of the tag that occupies it; 0 if free. Where sizes have memories of their
+    /// own, one for each size.
+    bits: [[Vec<u32>; 2]; SIZES],
 }
 
 /// The client that the addresses belong to, or `None` for a process image. An address that may belong to
@@ -151,8 +167,19 @@ impl Row<'_> {
             );
             return None;
         };
+        if at_address.text == "<No Value>" {
+            self.skipped.report(
+                at_address.at,
+                format!(
+                    "{} has no address, as a tag with symbolic access: skipped",
+                    quoted(self.text(Some(columns.name)))
+                ),
+                "export the tags of the PLC, not those of the panel",
+            );
+            return None;
+        }
         let found = match world {
-            World::Image(addressing) => self.in_image(at_address, addressing)?,
+            World::Image(image) => self.in_image(at_address, image)?,
             World::Device(client) => self.in_device(at_address, client)?,
             World::Modules => self.in_module(at_address)?,
         };
@@ -173,7 +200,11 @@ impl Row<'_> {
             return None;
         }
         if let Some(address) = found.address {
-            taken.take(name, address, line, at_address, wrong)?;
+            let image = match world {
+                World::Image(image) => image,
+                World::Device(_) | World::Modules => Image::default(),
+            };
+            self.take(taken, address, line, image, name)?;
         }
         taken.names.insert(name.to_owned(), line);
         let unit: String = self
@@ -196,10 +227,15 @@ impl Row<'_> {
         })
     }
 
-    fn in_image(&self, cell: &Cell, addressing: Addressing) -> Option<Found> {
-        let mistake = match place(&cell.text, addressing) {
+    fn in_image(&self, cell: &Cell, image: Image) -> Option<Found> {
+        let mistake = match place(&cell.text, image.addressing) {
             ParsedAddress::Image(address) => {
-                let (data_type, address) = kind(self.cell(self.columns.kind), address, self.wrong)?;
+                let wrong = if image.is_project {
+                    self.skipped
+                } else {
+                    self.wrong
+                };
+                let (data_type, address) = kind(self.cell(self.columns.kind), address, wrong)?;
                 return Some(Found {
                     area: address.area,
                     address: Some(address),
@@ -218,14 +254,12 @@ impl Row<'_> {
                 );
                 return None;
             }
-            ParsedAddress::Nothing if cell.text.ends_with('*') => {
-                self.skipped.report(
-                    cell.at,
-                    format!("{} has no place yet: skipped", quoted(&cell.text)),
-                    "give it an address in the PLC's editor",
-                );
-                return None;
+            ParsedAddress::Wrong(_) | ParsedAddress::Nothing
+                if image.is_project && without_place(&cell.text).is_some() =>
+            {
+                return self.unplaced(cell);
             }
+            ParsedAddress::Nothing if cell.text.ends_with('*') => return self.unplaced(cell),
             ParsedAddress::Wrong(mistake) => mistake,
             ParsedAddress::Nothing => Mistake::new(
                 format!("{} is no address", quoted(&cell.text)),
@@ -236,6 +270,45 @@ impl Row<'_> {
         None
     }
 
+    /// An input or output whose place another part of the PLC's project decides.
+    fn unplaced(&self, cell: &Cell) -> Option<Found> {
+        let Some((area, width)) = without_place(&cell.text) else {
+            self.skipped.report(
+                cell.at,
+                format!("{} is no input or output: skipped", quoted(&cell.text)),
+                "let the PLC program copy it from %I or to %Q if the simulation needs it",
+            );
+            return None;
+        };
+        let stated = self
+            .cell(self.columns.kind)
+            .filter(|cell| !cell.text.is_empty());
+        let data_type = match (stated, width) {
+            (Some(stated), _) => {
+                let known = stated.text.parse().ok();
+                if known.is_none() {
+                    unknown_type(stated, self.skipped);
+                }
+                known?
+            }
+            (None, Some(width)) => width.data_type(),
+            (None, None) => {
+                let what = format!(
+                    "{} has neither a place nor a type: skipped",
+                    quoted(&cell.text)
+                );
+                self.skipped.report(cell.at, what, "state one of the two");
+                return None;
+            }
+        };
+        Some(Found {
+            area,
+            address: None,
+            at: cell.text.clone(),
+            data_type,
+        })
+    }
+
     fn in_device(&self, cell: &Cell, client: Client) -> Option<Found> {
         if cell.text.chars().nth(LONGEST_ADDRESS).is_some() {
             let what = format!(
@@ -243,6 +316,21 @@ impl Row<'_> {
                 quoted(&cell.text)
             );
             self.wrong.report(cell.at, what, "shorten it");
+            return None;
+        }
+        if client == Client::S7
+            && let ParsedAddress::Elsewhere(
+                what @ ("a timer" | "a counter" | "a block" | "local data of a block"),
+            ) = place(&cell.text, Addressing::Bytes)
+        {
+            self.skipped.report(
+                cell.at,
+                format!(
+                    "{} is {what}, which the bus s7-client does not read: skipped",
+                    quoted(&cell.text)
+                ),
+                "let the PLC program copy it into a marker or a data block if the simulation needs it",
+            );
             return None;
         }
         let spots = match device::spots(&cell.text, client) {
@@ -299,6 +387,62 @@ impl Row<'_> {
             at: cell.text.clone(),
             data_type,
         })
+    }
+
+    /// Claims the bits of `address`, or reports which tag has them.
+    fn take(
+        &self,
+        taken: &mut Taken,
+        address: Address,
+        line: usize,
+        image: Image,
+        name: &str,
+    ) -> Option<()> {
+        let memory = if image.is_apart {
+            address.width as usize
+        } else {
+            0
+        };
+        let bits = &mut taken.bits[memory][usize::from(address.area == Area::Output)];
+        let range = address.bits();
+        if bits.len() < range.end {
+            bits.resize(range.end, 0);
+        }
+        let (first, others) = (bits[range.start], &bits[range.clone()]);
+        if let Some(other) = others.iter().find(|line| **line > 0) {
+            let at = self
+                .cell(Some(self.columns.address))
+                .map_or(0, |cell| cell.at);
+            if image.is_project && others.iter().all(|line| *line == first) {
+                self.skipped.report(
+                    at,
+                    format!(
+                        "{} ({address}) is where the tag on line {other} is: skipped",
+                        quoted(name)
+                    ),
+                    "nothing, if both mean the same",
+                );
+                return None;
+            }
+            let right = match image.addressing {
+                Addressing::Bytes if address.width.bytes() > 1 => {
+                    "each bit belongs to one signal: keep one of the two; if the numbers count elements, as in CODESYS, \
+                     add --iec"
+                }
+                _ => "each bit belongs to one signal: keep one of the two",
+            };
+            self.wrong.report(
+                at,
+                format!(
+                    "{} ({address}) overlaps the tag on line {other}",
+                    quoted(name)
+                ),
+                right,
+            );
+            return None;
+        }
+        bits[range].fill(u32::try_from(line).unwrap_or(u32::MAX));
+        Some(())
     }
 
     /// The type stated by an address, unless its column says otherwise.
@@ -425,42 +569,6 @@ impl Row<'_> {
         self.wrong
             .report(cell.at, "the linear scale has wrong values", right);
         None
-    }
-}
-
-impl Taken {
-    /// Claims the bits of `address`, or reports which tag has them.
-    fn take(
-        &mut self,
-        name: &str,
-        address: Address,
-        line: usize,
-        cell: &Cell,
-        wrong: &Collector<'_>,
-    ) -> Option<()> {
-        let bits = &mut self.bits[usize::from(address.area == Area::Output)];
-        let range = address.bits();
-        if bits.len() < range.end {
-            bits.resize(range.end, 0);
-        }
-        if let Some(first) = bits[range.clone()].iter().find(|line| **line > 0) {
-            wrong.report(
-                cell.at,
-                format!(
-                    "{} ({address}) overlaps the tag on line {first}",
-                    quoted(name)
-                ),
-                if address.width.bytes() > 1 {
-                    "each bit belongs to one signal: keep one of the two; if the numbers count elements, as in CODESYS, \
-                     add --iec"
-                } else {
-                    "each bit belongs to one signal: keep one of the two"
-                },
-            );
-            return None;
-        }
-        bits[range].fill(u32::try_from(line).unwrap_or(u32::MAX));
-        Some(())
     }
 }
 

@@ -30,13 +30,18 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
         "# Made by tickbus import from {}.\n\
          #\n\
          # Directions are the PLC's: %I is a PLC input, which the simulation writes; %Q is a PLC output, which it reads.\n\
-         {}\n\
+         {}{}\n\
          [driver]\n\
          id   = 1                       # a number that no other driver of the simulator has\n\
          name = {}\n\n\
          [fieldbus]\n{}",
         comment(&source),
         remark(world),
+        if matches!(world, World::Image(_)) && tags.iter().any(|tag| !tag.at.is_empty()) {
+            ASSIGNED
+        } else {
+            ""
+        },
         text(name),
         bus(world)
     );
@@ -51,6 +56,10 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
     }
     out
 }
+
+/// The remark about addresses that the PLC does not have.
+const ASSIGNED: &str = "# Signals with another address in their remark have that one in the PLC, and here one that import assigned, in order:\n\
+                        # let the PLC's program or its I/O configuration copy between the two.\n";
 
 /// The remark about the addresses below it.
 const fn remark(world: World) -> &'static str {
@@ -97,8 +106,9 @@ fn signal(out: &mut String, tag: &Tag, world: World) {
         return;
     };
     let mut remark = comment(&tag.comment);
-    if world == World::Modules {
-        remark = comment(&format!("{} {remark}", tag.at));
+    if !matches!(world, World::Device(_)) && !tag.at.is_empty() {
+        let place = if tag.at == tag.name { "" } else { &tag.at };
+        remark = comment(format!("{place} {remark}").trim_start());
     }
     if !remark.is_empty() {
         remark.insert_str(0, "   # ");

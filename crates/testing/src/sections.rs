@@ -193,8 +193,20 @@ impl Reader<'_> {
                     "write some, such as [{ run = \"1s\" }, { expect = \"Ready lamp\" }]",
                 );
             }
+            let is_empty = tables.is_empty();
             let steps: Vec<_> = tables.into_iter().map(|table| self.step(table)).collect();
-            steps.into_iter().collect::<Option<Vec<Step>>>()
+            let steps = steps.into_iter().collect::<Option<Vec<Step>>>()?;
+            let passes = |step: &Step| step.passage.is_some() || step.during > 0;
+            let timed = steps.iter().rposition(passes).map_or(0, |last| last + 1);
+            let watches = |step: &Step| !step.always.is_empty() || !step.never.is_empty();
+            let proves = timed > 0 || steps.iter().any(|step| !step.expect.is_empty());
+            if !is_empty && (!proves || steps[timed..].iter().any(watches)) {
+                value.wrong(
+                    "no time passes in which its conditions are checked: this test proves nothing",
+                    "let time pass with or after \"always\" and \"never\", such as { never = \"Jam lamp\", run = \"1s\" }",
+                );
+            }
+            Some(steps)
         });
         Some(Test {
             name: name?,

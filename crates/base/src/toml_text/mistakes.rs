@@ -46,6 +46,11 @@ impl Mistakes {
         }
     }
 
+    /// The name of the file.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
     /// All mistakes, in line order.
     pub fn iter(&self) -> std::slice::Iter<'_, PlacedMistake> {
         self.list.iter()

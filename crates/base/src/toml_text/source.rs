@@ -1,7 +1,8 @@
 //! Reading TOML text: every syntax error once, and a tree of what can still be read.
 
 use std::borrow::Cow;
-use std::io::ErrorKind;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read as _};
 use std::path::Path;
 
 use toml::de::DeTable;
@@ -27,7 +28,7 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
         let right = "name the configuration file in it, such as driver.cfg";
         return Err(refused("this is a directory".to_owned(), right));
     }
-    let bytes = std::fs::read(path).map_err(|error| match error.kind() {
+    let unreadable = |error: Error| match error.kind() {
         ErrorKind::NotFound => refused(
             "there is no such file".to_owned(),
             "check the path and the name",
@@ -40,7 +41,24 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
             format!("this file cannot be read: {error}"),
             "check the path and the disk",
         ),
-    })?;
+    };
+    // A pipe would block, and a device can have no end: both are refused before they are opened.
+    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(refused(
+            "this is no regular file".to_owned(),
+            "name a file on a disk; a pipe or a device cannot be a configuration",
+        ));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(LONGEST as u64 + 1).read_to_end(&mut bytes))
+        .map_err(unreadable)?;
+    if bytes.len() > LONGEST {
+        return Err(refused(
+            format!("this file is longer than {} MiB", LONGEST >> 20),
+            "name a configuration; none is this long",
+        ));
+    }
     String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let bytes = error.into_bytes();
@@ -135,6 +153,22 @@ mod tests {
                 .collect(),
             keys,
         )
+    }
+
+    #[test]
+    fn files_without_an_end_and_long_ones_are_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let long = folder.path().join("long.cfg");
+        File::create(&long)
+            .and_then(|file| file.set_len(LONGEST as u64 + 1))
+            .expect("a long file");
+        let told = load_text(&long).expect_err("too long").to_string();
+        assert!(told.contains("longer than 16 MiB"), "{told}");
+        #[cfg(unix)]
+        {
+            let told = load_text(Path::new("/dev/zero")).expect_err("a device");
+            assert!(told.to_string().contains("no regular file"), "{told}");
+        }
     }
 
     #[test]

@@ -214,7 +214,7 @@ fn kind_of(message: &str) -> Kind {
 /// A parser's message in this project's words.
 fn translate(error: &Error, text: &str) -> SyntaxError {
     let at = begin(error, text);
-    let piece = shown(text.get(error.span().unwrap_or(0..0)).unwrap_or("").trim());
+    let piece = named(text.get(error.span().unwrap_or(0..0)).unwrap_or(""));
     let line = text[line_around(text, at)].trim();
     let (message, expected) = error
         .message()
@@ -226,6 +226,18 @@ fn translate(error: &Error, text: &str) -> SyntaxError {
         kind: kind_of(message),
         header: line.starts_with('[') || opens_no_header,
         mistake: words(message, expected, &piece, line),
+    }
+}
+
+/// The piece of text that a parser blames, as messages quote it; a character that nobody sees by its number.
+fn named(piece: &str) -> String {
+    let invisible = |c: char| {
+        !c.is_ascii()
+            && (c.is_whitespace() || matches!(c, '\u{200B}'..='\u{200F}' | '\u{FEFF}' | '\u{AD}'))
+    };
+    match piece.trim_matches(' ').chars().next() {
+        Some(c) if invisible(c) => format!("the invisible character U+{:04X}", u32::from(c)),
+        _ => shown(piece.trim()),
     }
 }
 

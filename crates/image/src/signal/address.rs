@@ -70,7 +70,8 @@ impl Width {
         self.bits().div_ceil(8)
     }
 
-    fn of_letter(letter: char) -> Option<Self> {
+    /// The size of a letter in an address; `None` if there is no size with this letter.
+    pub fn of_letter(letter: char) -> Option<Self> {
         [Self::Bit, Self::Byte, Self::Word, Self::Double, Self::Long]
             .into_iter()
             .find(|width| width.letter() == letter)

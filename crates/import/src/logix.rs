@@ -1,0 +1,441 @@
+//! Inputs and outputs in projects of Studio 5000: L5X, and its table of tags as CSV.
+//!
+//! Modules have structures of data, `Local:1:I` and `Drive:O`, and a project names points in them by aliases, or uses
+//! them as they are, with comments on members and bits.
+
+use std::collections::{HashMap, HashSet};
+use std::fmt::Write as _;
+
+use roxmltree::Node;
+
+use super::cells::{Cell, Record};
+use super::device;
+use super::rows::MOST;
+use super::xml::{Names, child, named, place, record, words};
+use tickbus_base::toml_text::{Collector, shown};
+
+/// A value in a module's data.
+struct Point {
+    /// `Local:1:I.Ch0Data`.
+    path: String,
+    kind: String,
+    at: usize,
+    /// An alias names it, as a whole.
+    is_named: bool,
+    /// Its bits that an alias names.
+    bits: HashSet<String>,
+}
+
+/// The inputs and outputs of all modules.
+#[derive(Default)]
+struct Points {
+    list: Vec<Point>,
+    /// By path, in upper case: names in Logix have no case.
+    by_path: HashMap<String, usize>,
+    /// The points of each structure, `LOCAL:1:I`.
+    by_structure: HashMap<String, Vec<usize>>,
+    /// Structures that are a part of another one: `RACK:1:I` of `Rack:I.Slot[1]`.
+    parts: HashMap<String, String>,
+    comments: HashMap<String, String>,
+}
+
+impl Points {
+    fn add(&mut self, path: String, kind: &str, at: usize) {
+        let key = path.to_ascii_uppercase();
+        if self.by_path.contains_key(&key) {
+            return;
+        }
+        let structure = key.split('.').next().unwrap_or_default().to_owned();
+        let points = self.by_structure.entry(structure).or_default();
+        points.push(self.list.len());
+        self.by_path.insert(key, self.list.len());
+        self.list.push(Point {
+            path,
+            kind: if kind == "BIT" { "BOOL" } else { kind }.to_owned(),
+            at,
+            is_named: false,
+            bits: HashSet::new(),
+        });
+    }
+
+    /// The values in `node`, which is the data called `path`, or one member or element of it.
+    fn collect(&mut self, node: Node<'_, '_>, path: &str) {
+        // Depth is bounded by the XML parser, and structures of modules have three levels.
+        let mut open = vec![(node, path.to_owned())];
+        while let Some((node, path)) = open.pop() {
+            let mut inner = Vec::new();
+            for member in node.children().filter(Node::is_element) {
+                let name = member.attribute("Name").unwrap_or_default();
+                match member.tag_name().name() {
+                    "Structure" => inner.push((member, path.clone())),
+                    "StructureMember" => inner.push((member, format!("{path}.{name}"))),
+                    "DataValueMember" => {
+                        let kind = member.attribute("DataType").unwrap_or_default();
+                        self.add(format!("{path}.{name}"), kind, member.range().start);
+                    }
+                    "ArrayMember" => {
+                        let kind = member.attribute("DataType").unwrap_or_default();
+                        for element in member.children().filter(Node::is_element) {
+                            let index = element.attribute("Index").unwrap_or_default();
+                            let path = format!("{path}.{name}{index}");
+                            if element.has_attribute("Value") {
+                                self.add(path, kind, element.range().start);
+                            } else {
+                                inner.push((element, path));
+                            }
+                        }
+                    }
+                    _ => {}
+                }
+            }
+            open.extend(inner.into_iter().rev());
+        }
+    }
+
+    /// The structures of one module, and their comments.
+    fn module(&mut self, module: Node<'_, '_>) {
+        let name = module.attribute("Name").unwrap_or_default();
+        let parent = module.attribute("ParentModule").unwrap_or_default();
+        let mut ports = named(module, "Port");
+        let port = ports.find(|port| port.attribute("Upstream") == Some("true"));
+        let slot = port.and_then(|port| port.attribute("Address"));
+        // On a network a module has its own name, in a chassis that of the chassis and its slot.
+        let is_network = port.is_some_and(|port| {
+            matches!(
+                port.attribute("Type"),
+                Some("Ethernet" | "ControlNet" | "DeviceNet")
+            )
+        });
+        let slot = slot.filter(|slot| {
+            !is_network && !slot.is_empty() && slot.bytes().all(|byte| byte.is_ascii_digit())
+        });
+        for node in module.descendants().filter(Node::is_element) {
+            let (side, is_part) = match node.tag_name().name() {
+                "InputTag" => ("I", false),
+                "OutputTag" => ("O", false),
+                "InAliasTag" => ("I", true),
+                "OutAliasTag" => ("O", true),
+                _ => continue,
+            };
+            let path = match slot {
+                Some(slot) => format!("{parent}:{slot}:{side}"),
+                None => format!("{name}:{side}"),
+            };
+            if is_part && let Some(slot) = slot {
+                // The adapter has the data of its rack in one structure.
+                let parts =
+                    ["Slot", "Data"].map(|member| format!("{parent}:{side}.{member}[{slot}]"));
+                self.parts
+                    .insert(path.to_ascii_uppercase(), parts.join("\n"));
+            }
+            let comments = child(node, "Comments");
+            for comment in comments
+                .into_iter()
+                .flat_map(|comments| named(comments, "Comment"))
+            {
+                let operand = comment.attribute("Operand").unwrap_or_default();
+                let key = format!("{path}{operand}").to_ascii_uppercase();
+                self.comments.insert(key, words(Some(comment)));
+            }
+            for data in named(node, "Data") {
+                self.collect(data, &path);
+            }
+        }
+    }
+
+    /// `target` as the path of a point, or the beginning of some, or the bit of one.
+    fn resolved(&self, target: &str) -> String {
+        let upper = target.to_ascii_uppercase();
+        let end = upper.find('.').unwrap_or(upper.len());
+        let Some(parts) = self.parts.get(&upper[..end]) else {
+            return upper;
+        };
+        let rest = &upper[end..];
+        for part in parts.to_ascii_uppercase().lines() {
+            // The adapter of a rack has `Slot[1].Data`, or `Data[1]`.
+            let candidates = [
+                format!("{part}{rest}"),
+                format!("{part}{}", rest.strip_prefix(".DATA").unwrap_or(rest)),
+            ];
+            for candidate in candidates {
+                let whole = bit(&candidate).map_or(candidate.as_str(), |(whole, _)| whole);
+                if self.by_path.contains_key(whole) {
+                    return candidate;
+                }
+            }
+        }
+        upper
+    }
+
+    /// The points of a whole structure.
+    fn within(&self, path: &str) -> Vec<usize> {
+        let structure = path.split('.').next().unwrap_or_default();
+        let points = self.by_structure.get(structure).into_iter().flatten();
+        let points = points.copied().filter(|index| {
+            let rest = self.list[*index].path.get(path.len()..);
+            let start = self.list[*index].path.get(..path.len());
+            start.is_some_and(|start| start.eq_ignore_ascii_case(path))
+                && rest.is_some_and(|rest| rest.starts_with(['.', '[']))
+        });
+        points.collect()
+    }
+}
+
+/// A path that ends in a bit, `….Data.3`: the path in front of it, and the bit.
+fn bit(path: &str) -> Option<(&str, &str)> {
+    let (whole, bit) = path.rsplit_once('.')?;
+    let is_bit = !bit.is_empty() && bit.bytes().all(|byte| byte.is_ascii_digit());
+    is_bit.then_some((whole, bit))
+}
+
+/// The points of modules in an L5X, by the names of aliases where the project has some; they have the path in the
+/// module (`Local:1:I.Data.0`) instead of an address.
+pub(super) fn l5x(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
+    let mut points = Points::default();
+    for module in named(root, "Module") {
+        points.module(module);
+    }
+    for tag in named(root, "Tag") {
+        let name = tag.attribute("Name").unwrap_or_default();
+        if device::module_side(name).is_some() {
+            for data in named(tag, "Data") {
+                points.collect(data, name);
+            }
+        }
+    }
+    let mut records = aliases(root, &mut points, skipped);
+    // What an adapter's rack is called is that of the module in it.
+    let comments: Vec<(String, String)> = points.comments.drain().collect();
+    let comments: HashMap<String, String> = comments
+        .into_iter()
+        .map(|(path, comment)| (points.resolved(&path), comment))
+        .collect();
+    let mut bits: HashMap<&str, Vec<&str>> = HashMap::new();
+    for path in comments.keys() {
+        if let Some((whole, bit)) = bit(path) {
+            bits.entry(whole).or_default().push(bit);
+        }
+    }
+    for point in points.list.iter().filter(|point| !point.is_named) {
+        let key = point.path.to_ascii_uppercase();
+        let mut commented = bits.remove(key.as_str()).unwrap_or_default();
+        commented.sort_by_key(|bit| bit.parse::<u32>().unwrap_or(u32::MAX));
+        let mut add = |path: &str, kind: &str| {
+            let comment = comments.get(&path.to_ascii_uppercase());
+            let comment = comment.map_or("", String::as_str);
+            records.push(cells([path, path, kind, comment], [point.at; 4]));
+        };
+        for bit in &commented {
+            if !point.bits.contains(*bit) {
+                add(&format!("{}.{bit}", point.path), "BOOL");
+            }
+        }
+        if commented.is_empty() && point.bits.is_empty() {
+            add(&point.path, &point.kind);
+        }
+    }
+    records
+}
+
+/// The aliases of points, and of whole structures; the points they name are marked.
+fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> Vec<Record> {
+    let (mut records, mut others) = (Vec::new(), Vec::new());
+    let mut names = Names::default();
+    for tag in named(root, "Tag") {
+        let name = tag.attribute("Name").unwrap_or_default();
+        let target = tag.attribute("AliasFor").unwrap_or_default();
+        if device::module_side(target).is_none() {
+            if device::module_side(name).is_none() {
+                others.push(tag);
+            }
+            continue;
+        }
+        let at = place(tag, "AliasFor");
+        let path = points.resolved(target);
+        let known = points.by_path.get(&path).copied();
+        let within = if known.is_none() && records.len() < MOST {
+            points.within(&path)
+        } else {
+            Vec::new()
+        };
+        if !within.is_empty() {
+            let name = names.give(tag, name, &["Program"], "Name");
+            for index in within {
+                let point = &mut points.list[index];
+                point.is_named = true;
+                let name = format!("{name}{}", &point.path[path.len()..]);
+                records.push(cells(
+                    [&name, &point.path, &point.kind, ""],
+                    [place(tag, "Name"), at, at, at],
+                ));
+            }
+            continue;
+        }
+        let mut kind = tag.attribute("DataType").unwrap_or_default().to_owned();
+        if let Some(index) = known {
+            points.list[index].is_named = true;
+            kind.clone_from(&points.list[index].kind);
+        } else if let Some((whole, bit)) = bit(&path) {
+            let index = points.by_path.get(whole).copied();
+            if let Some(index) = index {
+                points.list[index].bits.insert(bit.to_owned());
+            }
+            "BOOL".clone_into(&mut kind);
+        } else if kind.is_empty() && is_point(target) {
+            "BOOL".clone_into(&mut kind);
+        }
+        if kind.is_empty() {
+            skipped.report(
+                at,
+                format!(
+                    "the type of \"{}\" stands nowhere in the file: skipped",
+                    shown(target)
+                ),
+                "export the whole controller, with its modules, or add a [[signal]] by hand",
+            );
+            continue;
+        }
+        let name = &names.give(tag, name, &["Program"], "Name");
+        let comment = words(child(tag, "Description"));
+        let mut record = record(
+            tag,
+            name,
+            (target, at),
+            (&kind, place(tag, "DataType")),
+            &comment,
+        );
+        record[0].at = place(tag, "Name");
+        records.push(record);
+    }
+    if let Some(first) = others.first() {
+        skipped.report(
+            first.range().start,
+            format!(
+                "{} tags that are no aliases of a module's inputs or outputs, \"{}\" the first: skipped",
+                others.len(),
+                shown(first.attribute("Name").unwrap_or_default())
+            ),
+            "make aliases of those that the simulation needs",
+        );
+    }
+    records
+}
+
+/// The data of one point of a module with a point in its path: `Local:1:I.Pt00.Data`.
+fn is_point(target: &str) -> bool {
+    let mut parts = target.rsplit('.');
+    parts.next() == Some("Data") && parts.next().is_some_and(|part| part.starts_with("Pt"))
+}
+
+fn cells(texts: [&str; 4], at: [usize; 4]) -> Record {
+    let cells = texts.into_iter().zip(at);
+    let cells = cells.map(|(text, at)| Cell {
+        text: text.to_owned(),
+        at,
+    });
+    cells.collect()
+}
+
+/// The headings of Studio 5000's table of tags.
+const HEADINGS: [&str; 6] = [
+    "TYPE",
+    "SCOPE",
+    "NAME",
+    "DESCRIPTION",
+    "DATATYPE",
+    "SPECIFIER",
+];
+
+/// The points in a table of tags that Studio 5000 exported as CSV: aliases of points, and points with a comment. `None`
+/// for another table.
+pub(super) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
+    let is_heading = |record: &Record| {
+        let cells = record.iter().map(|cell| cell.text.as_str());
+        record.len() >= HEADINGS.len() && cells.zip(HEADINGS).all(|(cell, heading)| cell == heading)
+    };
+    let first = 1 + records.iter().take(50).position(is_heading)?;
+    let mut points = Vec::new();
+    let mut seen = HashSet::new();
+    // An alias gives a better name than the comment of the point.
+    for wanted in ["ALIAS", "COMMENT"] {
+        for record in &records[first..] {
+            let [of, scope, name, comment, kind, path] = HEADINGS_AT.map(|index| record.get(index));
+            let (Some(of), Some(scope), Some(name), Some(path)) = (of, scope, name, path) else {
+                continue;
+            };
+            if of.text != wanted || device::module_side(&path.text).is_none() {
+                continue;
+            }
+            let kind = kind.map_or("", |kind| kind.text.as_str());
+            let kind = match kind {
+                "" if bit(&path.text).is_some() || is_point(&path.text) => "BOOL",
+                kind => kind,
+            };
+            if kind.is_empty() {
+                skipped.report(
+                    path.at,
+                    format!(
+                        "the type of \"{}\" stands nowhere in the table: skipped",
+                        shown(&path.text)
+                    ),
+                    "export the controller as L5X, which has the structures of its modules",
+                );
+                continue;
+            }
+            if !seen.insert(path.text.to_ascii_uppercase()) && wanted == "COMMENT" {
+                continue;
+            }
+            let called = match (wanted, scope.text.as_str()) {
+                ("COMMENT", _) => path.text.clone(),
+                (_, "") => name.text.clone(),
+                (_, program) => format!("{program}.{}", name.text),
+            };
+            let comment = unescaped(comment.map_or("", |comment| comment.text.as_str()));
+            points.push(cells(
+                [&called, &path.text, kind, &comment],
+                [name.at, path.at, path.at, path.at],
+            ));
+        }
+    }
+    Some(points)
+}
+
+const HEADINGS_AT: [usize; HEADINGS.len()] = [0, 1, 2, 3, 4, 5];
+
+/// A description without Studio 5000's escapes: `$N` is a line end, `$Q` a quotation mark, `$00E9` a character.
+fn unescaped(text: &str) -> String {
+    let mut plain = String::new();
+    let mut rest = text;
+    while let Some((before, after)) = rest.split_once('$') {
+        plain.push_str(before);
+        let code = after
+            .get(..4)
+            .and_then(|code| u32::from_str_radix(code, 16).ok());
+        if let Some(c) = code.and_then(char::from_u32) {
+            plain.push(c);
+            rest = &after[4..];
+            continue;
+        }
+        let letter = after.chars().next();
+        match letter {
+            Some('N' | 'n' | 'R' | 'r' | 'L' | 'l' | 'T' | 't') => plain.push(' '),
+            Some('Q' | 'q') => plain.push('"'),
+            Some(c) => plain.push(c),
+            None => {}
+        }
+        rest = &after[letter.map_or(0, char::len_utf8)..];
+    }
+    write!(plain, "{rest}").expect("a String takes all");
+    plain.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn escapes_of_descriptions_are_read() {
+        assert_eq!(unescaped("a$Nb $Qc$Q 5$$ $00E9$'"), "a b \"c\" 5$ é'");
+        assert_eq!(unescaped("$"), "");
+    }
+}

@@ -214,6 +214,15 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "fatal",
             "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal); it says: the solver has lost its matrix",
         ),
+        (
+            "formats",
+            "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
+        ),
+        // Some hand in an environment of their own.
+        (
+            "stray",
+            "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
+        ),
         // When it is asked how far it got.
         (
             "lost",

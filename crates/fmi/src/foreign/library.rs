@@ -62,7 +62,7 @@ pub(super) struct Instance {
 struct Kept {
     /// Dropped before what follows, which its finalisers may still use: they may log.
     _library: Library,
-    journal: Box<Journal>,
+    journal: Journal,
     /// Kept where it is: the FMU may keep its address.
     _callbacks: Option<Box<Callbacks>>,
 }
@@ -88,8 +88,9 @@ impl Instance {
             Version::Two => Functions::Two(Two::load(&loaded)?),
             Version::Three => Functions::Three(Box::new(Three::load(&loaded)?)),
         };
-        let journal = Box::new(Journal::of(file));
-        let env = std::ptr::from_ref(&*journal).cast_mut().cast::<c_void>();
+        let journal = Journal::of(file);
+        journal.begin_call();
+        let env = journal.env();
         let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
         let (name, token) = (c(name), c(token));
         let mut callbacks = None;
@@ -103,7 +104,7 @@ impl Instance {
                     step_finished: null(),
                     env,
                 }));
-                // SAFETY: by the standard; all texts outlive the call, callbacks and journal the instance.
+                // SAFETY: by the standard; all texts outlive the call, and the callbacks the instance.
                 unsafe {
                     (two.instantiate)(
                         name.as_ptr(),
@@ -472,6 +473,7 @@ impl Drop for Instance {
         if self.handle.is_null() {
             return;
         }
+        self.begin_call();
         // SAFETY: the handle is of this library, alive, and used no more.
         unsafe {
             match &self.functions {

@@ -300,7 +300,10 @@ mod tests {
         notes(&mut monitor, &[vec![0xDC, 2, 2], vec![0xDC, 54, 2]]);
         notes(&mut monitor, &[vec![0xDC, 2, 54], vec![0xDC, 2, 2]]);
         let table = monitor.table();
-        assert!(table.contains("master   2  requests 0  tokens 3\n"), "{table}");
+        assert!(
+            table.contains("master   2  requests 0  tokens 3\n"),
+            "{table}"
+        );
         assert!(!table.contains("master  54"), "{table}");
     }
 

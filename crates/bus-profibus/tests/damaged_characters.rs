@@ -179,7 +179,10 @@ fn no_outputs_are_believed_that_the_master_has_not_sent() {
                 if random(20) == 0 {
                     // Wrong parity, no stop bit, or a break.
                     let value = [character.0 ^ 1 << random(8), 0, 0xFF];
-                    *character = (value[usize::try_from(random(3)).expect("below three")], true);
+                    *character = (
+                        value[usize::try_from(random(3)).expect("below three")],
+                        true,
+                    );
                     is_harmed = true;
                 }
             }

@@ -109,7 +109,8 @@ impl Caller for Line<'_> {
         // Whatever it is, nobody waits for the last answer any more.
         self.reply.clear();
         self.written = 0;
-        let heard = self.segment
+        let heard = self
+            .segment
             .hear(now, characters, &mut machine, &mut self.reply);
         let heard = heard.map_err(|Taken { address }| {
             BusError::Link(format!(

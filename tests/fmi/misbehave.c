@@ -49,7 +49,14 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
 
 void fmi2FreeInstance(void *it) { (void)it; }
 
-int fmi2SetupExperiment(void *it, int a, double b, double c, int d, double e) { return (void)it, (void)a, (void)b, (void)c, (void)d, (void)e, 0; }
+int fmi2SetupExperiment(void *it, int has_tolerance, double tolerance, double start, int has_stop, double stop) {
+    (void)it;
+    if (is("setup")) {
+        callbacks->logger(callbacks->env, "it", 3, "logAll", "tolerance %d %g, from %g, to %d %g", has_tolerance, tolerance, start, has_stop, stop);
+        return 3;
+    }
+    return 0;
+}
 int fmi2EnterInitializationMode(void *it) { return (void)it, 0; }
 int fmi2ExitInitializationMode(void *it) { return (void)it, is("refuses") ? 3 : 0; }
 int fmi2Terminate(void *it) { return (void)it, 0; }
@@ -70,6 +77,10 @@ int fmi2SetBoolean(void *it, const uint32_t *vr, size_t n, const int *values) { 
 
 int fmi2DoStep(void *it, double from, double length, int prior) {
     (void)it, (void)prior;
+    if (is("slow")) {
+        usleep(25000);
+        return 0;
+    }
     /* The third step, whatever the rounding. */
     if (from < 2.5 * length) {
         if (is("grumbles")) {

@@ -22,6 +22,8 @@ pub struct Model {
     pub step: Option<f64>,
     /// The time at which it proposes to begin, in seconds.
     pub start: f64,
+    /// The relative tolerance that it proposes for its solver.
+    pub tolerance: Option<f64>,
     /// Whether it needs the tool that has made it.
     pub needs_tool: bool,
     /// Its variables, in its own order.
@@ -182,8 +184,7 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         );
     }
     let experiment = child(root, "DefaultExperiment");
-    let seconds =
-        |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
+    let number = |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
     let variables = child(root, "ModelVariables");
     let variables = variables.into_iter().flat_map(|node| node.children());
     let variables: Vec<_> = variables
@@ -198,10 +199,12 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         name,
         identifier: identifier?.to_owned(),
         token: token?.to_owned(),
-        step: seconds("stepSize").filter(|step| *step > 0.0 && step.is_finite()),
-        start: seconds("startTime")
+        step: number("stepSize").filter(|step| *step > 0.0 && step.is_finite()),
+        start: number("startTime")
             .filter(|start| start.is_finite())
             .unwrap_or(0.0),
+        tolerance: number("tolerance")
+            .filter(|tolerance| *tolerance > 0.0 && tolerance.is_finite()),
         needs_tool: matches!(kind.attribute("needsExecutionTool"), Some("true" | "1")),
         variables,
     })

@@ -181,13 +181,27 @@ impl Instance {
         status
     }
 
-    /// Enters the initialisation, for a run that begins at `start` seconds.
-    pub(super) fn enter(&mut self, start: f64) -> Status {
+    /// Enters the initialisation, for a run that begins at `start` seconds, and ends at `stop` if that is known.
+    pub(super) fn enter(
+        &mut self,
+        start: f64,
+        tolerance: Option<f64>,
+        stop: Option<f64>,
+    ) -> Status {
         self.begin_call();
+        let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
+        let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         let status = match &self.functions {
             // SAFETY: the handle is of this library, and alive, here and below.
             Functions::Two(two) => unsafe {
-                let status = (two.setup)(self.handle, 0, 0.0, start, 0, 0.0);
+                let status = (two.setup)(
+                    self.handle,
+                    has_tolerance.into(),
+                    tolerance,
+                    start,
+                    has_stop.into(),
+                    stop,
+                );
                 if status > Status::Warning as c_int {
                     status
                 } else {
@@ -196,7 +210,7 @@ impl Instance {
             },
             // SAFETY: as above.
             Functions::Three(three) => unsafe {
-                (three.enter)(self.handle, false, 0.0, start, false, 0.0)
+                (three.enter)(self.handle, has_tolerance, tolerance, start, has_stop, stop)
             },
         };
         self.noted(status)

@@ -24,6 +24,10 @@ pub(super) struct Setup {
     pub resources: PathBuf,
     /// The time at which the run begins, in seconds.
     pub start: f64,
+    /// The relative tolerance for its solver, if it is to have one.
+    pub tolerance: Option<f64>,
+    /// The time at which the run ends, in seconds, if that is known.
+    pub stop: Option<f64>,
     /// What is set before the run: type, value reference, value.
     pub parameters: Vec<(ValueType, u32, Value)>,
     /// What is set before every step.
@@ -137,7 +141,9 @@ impl Direct {
             let status = slave.instance.set(kind, &[reference], &[value]);
             slave.check(status, "setting a parameter")?;
         }
-        let status = slave.instance.enter(setup.start);
+        let status = slave
+            .instance
+            .enter(setup.start, setup.tolerance, setup.stop);
         slave.check(status, "entering the initialisation")?;
         slave.set(inputs)?;
         let status = slave.instance.exit();

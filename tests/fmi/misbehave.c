@@ -75,6 +75,12 @@ int fmi2SetInteger(void *it, const uint32_t *vr, size_t n, const int *values) { 
 int fmi2GetBoolean(void *it, const uint32_t *vr, size_t n, int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
 int fmi2SetBoolean(void *it, const uint32_t *vr, size_t n, const int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
 
+int fmi2SetString(void *it, const uint32_t *vr, size_t n, const char *const *values) {
+    (void)it;
+    callbacks->logger(callbacks->env, "it", 3, "logAll", "text %u of %zu is %s", vr[0], n, values[0]);
+    return 3;
+}
+
 int fmi2DoStep(void *it, double from, double length, int prior) {
     (void)it, (void)prior;
     if (is("slow")) {

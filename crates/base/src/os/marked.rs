@@ -50,7 +50,8 @@ impl Marks {
                 (Code::Begun, 0) => Code::Damaged,
                 (code, _) => {
                     // No port hands over FF and anything else: some character was lost.
-                    if matches!(code, Code::Damaged) || matches!(code, Code::Begun) && byte != 0xFF {
+                    if matches!(code, Code::Damaged) || matches!(code, Code::Begun) && byte != 0xFF
+                    {
                         self.damaged.push(self.bytes.len());
                     }
                     self.bytes.push(byte);

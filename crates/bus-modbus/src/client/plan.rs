@@ -21,6 +21,8 @@ pub struct Capabilities {
     pub many_coils: bool,
     /// It has function 16; otherwise registers are written one at a time.
     pub many_registers: bool,
+    /// It has function 22; otherwise bits of registers are not written.
+    pub masks: bool,
 }
 
 impl Capabilities {
@@ -31,6 +33,7 @@ impl Capabilities {
             gap,
             many_coils: true,
             many_registers: true,
+            masks: true,
         }
     }
 }
@@ -125,6 +128,7 @@ fn writings(table: Table, pieces: &[Piece], able: &Capabilities) -> Vec<Request>
     let (whole, partial) = elements(table, pieces);
     let mut queries: Vec<Request> = partial
         .into_iter()
+        .filter(|_| able.masks)
         .map(|first| Request::Mask(region(table, Span { first, count: 1 }, pieces)))
         .collect();
     let mut rest = whole.into_iter().peekable();

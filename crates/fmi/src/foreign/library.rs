@@ -7,7 +7,7 @@ mod functions;
 mod journal;
 
 use std::collections::BTreeSet;
-use std::ffi::{CString, OsString, c_int, c_void};
+use std::ffi::{CString, OsString, c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -61,7 +61,7 @@ pub(super) struct Instance {
 #[derive(Debug)]
 struct Kept {
     /// Dropped before what follows, which its finalisers may still use: they may log.
-    _library: Library,
+    library: Library,
     journal: Journal,
     /// Kept where it is: the FMU may keep its address.
     _callbacks: Option<Box<Callbacks>>,
@@ -91,12 +91,11 @@ impl Instance {
         let journal = Journal::of(file);
         journal.begin_call();
         let env = journal.env();
-        let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
-        let (name, token) = (c(name), c(token));
+        let (name, token) = (c_string(name), c_string(token));
         let mut callbacks = None;
         let handle = match &functions {
             Functions::Two(two) => {
-                let uri = c(&uri_of(resources));
+                let uri = c_string(&uri_of(resources));
                 let callbacks = callbacks.insert(Box::new(Callbacks {
                     logger: log_of_two,
                     allocate: calloc,
@@ -120,7 +119,7 @@ impl Instance {
             Functions::Three(three) => {
                 // With a separator at its end, as the standard says.
                 let path = resources.join("");
-                let path = c(&path.to_string_lossy());
+                let path = c_string(&path.to_string_lossy());
                 // SAFETY: as above.
                 unsafe {
                     (three.instantiate)(
@@ -146,7 +145,7 @@ impl Instance {
             is_dead: false,
             identity,
             kept: Some(Kept {
-                _library: loaded,
+                library: loaded,
                 journal,
                 _callbacks: callbacks,
             }),
@@ -333,6 +332,47 @@ impl Instance {
         self.noted(status)
     }
 
+    /// Sets a variable of type String.
+    ///
+    /// # Errors
+    ///
+    /// Its library has no function for that.
+    pub(super) fn set_text(&mut self, reference: u32, text: &str) -> Result<Status, String> {
+        self.begin_call();
+        let text = c_string(text);
+        let texts = [text.as_ptr()];
+        let library = &self.kept.as_ref().expect("it is alive").library;
+        let missing = |_| {
+            "its library has no function for texts; export it again, or tell its maker".to_owned()
+        };
+        let status = match &self.functions {
+            Functions::Two(_) => {
+                // SAFETY: the type is that of the standard's header, here and below.
+                let function = unsafe { library.symbol::<SetTwo<*const c_char>>("fmi2SetString") };
+                // SAFETY: as in `enter`; the lists have one value, and outlive the call.
+                unsafe {
+                    function.map_err(missing)?(self.handle, &raw const reference, 1, texts.as_ptr())
+                }
+            }
+            Functions::Three(_) => {
+                // SAFETY: as above.
+                let function =
+                    unsafe { library.symbol::<SetThree<*const c_char>>("fmi3SetString") };
+                // SAFETY: as above.
+                unsafe {
+                    function.map_err(missing)?(
+                        self.handle,
+                        &raw const reference,
+                        1,
+                        texts.as_ptr(),
+                        1,
+                    )
+                }
+            }
+        };
+        Ok(self.noted(status))
+    }
+
     fn set_two<T>(
         &self,
         function: SetTwo<T>,
@@ -497,6 +537,10 @@ impl Drop for Instance {
         }
         self.handle = null_mut();
     }
+}
+
+fn c_string(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
 /// The URI of a folder, as FMI 2.0 wants it.

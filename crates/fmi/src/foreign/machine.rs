@@ -103,6 +103,8 @@ impl Machine {
             let found = &model.variables[*at];
             Some((found.value_type?, found.reference, *value))
         });
+        let texts = join.texts.iter();
+        let texts = texts.map(|(at, text)| (model.variables[*at].reference, text.clone()));
         let setup = Setup {
             file: fmu.file.clone(),
             name: model.name.clone(),
@@ -114,6 +116,7 @@ impl Machine {
             tolerance: options.tolerance.or(model.tolerance),
             stop: options.duration.map(|end| model.start + seconds(end)),
             parameters: parameters.collect(),
+            texts: texts.collect(),
             inputs: join.inputs.iter().map(variable).collect(),
             outputs: join.outputs.iter().map(variable).collect(),
         };

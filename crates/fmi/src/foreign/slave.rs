@@ -30,6 +30,8 @@ pub(super) struct Setup {
     pub stop: Option<f64>,
     /// What is set before the run: type, value reference, value.
     pub parameters: Vec<(ValueType, u32, Value)>,
+    /// Texts that are set before the run: value reference, text.
+    pub texts: Vec<(u32, String)>,
     /// What is set before every step.
     pub inputs: Vec<(ValueType, u32)>,
     /// What is read after every step.
@@ -139,6 +141,11 @@ impl Direct {
         };
         for &(kind, reference, value) in &setup.parameters {
             let status = slave.instance.set(kind, &[reference], &[value]);
+            slave.check(status, "setting a parameter")?;
+        }
+        for (reference, text) in &setup.texts {
+            let status = slave.instance.set_text(*reference, text);
+            let status = status.map_err(|why| Failure(format!("{}: {why}", setup.file)))?;
             slave.check(status, "setting a parameter")?;
         }
         let status = slave

@@ -100,7 +100,7 @@ impl Rig {
 
     /// Whether the station answers.
     fn hear(&mut self, bytes: &[u8]) -> bool {
-        self.now = self.now + Nanos::from_millis(1);
+        self.now += Nanos::from_millis(1);
         let mut reply = Vec::new();
         let characters = self.marks.read(bytes);
         let heard = self

@@ -47,7 +47,7 @@ impl RealTime {
         let due = begun + Nanos(((time - from).0 as f64 / self.pace) as i64);
         if now > due + LATE {
             self.begun = Some((time, now));
-            self.lost = self.lost + (now - due);
+            self.lost += now - due;
             return None;
         }
         (now < due).then_some(due)

@@ -12,6 +12,10 @@ use super::request::{Region, Request};
 
 /// The capabilities of a device, which decide how requests are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "functions that a device has or not, independent of each other"
+)]
 pub struct Capabilities {
     /// One request can write and read holding registers: function 23.
     pub combine: bool,

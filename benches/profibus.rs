@@ -86,7 +86,7 @@ mod core {
                 telegram(address, 0x6D, Some(61), &[0x80, 0, 0, 11, 0x80, 0xE0, 0]),
                 telegram(address, 0x5D, Some(62), &[0x17, 0x27]),
             ] {
-                let heard = line.hear(Nanos(0), &bytes, &mut Machine, &mut reply);
+                let heard = line.hear(Nanos(0), &bytes[..], &mut Machine, &mut reply);
                 heard.expect("free addresses");
             }
         }
@@ -113,7 +113,7 @@ mod core {
                 'round: loop {
                     for telegrams in &both {
                         for bytes in telegrams {
-                            let heard = line.hear(Nanos(0), bytes, &mut Machine, &mut reply);
+                            let heard = line.hear(Nanos(0), &bytes[..], &mut Machine, &mut reply);
                             assert!(heard.is_ok_and(|heard| heard.answer.is_some()));
                             asked += 1;
                             if asked == requests {

@@ -61,6 +61,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 
+    /// Relative tolerance of the FMU's solver [default: as the FMU proposes].
+    #[arg(long, value_name = "NUMBER", value_parser = tolerance)]
+    tolerance: Option<f64>,
+
     /// Run the FMU in a process of its own, which it may crash.
     #[arg(long)]
     isolated: bool,
@@ -95,6 +99,13 @@ fn pace(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(pace) if pace.is_finite() && pace >= 0.0 => Ok(pace),
         _ => Err("write a number: 1 for real time, 0 for as fast as possible".to_owned()),
+    }
+}
+
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(tolerance) if tolerance.is_finite() && tolerance > 0.0 => Ok(tolerance),
+        _ => Err("write a number above 0, such as 1e-6".to_owned()),
     }
 }
 
@@ -149,6 +160,8 @@ fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
     let mut slots = driver.initial_slots();
     let options = MachineOptions {
         isolated: arguments.isolated,
+        tolerance: arguments.tolerance,
+        duration: arguments.duration,
     };
     let machine = Machine::open(&fmu, &join, &table, options, &mut slots);
     let machine = machine.map_err(|failure| Refused(failure.to_string(), Outcome::BusFailed))?;
@@ -352,7 +365,15 @@ fn tick(
         }
         let now = clock.now();
         line.look(now);
-        if let Some(due) = real_time.due(time, now) {
+        let was_late = real_time.lost() > Nanos::ZERO;
+        let due = real_time.due(time, now);
+        if real_time.lost() > Nanos::ZERO && !was_late {
+            say(&format!(
+                "run: at {time} the simulation is {} behind the clock, and does not catch up; the last line has the sum\n",
+                real_time.lost().rounded()
+            ));
+        }
+        if let Some(due) = due {
             while clock.now() < due && !stop.is_stopped() {
                 clock.wait_until(due, stop);
             }
@@ -366,20 +387,25 @@ fn tick(
     let statistics = stats.then(|| line.driver.statistics());
     line.driver.end_tick(&line.slots);
     line.driver.close();
+    let lost = real_time.lost();
     if let Some(statistics) = statistics {
-        say(&format!("{statistics}\n"));
+        say(&format!("{statistics}run.lost={lost}\n\n"));
     }
     if by_itself {
         say(&format!(
             "run: the FMU has ended its simulation at {time}\n"
         ));
     }
+    let lost = match lost {
+        Nanos::ZERO => String::new(),
+        lost => format!(" lost={}", lost.rounded()),
+    };
     match &failure {
         None => say(&format!(
-            "run: ok ticks={ticks} time={time} stale={stale}\n"
+            "run: ok ticks={ticks} time={time} stale={stale}{lost}\n"
         )),
         Some(why) => say(&format!(
-            "run: failed ticks={ticks} time={time} reason={why}\n"
+            "run: failed ticks={ticks} time={time}{lost} reason={why}\n"
         )),
     }
     if failure.is_some() {

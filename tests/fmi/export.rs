@@ -147,6 +147,13 @@ fn what_cannot_be_packed_says_why() {
             "pki has keys or passwords, and an FMU goes through many hands; name it by an absolute path",
         ),
         (
+            bus(
+                "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1\"\npki = \"/etc/pki\"\nuser = \"rig\"\n\
+                 password_in_clear = \"hunter2\"\n",
+            ),
+            "driver.cfg has a password (password_in_clear), and an FMU goes through many hands; write password_env",
+        ),
+        (
             bus("kind = \"sockt\"\n"),
             "driver.cfg:5:8: bus kind \"sockt\" is unknown",
         ),

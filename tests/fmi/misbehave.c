@@ -49,7 +49,14 @@ void *fmi2Instantiate(const char *name, int kind, const char *guid, const char *
 
 void fmi2FreeInstance(void *it) { (void)it; }
 
-int fmi2SetupExperiment(void *it, int a, double b, double c, int d, double e) { return (void)it, (void)a, (void)b, (void)c, (void)d, (void)e, 0; }
+int fmi2SetupExperiment(void *it, int has_tolerance, double tolerance, double start, int has_stop, double stop) {
+    (void)it;
+    if (is("setup")) {
+        callbacks->logger(callbacks->env, "it", 3, "logAll", "tolerance %d %g, from %g, to %d %g", has_tolerance, tolerance, start, has_stop, stop);
+        return 3;
+    }
+    return 0;
+}
 int fmi2EnterInitializationMode(void *it) { return (void)it, 0; }
 int fmi2ExitInitializationMode(void *it) { return (void)it, is("refuses") ? 3 : 0; }
 int fmi2Terminate(void *it) { return (void)it, 0; }
@@ -68,8 +75,18 @@ int fmi2SetInteger(void *it, const uint32_t *vr, size_t n, const int *values) { 
 int fmi2GetBoolean(void *it, const uint32_t *vr, size_t n, int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
 int fmi2SetBoolean(void *it, const uint32_t *vr, size_t n, const int *values) { return (void)it, (void)vr, (void)n, (void)values, 3; }
 
+int fmi2SetString(void *it, const uint32_t *vr, size_t n, const char *const *values) {
+    (void)it;
+    callbacks->logger(callbacks->env, "it", 3, "logAll", "text %u of %zu is %s", vr[0], n, values[0]);
+    return 3;
+}
+
 int fmi2DoStep(void *it, double from, double length, int prior) {
     (void)it, (void)prior;
+    if (is("slow")) {
+        usleep(25000);
+        return 0;
+    }
     /* The third step, whatever the rounding. */
     if (from < 2.5 * length) {
         if (is("grumbles")) {
@@ -89,6 +106,11 @@ int fmi2DoStep(void *it, double from, double length, int prior) {
     } else if (is("fatal")) {
         say(4, "the solver has lost its matrix");
         return 4;
+    } else if (is("formats") || is("stray")) {
+        /* More arguments than registers; and an environment that is no address of the importer's. */
+        callbacks->logger(is("stray") ? (void *)1 : callbacks->env, "it", 3, "logAll", "%s at %g s: %d %d %d|%g %g %g %g %g %g %g %g %s", "V7",
+                          from, 1, 2, 3, 1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5, 8.5, "end");
+        return 3;
     } else if (is("error") || is("grumbles")) {
         return 3;
     } else if (is("print")) {

@@ -92,6 +92,41 @@ fn what_is_not_joined_is_told_with_the_nearest_name() {
 }
 
 #[test]
+fn a_simulation_that_is_too_slow_for_the_clock_is_told_with_the_time_that_it_lost() {
+    let folder = misbehaving_as("slow");
+    let arguments = [
+        "run",
+        "it.fmu",
+        "--config",
+        "it.cfg",
+        "--duration",
+        "200ms",
+        "--stats",
+    ];
+    let output = tickbus(folder.path(), &[&arguments[..], &["--pace", "1"]].concat());
+    let told = out(&output);
+    assert_eq!(
+        told.matches(" behind the clock, and does not catch up; ")
+            .count(),
+        1,
+        "{told}"
+    );
+    assert!(told.contains("\nrun.lost="), "{told}");
+    let last = told.lines().last().expect("a line");
+    assert!(
+        last.starts_with("run: ok ticks=20 time=200ms stale=0 lost="),
+        "{last}"
+    );
+    // Nothing is late where no clock is to be kept.
+    let output = tickbus(folder.path(), &arguments);
+    let told = out(&output);
+    assert!(
+        !told.contains("behind the clock") && told.ends_with(" stale=0\n"),
+        "{told}"
+    );
+}
+
+#[test]
 fn mistakes_in_a_map_have_their_places() {
     let folder = tempfile::tempdir().expect("a folder");
     let map = folder.path().join("map.toml");

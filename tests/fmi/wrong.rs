@@ -214,6 +214,15 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "fatal",
             "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal); it says: the solver has lost its matrix",
         ),
+        (
+            "formats",
+            "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
+        ),
+        // Some hand in an environment of their own.
+        (
+            "stray",
+            "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
+        ),
         // When it is asked how far it got.
         (
             "lost",
@@ -331,20 +340,159 @@ fn an_archive_with_the_very_same_name_twice_is_refused() {
             Entry::File("resources/b", b"y"),
         ],
     );
-    // Programs that pack do not do that.
-    let mut bytes = fs::read(&path).expect("a file");
-    let other = b"resources/b";
-    for at in 0..bytes.len() - other.len() {
-        if bytes[at..].starts_with(other) {
-            bytes[at + other.len() - 1] = b'a';
-        }
-    }
-    fs::write(&path, bytes).expect("room");
+    rename(&path, b"resources/b", b"resources/a");
     let output = tickbus(folder.path(), &RUN);
     assert_eq!(output.status.code(), Some(1));
     let told = err(&output);
-    let words = "it.fmu: its directory has 3 entries, and 2 names: it has a file twice; do not use this FMU";
+    let words = "it.fmu: it has \"resources/a\" twice; do not use this FMU";
     assert!(told.contains(words), "{told}");
+}
+
+/// Gives a file in an archive another name of the same length, also one that is there already: programs that pack do not do that.
+fn rename(archive: &Path, from: &[u8], to: &[u8]) {
+    let mut bytes = fs::read(archive).expect("a file");
+    for at in 0..bytes.len() - from.len() {
+        if bytes[at..].starts_with(from) {
+            bytes[at..at + to.len()].copy_from_slice(to);
+        }
+    }
+    fs::write(archive, bytes).expect("room");
+}
+
+/// As the makers' own Reference FMU "Roberts" has it.
+#[test]
+fn the_same_file_twice_is_accepted_where_a_run_does_not_depend_on_it() {
+    let library = fs::read(misbehaving()).expect("the library");
+    let description = description("ok");
+    for (folder, second, code) in [
+        ("extra", &b"x"[..], 0),
+        ("extra", b"y", 1),
+        ("resources", b"x", 1),
+    ] {
+        let place = misbehaving_as("ok");
+        let path = place.path().join("it.fmu");
+        let names = ["a", "b"].map(|name| format!("{folder}/{name}"));
+        archive(
+            &path,
+            &[
+                Entry::File("modelDescription.xml", description.as_bytes()),
+                Entry::File("binaries/linux64/it.so", &library),
+                Entry::File(&names[0], b"x"),
+                Entry::File(&names[1], second),
+            ],
+        );
+        rename(&path, names[1].as_bytes(), names[0].as_bytes());
+        let output = tickbus(place.path(), &RUN);
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{folder} {second:?}: {}",
+            err(&output)
+        );
+    }
+}
+
+#[test]
+fn a_parameter_may_be_a_text_and_arrays_say_that_they_are() {
+    let folder = misbehaving_as("ok");
+    let text = description("ok").replace(
+        "<ModelVariables>",
+        "<ModelVariables><ScalarVariable name=\"File\" valueReference=\"7\" causality=\"parameter\"><String start=\"\"/></ScalarVariable>",
+    );
+    let library = fs::read(misbehaving()).expect("the library");
+    archive(
+        &folder.path().join("it.fmu"),
+        &[
+            Entry::File("modelDescription.xml", text.as_bytes()),
+            Entry::File("binaries/linux64/it.so", &library),
+        ],
+    );
+    let run = |map: &str| {
+        fs::write(folder.path().join("it.toml"), map).expect("a file");
+        err(&tickbus(
+            folder.path(),
+            &[&RUN[..], &["--map", "it.toml"]].concat(),
+        ))
+    };
+    let told = run("[parameters]\nFile = \"a.txt\"\n");
+    let words = "it.fmu: setting a parameter failed; it says: text 7 of 1 is a.txt";
+    assert!(told.contains(words), "{told}");
+    let told = run("[parameters]\nFile = 1\n");
+    assert!(
+        told.contains("it.toml:2:8: ") && told.contains("write a text in quotes"),
+        "{told}"
+    );
+    let three = "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"x\"><CoSimulation modelIdentifier=\"it\"/>\
+                 <ModelVariables><Float64 name=\"y\" valueReference=\"1\" causality=\"output\"><Dimension start=\"2\"/></Float64>\
+                 </ModelVariables></fmiModelDescription>";
+    archive(
+        &folder.path().join("it.fmu"),
+        &[
+            Entry::File("modelDescription.xml", three.as_bytes()),
+            Entry::File("binaries/x86_64-linux/it.so", &library),
+        ],
+    );
+    let told = run("[signals]\nLevel = \"y[1]\"\n");
+    assert!(
+        told.contains("it.toml:2:9: \"y\" is an array of Float64; tickbus does not reach the elements of arrays"),
+        "{told}"
+    );
+    let told = run("[parameters]\n");
+    assert!(
+        told.contains("(inputs: none; outputs: \"y\" (array of Float64))"),
+        "{told}"
+    );
+}
+
+/// What its setup is called with.
+#[test]
+fn the_tolerance_of_the_description_and_the_end_of_the_run_are_handed_in() {
+    for (attributes, more, words) in [
+        (
+            "startTime=\"1\" tolerance=\"1e-4\"",
+            &[][..],
+            "tolerance 1 0.0001, from 1, to 1 2",
+        ),
+        (
+            "startTime=\"1\" tolerance=\"1e-4\"",
+            &["--tolerance", "1e-6"],
+            "tolerance 1 1e-06, from 1, to 1 2",
+        ),
+        (
+            "tolerance=\"0\"",
+            &["--isolated"],
+            "tolerance 0 0, from 0, to 1 1",
+        ),
+    ] {
+        let folder = misbehaving_as("setup");
+        let text = description("setup").replace(
+            "<ModelVariables>",
+            &format!("<DefaultExperiment {attributes}/><ModelVariables>"),
+        );
+        let library = fs::read(misbehaving()).expect("the library");
+        archive(
+            &folder.path().join("it.fmu"),
+            &[
+                Entry::File("modelDescription.xml", text.as_bytes()),
+                Entry::File("binaries/linux64/it.so", &library),
+            ],
+        );
+        let output = tickbus(folder.path(), &[&RUN[..], more].concat());
+        let told = err(&output);
+        assert!(
+            told.contains(&format!(
+                "entering the initialisation failed; it says: {words}"
+            )),
+            "{told}"
+        );
+    }
+    let folder = misbehaving_as("ok");
+    let output = tickbus(folder.path(), &[&RUN[..], &["--tolerance", "0"]].concat());
+    assert!(
+        err(&output).contains("write a number above 0, such as 1e-6"),
+        "{}",
+        err(&output)
+    );
 }
 
 #[test]

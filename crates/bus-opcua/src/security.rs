@@ -120,14 +120,12 @@ impl Credentials {
     pub(super) fn files(&self, policies: &[Policy]) -> Vec<NamedFile> {
         let protected = policies.iter().any(|policy| *policy != Policy::None);
         let password = self.login.as_ref().and_then(|login| match &login.password {
-            Secret::File(file) => Some(file.clone()),
-            Secret::Environment(_) | Secret::Clear(_) => None,
+            Secret::File(file) => Some(NamedFile::Secret(file.clone())),
+            Secret::Environment(_) => None,
+            Secret::Clear(_) => Some(NamedFile::InClear("password_in_clear")),
         });
-        let pki = protected.then(|| self.pki.clone());
-        pki.into_iter()
-            .chain(password)
-            .map(NamedFile::Secret)
-            .collect()
+        let pki = protected.then(|| NamedFile::Secret(self.pki.clone()));
+        pki.into_iter().chain(password).collect()
     }
 }
 

@@ -1,5 +1,6 @@
 //! Finds the telegrams among the bytes of a line.
 
+use tickbus_base::os::Characters;
 use tickbus_base::time::Nanos;
 
 use crate::telegram::Telegram;
@@ -20,6 +21,8 @@ pub(crate) fn bits(baud: u32, count: i64) -> Nanos {
 pub(crate) struct Finder {
     silence: Nanos,
     buffer: Vec<u8>,
+    /// The indices of the damaged characters among them.
+    damaged: Vec<usize>,
     /// When the last bytes arrived.
     heard: Nanos,
 }
@@ -39,11 +42,13 @@ impl Finder {
         Self {
             silence: bits(baud, SILENCE),
             buffer: Vec::new(),
+            damaged: Vec::new(),
             heard: Nanos(0),
         }
     }
 
-    /// Takes bytes off the line, and hands out what is found in them.
+    /// Takes characters off the line, and hands out what is found in them. A telegram with a damaged one is none, whatever its
+    /// checksum says: that is a sum, which two of them can leave as it was.
     ///
     /// # Errors
     ///
@@ -51,39 +56,47 @@ impl Finder {
     pub(crate) fn hear<E>(
         &mut self,
         now: Nanos,
-        bytes: &[u8],
+        characters: Characters<'_>,
         mut each: impl FnMut(Found<'_>) -> Result<(), E>,
     ) -> Result<(), E> {
         let pause = now - self.heard;
         self.heard = now;
-        let begins_anew = pause > self.silence
-            && matches!(Telegram::parse(bytes), Ok(Some((Telegram::Frame(_), _))));
+        let is_frame = |bytes| matches!(Telegram::parse(bytes), Ok(Some((Telegram::Frame(_), _))));
+        let begins_anew = pause > self.silence && is_frame(characters.bytes);
         if !self.buffer.is_empty() && (pause > PATIENCE || begins_anew) {
             self.buffer.clear();
+            self.damaged.clear();
             each(Found::Damaged)?;
         }
-        self.buffer.extend_from_slice(bytes);
-        let mut rest = &self.buffer[..];
+        let before = self.buffer.len();
+        self.damaged
+            .extend(characters.damaged.iter().map(|index| before + index));
+        self.buffer.extend_from_slice(characters.bytes);
+        let mut at = 0;
         let mut is_damaged = false;
-        loop {
-            match Telegram::parse(rest) {
-                Ok(None) => break,
-                Ok(Some((telegram, length))) => {
-                    let (own, behind) = rest.split_at(length);
-                    rest = behind;
+        while let Some(found) = Telegram::parse(&self.buffer[at..]).transpose() {
+            let length = found.map_or(1, |(_, length)| length);
+            let own = at..at + length;
+            let is_sound = !self.damaged.iter().any(|index| own.contains(index));
+            at = own.end;
+            match found {
+                Ok((telegram, _)) if is_sound => {
                     is_damaged = false;
-                    each(Found::Telegram(telegram, own))?;
+                    each(Found::Telegram(telegram, &self.buffer[own]))?;
                 }
-                Err(_) => {
+                _ => {
                     if !std::mem::replace(&mut is_damaged, true) {
                         each(Found::Damaged)?;
                     }
-                    rest = &rest[1..];
                 }
             }
         }
-        let is_read = self.buffer.len() - rest.len();
-        self.buffer.drain(..is_read);
+        self.buffer.drain(..at);
+        self.damaged.retain_mut(|index| {
+            let is_left = *index >= at;
+            *index = index.saturating_sub(at);
+            is_left
+        });
         Ok(())
     }
 

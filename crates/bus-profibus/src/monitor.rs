@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::fmt::Write as _;
 
+use tickbus_base::os::Characters;
 use tickbus_base::time::{Nanos, TimeHistogram};
 
 use crate::finder::{Finder, Found};
@@ -80,10 +81,15 @@ impl Monitor {
         }
     }
 
-    /// Takes bytes off the line, and hands out what is in them.
-    pub fn hear(&mut self, now: Nanos, bytes: &[u8], mut each: impl FnMut(&Heard<'_>)) {
+    /// Takes characters off the line, and hands out what is in them.
+    pub fn hear<'a>(
+        &mut self,
+        now: Nanos,
+        characters: impl Into<Characters<'a>>,
+        mut each: impl FnMut(&Heard<'_>),
+    ) {
         let all = &mut self.all;
-        let heard = self.finder.hear(now, bytes, |found| {
+        let heard = self.finder.hear(now, characters.into(), |found| {
             let heard = match found {
                 Found::Damaged => {
                     all.damaged += 1;
@@ -112,7 +118,9 @@ impl Monitor {
         let all = &self.all;
         let mut text = format!("telegrams {}  damaged {}\n", all.telegrams, all.damaged);
         // Writing to a string cannot fail.
-        for (address, master) in &all.masters {
+        // A token has no checksum, so that one telegram proves nothing.
+        let masters = all.masters.iter();
+        for (address, master) in masters.filter(|(_, seen)| seen.requests + seen.tokens > 1) {
             let _ = writeln!(
                 text,
                 "master {address:>3}  requests {}  tokens {}",
@@ -244,7 +252,7 @@ mod tests {
     fn notes(monitor: &mut Monitor, telegrams: &[Vec<u8>]) -> Vec<&'static str> {
         let mut notes = Vec::new();
         for (number, bytes) in (1..).zip(telegrams) {
-            monitor.hear(Nanos::from_millis(number), bytes, |heard| {
+            monitor.hear(Nanos::from_millis(number), &bytes[..], |heard| {
                 notes.push(heard.note);
             });
         }
@@ -284,6 +292,19 @@ mod tests {
             assert!(table.contains(words), "{words}\n{table}");
         }
         assert!(!table.contains("slave    5"), "{table}");
+    }
+
+    #[test]
+    fn a_master_is_listed_after_its_second_telegram() {
+        let mut monitor = Monitor::new(500_000);
+        notes(&mut monitor, &[vec![0xDC, 2, 2], vec![0xDC, 54, 2]]);
+        notes(&mut monitor, &[vec![0xDC, 2, 54], vec![0xDC, 2, 2]]);
+        let table = monitor.table();
+        assert!(
+            table.contains("master   2  requests 0  tokens 3\n"),
+            "{table}"
+        );
+        assert!(!table.contains("master  54"), "{table}");
     }
 
     #[test]

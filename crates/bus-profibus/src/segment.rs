@@ -1,5 +1,6 @@
 //! All stations of one line: what of its bytes are telegrams, and for whom.
 
+use tickbus_base::os::Characters;
 use tickbus_base::time::Nanos;
 
 use crate::finder::{Finder, Found, bits};
@@ -88,16 +89,16 @@ impl Segment {
         }
     }
 
-    /// Takes bytes off the line. `reply` becomes the answer to the last telegram; a station whose master has gone on
+    /// Takes characters off the line. `reply` becomes the answer to the last telegram; a station whose master has gone on
     /// no longer answers what came before.
     ///
     /// # Errors
     ///
     /// Another device answers at the address of a station, before that has ever answered.
-    pub fn hear(
+    pub fn hear<'a>(
         &mut self,
         now: Nanos,
-        bytes: &[u8],
+        characters: impl Into<Characters<'a>>,
         process: &mut impl Process,
         reply: &mut Vec<u8>,
     ) -> Result<Heard, Taken> {
@@ -107,7 +108,7 @@ impl Segment {
             stations,
             baud,
         } = self;
-        finder.hear(now, bytes, |found| {
+        finder.hear(now, characters.into(), |found| {
             match found {
                 Found::Damaged => {
                     heard.damaged += 1;
@@ -285,7 +286,7 @@ mod tests {
         let mut noise: Vec<u8> = (0..=255).filter(|byte| *byte != 0xE5).collect();
         noise.extend_from_slice(&request);
         let mut reply = Vec::new();
-        let heard = line.hear(Nanos(0), &noise, &mut Nothing, &mut reply);
+        let heard = line.hear(Nanos(0), &noise[..], &mut Nothing, &mut reply);
         let heard = heard.expect("free");
         assert!(heard.damaged > 0 && heard.answer.is_some());
     }
@@ -336,7 +337,7 @@ mod tests {
         assert_eq!(hear(&mut line, Nanos(0), &[0xDC, 2, 2]), None);
         assert_eq!(hear(&mut line, Nanos(0), &status(3)), None, "it listens on");
         let mut reply = Vec::new();
-        let noise = line.hear(Nanos(0), &[0x33, 0xE5], &mut Nothing, &mut reply);
+        let noise = line.hear(Nanos(0), &[0x33, 0xE5][..], &mut Nothing, &mut reply);
         assert_eq!(noise.expect("no answer of another device").damaged, 1);
         assert_eq!(
             hear(&mut line, Nanos(0), &status(3)),
@@ -368,7 +369,7 @@ mod tests {
     fn the_wait_before_an_answer_is_that_of_the_station_in_bits_of_the_line() {
         let mut line = free(&[3]);
         let mut reply = Vec::new();
-        let heard = line.hear(Nanos(0), &status(3), &mut Nothing, &mut reply);
+        let heard = line.hear(Nanos(0), &status(3)[..], &mut Nothing, &mut reply);
         assert_eq!(heard.expect("free").answer, Some((3, Nanos(22_000))));
     }
 }

@@ -61,6 +61,8 @@ pub enum NamedFile {
     Plain(PathBuf),
     /// Keys or passwords, which stay where they are.
     Secret(PathBuf),
+    /// The driver.cfg itself, which has a password under this key.
+    InClear(&'static str),
 }
 
 /// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.

@@ -49,6 +49,19 @@ pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusErr
     })
 }
 
+/// Opens the port as [`open`] does, so that it marks characters that were damaged on the line, for
+/// [`Marks`](tickbus_base::os::Marks).
+///
+/// # Errors
+///
+/// As of [`open`].
+#[cfg(unix)]
+pub fn open_marking(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
+    let port = open(device, settings)?;
+    port.mark_damaged().map_err(|error| gone(device, error))?;
+    Ok(port)
+}
+
 /// The serial port `device` is gone.
 pub fn gone(device: &str, why: impl fmt::Display) -> BusError {
     BusError::Link(format!(

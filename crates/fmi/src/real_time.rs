@@ -12,12 +12,23 @@ pub struct RealTime {
     pub pace: f64,
     /// The time at which the pace began: the simulation's, and the clock's.
     begun: Option<(Nanos, Nanos)>,
+    /// The time on the clock that stalls have taken.
+    lost: Nanos,
 }
 
 impl RealTime {
     /// A pace, which begins with the first step.
     pub const fn new(pace: f64) -> Self {
-        Self { pace, begun: None }
+        Self {
+            pace,
+            begun: None,
+            lost: Nanos::ZERO,
+        }
+    }
+
+    /// How far simulation time has fallen behind the clock: the sum of all stalls of more than 100 ms.
+    pub const fn lost(&self) -> Nanos {
+        self.lost
     }
 
     /// Until when to wait at `now` when the simulation has come to `time`; `None` for not at all.
@@ -36,6 +47,7 @@ impl RealTime {
         let due = begun + Nanos(((time - from).0 as f64 / self.pace) as i64);
         if now > due + LATE {
             self.begun = Some((time, now));
+            self.lost += now - due;
             return None;
         }
         (now < due).then_some(due)
@@ -58,9 +70,13 @@ mod tests {
         // A little late: the next ones catch up.
         assert_eq!(twice.due(ms(30), ms(1012)), None);
         assert_eq!(twice.due(ms(50), ms(1013)), Some(ms(1020)));
+        assert_eq!(twice.lost(), Nanos::ZERO);
         // A stall: the pace begins here.
         assert_eq!(twice.due(ms(60), ms(2000)), None);
         assert_eq!(twice.due(ms(70), ms(2000)), Some(ms(2005)));
+        assert_eq!(twice.lost(), ms(975));
+        assert_eq!(twice.due(ms(80), ms(2510)), None);
+        assert_eq!(twice.lost(), ms(975 + 500));
         assert_eq!(RealTime::new(0.0).due(ms(70), ms(0)), None);
     }
 }

@@ -82,6 +82,7 @@ impl<'a> FmuKeys<'a> {
                     join,
                     options: MachineOptions {
                         isolated: isolated.unwrap_or_default(),
+                        ..MachineOptions::default()
                     },
                     place: value.place(),
                 };

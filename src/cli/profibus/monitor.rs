@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::Outcome;
 use crate::cli::host::span;
-use tickbus_base::os::{Interest, Parity, PollSet, SerialPort, SerialSettings};
+use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialPort, SerialSettings};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
 use tickbus_fieldbus::serial;
@@ -76,7 +76,7 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
         return Err("a line has a speed; write --baud 19200".to_owned());
     }
     let device = arguments.device.display().to_string();
-    let mut port = serial::open(&device, settings).map_err(|error| error.to_string())?;
+    let mut port = serial::open_marking(&device, settings).map_err(|error| error.to_string())?;
     let create = |file: &Option<PathBuf>| file.as_deref().map(create).transpose();
     let mut keep = Keep {
         prints: arguments.telegrams,
@@ -121,7 +121,7 @@ fn watch(
     let end = arguments.duration.map_or(Nanos::MAX, |span| begun + span);
     let mut set = PollSet::new(stop).map_err(Ending::Port)?;
     set.add(0, port, Interest::Read).map_err(Ending::Port)?;
-    let mut monitor = Monitor::new(arguments.baud);
+    let (mut marks, mut monitor) = (Marks::default(), Monitor::new(arguments.baud));
     let (mut next, mut told) = (begun + EVERY, String::new());
     let mut bytes = [0; 4096];
     while !stop.is_stopped() && clock.now() < end {
@@ -131,7 +131,7 @@ fn watch(
             Ok(0) => return Err(Ending::Port(ErrorKind::UnexpectedEof.into())),
             Ok(count) => {
                 let mut kept = Ok(());
-                monitor.hear(now, &bytes[..count], |heard| {
+                monitor.hear(now, marks.read(&bytes[..count]), |heard| {
                     if kept.is_ok() {
                         kept = keep.one(now - begun, heard);
                     }

@@ -4,6 +4,7 @@ mod library;
 #[cfg(unix)]
 mod linked_terminal;
 mod log;
+mod marked;
 #[cfg(unix)]
 mod named_memory;
 mod open_files;
@@ -28,6 +29,7 @@ pub use log::{
     collect_log, dropped_log_lines, flush_log, has_log, is_rarely_logged, is_told, log_to_stderr,
     take_log,
 };
+pub use marked::{Characters, Marks};
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
 pub use open_files::raise_open_files;

@@ -124,6 +124,22 @@ mod unix {
             tcflush(&port, QueueSelector::IOFlush)?;
             Ok(Self(File::from(port)))
         }
+
+        /// Marks characters that were damaged on the line in what is read from now on, in the code that
+        /// [`Marks`](crate::os::Marks) reads. Without this, they are read as zero, which only a strong checksum finds.
+        ///
+        /// # Errors
+        ///
+        /// The port is gone.
+        pub fn mark_damaged(&self) -> io::Result<()> {
+            let mut attributes = tcgetattr(&self.0)?;
+            attributes.input_modes -= InputModes::IGNBRK | InputModes::BRKINT | InputModes::IGNPAR;
+            attributes.input_modes |= InputModes::INPCK | InputModes::PARMRK;
+            tcsetattr(&self.0, OptionalActions::Now, &attributes)?;
+            // What came before is not in this code.
+            tcflush(&self.0, QueueSelector::IFlush)?;
+            Ok(())
+        }
     }
 
     /// Checks what the port's driver has made of the settings: some round a rate, or leave the parity bit out, without an
@@ -301,6 +317,30 @@ mod unix {
             assert!(opened.is_ok(), "{opened:?}");
             drop(port);
             SerialPort::open(&near, SETTINGS).expect("it is free again");
+        }
+
+        #[test]
+        fn a_port_that_marks_damaged_characters_tells_them_from_the_character_ff() {
+            use rustix::event::{PollFd, PollFlags, poll};
+
+            let (mut far, near) = PseudoTerminal::open().expect("a pseudo-terminal");
+            let mut port = SerialPort::open(&near, SETTINGS).expect("a port");
+            port.mark_damaged().expect("it is there");
+            let has = tcgetattr(&port).expect("it is there").input_modes;
+            assert!(has.contains(InputModes::INPCK | InputModes::PARMRK));
+            assert!(!has.intersects(InputModes::IGNBRK | InputModes::BRKINT | InputModes::IGNPAR));
+            let sent = [0x10, 0xFF, 0x00, 0x80, 0xFF];
+            far.write_all(&sent).expect("room");
+            let (mut marks, mut read) = (crate::os::Marks::default(), Vec::<u8>::new());
+            while read.len() < sent.len() {
+                poll(&mut [PollFd::new(&port, PollFlags::IN)], None).expect("it is there");
+                let mut bytes = [0; 16];
+                let count = port.read(&mut bytes).expect("there is something");
+                let characters = marks.read(&bytes[..count]);
+                assert_eq!(characters.damaged, [0; 0]);
+                read.extend(characters.bytes);
+            }
+            assert_eq!(read, sent);
         }
 
         #[test]

@@ -12,6 +12,10 @@ use super::request::{Region, Request};
 
 /// The capabilities of a device, which decide how requests are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(
+    clippy::struct_excessive_bools,
+    reason = "functions that a device has or not, independent of each other"
+)]
 pub struct Capabilities {
     /// One request can write and read holding registers: function 23.
     pub combine: bool,
@@ -21,6 +25,8 @@ pub struct Capabilities {
     pub many_coils: bool,
     /// It has function 16; otherwise registers are written one at a time.
     pub many_registers: bool,
+    /// It has function 22; otherwise bits of registers are not written.
+    pub masks: bool,
 }
 
 impl Capabilities {
@@ -31,6 +37,7 @@ impl Capabilities {
             gap,
             many_coils: true,
             many_registers: true,
+            masks: true,
         }
     }
 }
@@ -125,6 +132,7 @@ fn writings(table: Table, pieces: &[Piece], able: &Capabilities) -> Vec<Request>
     let (whole, partial) = elements(table, pieces);
     let mut queries: Vec<Request> = partial
         .into_iter()
+        .filter(|_| able.masks)
         .map(|first| Request::Mask(region(table, Span { first, count: 1 }, pieces)))
         .collect();
     let mut rest = whole.into_iter().peekable();

@@ -2,8 +2,9 @@
 
 use std::io;
 
+use tickbus_base::os::Marks;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::serial::{gone, open};
+use tickbus_fieldbus::serial::{gone, open_marking};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
@@ -31,7 +32,7 @@ pub(super) fn serve(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    let mut call = Call::new(open(&options.device, options.settings)?);
+    let mut call = Call::new(open_marking(&options.device, options.settings)?);
     port.tell("device", &options.device);
     port.opening(&format!("listening on {}", options.device));
     let stations = setups
@@ -40,6 +41,7 @@ pub(super) fn serve(
     let mut line = Line {
         options,
         setups,
+        marks: Marks::default(),
         segment: Segment::new(options.settings.baud, stations.collect()),
         stations: Stations::new(setups, port),
         reply: Vec::new(),
@@ -58,6 +60,7 @@ struct Line<'a> {
     options: &'a LineOptions,
     /// In the order of the signal table.
     setups: &'a [StationSetup],
+    marks: Marks,
     segment: Segment,
     stations: Stations,
     /// The answer being sent, and how much of it the system has accepted.
@@ -86,6 +89,7 @@ impl Line<'_> {
 
 impl Caller for Line<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
+        let characters = self.marks.read(bytes);
         // A line that is down by an injected fault carries nothing.
         if !port.is_up(now) {
             return Ok(());
@@ -105,7 +109,9 @@ impl Caller for Line<'_> {
         // Whatever it is, nobody waits for the last answer any more.
         self.reply.clear();
         self.written = 0;
-        let heard = self.segment.hear(now, bytes, &mut machine, &mut self.reply);
+        let heard = self
+            .segment
+            .hear(now, characters, &mut machine, &mut self.reply);
         let heard = heard.map_err(|Taken { address }| {
             BusError::Link(format!(
                 "another device on {} answers at address {address}; give the station another address, or take that \

@@ -5,7 +5,7 @@ use tickbus_base::toml_text::{did_you_mean, shown};
 
 use super::{Gsd, Module};
 use crate::Identity;
-use crate::configuration::Configuration;
+use crate::configuration::{Configuration, hex};
 use crate::telegram::DATA_LIMIT;
 use crate::user_parameters::{LIMIT, UserParameters};
 
@@ -109,9 +109,14 @@ impl Gsd {
         quoted(proposed.into_iter())
     }
 
+    /// The module with this name, or with this number (`#12`) where no module has such a name.
     fn module(&self, slot: u32, name: &str) -> Result<&Module, Mistake> {
-        let found = self.modules.iter().find(|module| module.name == name);
-        let Some(module) = found else {
+        let mut named: Vec<&Module> = self.modules.iter().filter(|m| m.name == name).collect();
+        let number = name.strip_prefix('#').and_then(|text| text.parse().ok());
+        if named.is_empty() && number.is_some() {
+            named.extend(self.modules.iter().find(|m| m.reference == number));
+        }
+        if named.is_empty() {
             let names: Vec<&str> = self.modules.iter().map(|m| m.name.as_str()).collect();
             return Err(Mistake::new(
                 format!(
@@ -121,27 +126,51 @@ impl Gsd {
                 ),
                 did_you_mean(name, "modules", &names),
             ));
-        };
-        let Some(own) = self.slots.iter().find(|own| own.number == slot) else {
-            return Ok(module);
-        };
-        let fits = |module: &&Module| {
-            let reference = module.reference;
-            reference.is_some_and(|number| own.fitting.iter().any(|range| range.contains(&number)))
-        };
-        if fits(&module) {
-            return Ok(module);
         }
+        let own = self.slots.iter().find(|own| own.number == slot);
+        let fits = |module: &&Module| {
+            let allowed = |number| {
+                own.is_some_and(|own| own.fitting.iter().any(|range| range.contains(&number)))
+            };
+            own.is_none() || module.reference.is_some_and(allowed)
+        };
+        named.retain(fits);
+        let Some((module, others)) = named.split_first() else {
+            return Err(Mistake::new(
+                format!(
+                    "\"{}\" does not fit into slot {slot} of \"{}\"",
+                    shown(name),
+                    shown(&self.model)
+                ),
+                format!(
+                    "its GSD file allows {}",
+                    quoted(self.modules.iter().filter(fits))
+                ),
+            ));
+        };
+        let is_same = |other: &&Module| {
+            (&other.identifiers, &other.parameters) == (&module.identifiers, &module.parameters)
+        };
+        let Some(other) = others.iter().find(|other| !is_same(other)) else {
+            return Ok(module);
+        };
+        let [first, second] = [*module, *other].map(|module| {
+            let number = module.reference.map(|number| format!("\"#{number}\", "));
+            format!("{}{}", number.unwrap_or_default(), hex(&module.identifiers))
+        });
+        let right = match (module.reference, other.reference) {
+            (Some(one), Some(two)) if one != two => {
+                "write the number of the one that the PLC's project has"
+            }
+            _ => "change the name of one in a copy of the GSD file",
+        };
         Err(Mistake::new(
             format!(
-                "\"{}\" does not fit into slot {slot} of \"{}\"",
-                shown(name),
-                shown(&self.model)
+                "\"{}\" has different modules \"{}\" ({first}; {second})",
+                shown(&self.model),
+                shown(name)
             ),
-            format!(
-                "its GSD file allows {}",
-                quoted(self.modules.iter().filter(fits))
-            ),
+            right,
         ))
     }
 }

@@ -359,6 +359,38 @@ fn mistakes_name_the_line() {
     );
 }
 
+#[test]
+fn modules_of_one_name_are_told_apart_by_their_numbers() {
+    let gsd = |numbers: [&str; 2], second: &str| {
+        let text = format!(
+            "#Profibus_DP\nIdent_Number=1\nModel_Name=\"CPU\"\nModular_Station=1\nMax_Module=4\n\
+             Module=\"2 byte\" 0x40,0x01\n{}\nEndModule\nModule=\"2 byte\" {second}\n{}\nEndModule\n",
+            numbers[0], numbers[1]
+        );
+        Gsd::read(text.as_bytes()).expect("a file")
+    };
+    let sizes = |gsd: &Gsd, name: &str| {
+        let identity = gsd.identity(&[name.to_owned()]);
+        identity.map(|own| (own.configuration.inputs(), own.configuration.outputs()))
+    };
+    let two = gsd(["11", "12"], "0x80,0x01");
+    let why = sizes(&two, "2 byte").expect_err("two").to_string();
+    assert_eq!(
+        why,
+        "\"CPU\" has different modules \"2 byte\" (\"#11\", 40 01; \"#12\", 80 01); write the number of the one that the PLC's \
+         project has"
+    );
+    assert_eq!(sizes(&two, "#11"), Ok((2, 0)));
+    assert_eq!(sizes(&two, "#12"), Ok((0, 2)));
+    assert!(sizes(&two, "#13").is_err());
+    let why = sizes(&gsd(["", ""], "0x80,0x01"), "2 byte").expect_err("two");
+    assert!(
+        why.to_string().ends_with("in a copy of the GSD file"),
+        "{why}"
+    );
+    assert_eq!(sizes(&gsd(["11", "12"], "0x40,0x01"), "2 byte"), Ok((2, 0)));
+}
+
 /// Whether it panics is the question; and an error names a line that there is.
 fn endure(file: &[u8]) {
     let lines = file.split(|byte| *byte == b'\n').count();

@@ -18,6 +18,8 @@ pub(super) struct Traffic {
     /// Stations that are excluded from the cycles.
     pub(super) suspended: Vec<bool>,
     pub(super) may_write: bool,
+    /// Each job has one item: the CPU answers the first of several alone.
+    pub(super) one_by_one: bool,
 }
 
 impl Traffic {
@@ -34,6 +36,7 @@ impl Traffic {
             suspended: vec![false; stations],
             jobs: Vec::new(),
             may_write: false,
+            one_by_one: false,
             fields,
         }
     }
@@ -54,6 +57,16 @@ impl Traffic {
             &active(&self.fields.read),
             limit,
         ));
+        if self.one_by_one {
+            let each = |Job { way, pieces }: Job| {
+                let pieces = pieces.into_iter();
+                pieces.map(move |piece| Job {
+                    way,
+                    pieces: vec![piece],
+                })
+            };
+            jobs = jobs.into_iter().flat_map(each).collect();
+        }
         self.jobs = jobs;
     }
 

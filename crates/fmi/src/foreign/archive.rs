@@ -108,37 +108,58 @@ fn open(path: &Path) -> Result<ZipArchive<File>, Mistake> {
 /// Before a file's entry in the directory of an archive.
 const ENTRY: &[u8] = b"PK\x01\x02";
 
-/// Refuses an archive that has two files of the very same name: of these `zip` shows the last alone, others the first.
+/// What a run depends on.
+const VITAL: [&str; 3] = [DESCRIPTION, "binaries", "resources"];
+
+/// Refuses an archive that has two files of the very same name: of these `zip` shows the last alone, others the first. Some makers
+/// pack the same file twice, which harms nobody where a run does not depend on it.
 fn check_twins(path: &Path, archive: &ZipArchive<File>) -> Result<(), Mistake> {
-    let listed = listed(path, archive.central_directory_start()).map_err(damaged)?;
-    if listed == archive.len() {
+    let mut files = BTreeMap::new();
+    for (name, content) in listed(path, archive.central_directory_start()).map_err(damaged)? {
+        let text = String::from_utf8_lossy(&name).into_owned();
+        let top = plain(&text);
+        let is_vital = VITAL.contains(&top.split('/').next().unwrap_or_default());
+        if files
+            .insert(name, content)
+            .is_some_and(|other| is_vital || other != content)
+        {
+            return Err(hostile(format!("it has \"{}\" twice", shown(&text))));
+        }
+    }
+    if files.len() == archive.len() {
         return Ok(());
     }
     let what = format!(
-        "its directory has {listed} entries, and {} names: it has a file twice",
+        "its directory has {} names, of which {} differ when they are read",
+        files.len(),
         archive.len()
     );
     Err(hostile(what))
 }
 
-/// The number of entries in the directory of an archive, which begins at `start`.
-fn listed(path: &Path, start: u64) -> io::Result<usize> {
+/// The entries in the directory of an archive, which begins at `start`: the name of each, and what stands for its content, checksum
+/// and length.
+fn listed(path: &Path, start: u64) -> io::Result<Vec<(Vec<u8>, [u8; 12])>> {
     let mut directory = BufReader::new(File::open(path)?);
     directory.seek(SeekFrom::Start(start))?;
-    let mut count = 0;
+    let mut all = Vec::new();
     loop {
         let mut entry = [0; 46];
         match directory.read_exact(&mut entry) {
-            Ok(()) if entry.starts_with(ENTRY) => count += 1,
+            Ok(()) if entry.starts_with(ENTRY) => {}
             // Behind the last one.
-            Ok(()) => return Ok(count),
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(count),
+            Ok(()) => return Ok(all),
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(all),
             Err(error) => return Err(error),
         }
         // The lengths of its name, of what is beside it, and of its comment.
-        let lengths =
-            [28, 30, 32].map(|at| i64::from(u16::from_le_bytes([entry[at], entry[at + 1]])));
-        directory.seek_relative(lengths.iter().sum())?;
+        let [name, beside, comment] =
+            [28, 30, 32].map(|at| u16::from_le_bytes([entry[at], entry[at + 1]]));
+        let mut own = vec![0; name.into()];
+        directory.read_exact(&mut own)?;
+        directory.seek_relative(i64::from(beside) + i64::from(comment))?;
+        // CRC-32, and the lengths packed and unpacked.
+        all.push((own, *entry[16..].first_chunk().expect("46 bytes")));
     }
 }
 

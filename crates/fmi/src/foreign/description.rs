@@ -22,11 +22,16 @@ pub struct Model {
     pub step: Option<f64>,
     /// The time at which it proposes to begin, in seconds.
     pub start: f64,
+    /// The relative tolerance that it proposes for its solver.
+    pub tolerance: Option<f64>,
     /// Whether it needs the tool that has made it.
     pub needs_tool: bool,
     /// Its variables, in its own order.
     pub variables: Vec<ForeignVariable>,
 }
+
+/// How the type of an array begins.
+const ARRAY: &str = "array of ";
 
 /// What a variable is to the importing tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,12 +61,30 @@ pub struct ForeignVariable {
     pub causality: Causality,
     /// Its unit, if it names one.
     pub unit: Option<String>,
+    /// Its other names.
+    pub aliases: Vec<String>,
+}
+
+impl ForeignVariable {
+    /// Whether it has elements.
+    pub(super) fn is_array(&self) -> bool {
+        self.type_name.starts_with(ARRAY)
+    }
 }
 
 impl Model {
     /// The variable with this name.
     pub fn position(&self, name: &str) -> Option<usize> {
-        self.variables.iter().position(|one| one.name == name)
+        let is_alias = |one: &ForeignVariable| one.aliases.iter().any(|alias| alias == name);
+        let mut variables = self.variables.iter();
+        variables.position(|one| one.name == name || is_alias(one))
+    }
+
+    /// A name that this is an element of: `y` of `y[1]`, if that is an array.
+    pub(super) fn array_of(&self, name: &str) -> Option<&ForeignVariable> {
+        let (array, _) = name.split_once('[')?;
+        let found = &self.variables[self.position(array)?];
+        found.is_array().then_some(found)
     }
 
     /// Reads a model description; mistakes call it `file`.
@@ -182,8 +205,7 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         );
     }
     let experiment = child(root, "DefaultExperiment");
-    let seconds =
-        |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
+    let number = |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
     let variables = child(root, "ModelVariables");
     let variables = variables.into_iter().flat_map(|node| node.children());
     let variables: Vec<_> = variables
@@ -198,10 +220,12 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         name,
         identifier: identifier?.to_owned(),
         token: token?.to_owned(),
-        step: seconds("stepSize").filter(|step| *step > 0.0 && step.is_finite()),
-        start: seconds("startTime")
+        step: number("stepSize").filter(|step| *step > 0.0 && step.is_finite()),
+        start: number("startTime")
             .filter(|start| start.is_finite())
             .unwrap_or(0.0),
+        tolerance: number("tolerance")
+            .filter(|tolerance| *tolerance > 0.0 && tolerance.is_finite()),
         needs_tool: matches!(kind.attribute("needsExecutionTool"), Some("true" | "1")),
         variables,
     })
@@ -239,6 +263,11 @@ fn common(
             _ => Causality::Local,
         },
         unit: unit.map(str::to_owned),
+        aliases: node
+            .children()
+            .filter(|child| child.has_tag_name("Alias"))
+            .filter_map(|alias| alias.attribute("name").map(str::to_owned))
+            .collect(),
     })
 }
 
@@ -314,7 +343,7 @@ fn variable_of_three(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<Fo
         }
     };
     if child(node, "Dimension").is_some() {
-        let name = format!("array of {name}");
+        let name = format!("{ARRAY}{name}");
         return common(node, collector, (None, &name), None);
     }
     common(node, collector, (value_type, name), node.attribute("unit"))
@@ -396,9 +425,12 @@ mod tests {
         let three = "<fmiModelDescription fmiVersion=\"3.0.1\" modelName=\"x\" instantiationToken=\"g\">\
                      <CoSimulation modelIdentifier=\"x\"/><ModelVariables>\
                      <Float64 name=\"v\" valueReference=\"1\" causality=\"output\"><Dimension start=\"3\"/></Float64>\
-                     <Enumeration name=\"e\" valueReference=\"2\" causality=\"output\"/></ModelVariables></fmiModelDescription>";
+                     <Enumeration name=\"e\" valueReference=\"2\" causality=\"output\"><Alias name=\"f\"/></Enumeration></ModelVariables></fmiModelDescription>";
         let model = Model::parse("m.xml", three).expect("right");
         assert_eq!(model.variables[0].type_name, "array of Float64");
+        assert_eq!(model.array_of("v[1]"), Some(&model.variables[0]));
+        assert_eq!(model.array_of("e[1]"), None);
+        assert_eq!(model.position("f"), Some(1));
         assert_eq!(model.variables[1].value_type, Some(ValueType::Int64));
     }
 }

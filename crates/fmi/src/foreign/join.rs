@@ -21,6 +21,8 @@ pub struct Join {
     pub outputs: Vec<Joined>,
     /// Parameters and their values.
     pub parameters: Vec<(usize, Value)>,
+    /// Parameters that are texts.
+    pub texts: Vec<(usize, String)>,
     /// What is left over: signals that nobody writes, inputs that keep their start values, outputs that nobody reads.
     pub left: Vec<Unjoined>,
 }
@@ -115,6 +117,7 @@ impl Join {
             inputs,
             outputs,
             parameters: map.parameters.clone(),
+            texts: map.texts.clone(),
             left,
         })
     }
@@ -126,7 +129,11 @@ fn nothing_in_common(config: &Config, model: &Model) -> Mistake {
         let names = model.variables.iter().filter(|one| one.causality == wanted);
         let names: Vec<_> = names
             .take(5)
-            .map(|one| format!("\"{}\"", one.name))
+            .map(|one| {
+                let kind = format!(" ({})", one.type_name);
+                let kind = if one.value_type.is_none() { &kind } else { "" };
+                format!("\"{}\"{kind}", one.name)
+            })
             .collect();
         if names.is_empty() {
             "none".to_owned()
@@ -166,7 +173,7 @@ mod tests {
         };
         let map = Map {
             joined: vec![command],
-            parameters: Vec::new(),
+            ..Map::default()
         };
         let join = Join::of(&config, &model, &map).expect("one is joined");
         assert_eq!(join.inputs, [command]);

@@ -7,7 +7,7 @@ mod functions;
 mod journal;
 
 use std::collections::BTreeSet;
-use std::ffi::{CString, OsString, c_int, c_void};
+use std::ffi::{CString, OsString, c_char, c_int, c_void};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -61,8 +61,8 @@ pub(super) struct Instance {
 #[derive(Debug)]
 struct Kept {
     /// Dropped before what follows, which its finalisers may still use: they may log.
-    _library: Library,
-    journal: Box<Journal>,
+    library: Library,
+    journal: Journal,
     /// Kept where it is: the FMU may keep its address.
     _callbacks: Option<Box<Callbacks>>,
 }
@@ -88,14 +88,14 @@ impl Instance {
             Version::Two => Functions::Two(Two::load(&loaded)?),
             Version::Three => Functions::Three(Box::new(Three::load(&loaded)?)),
         };
-        let journal = Box::new(Journal::of(file));
-        let env = std::ptr::from_ref(&*journal).cast_mut().cast::<c_void>();
-        let c = |text: &str| CString::new(text.replace('\0', " ")).unwrap_or_default();
-        let (name, token) = (c(name), c(token));
+        let journal = Journal::of(file);
+        journal.begin_call();
+        let env = journal.env();
+        let (name, token) = (c_string(name), c_string(token));
         let mut callbacks = None;
         let handle = match &functions {
             Functions::Two(two) => {
-                let uri = c(&uri_of(resources));
+                let uri = c_string(&uri_of(resources));
                 let callbacks = callbacks.insert(Box::new(Callbacks {
                     logger: log_of_two,
                     allocate: calloc,
@@ -103,7 +103,7 @@ impl Instance {
                     step_finished: null(),
                     env,
                 }));
-                // SAFETY: by the standard; all texts outlive the call, callbacks and journal the instance.
+                // SAFETY: by the standard; all texts outlive the call, and the callbacks the instance.
                 unsafe {
                     (two.instantiate)(
                         name.as_ptr(),
@@ -119,7 +119,7 @@ impl Instance {
             Functions::Three(three) => {
                 // With a separator at its end, as the standard says.
                 let path = resources.join("");
-                let path = c(&path.to_string_lossy());
+                let path = c_string(&path.to_string_lossy());
                 // SAFETY: as above.
                 unsafe {
                     (three.instantiate)(
@@ -145,7 +145,7 @@ impl Instance {
             is_dead: false,
             identity,
             kept: Some(Kept {
-                _library: loaded,
+                library: loaded,
                 journal,
                 _callbacks: callbacks,
             }),
@@ -180,13 +180,27 @@ impl Instance {
         status
     }
 
-    /// Enters the initialisation, for a run that begins at `start` seconds.
-    pub(super) fn enter(&mut self, start: f64) -> Status {
+    /// Enters the initialisation, for a run that begins at `start` seconds, and ends at `stop` if that is known.
+    pub(super) fn enter(
+        &mut self,
+        start: f64,
+        tolerance: Option<f64>,
+        stop: Option<f64>,
+    ) -> Status {
         self.begin_call();
+        let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
+        let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         let status = match &self.functions {
             // SAFETY: the handle is of this library, and alive, here and below.
             Functions::Two(two) => unsafe {
-                let status = (two.setup)(self.handle, 0, 0.0, start, 0, 0.0);
+                let status = (two.setup)(
+                    self.handle,
+                    has_tolerance.into(),
+                    tolerance,
+                    start,
+                    has_stop.into(),
+                    stop,
+                );
                 if status > Status::Warning as c_int {
                     status
                 } else {
@@ -195,7 +209,7 @@ impl Instance {
             },
             // SAFETY: as above.
             Functions::Three(three) => unsafe {
-                (three.enter)(self.handle, false, 0.0, start, false, 0.0)
+                (three.enter)(self.handle, has_tolerance, tolerance, start, has_stop, stop)
             },
         };
         self.noted(status)
@@ -316,6 +330,47 @@ impl Instance {
             },
         };
         self.noted(status)
+    }
+
+    /// Sets a variable of type String.
+    ///
+    /// # Errors
+    ///
+    /// Its library has no function for that.
+    pub(super) fn set_text(&mut self, reference: u32, text: &str) -> Result<Status, String> {
+        self.begin_call();
+        let text = c_string(text);
+        let texts = [text.as_ptr()];
+        let library = &self.kept.as_ref().expect("it is alive").library;
+        let missing = |_| {
+            "its library has no function for texts; export it again, or tell its maker".to_owned()
+        };
+        let status = match &self.functions {
+            Functions::Two(_) => {
+                // SAFETY: the type is that of the standard's header, here and below.
+                let function = unsafe { library.symbol::<SetTwo<*const c_char>>("fmi2SetString") };
+                // SAFETY: as in `enter`; the lists have one value, and outlive the call.
+                unsafe {
+                    function.map_err(missing)?(self.handle, &raw const reference, 1, texts.as_ptr())
+                }
+            }
+            Functions::Three(_) => {
+                // SAFETY: as above.
+                let function =
+                    unsafe { library.symbol::<SetThree<*const c_char>>("fmi3SetString") };
+                // SAFETY: as above.
+                unsafe {
+                    function.map_err(missing)?(
+                        self.handle,
+                        &raw const reference,
+                        1,
+                        texts.as_ptr(),
+                        1,
+                    )
+                }
+            }
+        };
+        Ok(self.noted(status))
     }
 
     fn set_two<T>(
@@ -472,6 +527,7 @@ impl Drop for Instance {
         if self.handle.is_null() {
             return;
         }
+        self.begin_call();
         // SAFETY: the handle is of this library, alive, and used no more.
         unsafe {
             match &self.functions {
@@ -481,6 +537,10 @@ impl Drop for Instance {
         }
         self.handle = null_mut();
     }
+}
+
+fn c_string(text: &str) -> CString {
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
 /// The URI of a folder, as FMI 2.0 wants it.

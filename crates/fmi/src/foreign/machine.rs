@@ -12,10 +12,14 @@ use crate::made::kind_of;
 use crate::value::{Value, Version};
 
 /// How an FMU is run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MachineOptions {
     /// In a helper process, which it may crash.
     pub isolated: bool,
+    /// The relative tolerance for its solver, in place of the one that it proposes.
+    pub tolerance: Option<f64>,
+    /// How long the run is, if that is known.
+    pub duration: Option<Nanos>,
 }
 
 /// A signal's slot, and its way to the variable.
@@ -99,6 +103,8 @@ impl Machine {
             let found = &model.variables[*at];
             Some((found.value_type?, found.reference, *value))
         });
+        let texts = join.texts.iter();
+        let texts = texts.map(|(at, text)| (model.variables[*at].reference, text.clone()));
         let setup = Setup {
             file: fmu.file.clone(),
             name: model.name.clone(),
@@ -107,7 +113,10 @@ impl Machine {
             library: fmu.library().to_owned(),
             resources: fmu.resources(),
             start: model.start,
+            tolerance: options.tolerance.or(model.tolerance),
+            stop: options.duration.map(|end| model.start + seconds(end)),
             parameters: parameters.collect(),
+            texts: texts.collect(),
             inputs: join.inputs.iter().map(variable).collect(),
             outputs: join.outputs.iter().map(variable).collect(),
         };

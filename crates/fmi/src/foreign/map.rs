@@ -31,6 +31,8 @@ pub struct Map {
     pub joined: Vec<Joined>,
     /// Parameters, by their places in the model description, and their values.
     pub parameters: Vec<(usize, Value)>,
+    /// Parameters that are texts.
+    pub texts: Vec<(usize, String)>,
 }
 
 impl Map {
@@ -80,25 +82,34 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
             map.joined.push(joined);
         }
     }
-    map.parameters = parameters.map_or_else(Vec::new, |value| read_parameters(&value, model));
+    let shape = "write lines such as \"tank.area\" = 2.5";
+    let parameters = parameters.and_then(|value| value.table("parameters", shape));
+    for (name, value) in parameters.iter().flat_map(Table::all) {
+        match parameter(name, &value, model) {
+            Some((at, Set::Value(value))) => map.parameters.push((at, value)),
+            Some((at, Set::Text(text))) => map.texts.push((at, text)),
+            None => {}
+        }
+    }
     map
 }
 
-/// Reads a table of parameters and their values.
-fn read_parameters(value: &TomlValue<'_>, model: &Model) -> Vec<(usize, Value)> {
-    let table = value.table("parameters", "write lines such as \"tank.area\" = 2.5");
-    let all = table.iter().flat_map(Table::all);
-    all.filter_map(|(name, value)| parameter(name, &value, model))
-        .collect()
+/// What a parameter is set to.
+enum Set {
+    Value(Value),
+    Text(String),
 }
 
-fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Value)> {
+fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Set)> {
     let Some(at) = model.position(name) else {
         let names = model
             .variables
             .iter()
             .filter(|one| one.causality != Causality::Output);
         let near = nearest(name, names.map(|one| &*one.name));
+        if refused_element(name, value, model) {
+            return None;
+        }
         value.wrong(
             format!("the FMU has no variable \"{}\"", shown(name)),
             near.map_or_else(
@@ -109,15 +120,19 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
         return None;
     };
     let variable = &model.variables[at];
+    if variable.type_name == ValueType::String.name() {
+        let text = value.text("write a text in quotes")?;
+        return Some((at, Set::Text(text.to_owned())));
+    }
     let Some(kind) = variable.value_type else {
         value.wrong(
             format!("\"{}\" is of type {}", shown(name), variable.type_name),
-            "only numbers and Booleans can be set",
+            "only numbers, Booleans and texts can be set",
         );
         return None;
     };
     if kind == ValueType::Boolean && value.is_boolean() {
-        return Some((at, Value::Boolean(value.boolean()?)));
+        return Some((at, Set::Value(Value::Boolean(value.boolean()?))));
     }
     let number = value.number(if kind == ValueType::Boolean {
         "write true or false"
@@ -139,7 +154,19 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
         );
         return None;
     }
-    Some((at, Value::Real(number)))
+    Some((at, Set::Value(Value::Real(number))))
+}
+
+/// Whether this is the name of an element of an array, which is refused.
+fn refused_element(name: &str, value: &TomlValue<'_>, model: &Model) -> bool {
+    let array = model.array_of(name);
+    if let Some(array) = array {
+        value.wrong(
+            format!("\"{}\" is an {}", shown(&array.name), array.type_name),
+            "tickbus does not reach the elements of arrays: export the FMU with scalar variables for them",
+        );
+    }
+    array.is_some()
 }
 
 /// Whether a type has this very number; floating point numbers have the nearest one.
@@ -205,6 +232,9 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
     let Some(at) = model.position(wanted) else {
         let names = model.variables.iter().filter(|one| fits(one.causality));
         let near = nearest(wanted, names.map(|one| &*one.name));
+        if refused_element(wanted, &variable, model) {
+            return None;
+        }
         variable.wrong(
             format!("the FMU has no variable \"{}\"", shown(wanted)),
             near.map_or_else(

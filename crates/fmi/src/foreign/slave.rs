@@ -24,8 +24,14 @@ pub(super) struct Setup {
     pub resources: PathBuf,
     /// The time at which the run begins, in seconds.
     pub start: f64,
+    /// The relative tolerance for its solver, if it is to have one.
+    pub tolerance: Option<f64>,
+    /// The time at which the run ends, in seconds, if that is known.
+    pub stop: Option<f64>,
     /// What is set before the run: type, value reference, value.
     pub parameters: Vec<(ValueType, u32, Value)>,
+    /// Texts that are set before the run: value reference, text.
+    pub texts: Vec<(u32, String)>,
     /// What is set before every step.
     pub inputs: Vec<(ValueType, u32)>,
     /// What is read after every step.
@@ -137,7 +143,14 @@ impl Direct {
             let status = slave.instance.set(kind, &[reference], &[value]);
             slave.check(status, "setting a parameter")?;
         }
-        let status = slave.instance.enter(setup.start);
+        for (reference, text) in &setup.texts {
+            let status = slave.instance.set_text(*reference, text);
+            let status = status.map_err(|why| Failure(format!("{}: {why}", setup.file)))?;
+            slave.check(status, "setting a parameter")?;
+        }
+        let status = slave
+            .instance
+            .enter(setup.start, setup.tolerance, setup.stop);
         slave.check(status, "entering the initialisation")?;
         slave.set(inputs)?;
         let status = slave.instance.exit();

@@ -24,6 +24,15 @@ pub(super) fn named(config: &Config, faults: Option<&Path>) -> Result<Named, Mis
         let (path, is_secret) = match &file {
             NamedFile::Plain(path) => (path, false),
             NamedFile::Secret(path) => (path, true),
+            NamedFile::InClear(key) => {
+                return Err(Mistake::new(
+                    format!(
+                        "{} has a password ({key}), and an FMU goes through many hands",
+                        config.path.display()
+                    ),
+                    "write password_env, and set that variable on the computer that runs the FMU",
+                ));
+            }
         };
         if path.is_absolute() {
             named.notes.push(format!(

@@ -202,7 +202,17 @@ impl Instance {
 
     /// Waits until the clock on the wall is where the simulation is.
     fn wait(&mut self, time: Nanos) {
-        if let Some(due) = self.real_time.due(time, self.clock.now()) {
+        let was_late = self.real_time.lost() > Nanos::ZERO;
+        let due = self.real_time.due(time, self.clock.now());
+        let lost = self.real_time.lost();
+        if lost > Nanos::ZERO && !was_late {
+            log::warn!(
+                "{}: at {time} the simulation is {} behind the clock, and does not catch up; later delays are not logged",
+                self.config.name,
+                lost.rounded()
+            );
+        }
+        if let Some(due) = due {
             while self.clock.now() < due {
                 self.clock.wait_until(due, &self.stop);
             }

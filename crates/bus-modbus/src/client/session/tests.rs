@@ -495,23 +495,31 @@ fn a_device_without_what_lies_between_the_signals_is_read_in_pieces() {
 }
 
 #[test]
-fn a_device_that_cannot_mask_is_told_so_and_never_read_to_write_the_other_bits() {
-    let bit = [signal(Table::HoldingRegisters, 8, 0, 1)];
-    let mut client = Client::new(1, &[], &bit, Some(FALLBACK));
-    let mut line = client.connect(tcp());
-    line.asked();
+fn a_device_that_cannot_mask_is_read_and_gets_all_but_the_bits() {
+    logged::expect("it cannot write single bits of a register");
+    let writes = [signal(Table::HoldingRegisters, 8, 0, 1), register(5)];
+    let mut client = Client::new(1, &[register(9)], &writes, Some(FALLBACK));
+    let mut line = client.connect_with(tcp(), Capabilities::new(false, 0));
+    assert_eq!(line.asked(), [3, 0, 9, 0, 1]);
     line.answer(&[3, 2, 0, 0]);
     assert_eq!(line.asked(), WHO);
     line.answer(&[0xAB, 1]);
     assert_eq!(line.asked(), [22, 0, 0, 0xFF, 0xFE, 0, 0]);
     line.answer(&[0x96, 1]);
-    let link = line.status.link();
+    for _ in 0..2 {
+        // Never read to write the other bits.
+        let written = line.asked();
+        assert_eq!(written[..5], [16, 0, 5, 0, 1]);
+        line.answer(&[16, 0, 5, 0, 1]);
+        assert_eq!(line.asked(), [3, 0, 9, 0, 1]);
+        line.answer(&[3, 2, 0, 0]);
+        assert_eq!(line.status.link().cause.name(), "running");
+    }
+    let refused = line.statistic("refused").expect("it is there");
     assert!(
-        link.reason.contains("cannot write single bits"),
-        "{}",
-        link.reason
+        refused.contains("write bit 0 of holding-register offset:0"),
+        "{refused}"
     );
-    assert_eq!(line.asked()[0], 22);
 }
 
 #[test]

@@ -108,10 +108,6 @@ impl ClientSession<'_> {
             return self.go_on(station, index + 1, now, port);
         }
         let right = match (exception, query) {
-            (Exception::ILLEGAL_FUNCTION, Request::Mask(_)) => {
-                "it cannot write single bits of a register: let signals have all 16 of it, or the PLC's program \
-                 take the bit from a coil"
-            }
             (Exception::ILLEGAL_FUNCTION, _) => {
                 "choose another table with \"inputs\", \"outputs\" or [fieldbus.at]"
             }
@@ -170,6 +166,23 @@ impl ClientSession<'_> {
             Request::Write(write) if is_unknown && write.table.is_bits() => {
                 able.many_coils = false;
                 "its coils are written one by one"
+            }
+            // Reading does no harm, nor does writing the rest.
+            Request::Mask(_) if is_unknown => {
+                able.masks = false;
+                port.tell(
+                    "refused",
+                    &format!("{unit} refused to {query}: {exception}"),
+                );
+                port.log(
+                    log::Level::Warn,
+                    "refused",
+                    format_args!(
+                        "{unit} refused to {query}: {exception}; it cannot write single bits of a register, and none is \
+                         written any more: let signals have all 16 of it, or the PLC's program take the bit from a coil"
+                    ),
+                );
+                return true;
             }
             Request::Write(_) if is_unknown => {
                 able.many_registers = false;

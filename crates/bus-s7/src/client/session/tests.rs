@@ -8,6 +8,15 @@ const PATIENCE: Nanos = Nanos::from_millis(100);
 
 /// Station 0 writes 2 bytes at DB 1 byte 2 and reads 4 at DB 1 byte 0, as in the captured conversation.
 fn session(asks_who: bool) -> ClientSession {
+    session_of(asks_who, &[(2, 2)], &[(0, 4)])
+}
+
+/// Station 0 writes and reads these numbers of bytes at these bytes of DB 1.
+fn session_of(
+    asks_who: bool,
+    written: &[(usize, usize)],
+    read: &[(usize, usize)],
+) -> ClientSession {
     let field = |byte: usize, length: usize| Field {
         station: 0,
         frame: 0,
@@ -23,8 +32,14 @@ fn session(asks_who: bool) -> ClientSession {
         asks_who,
     };
     let frames = FrameFields {
-        written: vec![field(2, 2)],
-        read: vec![field(0, 4)],
+        written: written
+            .iter()
+            .map(|(byte, length)| field(*byte, *length))
+            .collect(),
+        read: read
+            .iter()
+            .map(|(byte, length)| field(*byte, *length))
+            .collect(),
         lengths: vec![[2, 4]],
     };
     frames.session(terms, Nanos::ZERO)
@@ -53,7 +68,10 @@ const READ: &str = "03 00 00 1d 02 f0 80 32 03 0000 0003 0002 0008 00 00 04 01 f
 
 /// A session that may write, before its first cycle.
 fn met() -> ClientSession {
-    let mut session = session(false);
+    meet(session(false))
+}
+
+fn meet(mut session: ClientSession) -> ClientSession {
     said(&mut session);
     assert_eq!(hears(&mut session, CONFIRM), Ok(None));
     said(&mut session);
@@ -278,6 +296,26 @@ fn a_cpu_is_asked_whether_it_runs() {
     ] {
         assert_eq!(ask(refuses), Ok(Some(SessionEvent::State(None))));
     }
+}
+
+/// As the server of python-snap7 3 does.
+#[test]
+fn a_peer_that_answers_one_of_several_items_is_asked_for_one_at_a_time() {
+    let mut session = meet(session_of(false, &[(0, 2), (200, 2)], &[(0, 4)]));
+    assert_eq!(session.begin(Nanos::ZERO), None);
+    assert_eq!(said(&mut session)[17..19], [5, 2]);
+    assert_eq!(hears(&mut session, WRITTEN), Ok(None));
+    for reference in ["0003", "0004"] {
+        assert_eq!(said(&mut session)[17..19], [5, 1]);
+        let written = WRITTEN.replace("0000 0002 0002", &format!("0000 {reference} 0002"));
+        assert_eq!(hears(&mut session, &written), Ok(None));
+    }
+    assert_eq!(said(&mut session)[17..19], [4, 1]);
+    let read = READ.replace("0003", "0005");
+    assert_eq!(hears(&mut session, &read), Ok(Some(SessionEvent::Done)));
+    assert_eq!(session.refusal(0), None);
+    session.begin(Nanos::ZERO);
+    assert_eq!(said(&mut session)[17..19], [5, 1], "on this connection");
 }
 
 #[test]

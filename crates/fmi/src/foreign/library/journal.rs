@@ -3,45 +3,42 @@
 #![allow(unsafe_code, reason = "an FMU hands in its texts as pointers")]
 
 use std::borrow::Cow;
+use std::cell::Cell;
+use std::collections::BTreeMap;
 use std::ffi::{CStr, c_char, c_int};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use tickbus_base::os::is_told;
 
 use super::functions::Handle;
 use crate::value::Status;
 
-/// What the FMU has said.
+/// The journals of all instances that may still log, by the addresses that their FMUs were given. An FMU hands anything in as its
+/// environment, so that an address is compared with these, and never followed.
+static LIVING: Mutex<BTreeMap<usize, Arc<Entry>>> = Mutex::new(BTreeMap::new());
+
+fn living() -> MutexGuard<'static, BTreeMap<usize, Arc<Entry>>> {
+    LIVING.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+thread_local! {
+    /// The address of the journal of the FMU that this thread has called last.
+    static CALLED: Cell<usize> = const { Cell::new(0) };
+}
+
+/// What an FMU has said.
 #[derive(Debug, Default)]
-pub(super) struct Journal {
+struct Entry {
     file: String,
     lines: AtomicU64,
     /// What it has said since its last call began.
     last: Mutex<String>,
 }
 
-impl Journal {
-    /// That of the FMU which messages call `file`.
-    pub(super) fn of(file: &str) -> Self {
-        Self {
-            file: file.to_owned(),
-            ..Self::default()
-        }
-    }
-
+impl Entry {
     fn last(&self) -> MutexGuard<'_, String> {
         self.last.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The FMU is about to be called: what it has said before is not about this call.
-    pub(super) fn begin_call(&self) {
-        self.last().clear();
-    }
-
-    /// What it has said last in the present call, of what is not right; empty for nothing.
-    pub(super) fn said(&self) -> String {
-        self.last().clone()
     }
 
     fn take(&self, status: c_int, text: &str) {
@@ -59,6 +56,44 @@ impl Journal {
     }
 }
 
+/// The journal of one instance. Messages reach it until it is dropped.
+#[derive(Debug)]
+pub(super) struct Journal(Arc<Entry>);
+
+impl Journal {
+    /// That of the FMU which messages call `file`.
+    pub(super) fn of(file: &str) -> Self {
+        let journal = Self(Arc::new(Entry {
+            file: file.to_owned(),
+            ..Entry::default()
+        }));
+        living().insert(journal.env().addr(), Arc::clone(&journal.0));
+        journal
+    }
+
+    /// What the FMU is to hand in with each message.
+    pub(super) fn env(&self) -> Handle {
+        Arc::as_ptr(&self.0).cast_mut().cast()
+    }
+
+    /// The FMU is about to be called: what it has said before is not about this call.
+    pub(super) fn begin_call(&self) {
+        CALLED.set(self.env().addr());
+        self.0.last().clear();
+    }
+
+    /// What it has said last in the present call, of what is not right; empty for nothing.
+    pub(super) fn said(&self) -> String {
+        self.0.last().clone()
+    }
+}
+
+impl Drop for Journal {
+    fn drop(&mut self) {
+        living().remove(&self.env().addr());
+    }
+}
+
 /// A text of the FMU's, for the length of a call.
 ///
 /// # Safety
@@ -72,8 +107,14 @@ unsafe fn words<'a>(text: *const c_char) -> Cow<'a, str> {
     unsafe { CStr::from_ptr(text) }.to_string_lossy()
 }
 
-/// What nobody knows the FMU of is of no use.
-fn take(journal: Option<&Journal>, status: c_int, text: &str) {
+/// Takes a message of the instance with this environment. Some FMUs hand in another one: then the FMU is meant that this thread
+/// calls. A message of neither is dropped.
+fn take(env: Handle, status: c_int, text: &str) {
+    let journal = {
+        let living = living();
+        let called = || living.get(&CALLED.get());
+        living.get(&env.addr()).or_else(called).cloned()
+    };
     if let Some(journal) = journal {
         journal.take(status, text);
     }
@@ -86,14 +127,107 @@ pub(super) unsafe extern "C" fn log_of_three(
     _: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: `env` is the journal that the instance was made with and that outlives it, or null where an FMU does not hand it back. The
-    // message is the FMU's C string.
-    let (journal, text) = unsafe { (env.cast::<Journal>().as_ref(), words(message)) };
-    take(journal, status, &text);
+    // SAFETY: the message is the FMU's C string.
+    take(env, status, &unsafe { words(message) });
 }
 
-/// The logger of FMI 2.0, which by the standard has any number of further arguments. Rust cannot write such a function; where the
+#[cfg(all(target_arch = "x86_64", unix))]
+pub(super) use formatted::log_of_two;
+
+/// The logger of FMI 2.0, which has any number of further arguments. Rust cannot write such a function; the convention of System V
+/// for x86-64 is simple enough to collect them in a few instructions.
+#[cfg(all(target_arch = "x86_64", unix))]
+mod formatted {
+    use std::arch::naked_asm;
+    use std::ffi::{c_char, c_int};
+
+    use super::{take, words};
+    use crate::foreign::library::functions::Handle;
+
+    /// The most bytes of a message; what is longer is cut.
+    const MOST: usize = 4096;
+
+    /// `va_list`, as the thunk below fills it.
+    #[repr(C)]
+    struct Arguments {
+        next_general: u32,
+        next_vector: u32,
+        on_stack: *const u8,
+        registers: *const u8,
+    }
+
+    unsafe extern "C" {
+        fn vsnprintf(
+            text: *mut c_char,
+            size: usize,
+            format: *const c_char,
+            arguments: *mut Arguments,
+        ) -> c_int;
+    }
+
+    /// Saves the registers that carry further arguments, makes a `va_list` of them and the stack, and calls [`take_formatted`].
+    #[unsafe(naked)]
+    pub(in super::super) unsafe extern "C" fn log_of_two(
+        env: Handle,
+        name: *const c_char,
+        status: c_int,
+        category: *const c_char,
+        format: *const c_char,
+        first: *const c_char,
+    ) {
+        naked_asm!(
+            // At rsp: the va_list, 24 bytes; at rsp + 32: the registers, 6 of 8 and 8 of 16 bytes, the latter at multiples of 16; at
+            // rsp + 216: the return address; behind it: what was passed on the stack.
+            "sub rsp, 216",
+            // Five of the six general registers have the named parameters.
+            "mov [rsp + 72], r9",
+            "test al, al",
+            "je 2f",
+            "movaps [rsp + 80], xmm0",
+            "movaps [rsp + 96], xmm1",
+            "movaps [rsp + 112], xmm2",
+            "movaps [rsp + 128], xmm3",
+            "movaps [rsp + 144], xmm4",
+            "movaps [rsp + 160], xmm5",
+            "movaps [rsp + 176], xmm6",
+            "movaps [rsp + 192], xmm7",
+            "2:",
+            "mov dword ptr [rsp], 40",
+            "mov dword ptr [rsp + 4], 48",
+            "lea rax, [rsp + 224]",
+            "mov [rsp + 8], rax",
+            "lea rax, [rsp + 32]",
+            "mov [rsp + 16], rax",
+            "mov esi, edx",
+            "mov rdx, r8",
+            "mov rcx, rsp",
+            "call {take}",
+            "add rsp, 216",
+            "ret",
+            take = sym take_formatted,
+        )
+    }
+
+    unsafe extern "C" fn take_formatted(
+        env: Handle,
+        status: c_int,
+        format: *const c_char,
+        arguments: *mut Arguments,
+    ) {
+        let mut text: [c_char; MOST] = [0; MOST];
+        if !format.is_null() {
+            // SAFETY: it writes at most MOST bytes with a zero at the end. The format is the FMU's, and the arguments are those that
+            // the FMU passed with it.
+            unsafe { vsnprintf(text.as_mut_ptr(), MOST, format, arguments) };
+        }
+        // SAFETY: it ends with a zero.
+        take(env, status, &unsafe { words(text.as_ptr()) });
+    }
+}
+
+/// The logger of FMI 2.0, which has any number of further arguments. Rust cannot write such a function; where the
 /// first of them is passed as that of a plain function is, it is taken for the one format that consists of it.
+#[cfg(not(all(target_arch = "x86_64", unix)))]
 pub(super) unsafe extern "C" fn log_of_two(
     env: Handle,
     _: *const c_char,
@@ -102,15 +236,15 @@ pub(super) unsafe extern "C" fn log_of_two(
     format: *const c_char,
     first: *const c_char,
 ) {
-    // SAFETY: as above.
-    let (journal, format) = unsafe { (env.cast::<Journal>().as_ref(), words(format)) };
+    // SAFETY: the format is the FMU's C string.
+    let format = unsafe { words(format) };
     // On Apple's arm64 further arguments are on the stack.
     let has_first = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
     if has_first && matches!(format.trim_end(), "%s") {
-        // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 (System V and
-        // Windows) and of arm64 Linux pass it where they pass the sixth parameter of a plain function.
-        take(journal, status, &unsafe { words(first) });
+        // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 Windows and of arm64
+        // Linux pass it where they pass the sixth parameter of a plain function.
+        take(env, status, &unsafe { words(first) });
     } else {
-        take(journal, status, &format);
+        take(env, status, &format);
     }
 }

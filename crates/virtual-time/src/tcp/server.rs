@@ -172,7 +172,7 @@ impl Host<'_, '_, '_> {
             let Some((seat, message)) = self.server.poll() else {
                 break;
             };
-            has_asked |= !matches!(message, ToClient::End(_));
+            has_asked |= !matches!(message, ToClient::End(_) | ToClient::Waiting);
             if self.locals.take(seat, &message) {
                 continue;
             }

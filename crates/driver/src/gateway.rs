@@ -458,9 +458,11 @@ mod tests {
     fn config(role: &str) -> Config {
         let mut text = format!("{LINE}role = \"{role}\"\n");
         for (name, address) in SIGNALS {
-            text += &format!(
-                "[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\ntype = \"UDINT\"\n"
-            );
+            let lines = [
+                format!("name = \"{name}\""),
+                format!("address = \"{address}\""),
+            ];
+            text.extend(["[[signal]]\n", &lines.join("\n"), "\ntype = \"UDINT\"\n"]);
         }
         Config::parse("driver.cfg", &text).unwrap_or_else(|wrong| panic!("{wrong}"))
     }

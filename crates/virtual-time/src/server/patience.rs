@@ -16,10 +16,9 @@ impl Server<'_> {
             _ => None,
         });
         let silent = silent.min().unwrap_or(Nanos::MAX);
-        let inform = match self.informed.is_empty() || matches!(self.phase, Phase::Ended(_)) {
-            true => Nanos::MAX,
-            false => self.informed_at + INFORM,
-        };
+        let informs = !self.informed.is_empty() && !matches!(self.phase, Phase::Ended(_));
+        let inform = informs.then(|| self.informed_at + INFORM);
+        let inform = inform.unwrap_or(Nanos::MAX);
         silent.min(inform).min(match &self.phase {
             Phase::Joining(..) => self.asked + self.settings.join,
             Phase::Running(barrier, _) if barrier.state() == State::PreRead => {

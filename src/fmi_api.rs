@@ -191,6 +191,20 @@ fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), Stri
     })
 }
 
+/// A step; discarded if the bus has come to its end, after which there is none.
+fn step(handle: *mut c_void, from: f64, length: f64) -> c_int {
+    let mut is_over = false;
+    let status = call(handle, |instance| {
+        instance.step(from, length)?;
+        is_over = instance.is_over();
+        Ok(())
+    });
+    if is_over {
+        return Status::Discard as c_int;
+    }
+    status
+}
+
 /// The same, once for all of the functions: there are more than a hundred.
 #[inline(never)]
 fn call_once(

@@ -56,6 +56,14 @@ fn main() -> ExitCode {
         ),
         ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
         (
+            "a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ",
+            a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ,
+        ),
+        (
+            "the_clock_of_oscat_is_virtual_time",
+            the_clock_of_oscat_is_virtual_time,
+        ),
+        (
             "the_example_counts_virtual_time",
             the_example_counts_virtual_time,
         ),
@@ -347,6 +355,64 @@ fn time_stands_still_between_steps() -> Result<(), Absent> {
     Ok(())
 }
 
+fn a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ() -> Result<(), Absent>
+{
+    let program = "PROGRAM count\nVAR steps AT %QW8 : UINT; END_VAR\nsteps := steps + 1;\nEND_PROGRAM\nCONFIGURATION c\n\
+        RESOURCE r ON PLC\nTASK t(INTERVAL := T#10ms, PRIORITY := 0);\nPROGRAM p WITH t : count;\nEND_RESOURCE\n\
+        END_CONFIGURATION\n";
+    let second = |address: &str| Some(address.to_owned());
+    let made = prepared_with(program, (second("%ID8"), second("%QD4")));
+    let mut plc = Stepped::load(&Compiler::find()?, &made);
+    let mut answer = |go: u32, go_end: u32| {
+        plc.inputs[..4].copy_from_slice(&go.to_be_bytes());
+        plc.inputs[8..12].copy_from_slice(&go_end.to_be_bytes());
+        plc.idle(2);
+        let double = |at: usize| u32::from_be_bytes(plc.outputs[at..][..4].try_into().expect("4"));
+        assert_eq!(double(0), double(4));
+        (
+            double(0),
+            u16::from_be_bytes(plc.outputs[8..10].try_into().expect("two")),
+        )
+    };
+    // One that was reset begins anywhere; each row: go, its copy, done, steps made.
+    for (go, go_end, done, steps) in [
+        (0, 0, 0, 0),
+        (386, 0, 0, 0),
+        (386, 386, 386, 1),
+        (0, 0, 386, 1),
+        (386, 386, 386, 1),
+        (385, 385, 386, 1),
+        (388, 388, 386, 1),
+        (387, 386, 386, 1),
+        (386, 387, 386, 1),
+        (387, 387, 387, 2),
+    ] {
+        assert_eq!(answer(go, go_end), (done, steps), "{go} {go_end}");
+    }
+    Ok(())
+}
+
+/// By the pragma of OSCAT's edition for `iec2c`.
+fn the_clock_of_oscat_is_virtual_time() -> Result<(), Absent> {
+    let program = "FUNCTION T_PLC_MS : UDINT\nVAR tx : UDINT; END_VAR\nVAR_INPUT debug : BOOL; END_VAR\ntx := 0;\n\
+        {extern unsigned long __tick;\nextern unsigned long long common_ticktime__;\n\
+        UDINT plc_time = (UDINT)((common_ticktime__ / 1000000) * (unsigned long long)__tick);\nTX = plc_time}\n\
+        T_PLC_MS := tx;\nEND_FUNCTION\n\
+        PROGRAM watch\nVAR now AT %QD8 : UDINT; END_VAR\nnow := T_PLC_MS(en := TRUE);\nEND_PROGRAM\nCONFIGURATION c\n\
+        RESOURCE r ON PLC\nTASK t(INTERVAL := T#20ms, PRIORITY := 0);\nPROGRAM p WITH t : watch;\nEND_RESOURCE\n\
+        END_CONFIGURATION\n";
+    let mut plc = Stepped::load(
+        &Compiler::find()?,
+        &prepared(&program.replace("now", "seen")),
+    );
+    for ms in [0, 20, 1980, 4_000_000_000] {
+        plc.step(ms);
+        let seen = u32::from_be_bytes(plc.outputs[8..12].try_into().expect("four"));
+        assert_eq!(seen, ms);
+    }
+    Ok(())
+}
+
 fn the_example_counts_virtual_time() -> Result<(), Absent> {
     let compiler = Compiler::find()?;
     let mut cell = Stepped::load(&compiler, &with_blocks(&text("plc/iec61131/example.st")));
@@ -370,15 +436,27 @@ fn the_example_counts_virtual_time() -> Result<(), Absent> {
 
 /// A source, prepared with the server's variables at the addresses of [`Stepped`].
 fn prepared(program: &str) -> String {
+    prepared_with(program, (None, None))
+}
+
+/// The same with second copies of `go` and `done` at these addresses.
+fn prepared_with(program: &str, (go_end, done_end): (Option<String>, Option<String>)) -> String {
     let source = |bytes: Vec<u8>| Source {
         name: "program.st".to_owned(),
         bytes,
     };
     let [go, ms, done] = ["%ID0", "%ID4", "%QD0"].map(|address| Some(address.to_owned()));
-    let addresses = Addresses { go, ms, done };
+    let addresses = Addresses {
+        go,
+        ms,
+        done,
+        go_end,
+        done_end,
+    };
     let settings = Settings {
         addresses,
-        ..Settings::default()
+        // Its body is a pragma.
+        no_clock: vec!["three".to_owned()],
     };
     let made = prepare(&[source(program.as_bytes().to_vec())], &settings);
     let made = made.unwrap_or_else(|mistakes| panic!("{}", mistakes[0]));

@@ -139,11 +139,12 @@ impl Run {
             let content = wire::frame(&frame).expect("a frame").expect("complete");
             if let Some(client) = &mut here.client {
                 match client.receive(content).expect("the server behaves") {
-                    Asked::Initial | Asked::Step(_) => here.owes = true,
-                    Asked::End(Ok(outcome)) => {
+                    None => assert!(!here.owes, "nothing is waited for"),
+                    Some(Asked::Initial | Asked::Step(_)) => here.owes = true,
+                    Some(Asked::End(Ok(outcome))) => {
                         assert_eq!(*self.outcome.get_or_insert(outcome), outcome, "one end");
                     }
-                    Asked::End(Err(_)) => {}
+                    Some(Asked::End(Err(_))) => {}
                 }
             }
             if is_end {

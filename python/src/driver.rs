@@ -260,6 +260,12 @@ impl Driver {
         self.handle.memory.granted().0
     }
 
+    /// Whether the bus has come to an end of its own, such as that of a run on virtual time: further ticks bring nothing.
+    #[getter]
+    fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
+        Self::done(py, self.handle.is_over())
+    }
+
     /// Whether the bus is stepped: the PLC runs by the simulation's time, and a tick waits for it.
     #[getter]
     fn is_stepped(&self) -> bool {

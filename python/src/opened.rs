@@ -229,6 +229,10 @@ impl Handle {
         self.with_reason(|opened| opened.driver.snapshot())
     }
 
+    pub(crate) fn is_over(&self) -> Result<bool, Refusal> {
+        self.with_reason(|opened| opened.driver.is_over())
+    }
+
     pub(crate) fn config(&self) -> Result<Arc<Config>, Refusal> {
         self.with_reason(|opened| Arc::clone(opened.driver.config()))
     }

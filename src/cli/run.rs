@@ -331,7 +331,7 @@ impl Line {
     }
 }
 
-/// Ticks until the end of the time, of the FMU, or of patience.
+/// Ticks until the end of the time, of the FMU, of a run on virtual time, or of patience.
 fn tick(
     mut line: Line,
     mut machine: Machine,
@@ -356,6 +356,11 @@ fn tick(
         }
         time += step;
         let done = line.driver.exchange(time, &mut line.slots);
+        if line.driver.is_over() && done.code.code() >= 0 {
+            // The run had no further step.
+            time = time - step;
+            break;
+        }
         ticks += 1;
         stale += u64::from(done.code == Code::Stale);
         if done.code.code() < 0 {
@@ -385,6 +390,8 @@ fn tick(
     let ended = machine.end();
     let failure = failure.or(ended.err().map(|why| why.to_string()));
     let statistics = stats.then(|| line.driver.statistics());
+    let hash = line.driver.fact("sdsp.hash");
+    let hash = hash.map_or_else(String::new, |hash| format!(" hash={hash}"));
     line.driver.end_tick(&line.slots);
     line.driver.close();
     let lost = real_time.lost();
@@ -402,7 +409,8 @@ fn tick(
     };
     match &failure {
         None => say(&format!(
-            "run: ok ticks={ticks} time={time} stale={stale}{lost}\n"
+            "run: ok ticks={ticks} time={time} stale={stale}{lost}{hash}
+"
         )),
         Some(why) => say(&format!(
             "run: failed ticks={ticks} time={time}{lost} reason={why}\n"

@@ -10,7 +10,7 @@ use tickbus_fmi::{Status, Version};
 
 use super::{
     Inner, Journal, Logger, LoggerOfThree, call, free, get_texts, instantiate, lacking, list,
-    reset, room, same, set_logging, set_texts, terminate, text,
+    reset, room, same, set_logging, set_texts, step, terminate, text,
 };
 
 #[unsafe(no_mangle)]
@@ -157,11 +157,12 @@ unsafe extern "C" fn fmi3DoStep(
     early_return: *mut bool,
     last: *mut f64,
 ) -> c_int {
-    let status = call(instance, |instance| instance.step(from, length));
-    for flag in [event, terminate, early_return] {
+    let status = step(instance, from, length);
+    let is_over = status == Status::Discard as c_int;
+    for (flag, value) in [(event, false), (terminate, is_over), (early_return, false)] {
         if !flag.is_null() {
             // SAFETY: the caller's promise.
-            unsafe { flag.write(false) };
+            unsafe { flag.write(value) };
         }
     }
     if !last.is_null() {

@@ -9,7 +9,7 @@ use tickbus_fmi::{Status, Version};
 
 use super::{
     Inner, Journal, Logger, LoggerOfTwo, call, free, get_texts, instantiate, lacking, list, reset,
-    room, same, set_logging, set_texts, terminate, text,
+    room, same, set_logging, set_texts, step, terminate, text,
 };
 
 /// `fmi2Error`.
@@ -141,22 +141,52 @@ extern "C" fn fmi2DoStep(
     length: f64,
     _no_set_prior: c_int,
 ) -> c_int {
-    call(instance, |instance| instance.step(from, length))
+    step(instance, from, length)
 }
 
-/// No step is ever pending, and none was discarded.
+/// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+
+/// `fmi2Terminated`.
+const TERMINATED: c_int = 3;
+
+/// No step is ever pending, and one was discarded only if the bus has come to its end.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2GetBooleanStatus(
-    _instance: *mut c_void,
-    _kind: c_int,
+    instance: *mut c_void,
+    kind: c_int,
     value: *mut c_int,
 ) -> c_int {
     if value.is_null() {
         return ERROR;
     }
+    let mut is_over = false;
+    let status = call(instance, |instance| {
+        is_over = instance.is_over();
+        Ok(())
+    });
     // SAFETY: the caller's promise, as for `fmi2Instantiate`.
-    unsafe { value.write(0) };
-    Status::Ok as c_int
+    unsafe { value.write((kind == TERMINATED && is_over).into()) };
+    status
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn fmi2GetRealStatus(
+    instance: *mut c_void,
+    kind: c_int,
+    value: *mut f64,
+) -> c_int {
+    if value.is_null() || kind != LAST_SUCCESSFUL_TIME {
+        return ERROR;
+    }
+    let mut time = 0.0;
+    let status = call(instance, |instance| {
+        time = instance.time();
+        Ok(())
+    });
+    // SAFETY: the caller's promise, as for `fmi2Instantiate`.
+    unsafe { value.write(time) };
+    status
 }
 
 lacking! {
@@ -171,7 +201,6 @@ lacking! {
     fmi2GetRealOutputDerivatives,
     fmi2CancelStep,
     fmi2GetStatus,
-    fmi2GetRealStatus,
     fmi2GetIntegerStatus,
     fmi2GetStringStatus,
 }

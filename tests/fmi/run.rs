@@ -4,7 +4,10 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::fixture::{err, misbehaving_as, out, tanks, tickbus};
+use crate::fixture::{CONFIG, err, misbehaving_as, out, tanks, tickbus};
+use tickbus::fieldbus::tcp::Address;
+use tickbus::time::{Monotonic, Nanos};
+use tickbus::virtual_time::{Controls, Hosting, Logic, Outcome, Settings, StartCondition, tcp};
 
 const RUN: [&str; 6] = [
     "--config",
@@ -363,5 +366,81 @@ fn a_test_file_names_an_fmu_that_is_not_right() {
         let output = tickbus(folder.path(), &["test", "tank.toml.test.toml"]);
         assert_eq!(output.status.code(), Some(1), "{machine}");
         assert!(err(&output).contains(told), "{machine}\n{}", err(&output));
+    }
+}
+
+/// A server of virtual time with one client and this many steps of 10 ms, and a driver.cfg beside the FMU that takes part.
+fn with_server<R>(folder: &Path, steps: u64, work: impl FnOnce() -> R) -> (R, Outcome) {
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let bus = format!("kind = \"sdsp\"\naddress = \"{}\"\n", listener.address());
+    let config = CONFIG.replace(
+        "kind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\nscan = \"10ms\"\n",
+        &bus,
+    );
+    let (level, _) = config.rsplit_once("[[signal]]").expect("two signals");
+    fs::write(folder.join("sdsp.cfg"), level).expect("a file");
+    let mut settings = Settings::new(Nanos::from_millis(10), StartCondition::Count(1));
+    settings.steps = Some(steps);
+    std::thread::scope(|scope| {
+        let server = scope.spawn(|| {
+            let hosting = Hosting {
+                clock: &*Monotonic::shared(),
+                controls: &Controls::default(),
+                news: &mut |_| {},
+            };
+            listener.run(settings, Logic::new(), hosting)
+        });
+        let done = work();
+        let outcome = server.join().expect("no panic").expect("as planned");
+        (done, outcome)
+    })
+}
+
+#[test]
+fn a_run_on_virtual_time_that_ends_ends_the_fmu_and_its_hash_is_told() {
+    let folder = misbehaving_as("print");
+    let (output, outcome) = with_server(folder.path(), 20, || {
+        tickbus(
+            folder.path(),
+            &["run", "it.fmu", "--config", "sdsp.cfg", "--step", "10ms"],
+        )
+    });
+    let told = out(&output);
+    assert_eq!(output.status.code(), Some(0), "{told}{}", err(&output));
+    let right = format!(
+        "run: ok ticks=20 time=200ms stale=0 hash={}\n",
+        outcome.hash
+    );
+    assert!(told.ends_with(&right), "{told}");
+}
+
+/// Our own FMU, in a line of its own behind `tickbus run`.
+#[test]
+fn an_exported_fmu_ends_with_its_run_on_virtual_time() {
+    let library = crate::fixture::library();
+    let library = library.to_str().expect("UTF-8");
+    for version in ["fmi2", "fmi3"] {
+        let folder = misbehaving_as("print");
+        let (output, _) = with_server(folder.path(), 20, || {
+            let made = tickbus(
+                folder.path(),
+                &["export", "sdsp.cfg", "--for", version, "--library", library],
+            );
+            assert_eq!(made.status.code(), Some(0), "{}", err(&made));
+            let line = "[driver]\nid = 2\nname = \"Outer\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                mode = \"stepped\"\nscan = \"10ms\"\n[[signal]]\nname = \"Level\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
+            fs::write(folder.path().join("outer.cfg"), line).expect("a file");
+            let fmu = format!("sdsp-{version}.fmu");
+            tickbus(
+                folder.path(),
+                &["run", &fmu, "--config", "outer.cfg", "--step", "10ms"],
+            )
+        });
+        let told = out(&output);
+        assert_eq!(output.status.code(), Some(0), "{told}{}", err(&output));
+        assert!(
+            told.contains("run: the FMU has ended its simulation at 210ms"),
+            "{told}"
+        );
     }
 }

@@ -8,7 +8,7 @@ use tickbus_virtual_time as sdsp;
 use tickbus_virtual_time::{Declaration, Ended, Meeting, Step};
 
 use super::run::{End, Run};
-use super::{Every, Options, Variables};
+use super::{Options, Variables};
 
 /// The most steps that one tick catches up on. A longer one is taken for a wrong time.
 const MOST_STEPS: i64 = 100_000;
@@ -19,7 +19,6 @@ pub struct Sdsp {
     meeting: Meeting,
     timeout: Nanos,
     declaration: Declaration,
-    every: Every,
     stop: Stop,
     values: Values,
     state: State,
@@ -49,9 +48,6 @@ impl Sdsp {
         Ok(Self {
             meeting: options.meeting.clone(),
             timeout: options.timeout,
-            every: setup
-                .hosted
-                .map_or(options.every, |hosted| Every::Time(hosted.interval)),
             stop: setup
                 .hosted
                 .map(|hosted| hosted.stop.clone())
@@ -82,12 +78,12 @@ impl Sdsp {
             let mut run = Run::join(
                 (&self.meeting, self.timeout),
                 &self.declaration,
-                (self.every, &values.types),
+                &values.types,
                 &values.slots,
                 &self.stop,
             )?;
             values.are_sent(port);
-            let step = run.step(&values.slots)?;
+            let step = run.step()?;
             let due = now + run.interval;
             values.deliver(now, run.reads(), port);
             self.begin(step, port);

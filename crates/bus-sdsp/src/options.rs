@@ -16,7 +16,7 @@ use super::Variables;
 /// The longest name of a client, in characters.
 const NAME_LIMIT: usize = 120;
 
-/// How long the server may be silent: it may be paused, or other clients may have to be started by hand.
+/// How long the server may be silent. While it waits for clients or is paused, it says so every second.
 const TIMEOUT: Nanos = Nanos::from_secs(60);
 
 /// The options of the bus `sdsp`.
@@ -174,8 +174,10 @@ impl Options {
             (None, Role::Controller) => format!("{} PLC", setup.name),
         };
         let mut declaration = Declaration::new(name);
-        if let (Every::Steps(multiple), None) = (self.every, setup.hosted) {
-            declaration.multiple = multiple;
+        match (self.every, setup.hosted) {
+            (_, Some(hosted)) => declaration.interval = Some(hosted.interval),
+            (Every::Time(interval), None) => declaration.interval = Some(interval),
+            (Every::Steps(multiple), None) => declaration.multiple = multiple,
         }
         declaration.writes = writes.iter().cloned().collect();
         declaration.reads = reads.iter().map(|variable| variable.name.clone()).collect();

@@ -5,8 +5,6 @@ use tickbus_image::signal::DataType;
 use tickbus_virtual_time::client::{Asked, Client, Connection};
 use tickbus_virtual_time::{Cause, Declaration, Ended, Meeting, Outcome, Step};
 
-use super::Every;
-
 /// How long to wait until a server that was not there is tried again.
 const PAUSE: Nanos = Nanos::from_millis(100);
 
@@ -36,10 +34,6 @@ pub(super) struct Run {
     timeout: Nanos,
     /// The virtual time of one step of this client.
     pub(super) interval: Nanos,
-    /// How many of the steps that it is asked for make one of its own.
-    each: u64,
-    /// The first step that it is not to skip.
-    next: u64,
     is_over: bool,
 }
 
@@ -49,7 +43,7 @@ impl Run {
     pub(super) fn join(
         (meeting, timeout): (&Meeting, Nanos),
         declaration: &Declaration,
-        (every, types): (Every, &[DataType]),
+        types: &[DataType],
         initial: &[u64],
         stop: &Stop,
     ) -> Result<Self, End> {
@@ -57,8 +51,6 @@ impl Run {
             connection: connect(meeting, timeout, declaration, stop)?,
             timeout,
             interval: Nanos::ZERO,
-            each: 1,
-            next: 1,
             is_over: false,
         };
         match run.wait()? {
@@ -66,29 +58,18 @@ impl Run {
             other => unreachable!("a client is first asked for its initial values, not {other:?}"),
         }
         let client = run.connection.client();
-        let step = client.server_step();
-        let fits = match every {
-            Every::Steps(_) => Ok(1),
-            Every::Time(interval) => steps_of(interval, step),
-        };
-        let fits = fits.and_then(|each| {
-            let found = client.read_types();
-            let wrong =
-                (declaration.reads.iter().zip(types).zip(found)).find(|((_, own), is)| own != is);
-            match wrong {
-                None => Ok(each),
-                Some(((name, own), is)) => Err(format!(
-                    "it reads \"{name}\" as {own}, but that is {is}; give the signal this \"type\""
-                )),
-            }
-        });
-        match fits {
-            Ok(each) => run.each = each,
-            Err(reason) => return Err(run.give_up(&reason)),
+        let of_steps = client
+            .server_step()
+            .times(declaration.multiple.get().into());
+        run.interval = declaration.interval.unwrap_or(of_steps);
+        let found = client.read_types();
+        let mut all = declaration.reads.iter().zip(types).zip(found);
+        if let Some(((name, own), is)) = all.find(|((_, own), is)| own != is) {
+            let reason = format!(
+                "it reads \"{name}\" as {own}, but that is {is}; give the signal this \"type\""
+            );
+            return Err(run.give_up(&reason));
         }
-        let steps =
-            i64::try_from(u64::from(declaration.multiple.get()) * run.each).unwrap_or(i64::MAX);
-        run.interval = step.times(steps);
         run.connection.answer(initial);
         Ok(run)
     }
@@ -96,19 +77,14 @@ impl Run {
     /// Finishes the step that this client is in, and waits for its next one.
     pub(super) fn advance(&mut self, writes: &[u64]) -> Result<Step, End> {
         self.connection.answer(writes);
-        self.step(writes)
+        self.step()
     }
 
-    /// Waits for the next step of this client; until then its values stay.
-    pub(super) fn step(&mut self, writes: &[u64]) -> Result<Step, End> {
-        loop {
-            match self.wait()? {
-                Asked::Step(step) if step.sequence >= self.next => {
-                    self.next = step.sequence + self.each;
-                    return Ok(step);
-                }
-                _ => self.connection.answer(writes),
-            }
+    /// Waits for the next step of this client.
+    pub(super) fn step(&mut self) -> Result<Step, End> {
+        match self.wait()? {
+            Asked::Step(step) => Ok(step),
+            other => unreachable!("after the start a client is asked for steps, not {other:?}"),
         }
     }
 
@@ -181,17 +157,6 @@ pub fn connect(
             }
             connected => return connected,
         }
-    }
-}
-
-/// How many steps of the server make one of `interval`.
-fn steps_of(interval: Nanos, step: Nanos) -> Result<u64, String> {
-    let whole = interval.0 >= step.0 && interval.0 % step.0 == 0;
-    match u64::try_from(interval.0 / step.0) {
-        Ok(steps) if whole => Ok(steps),
-        _ => Err(format!(
-            "its step of {interval} is no whole multiple of the server's, {step}; make one of them fit"
-        )),
     }
 }
 

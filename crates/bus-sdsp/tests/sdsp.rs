@@ -9,7 +9,7 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
 use server::Server;
-use tickbus_base::time::{Manual, Monotonic, Nanos};
+use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos, Stop};
 use tickbus_conformance::rig::{End, SIGNALS};
 use tickbus_driver::{Code, Exchange, Host};
 use tickbus_driver_cfg::Config;
@@ -293,13 +293,13 @@ fn what_does_not_fit_the_run_is_refused_by_name() {
         (
             "step = \"2500us\"",
             int,
-            Cause::Left,
-            "client \"cell\" gave up: its step of 2500us is no whole multiple of the server's, 1ms; make one of them fit",
+            Cause::Refused,
+            "its step of 2500us is no whole multiple of the server's, 1ms; make one of them fit",
         ),
         (
             "step = \"100us\"",
             int,
-            Cause::Left,
+            Cause::Refused,
             "its step of 100us is no whole multiple of the server's, 1ms",
         ),
         (
@@ -550,6 +550,69 @@ fn a_run_in_shared_memory_is_that_over_tcp() {
         outcomes.push(server.end().expect("as planned"));
     }
     assert_eq!(outcomes[0], outcomes[1]);
+}
+
+/// Neither a pause nor a client that joins late is a server that hangs.
+#[test]
+fn a_pause_longer_than_the_time_out_is_waited_for() {
+    let name = format!("bus-sdsp-pause-{}", std::process::id());
+    let mut settings = Settings::new(STEP, StartCondition::Count(1));
+    (settings.steps, settings.paused) = (Some(3), true);
+    let servers = [
+        Server::start(settings.clone()),
+        #[cfg(unix)]
+        Server::in_memory(&name, settings),
+    ];
+    let machines = servers.each_ref().map(|server| {
+        let text = config(server.port, "device", "timeout = \"2500ms\"");
+        let place = format!("address = \"127.0.0.1:{}\"", server.port);
+        let memory = format!("shared_memory = \"{name}\"");
+        let text = match server.port {
+            0 => text.replace(&place, &memory),
+            _ => text,
+        };
+        let text = text.split("[[signal]]").map(str::to_owned);
+        let written: Vec<String> = text
+            .enumerate()
+            .filter(|(at, section)| *at == 0 || section.contains("%I"))
+            .map(|(_, section)| section)
+            .collect();
+        let text = written.join("[[signal]]");
+        thread::spawn(move || {
+            let mut machine = End::open(&text, &Manual::new());
+            while machine.tick().code == Code::Fresh {}
+            machine.link().reason
+        })
+    });
+    for server in &servers {
+        server.says("the run starts");
+    }
+    let clock = Monotonic::shared();
+    clock.wait_until(clock.now() + Nanos::from_secs(4), &Stop::new());
+    for (server, machine) in servers.into_iter().zip(machines) {
+        server.controls.send(Control::Run);
+        let reason = machine.join().expect("no panic");
+        assert!(reason.contains("come to its end after 3 steps"), "{reason}");
+        assert_eq!(server.end().map(|outcome| outcome.steps), Ok(3));
+    }
+}
+
+#[test]
+fn a_step_in_time_is_the_same_run_as_its_multiple() {
+    let hashes = ["step = \"10ms\"", "multiple = 10"].map(|extra| {
+        let server = of_two(41);
+        let plc = foreign(server.port, DataType::Int, |_, _, _| Ok(()));
+        let mut machine = open(server.port, "device", extra);
+        let mut ticks = 0;
+        while machine.tick().code == Code::Fresh {
+            ticks += 1;
+            machine.set("position", f64::from(ticks));
+        }
+        assert_eq!(ticks, 5, "at 0, 10, 20, 30 and 40 ms");
+        assert!(plc.join().expect("no panic").is_ok());
+        server.end().expect("as planned").hash
+    });
+    assert_eq!(hashes[0], hashes[1]);
 }
 
 #[test]

@@ -93,6 +93,7 @@ fn open_hosted(
     let hosted = ScanSetup {
         program,
         interval: scan,
+        has_watchdog: true,
         tape: None,
     };
     let clock = Arc::clone(clock);

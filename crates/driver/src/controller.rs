@@ -31,8 +31,28 @@ impl Host {
     /// created, or the system refused a thread.
     pub fn open(
         config: &Config,
-        mut program: Box<dyn Program>,
+        program: Box<dyn Program>,
         interval: Nanos,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self, DriverError> {
+        Self::open_with(config, program, (interval, true), clock)
+    }
+
+    /// As [`open`](Self::open), without the watchdog: on a busy computer a late scan changes no values on the bus. For
+    /// a program whose peer waits for it.
+    pub(crate) fn open_patient(
+        config: &Config,
+        program: Box<dyn Program>,
+        interval: Nanos,
+        clock: Arc<dyn Clock>,
+    ) -> Result<Self, DriverError> {
+        Self::open_with(config, program, (interval, false), clock)
+    }
+
+    fn open_with(
+        config: &Config,
+        mut program: Box<dyn Program>,
+        (interval, has_watchdog): (Nanos, bool),
         clock: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
         let unfit = |what: &str, right: &str| DriverError::Fit {
@@ -67,6 +87,7 @@ impl Host {
         let hosted = ScanSetup {
             program,
             interval,
+            has_watchdog,
             tape: ScanRecorder::start(config, role, is_stepped)?,
         };
         let thread = match bus {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Link, LinkStatus};
+use tickbus_fieldbus::{Lead, Link, LinkStatus};
 use tickbus_image::signal::Slot;
 use tickbus_image::{Event, TickEnd};
 use tickbus_record::Recorder;
@@ -69,6 +69,16 @@ impl Driver {
     /// Whether the bus is stepped: a tick may wait for it.
     pub fn is_stepped(&self) -> bool {
         matches!(self.line, BusHandle::Stepped { .. })
+    }
+
+    /// Whether the bus has come to an end of its own: a run on virtual time is over. Ticks then bring nothing.
+    pub fn is_over(&self) -> bool {
+        matches!(&self.line, BusHandle::Stepped { bus, .. } if bus.lead() == Lead::Ended)
+    }
+
+    /// What the bus has told about itself under this key of the statistics.
+    pub fn fact(&self, key: &'static str) -> Option<String> {
+        self.status.fact(key)
     }
 
     /// The slots before the first exchange: every signal at its fail-safe value.

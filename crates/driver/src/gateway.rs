@@ -2,7 +2,8 @@
 //!
 //! The PLC needs no library of ours. Two signals keep it in step: the gateway writes what the PLC reads and the time,
 //! and with them a new value of `sync.go`; the PLC runs one step, and answers with the same value in `sync.done`. In
-//! between it may take any time.
+//! between it may take any time. A bus that transfers them in several requests can have a second copy of each at the
+//! other end of the block: a value counts when both copies agree.
 
 use std::num::NonZeroU32;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,6 +24,12 @@ const GO: &str = "sync.go";
 
 /// The signal with which the PLC tells that it has finished a step.
 const DONE: &str = "sync.done";
+
+/// The second copy of [`GO`], behind what the PLC reads, if there is one.
+const GO_END: &str = "sync.go_end";
+
+/// The second copy of [`DONE`], in front of or behind what the PLC writes, if there is one.
+const DONE_END: &str = "sync.done_end";
 
 /// The signal with the virtual time of a step, in milliseconds; it wraps, as the PLC's TIME does.
 const TIME: &str = "sync.time";
@@ -74,7 +81,8 @@ impl Side {
     fn new(config: &Config, area: Area) -> Self {
         let variables = Variables::new(&config.table, area, |signal| Some(signal.name.clone()));
         let names = variables.iter().enumerate();
-        let shared = names.filter(|(_, variable)| ![GO, DONE, TIME].contains(&&*variable.name));
+        let own = [GO, GO_END, DONE, DONE_END, TIME];
+        let shared = names.filter(|(_, variable)| !own.contains(&&*variable.name));
         let shared = shared.map(|(slot, _)| slot).collect();
         let slots = vec![0; variables.iter().len()];
         Self {
@@ -85,11 +93,25 @@ impl Side {
         }
     }
 
-    /// The slot of one of the signals that synchronise.
-    fn slot(&mut self, name: &str) -> &mut u64 {
+    /// The slot of one of the signals that synchronise, if there is such a signal.
+    fn slot(&mut self, name: &str) -> Option<&mut u64> {
         let mut variables = self.variables.iter();
         let slot = variables.position(|variable| variable.name == name);
-        &mut self.slots[slot.expect("checked when it was opened")]
+        slot.map(|slot| &mut self.slots[slot])
+    }
+
+    /// Sets one of them.
+    fn set(&mut self, name: &str, value: u32) {
+        if let Some(slot) = self.slot(name) {
+            *slot = value.into();
+        }
+    }
+
+    /// The value of [`DONE`], unless a second copy has another one.
+    fn done(&mut self) -> Option<u32> {
+        let done = self.slot(DONE).map(|slot| low(*slot))?;
+        let copy = self.slot(DONE_END).map(|slot| low(*slot));
+        copy.is_none_or(|copy| copy == done).then_some(done)
     }
 }
 
@@ -189,7 +211,8 @@ impl Gateway {
         });
         let program = Box::new(Desktop(Arc::clone(&desk)));
         Ok(Self {
-            host: Host::open(config, program, INTERVAL, Arc::clone(&clock))?,
+            // On a busy computer scans come late. The PLC waits for the next step then, and must not read other values.
+            host: Host::open_patient(config, program, INTERVAL, Arc::clone(&clock))?,
             desk,
             declaration,
             timeout: options.timeout,
@@ -207,13 +230,16 @@ impl Gateway {
     ///
     /// It does not appear within the time-out, or the gateway was stopped.
     pub fn await_plc(&mut self) -> Result<(), String> {
-        let is_there = |frames: &Frames, _: &mut Side| frames.alive;
-        self.wait_until(is_there)?;
-        // A PLC that was not restarted has finished steps before; and any new value would be one more.
-        let done = *self.outputs.slot(DONE);
-        *self.inputs.slot(GO) = done;
+        let done = self.wait_for(|frames, side| side.done().filter(|_| frames.alive))?;
+        // A PLC that was not restarted has finished steps before.
+        self.set_go(done);
         self.publish();
         Ok(())
+    }
+
+    fn set_go(&mut self, go: u32) {
+        self.inputs.set(GO, go);
+        self.inputs.set(GO_END, go);
     }
 
     /// Takes part in the run of the server at `meeting`, as soon as that is there, until the run ends.
@@ -259,19 +285,19 @@ impl Gateway {
         self.desk.lock().inputs.copy_from_slice(frame);
     }
 
-    /// Waits until the PLC's outputs are as `is_right` wants them, which has them in the slots then.
-    fn wait_until(
+    /// Waits until `look` finds something in the PLC's outputs, which are in the slots then.
+    fn wait_for<T>(
         &mut self,
-        mut is_right: impl FnMut(&Frames, &mut Side) -> bool,
-    ) -> Result<(), String> {
+        mut look: impl FnMut(&Frames, &mut Side) -> Option<T>,
+    ) -> Result<T, String> {
         let end = self.clock.now() + self.timeout;
         loop {
             let frames = self.desk.lock();
             let side = &mut self.outputs;
             side.variables.take(0, &frames.outputs);
             side.variables.get(&mut side.slots);
-            if is_right(&frames, side) {
-                return Ok(());
+            if let Some(found) = look(&frames, side) {
+                return Ok(found);
             }
             drop(frames);
             if self.stop.is_stopped() {
@@ -294,7 +320,15 @@ impl Gateway {
     fn missing(&mut self) -> String {
         let (timeout, link) = (self.timeout, self.host.link());
         let go = self.go;
-        let done = *self.outputs.slot(DONE);
+        let done = |side: &mut Side, name| side.slot(name).map_or(0, |slot| *slot);
+        let done = match self.outputs.done() {
+            Some(done) => format!("{DONE} {done}"),
+            None => format!(
+                "{DONE} {} but {DONE_END} {}",
+                done(&mut self.outputs, DONE),
+                done(&mut self.outputs, DONE_END)
+            ),
+        };
         let Some(go) = go else {
             return format!("the PLC did not appear within {timeout}: {}", link.reason);
         };
@@ -304,9 +338,7 @@ impl Gateway {
             }
             state => format!("the line is {}: {}", state.name(), link.reason),
         };
-        format!(
-            "the PLC did not finish its step within {timeout} ({GO} is {go}, {DONE} {done}); {line}"
-        )
+        format!("the PLC did not finish its step within {timeout} ({GO} is {go}, {done}); {line}")
     }
 }
 
@@ -326,20 +358,21 @@ impl Participant for Gateway {
                 step.time
             ));
         }
-        if self.go.is_none() {
+        let last = match self.go {
+            Some(go) => go,
             // As it is now: the PLC may have been restarted since it was awaited.
-            self.wait_until(|_, _| true)?;
-        }
-        let go = self.go.unwrap_or_else(|| low(*self.outputs.slot(DONE)));
-        let go = go.wrapping_add(1);
+            None => self.wait_for(|_, side| side.done())?,
+        };
+        // 0 is what a PLC reads where no gateway is.
+        let go = last.checked_add(1).unwrap_or(1);
         self.go = Some(go);
         for (slot, read) in self.inputs.shared.iter().zip(reads) {
             self.inputs.slots[*slot] = *read;
         }
-        *self.inputs.slot(TIME) = low(millis.cast_unsigned()).into();
-        *self.inputs.slot(GO) = go.into();
+        self.inputs.set(TIME, low(millis.cast_unsigned()));
+        self.set_go(go);
         self.publish();
-        self.wait_until(|_, outputs| low(*outputs.slot(DONE)) == go)?;
+        self.wait_for(|_, outputs| (outputs.done()? == go).then_some(()))?;
         for (slot, write) in self.outputs.shared.iter().zip(writes) {
             *write = self.outputs.slots[*slot];
         }
@@ -356,15 +389,30 @@ const fn low(word: u64) -> u32 {
 /// Checks that a driver.cfg has the signals that synchronise, and none whose value depends on when it is looked at.
 fn check(config: &Config) -> Result<(), Mistake> {
     let table = &config.table;
-    for (name, area, what) in [
-        (GO, Area::Input, "begins a step of the PLC"),
-        (TIME, Area::Input, "has the virtual time in milliseconds"),
-        (DONE, Area::Output, "tells that the PLC has finished a step"),
+    for (name, area, is_needed, what) in [
+        (GO, Area::Input, true, "begins a step of the PLC"),
+        (
+            TIME,
+            Area::Input,
+            true,
+            "has the virtual time in milliseconds",
+        ),
+        (
+            DONE,
+            Area::Output,
+            true,
+            "tells that the PLC has finished a step",
+        ),
+        (GO_END, Area::Input, false, "repeats sync.go"),
+        (DONE_END, Area::Output, false, "repeats sync.done"),
     ] {
         let right = format!(
             "add it as a UDINT in {area}, such as address = \"{area}D0\" and type = \"UDINT\": it {what}"
         );
         let Some(signal) = table.position(name).map(|at| &table.signals[at]) else {
+            if !is_needed {
+                continue;
+            }
             return Err(Mistake::new(
                 format!("there is no signal \"{name}\""),
                 right,
@@ -388,4 +436,82 @@ fn check(config: &Config) -> Result<(), Mistake> {
         ));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Driver;
+    use tickbus_base::time::Monotonic;
+
+    const LINE: &str = "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"loopback\"\ncycle = \"100us\"\n\
+        max_age = \"20ms\"\nlink = \"starved\"\n";
+
+    const SIGNALS: [(&str, &str); 5] = [
+        ("sync.go", "%ID0"),
+        ("sync.time", "%ID4"),
+        ("sync.go_end", "%ID8"),
+        ("sync.done", "%QD0"),
+        ("sync.done_end", "%QD4"),
+    ];
+
+    fn config(role: &str) -> Config {
+        let mut text = format!("{LINE}role = \"{role}\"\n");
+        for (name, address) in SIGNALS {
+            let lines = [
+                format!("name = \"{name}\""),
+                format!("address = \"{address}\""),
+            ];
+            text.extend(["[[signal]]\n", &lines.join("\n"), "\ntype = \"UDINT\"\n"]);
+        }
+        Config::parse("driver.cfg", &text).unwrap_or_else(|wrong| panic!("{wrong}"))
+    }
+
+    #[test]
+    fn a_plc_reads_the_same_step_while_the_scans_of_the_gateway_are_starved() {
+        let clock = Monotonic::shared();
+        let mut plc = Driver::open(config("controller"), Arc::clone(&clock) as _).expect("opens");
+        let stop = Stop::new();
+        let mut slots = plc.initial_slots();
+        let mut tick = |done: (f64, f64)| {
+            slots[3] = tickbus_image::signal::Slot::from_real(done.0);
+            slots[4] = tickbus_image::signal::Slot::from_real(done.1);
+            plc.exchange(clock.now(), &mut slots);
+            clock.wait_until(clock.now() + INTERVAL, &stop);
+            (slots[0].real(), slots[2].real())
+        };
+        // One copy of the answer alone does not count: the gateway is not to begin with 387.
+        tick((386.0, 385.0));
+        let options = GatewayOptions {
+            client: None,
+            multiple: NonZeroU32::MIN,
+            timeout: Nanos::from_secs(20),
+        };
+        let mut gateway = Gateway::open(&config("device"), options, Arc::clone(&clock) as _, &stop)
+            .expect("opens");
+        std::thread::scope(|scope| {
+            let desk = Arc::clone(&gateway.desk);
+            let step = scope.spawn(move || {
+                gateway.await_plc().expect("the PLC is there");
+                let step = Step {
+                    sequence: 1,
+                    time: Nanos::ZERO,
+                };
+                gateway.run(step, &[], &mut []).expect("the PLC answers");
+                gateway.close();
+            });
+            while tick((385.0, 385.0)) != (386.0, 386.0) {}
+            {
+                let _starved = desk.lock();
+                let end = clock.now() + Nanos::from_millis(100);
+                while clock.now() < end {
+                    assert_eq!(tick((385.0, 385.0)), (386.0, 386.0));
+                }
+            }
+            while !step.is_finished() {
+                tick((386.0, 386.0));
+            }
+            step.join().expect("it was in step");
+        });
+    }
 }

@@ -17,8 +17,8 @@ pub(crate) fn mistakes(addresses: &Addresses) -> Vec<Mistakes> {
             let mistake = Mistake::new(what, "give each variable an address of its own");
             wrong.push(Mistakes::of(name, mistake));
         }
-        if *name == "done" && address[1..].starts_with(['I', 'i']) {
-            let what = format!("{address} is an input, and the PLC writes done");
+        if name.starts_with("done") && address[1..].starts_with(['I', 'i']) {
+            let what = format!("{address} is an input, and the PLC writes {name}");
             let mistake = Mistake::new(what, "name an output, such as %QD100, or a marker");
             wrong.push(Mistakes::of(name, mistake));
         }
@@ -27,12 +27,7 @@ pub(crate) fn mistakes(addresses: &Addresses) -> Vec<Mistakes> {
 }
 
 fn named(addresses: &Addresses) -> Vec<(&'static str, &str)> {
-    let all = [
-        ("go", &addresses.go),
-        ("ms", &addresses.ms),
-        ("done", &addresses.done),
-    ];
-    let stated = all.into_iter();
+    let stated = addresses.variables();
     let stated = stated.filter_map(|(name, address)| Some((name, address.as_deref()?)));
     stated
         .filter(|(_, address)| address.starts_with('%'))

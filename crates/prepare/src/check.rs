@@ -9,6 +9,7 @@ use super::code::Code;
 use super::lexer::Kind;
 use super::library::Addresses;
 use super::outline::{Outline, Unit, UnitKind, declared};
+use super::pragma;
 use super::words;
 use tickbus_base::toml_text::{Collector, shown};
 
@@ -19,9 +20,18 @@ pub(crate) struct World {
     pub(crate) types: HashSet<String>,
     /// Global variables.
     pub(crate) globals: HashSet<String>,
+    /// What the user vouches for: its pragmas read no clock, either.
+    pub(crate) vouched: HashSet<String>,
 }
 
 impl World {
+    /// Adds what the user vouches for.
+    pub(crate) fn vouch<'n>(&mut self, names: impl IntoIterator<Item = &'n String>) {
+        let names = names.into_iter().map(|name| name.to_uppercase());
+        self.vouched.extend(names);
+        self.types.extend(self.vouched.iter().cloned());
+    }
+
     /// Adds what a source declares.
     pub(crate) fn add(&mut self, code: &Code<'_>, outline: &Outline) {
         for unit in &outline.units {
@@ -66,6 +76,14 @@ pub(crate) fn all_declarations(outline: &Outline) -> impl Iterator<Item = Range<
 /// Reports what cannot be prepared in a source.
 pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &Collector<'_>) {
     check_words(code, wrong);
+    for pragma in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
+        let unit = outline.unit_at(code, pragma.start);
+        let function = unit.map(|unit| code.word(unit.name));
+        let text = &code.text[pragma.range()];
+        if function.is_none_or(|name| pragma::on_virtual_time(name, text).is_none()) {
+            check_pragma(text, code.base + pragma.start, function, world, wrong);
+        }
+    }
     for inner in all_declarations(outline) {
         for at in declared(code, inner).types {
             check_type(code.word(at), code.start(at), world, wrong);
@@ -84,7 +102,35 @@ pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &C
     }
 }
 
-/// Comments within comments, names that are taken, and code that a pragma hands to a compiler.
+/// Reports a pragma, at a byte of the file and in this unit, that is code of which nothing is known.
+pub(crate) fn check_pragma(
+    text: &str,
+    at: usize,
+    unit: Option<&str>,
+    world: &World,
+    wrong: &Collector<'_>,
+) {
+    if pragma::reads_clock(text) {
+        wrong.report(
+            at,
+            "this pragma reads the time of the PLC",
+            "use a TON, TOF, TP or RTC",
+        );
+    } else if pragma::is_code(text) {
+        let what = "this pragma holds code, which may read the clock of the PLC";
+        match unit {
+            Some(unit) if world.vouched.contains(&unit.to_uppercase()) => {}
+            Some(unit) => wrong.report(
+                at,
+                what,
+                format!("if it reads no clock, name the unit: --no-clock {unit}"),
+            ),
+            None => wrong.report(at, what, "take it out"),
+        }
+    }
+}
+
+/// Comments within comments, and names that are taken.
 pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
     for token in &code.all {
         let text = &code.text[token.range()];
@@ -98,11 +144,6 @@ pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
                     );
                 }
             }
-            Kind::Pragma if text.contains("__CURRENT_TIME") => wrong.report(
-                code.base + token.start,
-                "this pragma reads the time of the PLC",
-                "use a TON, TOF, TP or RTC",
-            ),
             Kind::Word if words::is_put_in(text) => wrong.report(
                 code.base + token.start,
                 format!("the name {} is reserved by tickbus", shown(text)),
@@ -146,7 +187,11 @@ pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector
         wrong.report(
             at,
             format!("{} runs on a clock of its own", shown(name)),
-            "use TON, TOF, TP or RTC, or a block of your own that is built from them",
+            format!(
+                "use TON, TOF, TP or RTC, or a block of your own that is built from them; if that of your library takes its \
+                 cycle as an input, name it: --no-clock {}",
+                shown(name)
+            ),
         );
     } else {
         wrong.report(

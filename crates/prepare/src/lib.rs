@@ -24,6 +24,7 @@ mod library;
 mod outline;
 mod plan;
 mod plcopen;
+mod pragma;
 mod structured_text;
 #[cfg(test)]
 mod tests;
@@ -166,8 +167,7 @@ fn prepared(
     for (code, outline) in codes.iter().zip(&outlines) {
         world.add(code, outline);
     }
-    let vouched = settings.no_clock.iter().map(|name| name.to_uppercase());
-    world.types.extend(vouched);
+    world.vouch(&settings.no_clock);
     let mut found = None;
     let mut shared = BTreeSet::new();
     for (index, outline) in outlines.iter().enumerate() {

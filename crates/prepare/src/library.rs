@@ -101,6 +101,20 @@ pub struct Addresses {
     pub ms: Option<String>,
     /// `done`, a UDINT that the server reads.
     pub done: Option<String>,
+    /// A second copy of `go`, at the other end of what the server writes: a step begins when both agree.
+    pub go_end: Option<String>,
+    /// A second copy of `done`, at the other end of what the server reads.
+    pub done_end: Option<String>,
+}
+
+impl Addresses {
+    /// The variables for the server, with their addresses.
+    pub(crate) fn variables(&self) -> impl Iterator<Item = (&'static str, &Option<String>)> {
+        let second = [("go_end", &self.go_end), ("done_end", &self.done_end)];
+        let first = [("go", &self.go), ("ms", &self.ms), ("done", &self.done)];
+        let second = second.into_iter().filter(|(_, address)| address.is_some());
+        first.into_iter().chain(second)
+    }
 }
 
 /// The blocks that are needed and the scheduler's program, without comments.
@@ -148,17 +162,25 @@ fn schedule(signals: &[Signal], addresses: &Addresses) -> String {
         writeln!(made, "    {name} : {kind};").expect("a String takes all");
     }
     // A section holds either variables with an address or others.
-    for (name, address) in [
-        ("go", &addresses.go),
-        ("ms", &addresses.ms),
-        ("done", &addresses.done),
-    ] {
+    for (name, address) in addresses.variables() {
         let at = at(address);
         write!(made, "  END_VAR\n  VAR\n    {name} {at}: UDINT;\n").expect("a String takes all");
     }
     made.push_str("  END_VAR\n  VAR\n    handshake : TICKBUS_SCHEDULER;\n  END_VAR\n\n");
-    made.push_str("  handshake(SIMULATED := tickbus_simulated, GO := go, MS := ms);\n");
-    made.push_str("  done := handshake.DONE;\n  tickbus_now := handshake.NOW;\n");
+    let go = match addresses.go_end {
+        // 0 is never a step.
+        Some(_) => "SEL(go = go_end, UDINT#0, go)",
+        None => "go",
+    };
+    writeln!(
+        made,
+        "  handshake(SIMULATED := tickbus_simulated, GO := {go}, MS := ms);\n  done := handshake.DONE;"
+    )
+    .expect("a String takes all");
+    if addresses.done_end.is_some() {
+        made.push_str("  done_end := handshake.DONE;\n");
+    }
+    made.push_str("  tickbus_now := handshake.NOW;\n");
     for signal in signals {
         let due = match signal.interval {
             Some(interval) => format!(" AND ms MOD {interval} = 0"),

@@ -17,6 +17,16 @@ pub(crate) struct Outline {
     pub(crate) configurations: Vec<Configuration>,
 }
 
+impl Outline {
+    /// The unit that holds a byte of its code's text.
+    pub(crate) fn unit_at(&self, code: &Code<'_>, byte: usize) -> Option<&Unit> {
+        let byte = code.base + byte;
+        self.units
+            .iter()
+            .find(|unit| (code.start(unit.name)..code.start(unit.body.end)).contains(&byte))
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum UnitKind {
     Program,

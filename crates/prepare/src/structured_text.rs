@@ -7,9 +7,11 @@ use super::chart::{chart, is_chart};
 use super::check::{World, all_declarations};
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
+use super::lexer::Kind;
 use super::library::{self, SCHEDULE, TASK};
 use super::outline::{Configuration, Outline, UnitKind, declared};
 use super::plan::{self, Named, Plan};
+use super::pragma;
 use tickbus_base::toml_text::Collector;
 
 const MARKS: Marks = Marks::StructuredText;
@@ -78,6 +80,14 @@ impl Preparation<'_, '_> {
         for at in self.timer_types() {
             let name = format!("TICKBUS_{}", code.capitals(at));
             edits.replace(code.tokens[at].range(), name, MARKS);
+        }
+        for token in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
+            let unit = self.outline.unit_at(code, token.start);
+            let text = &code.text[token.range()];
+            let ours = unit.and_then(|unit| pragma::on_virtual_time(code.word(unit.name), text));
+            if let Some(ours) = ours {
+                edits.replace(token.range(), ours, MARKS);
+            }
         }
         for unit in &self.outline.units {
             let signal = self.plan.programs.get(&code.capitals(unit.name));

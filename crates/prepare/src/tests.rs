@@ -51,6 +51,7 @@ fn a_prepared_program_is_the_original_with_marked_changes() {
         go: Some("%ID0".to_owned()),
         ms: Some("%ID1".to_owned()),
         done: Some("%QD0".to_owned()),
+        ..Addresses::default()
     };
     let made = prepared_text(
         &text,
@@ -241,15 +242,57 @@ fn variables_named_like_parts_of_a_chart_make_no_chart() {
 #[test]
 fn a_body_of_pragmas_gets_a_controller() {
     let text = line("VAR n : INT; END_VAR", "{n++;}");
-    let made = prepared_text(&text, &Settings::default());
+    let settings = Settings {
+        no_clock: vec!["One".to_owned()],
+        ..Settings::default()
+    };
+    let made = prepared_text(&text, &settings);
     assert!(
         made.contains("(*{tickbus*)IF NOT tickbus_simulated OR tickbus_execute_fast THEN\n(*tickbus}*){n++;}(*{tickbus*)\nEND_IF;"),
         "{made}"
     );
     assert_eq!(undone(&made), text);
     let chart = "INITIAL_STEP one: move(N); END_STEP\nTRANSITION FROM one TO one := TRUE; END_TRANSITION\nACTION move: {n++;} END_ACTION";
-    let made = prepared_text(&line("VAR n : INT; END_VAR", chart), &Settings::default());
+    let made = prepared_text(&line("VAR n : INT; END_VAR", chart), &settings);
     assert!(made.contains("THEN (*tickbus}*){n++;}"), "{made}");
+}
+
+#[test]
+fn the_clock_of_oscat_becomes_virtual_time() {
+    let clock = "FUNCTION T_PLC_MS : UDINT\nVAR tx : UDINT; END_VAR\ntx := 0;\n{extern unsigned long __tick;\nTX = __tick}\n\
+        T_PLC_MS := tx;\nEND_FUNCTION\n";
+    let text = clock.to_owned() + &line("VAR n : UDINT; END_VAR", "n := T_PLC_MS();");
+    let made = prepared_text(&text, &Settings::default());
+    assert!(
+        made.contains("*){extern TIME *__GET_GLOBAL_TICKBUS_NOW(void);"),
+        "{made}"
+    );
+    assert_eq!(undone(&made), text);
+    let other = text.replace("T_PLC_MS", "T_PLC");
+    refused(&other, "line.st:4:1: this pragma reads the time of the PLC");
+}
+
+#[test]
+fn go_and_done_have_second_copies_where_addresses_are_stated() {
+    let [go, go_end, done_end] = ["%ID0", "%ID8", "%QD8"].map(|text| Some(text.to_owned()));
+    let addresses = Addresses {
+        go,
+        go_end,
+        done_end,
+        ..Addresses::default()
+    };
+    let settings = Settings {
+        addresses,
+        ..Settings::default()
+    };
+    let made = prepared_text(&line("", "RETURN;"), &settings);
+    for piece in [
+        "  VAR\n    go_end AT %ID8 : UDINT;\n  END_VAR\n  VAR\n    done_end AT %QD8 : UDINT;\n",
+        "  handshake(SIMULATED := tickbus_simulated, GO := SEL(go = go_end, UDINT#0, go), MS := ms);\n",
+        "  done := handshake.DONE;\n  done_end := handshake.DONE;\n",
+    ] {
+        assert!(made.contains(piece), "{piece}\n{made}");
+    }
 }
 
 #[test]
@@ -368,7 +411,12 @@ fn an_address_that_is_taken_is_told() {
 fn addresses_of_the_server_are_compared() {
     let with = |go: &str, ms: &str, done: &str| {
         let [go, ms, done] = [go, ms, done].map(|address| Some(address.to_owned()));
-        let addresses = Addresses { go, ms, done };
+        let addresses = Addresses {
+            go,
+            ms,
+            done,
+            ..Addresses::default()
+        };
         Settings {
             addresses,
             ..Settings::default()

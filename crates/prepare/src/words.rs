@@ -18,7 +18,10 @@ pub(crate) fn is_put_in(name: &str) -> bool {
 
 /// Whether a name is one of the variables that are put in: no type or program of that name can stand beside them.
 pub(crate) fn is_variable_put_in(name: &str) -> bool {
-    is_in("HANDSHAKE GO MS DONE SIMULATED STEPPING NOW", name)
+    is_in(
+        "HANDSHAKE GO MS DONE GO_END DONE_END SIMULATED STEPPING NOW",
+        name,
+    )
 }
 
 const TYPES: &str = "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME LTIME DATE LDATE TOD \
@@ -43,7 +46,8 @@ const CLOCKS: &str = "TIME LTIME TIME_TCK RD_SYS_T WR_SYS_T RD_LOC_T SYSTIMEGETM
     GETTASKTIME F_GETSYSTEMTIME RUNTIME T_READ TONR TOFR LTON LTOF LTP TON_TIME TOF_TIME TP_TIME TONR_TIME TON_LTIME TOF_LTIME \
     TP_LTIME TONR_LTIME IEC_TIMER IEC_LTIMER S_ODT S_ODTS S_OFFDT S_PULSE S_PEXT BLINK GEN PID PD PID_FIXCYCLE FREQ_MEASURE";
 
-fn is_in(list: &str, name: &str) -> bool {
+/// Whether a list has a name, in any case.
+pub(crate) fn is_in(list: &str, name: &str) -> bool {
     list.split_ascii_whitespace()
         .any(|one| one.eq_ignore_ascii_case(name))
 }

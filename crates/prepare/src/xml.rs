@@ -12,10 +12,12 @@ use roxmltree::{Document, Node, ParsingOptions};
 
 use super::addresses;
 use super::check::{
-    World, check_addresses, check_callers, check_name, check_statements, check_type, check_words,
+    World, check_addresses, check_callers, check_name, check_pragma, check_statements, check_type,
+    check_words,
 };
 use super::code::{Code, line_end};
 use super::edit::{Edits, Marks};
+use super::lexer::Kind;
 use super::library::{self, SCHEDULE, TASK};
 use super::outline;
 use super::plan::{self, Named, Plan};
@@ -65,9 +67,7 @@ pub(crate) fn prepare(
     }
     let project = Project { text, root, wrong };
     let mut world = project.world();
-    world
-        .types
-        .extend(settings.no_clock.iter().map(|name| name.to_uppercase()));
+    world.vouch(&settings.no_clock);
     project.check_types(&world);
     let mut shared = project.check_addresses(settings);
     let bodies = project.bodies(&world, settings, &mut shared);
@@ -202,6 +202,11 @@ impl<'a, 'i> Project<'a, 'i> {
                     continue;
                 }
                 check_words(&code, self.wrong);
+                let name = unit.attribute("name");
+                for pragma in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
+                    let text = &masked[pragma.range()];
+                    check_pragma(text, start + pragma.start, name, world, self.wrong);
+                }
                 shared.extend(check_addresses(&code, &settings.addresses, self.wrong));
                 let all = 0..code.tokens.len();
                 check_statements(&code, &all, &known, world, self.wrong);

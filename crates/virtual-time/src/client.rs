@@ -86,12 +86,12 @@ impl Client {
         self.ran.unwrap_or(0).saturating_sub(1)
     }
 
-    /// Takes a frame of the server, without its header.
+    /// Takes a frame of the server, without its header; `None`: it asks for nothing yet.
     ///
     /// # Errors
     ///
     /// The server violates the protocol.
-    pub fn receive(&mut self, frame: &[u8]) -> Result<Asked, Ended> {
+    pub fn receive(&mut self, frame: &[u8]) -> Result<Option<Asked>, Ended> {
         let steps = self.steps();
         let violated = |what: String| {
             let reason = format!("the server violates the protocol: it {what}");
@@ -103,7 +103,10 @@ impl Client {
         let message = wire::from_server(frame).map_err(violated)?;
         if let FromServer::End(outcome) = message {
             self.owes = None;
-            return Ok(Asked::End(outcome));
+            return Ok(Some(Asked::End(outcome)));
+        }
+        if message == FromServer::Waiting {
+            return Ok(None);
         }
         if let Some(owed) = self.owes {
             return Err(violated(format!("went on before step {owed} was answered")));
@@ -123,7 +126,7 @@ impl Client {
                 count(reads.len())?;
                 (self.step, self.read_types) = (step, reads);
                 self.owes = Some(0);
-                Ok(Asked::Initial)
+                Ok(Some(Asked::Initial))
             }
             FromServer::Step { step, reads } => {
                 if self.ran.is_none_or(|ran| step.sequence <= ran) {
@@ -136,9 +139,9 @@ impl Client {
                     *slot = read;
                 }
                 self.owes = Some(step.sequence);
-                Ok(Asked::Step(step))
+                Ok(Some(Asked::Step(step)))
             }
-            FromServer::End(_) => unreachable!("dealt with above"),
+            FromServer::End(_) | FromServer::Waiting => unreachable!("dealt with above"),
         }
     }
 
@@ -192,22 +195,27 @@ impl Connection {
         &self.client
     }
 
-    /// Waits for what the server asks next, for `limit` of wall-clock time at most, to some 50 ms. The server may be
-    /// paused, so without a reason of its own the limit is [`Nanos::MAX`].
+    /// Waits for what the server asks next. If the server says nothing for `limit` of wall-clock time, to some 50 ms, it
+    /// hangs: while it waits itself, it says so every second.
     ///
     /// # Errors
     ///
     /// The server is lost, violates the protocol or says nothing, or this client was stopped.
     pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
-        let steps = self.client.steps();
-        let frame = self.line.receive(limit);
-        // The line does not know how far the run has come.
-        let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
-        let asked = self.client.receive(frame);
-        if let Err(ended) = &asked {
-            self.give_up(&ended.reason.clone());
+        loop {
+            let steps = self.client.steps();
+            let frame = self.line.receive(limit);
+            // The line does not know how far the run has come.
+            let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
+            match self.client.receive(frame) {
+                Ok(Some(asked)) => return Ok(asked),
+                Ok(None) => {}
+                Err(ended) => {
+                    self.give_up(&ended.reason);
+                    return Err(ended);
+                }
+            }
         }
-        asked
     }
 
     /// Answers what was asked, with one value per variable of the declaration's writes. If the server is lost, the next

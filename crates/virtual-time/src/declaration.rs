@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::num::NonZeroU32;
 
 use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
 /// The longest name of a client or variable, in bytes of UTF-8.
@@ -19,6 +20,8 @@ pub struct Declaration {
     pub name: String,
     /// How many steps of the server one step of this client takes.
     pub multiple: NonZeroU32,
+    /// The virtual time of one step of this client. The server then sets the multiple by it.
+    pub interval: Option<Nanos>,
     /// The variables that it writes, at most 65535. No one else writes them.
     pub writes: Vec<Variable>,
     /// The names of the variables that it reads, at most 65535; they may be its own.
@@ -48,9 +51,30 @@ impl Declaration {
         Self {
             name: name.into(),
             multiple: NonZeroU32::MIN,
+            interval: None,
             writes: Vec::new(),
             reads: Vec::new(),
         }
+    }
+
+    /// Sets the multiple by the interval, if there is one, at a server with this step.
+    ///
+    /// # Errors
+    ///
+    /// The interval is no multiple of the step that can be counted.
+    pub(crate) fn fit(&mut self, step: Nanos) -> Result<(), String> {
+        let Some(interval) = self.interval else {
+            return Ok(());
+        };
+        let multiple = u32::try_from(interval.0 / step.0).ok();
+        let multiple = multiple.and_then(NonZeroU32::new);
+        let fits = multiple.filter(|_| interval.0 % step.0 == 0);
+        self.multiple = fits.ok_or_else(|| {
+            format!(
+                "its step of {interval} is no whole multiple of the server's, {step}; make one of them fit"
+            )
+        })?;
+        Ok(())
     }
 
     /// Checks what can be checked without knowing the other clients.

@@ -105,7 +105,15 @@ pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
         Ok(FromClient::Done { sequence, writes }) => {
             server.done(now, seat, sequence, writes.iter());
         }
-        Ok(FromClient::Join(declaration)) => server.join(now, seat, declaration),
+        Ok(FromClient::Join {
+            declaration,
+            version,
+        }) => {
+            if version >= 2 {
+                server.keep_informed(seat);
+            }
+            server.join(now, seat, declaration);
+        }
         Ok(FromClient::GiveUp(reason)) => server.gave_up(seat, reason),
         Err(why) => server.violated(seat, &why),
     }

@@ -62,6 +62,7 @@ impl<'p> Locals<'p> {
                 local.reads.copy_from_slice(reads);
                 local.asked = Some(Asked::Step(*step));
             }
+            ToClient::Waiting => {}
             ToClient::End(end) => {
                 local.asked = None;
                 local.end = Some((*end).clone());

@@ -151,6 +151,9 @@ fn steps(value: &Value<'_>, step: Option<Nanos>) -> Option<u64> {
             format!("\"until\" is {until}, which is no whole number of steps of {step}"),
             match below {
                 0 => format!("write \"{step}\""),
+                _ if step.0.checked_mul(above).is_none() => {
+                    format!("write \"{}\"", step.times(below))
+                }
                 _ => format!(
                     "write \"{}\" or \"{}\"",
                     step.times(below),
@@ -238,6 +241,16 @@ mod tests {
         let told = parse(text).expect_err("it is wrong").to_string();
         assert!(
             told.ends_with("whole number of steps of 1ms; write \"1ms\""),
+            "{told}"
+        );
+    }
+
+    #[test]
+    fn a_run_that_ends_with_virtual_time_is_told_the_last_whole_step() {
+        let text = "[sync]\nstep = \"1ms\"\nuntil = \"9223372036854775807ns\"\nlisten = \"127.0.0.1:0\"\nclients = 1\n";
+        let told = parse(text).expect_err("it is wrong").to_string();
+        assert!(
+            told.ends_with("whole number of steps of 1ms; write \"9223372036854ms\""),
             "{told}"
         );
     }

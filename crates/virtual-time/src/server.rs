@@ -5,12 +5,12 @@ mod message;
 mod patience;
 mod showing;
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace};
-use tickbus_base::toml_text::shown;
+use tickbus_base::toml_text::{printable, shown};
 
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
@@ -38,6 +38,10 @@ pub struct Server<'l> {
     settings: Settings,
     phase: Phase<'l>,
     seats: Vec<Seat>,
+    /// The seats whose clients are told that the server waits.
+    informed: BTreeSet<usize>,
+    /// When they were told last.
+    informed_at: Nanos,
     outbox: VecDeque<Out>,
     news: VecDeque<String>,
     /// The end of a client that was refused, while its message is fetched.
@@ -79,6 +83,7 @@ enum Seat {
 enum Out {
     Start(usize),
     Step(usize),
+    Waiting(usize),
     End(usize),
     Refused(usize, Box<Ended>),
 }
@@ -97,6 +102,8 @@ impl<'l> Server<'l> {
             phase: Phase::Joining(joining, logic),
             settings,
             seats: Vec::new(),
+            informed: BTreeSet::new(),
+            informed_at: now,
             outbox: VecDeque::new(),
             news: VecDeque::new(),
             refused: Err(Ended::before(Cause::Refused, "")),
@@ -185,6 +192,7 @@ impl<'l> Server<'l> {
             self.seats.len() - 1
         });
         self.seats[seat] = Seat::Silent(now);
+        self.informed.remove(&seat);
         if self.outcome().is_some() {
             self.seats[seat] = Seat::Leaving;
             self.outbox.push_back(Out::End(seat));
@@ -192,8 +200,13 @@ impl<'l> Server<'l> {
         seat
     }
 
+    /// The client at `seat` wants [`ToClient::Waiting`].
+    pub(crate) fn keep_informed(&mut self, seat: usize) {
+        self.informed.insert(seat);
+    }
+
     /// The client at `seat` declares what it writes and reads.
-    pub fn join(&mut self, now: Nanos, seat: usize, declaration: Declaration) {
+    pub fn join(&mut self, now: Nanos, seat: usize, mut declaration: Declaration) {
         match self.seats[seat] {
             Seat::Silent(_) => {}
             Seat::Joined | Seat::Client(_) => return self.violated(seat, "joined twice"),
@@ -201,7 +214,9 @@ impl<'l> Server<'l> {
         }
         let name = declaration.name.clone();
         let refused = match &mut self.phase {
-            Phase::Joining(joining, _) => joining.join(seat, declaration),
+            Phase::Joining(joining, _) => declaration
+                .fit(self.settings.step)
+                .and_then(|()| joining.join(seat, declaration)),
             Phase::Running(barrier, _) => Err(format!(
                 "the run has started, and is at step {}; start it again with this client",
                 barrier.step().sequence
@@ -335,6 +350,7 @@ impl<'l> Server<'l> {
                 step: self.settings.step,
                 reads: barrier.read_types(client),
             },
+            (Out::Waiting(_), ..) => ToClient::Waiting,
             (Out::Refused(_, ended), ..) => {
                 self.seats[seat] = Seat::Free;
                 self.refused = Err(*ended);
@@ -460,7 +476,9 @@ impl<'l> Server<'l> {
             Some(name) => format!("client \"{}\"", shown(name)),
             None => "a client without a name".to_owned(),
         };
-        self.news.push_back(format!("{who} was refused: {reason}"));
+        // The reason may have a client's own words.
+        self.news
+            .push_back(format!("{who} was refused: {}", printable(reason)));
         let ended = Ended {
             client,
             ..Ended::before(Cause::Refused, reason)
@@ -472,9 +490,11 @@ impl<'l> Server<'l> {
 impl Out {
     const fn seat(&self) -> usize {
         match self {
-            Self::Start(seat) | Self::Step(seat) | Self::End(seat) | Self::Refused(seat, _) => {
-                *seat
-            }
+            Self::Start(seat)
+            | Self::Step(seat)
+            | Self::Waiting(seat)
+            | Self::End(seat)
+            | Self::Refused(seat, _) => *seat,
         }
     }
 }

@@ -14,8 +14,11 @@ use crate::server::ToClient;
 use crate::{Cause, Declaration, Ended, Outcome, Step, TraceHash, Variable};
 use reader::Reader;
 
-/// The version of this format.
-pub const VERSION: u16 = 1;
+/// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`].
+pub const VERSION: u16 = 2;
+
+/// The oldest version that a server takes.
+const OLDEST: u16 = 1;
 
 /// The longest frame, without the four bytes of its length.
 pub const LONGEST_FRAME: usize = 1 << 20;
@@ -36,6 +39,7 @@ const START: u8 = 0x81;
 const STEP: u8 = 0x82;
 const FINISHED: u8 = 0x83;
 const ENDED: u8 = 0x84;
+const WAITING: u8 = 0x85;
 
 /// Slots as they are on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +56,12 @@ impl<'a> Slots<'a> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FromClient<'a> {
     /// The first one: what it writes and reads.
-    Join(Declaration),
+    Join {
+        /// What it declares.
+        declaration: Declaration,
+        /// The version of the format that it speaks.
+        version: u16,
+    },
     /// It has run.
     Done {
         /// The step; 0 is the initial write.
@@ -83,6 +92,8 @@ pub enum FromServer<'a> {
     },
     /// See [`ToClient::End`].
     End(Result<Outcome, Ended>),
+    /// See [`ToClient::Waiting`].
+    Waiting,
 }
 
 /// The length of the frame at the beginning of `bytes`, with its header, as far as that is known.
@@ -146,6 +157,8 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
     out.extend_from_slice(&MAGIC);
     out.extend_from_slice(&VERSION.to_le_bytes());
     out.extend_from_slice(&declaration.multiple.get().to_le_bytes());
+    let interval = declaration.interval.unwrap_or(Nanos::ZERO);
+    out.extend_from_slice(&interval.0.to_le_bytes());
     name(out, &declaration.name);
     count(out, declaration.writes.len());
     for variable in &declaration.writes {
@@ -195,6 +208,7 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
             out.extend_from_slice(&step.time.0.to_le_bytes());
             slots(out, reads);
         }),
+        ToClient::Waiting => append(out, WAITING, |_| {}),
         ToClient::End(Ok(outcome)) => append(out, FINISHED, |out| {
             out.extend_from_slice(&outcome.steps.to_le_bytes());
             out.extend_from_slice(&outcome.time.0.to_le_bytes());
@@ -222,7 +236,7 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
 pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
     let mut reader = Reader::new(frame);
     let message = match reader.byte()? {
-        JOIN => FromClient::Join(read_join(&mut reader)?),
+        JOIN => read_join(&mut reader)?,
         DONE => FromClient::Done {
             sequence: reader.word()?,
             writes: reader.slots()?,
@@ -234,18 +248,25 @@ pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
     Ok(message)
 }
 
-fn read_join(reader: &mut Reader<'_>) -> Result<Declaration, String> {
+fn read_join<'a>(reader: &mut Reader<'_>) -> Result<FromClient<'a>, String> {
     if reader.take::<4>()? != MAGIC {
         return Err("sent a join without the letters SDSP".to_owned());
     }
     let version = u16::from_le_bytes(reader.take()?);
-    if version != VERSION {
+    if !(OLDEST..=VERSION).contains(&version) {
         return Err(format!(
-            "speaks version {version} of the format, and this server version {VERSION}"
+            "speaks version {version} of the format, and this server versions {OLDEST} to {VERSION}"
         ));
     }
     let multiple = u32::from_le_bytes(reader.take()?).try_into();
     let multiple = multiple.map_err(|_| "runs every 0 steps; expected 1 or more".to_owned())?;
+    let interval = match version {
+        OLDEST => 0,
+        _ => i64::from_le_bytes(reader.take()?),
+    };
+    if interval < 0 {
+        return Err(format!("runs every {interval} ns; expected 0 or more"));
+    }
     let name = reader.name()?.to_owned();
     let mut writes = Vec::new();
     for _ in 0..u16::from_le_bytes(reader.take()?) {
@@ -256,11 +277,16 @@ fn read_join(reader: &mut Reader<'_>) -> Result<Declaration, String> {
     for _ in 0..u16::from_le_bytes(reader.take()?) {
         reads.push(reader.name()?.to_owned());
     }
-    Ok(Declaration {
+    let declaration = Declaration {
         name,
         multiple,
+        interval: (interval > 0).then_some(Nanos(interval)),
         writes,
         reads,
+    };
+    Ok(FromClient::Join {
+        declaration,
+        version,
     })
 }
 
@@ -288,6 +314,7 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
             },
             reads: reader.slots()?,
         },
+        WAITING => FromServer::Waiting,
         FINISHED => FromServer::End(Ok(Outcome {
             steps: reader.word()?,
             time: nanos(reader.word()?),

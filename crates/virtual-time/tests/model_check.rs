@@ -211,6 +211,7 @@ impl World {
     fn declaration(&self, at: usize) -> Declaration {
         let client = &self.clients[at];
         Declaration {
+            interval: None,
             name: client.name.clone(),
             multiple: NonZeroU32::new(client.multiple).expect("above zero"),
             writes: vec![Variable::new(format!("x{at}"), DataType::Ulint)],
@@ -237,6 +238,7 @@ impl World {
                     assert_eq!(step.time.0, (step.sequence.cast_signed() - 1) * 1_000_000);
                     (seat, step.sequence, Some(reads.to_vec()), None)
                 }
+                Some((_, ToClient::Waiting)) => continue,
                 Some((seat, ToClient::End(end))) => (seat, 0, None, Some(end.clone())),
             };
             if self.stranger == Some(seat) {

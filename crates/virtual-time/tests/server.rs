@@ -8,7 +8,7 @@ use tickbus_image::signal::DataType;
 use tickbus_virtual_time::server::{Control, Server, ToClient};
 use tickbus_virtual_time::{
     Cause, Declaration, Ended, Logic, Outcome, Pacing, Settings, StartCondition, State, Variable,
-    in_process,
+    hear, in_process, wire,
 };
 
 const MS: i64 = 1_000_000;
@@ -53,6 +53,7 @@ impl Bench {
             asked.push(match message {
                 ToClient::Start { .. } => 0,
                 ToClient::Step { step, .. } => step.sequence,
+                ToClient::Waiting => continue,
                 ToClient::End(end) => panic!("{end:?}"),
             });
         }
@@ -332,17 +333,110 @@ fn a_client_that_gives_up_before_the_start_is_named_with_its_reason() {
     let mut server = Server::new(two(), Logic::new(), now).expect("right settings");
     let seat = server.connected(now);
     server.join(now, seat, declaration("a"));
-    server.gave_up(seat, "no paper");
+    server.gave_up(seat, "no paper\nsync: ok\u{1b}[2J");
     let (_, ended) = refusal(&mut server);
     assert_eq!(ended.cause, Cause::Refused);
     assert_eq!(ended.client.as_deref(), Some("a"));
-    assert_eq!(ended.reason, "gave up before the start: no paper");
+    assert_eq!(
+        ended.reason,
+        "gave up before the start: no paper\nsync: ok\u{1b}[2J"
+    );
     let news: Vec<String> = std::iter::from_fn(|| server.news()).collect();
     assert_eq!(
         news[1],
-        "client \"a\" was refused: gave up before the start: no paper"
+        "client \"a\" was refused: gave up before the start: no paper\\nsync: ok\\u{1b}[2J"
     );
     assert_eq!(server.missing().as_deref(), Some("\"a\", \"b\""));
+}
+
+/// A client that joins by a frame, in this version of the format; the answer is its seat.
+fn joined(server: &mut Server<'_>, name: &str, version: u8) -> usize {
+    let mut frame = Vec::new();
+    wire::join(&mut frame, &Declaration::new(name)).expect("short");
+    // The interval, behind kind, letters, version and multiple.
+    if version == 1 {
+        frame[wire::HEADER + 5] = 1;
+        frame.drain(wire::HEADER + 11..wire::HEADER + 19);
+    }
+    let seat = server.connected(Nanos::ZERO);
+    hear(server, Nanos::ZERO, seat, &frame[wire::HEADER..]);
+    seat
+}
+
+#[test]
+fn clients_that_have_nothing_to_do_are_told_every_second_that_the_server_waits() {
+    let settings = Settings {
+        paused: true,
+        hang: Nanos::from_secs(600),
+        ..settings(9, &["a", "b", "c"])
+    };
+    let now = |seconds| Nanos::from_secs(seconds);
+    let mut server = Server::new(settings, Logic::new(), now(0)).expect("right settings");
+    // The seats that are told, and nothing else.
+    let told = |server: &mut Server<'_>| {
+        let mut seats = Vec::new();
+        while let Some((seat, message)) = server.poll() {
+            assert_eq!(message, ToClient::Waiting);
+            seats.push(seat);
+        }
+        seats
+    };
+    let (a, b) = (joined(&mut server, "a", 2), joined(&mut server, "b", 1));
+    assert_eq!(server.deadline(), now(1));
+    server.tick(now(1));
+    assert_eq!(told(&mut server), [a], "others have to join");
+    server.tick(now(1) + Nanos(MS));
+    assert_eq!(told(&mut server), [0; 0]);
+    let c = joined(&mut server, "c", 2);
+    assert!((0..3).all(|_| matches!(server.poll(), Some((_, ToClient::Start { .. })))));
+    server.done(now(1), a, 0, [].into_iter());
+    server.tick(now(2));
+    assert_eq!(told(&mut server), [a], "the others have not answered");
+    for seat in [b, c] {
+        server.done(now(2), seat, 0, [].into_iter());
+    }
+    server.tick(now(3));
+    assert_eq!(told(&mut server), [a, c], "the run is paused");
+}
+
+#[test]
+fn a_client_that_states_its_interval_has_a_step_for_each() {
+    let mut server = Server::new(two(), Logic::new(), Nanos::ZERO).expect("right settings");
+    let with = |name: &str, micros| Declaration {
+        interval: Some(Nanos::from_micros(micros)),
+        ..Declaration::new(name)
+    };
+    let seat = server.connected(Nanos::ZERO);
+    server.join(Nanos::ZERO, seat, with("a", 2_500));
+    let (_, ended) = refusal(&mut server);
+    assert_eq!(
+        ended.reason,
+        "its step of 2500us is no whole multiple of the server's, 1ms; make one of them fit"
+    );
+    let seats = [("a", 3_000), ("b", 1_000)].map(|(name, micros)| {
+        let seat = server.connected(Nanos::ZERO);
+        server.join(Nanos::ZERO, seat, with(name, micros));
+        seat
+    });
+    let mut asked = Vec::new();
+    loop {
+        let mut due = Vec::new();
+        while let Some((seat, message)) = server.poll() {
+            match message {
+                ToClient::Start { .. } => due.push((seat, 0)),
+                ToClient::Step { step, .. } => due.push((seat, step.sequence)),
+                _ => {}
+            }
+        }
+        if due.is_empty() {
+            break;
+        }
+        for (seat, sequence) in due {
+            asked.extend((seat == seats[0]).then_some(sequence));
+            server.done(Nanos::ZERO, seat, sequence, [].into_iter());
+        }
+    }
+    assert_eq!(asked, [0, 1, 4, 7]);
 }
 
 #[test]

@@ -19,7 +19,7 @@ pub(super) struct Arguments {
     files: Vec<PathBuf>,
 
     /// Take out what was put in.
-    #[arg(long, conflicts_with_all = ["go", "ms", "done", "no_clock"])]
+    #[arg(long, conflicts_with_all = ["go", "ms", "done", "go_end", "done_end", "no_clock"])]
     undo: bool,
 
     /// Folder for the files, which keep their names [default: beside the first FILE, "prepared", or "original" with --undo].
@@ -45,6 +45,14 @@ pub(super) struct Arguments {
     /// Where the server reads the number of the last step that was made, such as %QD100.
     #[arg(long, value_name = "ADDRESS", value_parser = address)]
     done: Option<String>,
+
+    /// Where the server writes the number of a step once more, at the other end of what it writes: a step begins when both agree.
+    #[arg(long, value_name = "ADDRESS", value_parser = address, requires = "go")]
+    go_end: Option<String>,
+
+    /// Where the server reads the number of the last step once more, at the other end of what it reads.
+    #[arg(long, value_name = "ADDRESS", value_parser = address, requires = "done")]
+    done_end: Option<String>,
 
     /// A type or function of a library that uses no clock; may be repeated.
     #[arg(long, value_name = "NAME")]
@@ -124,6 +132,8 @@ fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
             go: arguments.go.clone(),
             ms: arguments.ms.clone(),
             done: arguments.done.clone(),
+            go_end: arguments.go_end.clone(),
+            done_end: arguments.done_end.clone(),
         },
         no_clock: arguments.no_clock.clone(),
     };

@@ -205,14 +205,19 @@ impl<'t> Collector<'t> {
 /// Text from a file as messages quote it: shortened, and without control characters.
 pub fn shown(text: &str) -> String {
     const LONGEST: usize = 40;
-    let mut shown: String = text.chars().take(LONGEST).flat_map(printable).collect();
+    let mut shown: String = text.chars().take(LONGEST).flat_map(escaped).collect();
     if text.chars().nth(LONGEST).is_some() {
         shown.push('…');
     }
     shown
 }
 
-fn printable(c: char) -> impl Iterator<Item = char> {
+/// A text with its control characters escaped, at its full length.
+pub fn printable(text: &str) -> String {
+    text.chars().flat_map(escaped).collect()
+}
+
+fn escaped(c: char) -> impl Iterator<Item = char> {
     let escape = c.is_control().then(|| c.escape_default());
     let plain = (!c.is_control()).then_some(c);
     escape.into_iter().flatten().chain(plain)

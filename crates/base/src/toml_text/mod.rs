@@ -11,7 +11,7 @@ mod source;
 mod syntax;
 mod table;
 
-pub use mistakes::{Collector, Mistakes, PlacedMistake, shown};
+pub use mistakes::{Collector, Mistakes, PlacedMistake, printable, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;
 pub use source::{load_text, read_text};

@@ -55,6 +55,8 @@ impl Scanning {
 pub(crate) struct ScanSetup {
     pub(crate) program: Box<dyn Program>,
     pub(crate) interval: Nanos,
+    /// Whether a late scan is a broken line, and fail-safe values take its place.
+    pub(crate) has_watchdog: bool,
     /// The recording of its scans.
     pub(crate) tape: Option<ScanRecorder>,
 }
@@ -145,9 +147,10 @@ impl HostThread {
         let status = LinkStatus::new(&name, max_age);
         // A CPU whose program has died must not keep its last outputs on the bus.
         let watchdog = (interval + interval).max(max_age);
+        let watchdog = hosted.has_watchdog.then_some(watchdog);
         let virtual_time = Manual::new();
         let (clock, limit) = match &scanned {
-            Scanned::Freely { clock, .. } => (Arc::clone(clock), Some(watchdog)),
+            Scanned::Freely { clock, .. } => (Arc::clone(clock), watchdog),
             Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
@@ -375,7 +378,7 @@ impl Drop for HostThread {
 
 fn scan_until_stopped(
     cpu: &mut Cpu,
-    (interval, watchdog): (Nanos, Nanos),
+    (interval, watchdog): (Nanos, Option<Nanos>),
     clock: &dyn Clock,
     stop: &Stop,
     scanning: &Scanning,
@@ -387,7 +390,11 @@ fn scan_until_stopped(
         let now = clock.now();
         if pace.take(now) {
             scanning.set(Some(now));
-            cpu.scan(now, last.is_none_or(|last| now - last <= watchdog));
+            let limit = last.zip(watchdog);
+            cpu.scan(
+                now,
+                limit.is_none_or(|(last, watchdog)| now - last <= watchdog),
+            );
             last = Some(now);
             scanning.set(None);
         }

@@ -44,6 +44,19 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             "line.st:3:1: this pragma reads the time",
         ),
         (
+            saying("{n = read_clock();}\nn := 1;"),
+            "line.st:3:1: this pragma holds code, which may read the clock of the PLC; if it reads no clock, name the \
+             unit: --no-clock one",
+        ),
+        (
+            "{int n = 1;}\n".to_owned() + &saying("n := 1;"),
+            "line.st:1:1: this pragma holds code, which may read the clock of the PLC; take it out",
+        ),
+        (
+            line("VAR control : PID; END_VAR", "control();"),
+            "takes its cycle as an input, name it: --no-clock PID",
+        ),
+        (
             saying("LD n\nADD 1\nST n"),
             "line.st:3:1: these statements are in IL; write them in Structured Text",
         ),

@@ -69,7 +69,12 @@ fn source(text: &str) -> Source {
 
 fn prepared(text: &str) -> Result<Prepared, Vec<Mistakes>> {
     let [go, ms, done] = ["%ID0", "%ID4", "%QD0"].map(|address| Some(address.to_owned()));
-    let addresses = Addresses { go, ms, done };
+    let addresses = Addresses {
+        go,
+        ms,
+        done,
+        ..Addresses::default()
+    };
     let settings = Settings {
         addresses,
         ..Settings::default()
@@ -151,7 +156,17 @@ fn a_body_of_pragmas_gets_a_controller() {
     let end = project().find("</xhtml>").expect("its end");
     let mut text = project();
     text.replace_range(start..end, "{n++;}");
-    assert!(prepared_text(&text).contains("THEN (*tickbus}*){n++;}(*{tickbus*) END_IF;"));
+    refused(&text, "if it reads no clock, name the unit: --no-clock ");
+    let settings = Settings {
+        no_clock: vec!["PRESS".to_owned()],
+        ..Settings::default()
+    };
+    let made = prepare(&[source(&text)], &settings).expect("vouched for");
+    let made = String::from_utf8(made.files[0].clone()).expect("text");
+    assert!(
+        made.contains("THEN (*tickbus}*){n++;}(*{tickbus*) END_IF;"),
+        "{made}"
+    );
 }
 
 #[test]

@@ -35,6 +35,9 @@ pub enum ToClient<'a> {
         /// What it reads, in the order of its declaration.
         reads: &'a [u64],
     },
+    /// The run goes on without this client for now: others have to join or to answer, or it is paused. For a client that has
+    /// nothing to do, once a second, so that it can tell a server that waits from one that hangs.
+    Waiting,
     /// The run has ended, or the client does not take part in it. Nothing follows.
     End(&'a Result<Outcome, Ended>),
 }

@@ -2,8 +2,11 @@
 
 use tickbus_base::time::Nanos;
 
-use super::{Phase, STOP_PATIENCE, Seat, Server};
+use super::{Out, Phase, STOP_PATIENCE, Seat, Server};
 use crate::{Cause, State};
+
+/// How often those who have nothing to do are told that the server waits.
+const INFORM: Nanos = Nanos::from_secs(1);
 
 impl Server<'_> {
     /// When [`tick`](Self::tick) has something to do, if nothing happens before; a time that has passed means at once.
@@ -13,7 +16,10 @@ impl Server<'_> {
             _ => None,
         });
         let silent = silent.min().unwrap_or(Nanos::MAX);
-        silent.min(match &self.phase {
+        let informs = !self.informed.is_empty() && !matches!(self.phase, Phase::Ended(_));
+        let inform = informs.then(|| self.informed_at + INFORM);
+        let inform = inform.unwrap_or(Nanos::MAX);
+        silent.min(inform).min(match &self.phase {
             Phase::Joining(..) => self.asked + self.settings.join,
             Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
                 match (self.is_paused(), &self.pace) {
@@ -35,6 +41,7 @@ impl Server<'_> {
     /// Does what is due at `now`: the next step, or the end of somebody's patience.
     pub fn tick(&mut self, now: Nanos) {
         let hang = self.settings.hang;
+        self.inform(now);
         for seat in 0..self.seats.len() {
             if matches!(self.seats[seat], Seat::Silent(since) if now >= since + hang) {
                 let reason = format!("did not join within {hang}");
@@ -58,6 +65,31 @@ impl Server<'_> {
             _ => {}
         }
         self.advance(now);
+    }
+
+    /// Tells those who have nothing to do that the server waits, once a second.
+    fn inform(&mut self, now: Nanos) {
+        if now < self.informed_at + INFORM {
+            return;
+        }
+        self.informed_at = now;
+        let barrier = match &self.phase {
+            Phase::Joining(..) => None,
+            Phase::Running(barrier, _) => Some(barrier),
+            Phase::Ended(_) => return,
+        };
+        for seat in &self.informed {
+            let is_idle = match self.seats[*seat] {
+                Seat::Joined => true,
+                Seat::Client(client) => {
+                    barrier.is_some_and(|barrier| barrier.owing().all(|owing| owing != client))
+                }
+                Seat::Free | Seat::Silent(_) | Seat::Leaving => false,
+            };
+            if is_idle && self.outbox.iter().all(|out| out.seat() != *seat) {
+                self.outbox.push_back(Out::Waiting(*seat));
+            }
+        }
     }
 
     /// Ends the run for a client that has not answered.

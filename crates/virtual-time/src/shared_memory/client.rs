@@ -130,6 +130,7 @@ impl Line for MemoryLine {
 
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
         let mut until = None;
+        let mut pulse = None;
         while !self.down.has_frame(self.memory.memory()) {
             self.nap();
             if self.down.has_frame(self.memory.memory()) {
@@ -143,6 +144,10 @@ impl Line for MemoryLine {
                 return Err(Ended::before(Cause::Stopped, "this client was stopped"));
             }
             let now = Monotonic::shared().now();
+            let beats = self.memory.memory().word(layout::PULSE).load(Relaxed);
+            if pulse.replace(beats) != Some(beats) {
+                until = None;
+            }
             if now >= *until.get_or_insert(now + limit - NAP) {
                 return Err(silent(limit));
             }

@@ -7,7 +7,7 @@ use tickbus_base::os::{NamedMemory, SharedMemory};
 use crate::wire::LONGEST_FRAME;
 
 /// What the memory begins with, once it is ready: the format and its version.
-pub(super) const READY: u64 = u64::from_le_bytes(*b"SDSPshm1");
+pub(super) const READY: u64 = u64::from_le_bytes(*b"SDSPshm2");
 
 /// The place of [`READY`].
 pub(super) const MAGIC: usize = 0;
@@ -23,6 +23,9 @@ pub(super) const BELL: usize = 8;
 
 /// Whether the server sleeps.
 pub(super) const SERVER_SLEEPS: usize = 9;
+
+/// Counts how often the server has looked after all seats.
+pub(super) const PULSE: usize = 10;
 
 /// Where the seats begin.
 const FIRST: usize = 16;

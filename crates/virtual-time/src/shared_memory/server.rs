@@ -1,7 +1,7 @@
 //! The server: one thread for all seats.
 
 use std::io;
-use std::sync::atomic::Ordering::{Acquire, SeqCst};
+use std::sync::atomic::Ordering::{Acquire, Relaxed, SeqCst};
 
 use tickbus_base::os::{NamedMemory, ProcessWatch};
 use tickbus_base::time::Nanos;
@@ -203,6 +203,10 @@ impl Host<'_, '_, '_> {
             let Some((client, message)) = self.server.poll() else {
                 break;
             };
+            if matches!(message, ToClient::Waiting) {
+                // Clients look at the pulse instead: a mailbox has room for one frame.
+                continue;
+            }
             has_asked |= !matches!(message, ToClient::End(_));
             if self.locals.take(client, &message) {
                 continue;
@@ -273,6 +277,8 @@ impl Host<'_, '_, '_> {
             self.felt = now;
         }
         self.looked = now;
+        let pulse = self.memory.memory().word(layout::PULSE);
+        pulse.fetch_add(1, Relaxed);
         for at in 0..self.seats.len() {
             self.look_after(at, now, feels);
         }

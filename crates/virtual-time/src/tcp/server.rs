@@ -106,6 +106,7 @@ impl Listener {
             connections: Vec::new(),
             leaving: Vec::new(),
             accept_paused_until: None,
+            was_full: false,
             looked: now,
         };
         let outcome = host.run();
@@ -128,6 +129,8 @@ struct Host<'l, 'h, 'p> {
     /// Those that have to write their last words, and until when.
     leaving: Vec<(Connection, Nanos)>,
     accept_paused_until: Option<Nanos>,
+    /// The last client that came was turned away.
+    was_full: bool,
     /// When all sockets were looked at last.
     looked: Nanos,
 }
@@ -172,7 +175,7 @@ impl Host<'_, '_, '_> {
             let Some((seat, message)) = self.server.poll() else {
                 break;
             };
-            has_asked |= !matches!(message, ToClient::End(_));
+            has_asked |= !matches!(message, ToClient::End(_) | ToClient::Waiting);
             if self.locals.take(seat, &message) {
                 continue;
             }
@@ -283,7 +286,14 @@ impl Host<'_, '_, '_> {
                     return Ok(());
                 }
             };
-            if self.connections.iter().flatten().count() + self.leaving.len() >= MOST {
+            let is_full = self.connections.iter().flatten().count() + self.leaving.len() >= MOST;
+            if is_full && !self.was_full {
+                (self.hosting.news)(&format!(
+                    "{MOST} clients are connected: further ones are turned away until some have left"
+                ));
+            }
+            self.was_full = is_full;
+            if is_full {
                 continue;
             }
             // If it broke at once, it will come again.

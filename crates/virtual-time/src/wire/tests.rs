@@ -9,12 +9,14 @@ fn declaration() -> impl Strategy<Value = Declaration> {
     (
         name,
         1..=u32::MAX,
+        proptest::option::of(1..=i64::MAX),
         proptest::collection::vec(variable, 0..9),
         proptest::collection::vec(name, 0..9),
     )
-        .prop_map(|(name, multiple, writes, reads)| Declaration {
+        .prop_map(|(name, multiple, interval, writes, reads)| Declaration {
             name,
             multiple: multiple.try_into().expect("above zero"),
+            interval: interval.map(Nanos),
             writes,
             reads,
         })
@@ -59,7 +61,8 @@ proptest! {
     ) {
         let mut out = Vec::new();
         join(&mut out, &declaration).expect("short names");
-        prop_assert_eq!(from_client(content(&out)), Ok(FromClient::Join(declaration)));
+        let version = VERSION;
+        prop_assert_eq!(from_client(content(&out)), Ok(FromClient::Join { declaration, version }));
         out.clear();
         done(&mut out, sequence, &writes);
         match from_client(content(&out)) {
@@ -99,6 +102,9 @@ proptest! {
         out.clear();
         to_client(&mut out, &ToClient::End(&end));
         prop_assert_eq!(from_server(content(&out)), Ok(FromServer::End(end)));
+        out.clear();
+        to_client(&mut out, &ToClient::Waiting);
+        prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Waiting));
     }
 
     #[test]
@@ -107,12 +113,15 @@ proptest! {
     ) {
         let mut out = Vec::new();
         match from_client(&bytes) {
-            Ok(FromClient::Join(declaration)) => join(&mut out, &declaration).expect("short"),
+            Ok(FromClient::Join { declaration, version: VERSION }) => {
+                join(&mut out, &declaration).expect("short");
+            }
             Ok(FromClient::Done { sequence, writes }) => {
                 done(&mut out, sequence, &writes.iter().collect::<Vec<_>>());
             }
             Ok(FromClient::GiveUp(reason)) => give_up(&mut out, reason),
-            Err(_) => return Ok(()),
+            // Joins of version 1 are read, and not written.
+            Ok(FromClient::Join { .. }) | Err(_) => return Ok(()),
         }
         prop_assert_eq!(content(&out), &*bytes);
     }
@@ -165,7 +174,7 @@ fn another_version_is_refused_by_its_number() {
     let told = from_client(&out[HEADER..]).expect_err("another version");
     assert_eq!(
         told,
-        "speaks version 7 of the format, and this server version 1"
+        "speaks version 7 of the format, and this server versions 1 to 2"
     );
 }
 

@@ -31,6 +31,8 @@ pub(super) struct ScannedStation<'a> {
     pub(super) status: Code,
     pub(super) inputs: &'a [u8],
     pub(super) outputs: &'a [u8],
+    /// Whether these inputs are fail-safe values.
+    pub(super) is_fail_safe: bool,
 }
 
 impl WatchedScans {
@@ -96,8 +98,7 @@ impl WatchedScans {
                     },
                     age,
                     is_valid,
-                    // A program is told, and sees what came last.
-                    is_fail_safe: false,
+                    is_fail_safe: station.is_fail_safe,
                     cycles: station.image.cycles(),
                 };
                 code = code.worse(seen.status);

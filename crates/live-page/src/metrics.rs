@@ -144,14 +144,14 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     family(
         text,
         "tickbus_line_state",
-        "gauge",
-        "1 for the state that the line is in.",
+        "stateset",
+        "The state of the line.",
     )?;
     for driver in model.drivers() {
         let labels = Labels::of(driver);
         for state in LinkState::ALL {
             let is_it = f64::from(u8::from(state == driver.state()));
-            let of_state = labels.and("state", state.name());
+            let of_state = labels.and("tickbus_line_state", state.name());
             sample(text, "tickbus_line_state", &of_state, is_it)?;
         }
     }
@@ -180,12 +180,12 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
 /// What says that a value is not one of now.
 const NOT_LIVE: u8 = FAIL_SAFE | STALE | UNKNOWN;
 
-/// The labels of a signal, with its station if there is one.
+/// The labels of a signal, with its station if there are several.
 fn of_signal(labels: &Labels, stations: &[Freshness<'_>], signal: &Signal) -> Labels {
     let labels = labels.and("signal", &signal.name);
     match stations.get(signal.station) {
-        Some(station) => labels.and("station", station.name),
-        None => labels,
+        Some(station) if stations.len() > 1 => labels.and("station", station.name),
+        _ => labels,
     }
 }
 

@@ -103,7 +103,7 @@ mod tests {
         let mut stream = TcpStream::connect(address).expect("it listens");
         let _peer = listener.accept().expect("it came");
         stream.set_nonblocking(true).expect("an option");
-        while stream.write(&[0; 65536]).is_ok() {}
+        while stream.write(&[0; 8192]).is_ok() {}
         let silence = super::peer_silence(&stream).unwrap_or_default();
         assert_eq!(silence, crate::time::Nanos::ZERO);
     }

@@ -47,6 +47,20 @@ fn a_record_that_comes_byte_by_byte_is_one_record() {
 }
 
 #[test]
+fn an_http_request_is_no_record() {
+    let (mut device, address) = device("");
+    let mut browser = client(address);
+    let body = "a".repeat(20 * RECORD);
+    let request = format!("POST / HTTP/1.1\r\nContent-Type: text/plain\r\n\r\n{body}");
+    browser.write_all(request.as_bytes()).expect("it is taken");
+    device.until_reason("is an HTTP request");
+    assert_eq!(device.end.statistic("bus_cycles"), "0");
+    let mut plc = client(address);
+    plc.write_all(&record(1)).expect("the device reads");
+    device.until_speed(1);
+}
+
+#[test]
 fn records_that_come_together_are_handed_in_one_by_one() {
     let (mut device, address) = device("events = true");
     let mut peer = client(address);

@@ -60,6 +60,10 @@ pub(super) struct Arguments {
     #[cfg(feature = "page")]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
     page: Option<Address>,
+    /// The file in which the token of the page survives a restart; it is made if there is none.
+    #[cfg(feature = "page")]
+    #[arg(long, value_name = "FILE", requires = "page")]
+    page_token_file: Option<PathBuf>,
 }
 
 fn say(line: &str) {
@@ -102,8 +106,15 @@ fn join(
 
 /// Serves the patch bay, and prints its address.
 #[cfg(feature = "page")]
-fn serve_page(address: &Address, door: &Door) -> io::Result<tickbus_web::Serving> {
-    let room = tickbus_web::Room::bind(address, tickbus_web::Limits::default())?;
+fn serve_page(
+    address: &Address,
+    token_file: Option<&std::path::Path>,
+    door: &Door,
+) -> io::Result<tickbus_web::Serving> {
+    let mut room = tickbus_web::Room::bind(address, tickbus_web::Limits::default())?;
+    if let Some(file) = token_file {
+        room.keep_token(file)?;
+    }
     say(&format!("page at {}", room.url()));
     let site = tickbus_patch_bay::PatchBay::new(door.clone());
     room.serve(std::sync::Arc::new(site), Monotonic::shared())
@@ -176,7 +187,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     #[cfg(feature = "page")]
     let _serving = match &arguments.page {
         None => None,
-        Some(address) => match serve_page(address, &door) {
+        Some(address) => match serve_page(address, arguments.page_token_file.as_deref(), &door) {
             Ok(serving) => Some(serving),
             Err(error) => {
                 return failed(format!(

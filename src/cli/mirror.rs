@@ -9,6 +9,8 @@ use tickbus_fieldbus::Role;
 use tickbus_programs::Mirror;
 
 /// Stand in for the machine: every %Q byte comes back on the %I byte of the same offset.
+///
+/// When the PLC is gone, %Q signals with a `fail_safe` take that value. The others stay as they are, and the page marks them as stale.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the device.

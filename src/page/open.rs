@@ -72,7 +72,14 @@ pub(crate) fn show(
     let picture = wanted.picture.as_deref();
     let picture = picture.map(|file| read_picture(config, file)).transpose()?;
     let any = "listen = \"127.0.0.1:0\" in [page]";
-    let open = open(&config.name, (&wanted.listen, any), announce)?;
+    let token = wanted.token_file.as_ref();
+    let token = token.map(|file| config.folder().join(file));
+    let open = open(
+        &config.name,
+        (&wanted.listen, any),
+        token.as_deref(),
+        announce,
+    )?;
     let Some(watch) = watch() else {
         return Ok(None);
     };
@@ -93,7 +100,7 @@ pub(crate) fn show_run(
     controls: Controls,
     announce: impl FnOnce(&str),
 ) -> Result<Place, PageError> {
-    let open = open(name, (listen, "--page 127.0.0.1:0"), announce)?;
+    let open = open(name, (listen, "--page 127.0.0.1:0"), None, announce)?;
     Ok(Place {
         member: Some(open.page.join_run(name, controls)),
         open: Some(open),
@@ -104,6 +111,7 @@ pub(crate) fn show_run(
 fn open(
     name: &str,
     (asked, any): (&Address, &str),
+    token_file: Option<&Path>,
     announce: impl FnOnce(&str),
 ) -> Result<Arc<Open>, PageError> {
     let mut present = present();
@@ -122,7 +130,11 @@ fn open(
              {any} takes any"
         ))
     };
-    let room = Room::bind(asked, Limits::default()).map_err(refused)?;
+    let mut room = Room::bind(asked, Limits::default()).map_err(refused)?;
+    if let Some(file) = token_file {
+        room.keep_token(file)
+            .map_err(|error| PageError::NotServed(format!("the page has no token: {error}")))?;
+    }
     let url = room.url();
     let page = LivePage::open(Monotonic::shared()).map_err(refused)?;
     let serving = room.serve(page.site(), Monotonic::shared());

@@ -71,6 +71,19 @@ impl Browser {
         self.go(&format!("file://{}", file.display()));
     }
 
+    /// Opens another tab, which is the one from now on.
+    pub(crate) fn new_tab(&self) {
+        let tab = self.command("window/new", &json!({"type": "tab"}));
+        self.command("window", &json!({"handle": tab["handle"]}));
+    }
+
+    /// Returns to the first tab.
+    pub(crate) fn first_tab(&self) {
+        let path = format!("/session/{}/window/handles", self.session);
+        let tabs = self.call("GET", &path, &json!({}));
+        self.command("window", &json!({"handle": tabs[0]}));
+    }
+
     /// Opens an address, and waits until it is loaded.
     pub(crate) fn go(&self, url: &str) {
         self.command("url", &json!({"url": url}));

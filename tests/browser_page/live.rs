@@ -456,6 +456,61 @@ fn two_viewers_see_the_same_and_without_the_token_a_page_only_shows() {
 }
 
 #[test]
+fn seven_tabs_can_force_and_release() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1280, 800);
+    // A browser has six connections to one host.
+    for _ in 2..=7 {
+        browser.new_tab();
+        browser.go(&machine.url);
+        browser.wait("document.getElementById('access').textContent === 'may force'");
+        browser.wait("document.querySelector('.row.signal')");
+    }
+    choose(&browser, "Level low");
+    click(&browser, "#force-true");
+    wait_said(&browser, "Level low is forced to TRUE.");
+    browser.first_tab();
+    wait_marked(&browser, "Level low", "forced");
+    click(&browser, "#release-all");
+    wait_said(&browser, "All signals are released.");
+    wait_marked(&browser, "Level low", "");
+    assert_quiet(&browser);
+}
+
+#[test]
+fn what_came_before_the_page_is_marked_and_a_constant_has_no_edge() {
+    let machine = Machine::tank();
+    machine.write("0", "0", "1");
+    let browser = open(&machine, 1280, 800);
+    wait_shown(&browser, "Valve", "TRUE");
+    browser.run("list.toggle(plant.signals.find((it) => it.name === 'Level low'))");
+    let trend = "plant.signals.find((it) => it.name === 'Level low').trend";
+    browser.wait(&format!("{trend}?.sampled?.often === 2"));
+    let equal =
+        format!("return {trend}.values.some((it, i, all) => i && Object.is(it, all[i - 1]))");
+    assert_eq!(browser.run(&equal), false);
+}
+
+#[test]
+fn a_plc_that_is_gone_is_not_shown_as_one_that_is_there() {
+    let mut machine = Machine::rig();
+    let browser = open(&machine, 1280, 900);
+    let overlay = "document.querySelector('.picture').classList.contains('is-stale')";
+    // Before the first contact nothing is known.
+    browser.wait(overlay);
+    browser.wait("plant.signals.every((it) => it.direction !== 'Q' || it.value === null)");
+    let mut plc = machine.plc();
+    browser.wait(&format!("!{overlay}"));
+    browser.wait("plant.signals.every((it) => !it.isStale)");
+    browser.run("list.toggle(plant.signals.find((it) => it.direction === 'Q'))");
+    plc.kill();
+    browser.wait(overlay);
+    browser.wait("plant.signals.every((it) => it.direction !== 'Q' || it.isStale)");
+    browser.wait("Number.isNaN(plant.signals.find((it) => it.isOpen).trend?.values.at(-1))");
+    machine.kill();
+}
+
+#[test]
 fn the_page_says_when_it_is_old_and_comes_back_after_a_restart() {
     let mut machine = Machine::tank();
     let browser = open(&machine, 1280, 800);

@@ -4,11 +4,11 @@ use std::io;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::Caller;
+use tickbus_fieldbus::tcp::{Caller, begins_like_http};
 use tickbus_fieldbus::{BusError, Port, Receipt};
 
 use super::connection_states::ConnectionStates;
-use super::{ConnectionFrames, Session, SessionParameters};
+use super::{ConnectionFrames, EndReason, Session, SessionParameters};
 
 /// One connection.
 #[derive(Debug)]
@@ -116,6 +116,10 @@ impl Transfer<'_> {
 impl Caller for Transfer<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         let Connection { peer, session, .. } = &mut *self.connection;
+        // A browser sends the beginning of its request at once.
+        if !session.has_heard() && session.partial().is_none() && begins_like_http(bytes) {
+            return Err(EndReason::Http.of(*peer));
+        }
         let mut bytes = bytes;
         while !bytes.is_empty() {
             let space = session.space();

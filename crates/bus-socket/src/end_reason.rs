@@ -4,6 +4,7 @@ use std::fmt;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
+use tickbus_fieldbus::tcp::IS_HTTP;
 
 use super::Partial;
 
@@ -24,6 +25,8 @@ pub enum EndReason {
     Silent(Nanos),
     /// Bytes arrived, although nothing is to be received.
     Unasked,
+    /// The peer is a web browser, or sends what one would.
+    Http,
 }
 
 impl EndReason {
@@ -54,6 +57,7 @@ impl EndReason {
             Self::Unasked => BusError::Protocol(format!(
                 "{peer} sends, but this end has nothing to receive; give both ends the same signals"
             )),
+            Self::Http => BusError::Protocol(format!("refused {peer}: {IS_HTTP}")),
         }
     }
 }
@@ -101,6 +105,7 @@ mod tests {
             ),
             (EndReason::Silent(limit), &["silent for 300ms", "max_age"]),
             (EndReason::Unasked, &["nothing to receive", "same signals"]),
+            (EndReason::Http, &["HTTP request", "web page"]),
         ] {
             let text = fault.of("10.0.0.7:4000").to_string();
             for part in parts {

@@ -3,10 +3,12 @@
 mod laboratory;
 mod operator;
 mod requests;
+mod saving;
 
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::tcp::{IS_HTTP, begins_like_http};
 
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::{Channel, Counts};
@@ -61,6 +63,8 @@ pub struct Dispatcher {
     resumable: Vec<usize>,
     /// Answers to be given when the patch is saved.
     promised: Vec<Promised>,
+    /// How many of these wait for the patch that is being saved; the others came later.
+    saving: usize,
     /// When the times of all clients are looked at next.
     next_look: Nanos,
     /// The other dispatchers of the laboratory, if there can be any.
@@ -136,6 +140,7 @@ impl Dispatcher {
             items: Vec::new(),
             resumable: Vec::new(),
             promised: Vec::new(),
+            saving: 0,
             next_look: Nanos::MAX,
             federation: None,
             waiting: Vec::new(),
@@ -293,64 +298,6 @@ impl Dispatcher {
         }
     }
 
-    /// The patch, if it was changed and not saved since.
-    pub fn unsaved(&self) -> Option<&Patch> {
-        (!self.promised.is_empty()).then(|| self.board.patch())
-    }
-
-    /// The patch was saved, or why not: who changed it is answered.
-    pub fn saved(&mut self, outcome: &Result<(), String>) {
-        let outcome = outcome.as_ref().map(drop).map_err(|why| {
-            Code::Internal.because(format_args!(
-                "the patch could not be saved ({why}); it holds until the dispatcher ends"
-            ))
-        });
-        if outcome.is_ok() {
-            self.board.set_saved();
-        }
-        for promised in std::mem::take(&mut self.promised) {
-            self.fulfil(promised, outcome.clone());
-        }
-    }
-
-    fn fulfil(&mut self, Promised { author, sinks }: Promised, outcome: Result<(), Refusal>) {
-        self.conclude(author, outcome);
-        self.board.begin_line();
-        for sink in sinks {
-            self.board.refresh(&sink);
-        }
-    }
-
-    /// Answers who has changed the patch, or wanted to.
-    fn conclude(&mut self, author: Author, outcome: Result<(), Refusal>) {
-        match author {
-            Author::Client { seat, verb } => {
-                match outcome {
-                    Ok(()) => self.confirm(seat, verb),
-                    Err(refusal) => self.refuse(seat, &refusal),
-                }
-                self.go_on(seat);
-            }
-            Author::Operator(reply) => reply.give(outcome),
-            Author::Host { host, number } => self.answer(host, number, outcome),
-            Author::Nobody => {}
-        }
-    }
-
-    /// A client that had to wait for its answer has got it.
-    fn go_on(&mut self, seat: usize) {
-        if let Some(session) = &mut self.sessions[seat]
-            && session.progress == Progress::Stuck
-        {
-            session.progress = Progress::Going;
-            if !session.begun.is_empty() {
-                self.resumable.push(seat);
-            }
-            // Its bytes are wanted again, even if there was nothing to say.
-            self.board.touch(seat);
-        }
-    }
-
     /// Bytes have arrived from a client, in any pieces.
     pub fn arrived(&mut self, now: Nanos, seat: usize, bytes: &[u8]) {
         let Some(session) = &mut self.sessions[seat] else {
@@ -400,6 +347,10 @@ impl Dispatcher {
                 if session.is_skipping {
                     return bytes.len();
                 }
+                if rest.len() >= LONGEST_LINE && begins_like_http(rest) {
+                    self.refuse_http(seat);
+                    return bytes.len();
+                }
                 if rest.len() >= LONGEST_LINE {
                     if may_answer(&mut self.board, seat) {
                         session.is_skipping = true;
@@ -419,6 +370,10 @@ impl Dispatcher {
             self.board.traffic.lines += 1;
             if std::mem::take(&mut session.is_skipping) {
                 continue;
+            }
+            if begins_like_http(rest) {
+                self.refuse_http(seat);
+                return bytes.len();
             }
             if end >= LONGEST_LINE {
                 self.refuse_length(seat);
@@ -654,6 +609,14 @@ impl Dispatcher {
     fn refuse(&mut self, seat: usize, refusal: &Refusal) {
         self.board.traffic.refused += 1;
         self.board.say(seat, &refusal.to_string());
+    }
+
+    /// Closes the connection of a web browser: what follows the head of its request is the text of a web site.
+    fn refuse_http(&mut self, seat: usize) {
+        if let Some(session) = &mut self.sessions[seat] {
+            session.progress = Progress::Closing;
+        }
+        self.refuse(seat, &Code::Syntax.because(IS_HTTP));
     }
 
     fn refuse_length(&mut self, seat: usize) {

@@ -7,7 +7,7 @@
 //! connect    = "CONNECT" 1*(channel ":" name ":" channel)
 //! disconnect = "DISCONNECT" 1*channel
 //! channel    = ("Q" | "I" | "AQ" | "AI") 1*DIGIT
-//! number     = ["-"] 1*DIGIT ["." 1*DIGIT]
+//! number     = ["-" | "+"] (1*DIGIT ["." *DIGIT] | "." 1*DIGIT) ["E" ["-" | "+"] 1*DIGIT]
 //! name       = 1*63(ALPHA | DIGIT | "_" | "-" | ".")
 //! ```
 //!

@@ -23,6 +23,7 @@ mod patch;
 mod patch_file;
 mod post;
 mod refusal;
+mod saver;
 pub mod tcp;
 mod trickle;
 mod volts;

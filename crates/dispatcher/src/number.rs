@@ -52,24 +52,36 @@ impl Number {
         Self { bytes }
     };
 
-    /// Reads `["-"] 1*DIGIT ["." 1*DIGIT]`; `None` for everything else, and for more than 23 characters that count.
+    /// Reads digits with a sign or none, a point somewhere or none, and an exponent or none, such as `-4.5`, `+3`, `.5` and `1e3`;
+    /// `None` for everything else, and for more than 23 characters that count. With an exponent the number is rounded to a double.
     pub fn parse(text: &[u8]) -> Option<Self> {
         let (is_negative, digits) = match text {
             [b'-', rest @ ..] => (true, rest),
+            [b'+', rest @ ..] => (false, rest),
             _ => (false, text),
         };
+        if let [b'0'..=b'9' | b'.', rest @ ..] = digits
+            && rest.iter().any(|byte| matches!(byte, b'e' | b'E'))
+            && rest.iter().all(|byte| b"0123456789.eE+-".contains(byte))
+        {
+            let value: f64 = std::str::from_utf8(text).ok()?.parse().ok()?;
+            return Self::of(value);
+        }
         let point = digits.iter().position(|byte| *byte == b'.');
         let (whole, fraction) = match point {
             Some(at) => (&digits[..at], Some(&digits[at + 1..])),
             None => (digits, None),
         };
-        let is_number = |part: &[u8]| !part.is_empty() && part.iter().all(u8::is_ascii_digit);
-        if !is_number(whole) || fraction.is_some_and(|part| !is_number(part)) {
+        let fraction = fraction.unwrap_or_default();
+        let is_number = |part: &[u8]| part.iter().all(u8::is_ascii_digit);
+        if !is_number(whole) || !is_number(fraction) || whole.len() + fraction.len() == 0 {
             return None;
         }
         let leading = whole.iter().take_while(|byte| **byte == b'0').count();
-        let whole = &whole[leading.min(whole.len() - 1)..];
-        let fraction = fraction.unwrap_or_default();
+        let whole = match &whole[leading..] {
+            [] => b"0",
+            significant => significant,
+        };
         let trailing = fraction.iter().rev().take_while(|byte| **byte == b'0');
         let fraction = &fraction[..fraction.len() - trailing.count()];
         let mut number = Self::UNKNOWN;
@@ -242,6 +254,13 @@ mod tests {
             ("-12.0", "-12"),
             ("0.5", "0.5"),
             ("-0.5", "-0.5"),
+            ("+3", "3"),
+            (".5", "0.5"),
+            ("-.50", "-0.5"),
+            ("5.", "5"),
+            ("1e3", "1000"),
+            ("-2.5E-1", "-0.25"),
+            ("+.5e+1", "5"),
             (
                 "00000000000000000000000000001.000000000000000000000000000",
                 "1",
@@ -286,10 +305,12 @@ mod tests {
             "",
             "-",
             ".",
-            "1.",
-            ".5",
-            "+1",
-            "1e3",
+            "-.",
+            "+-1",
+            "e3",
+            "1e",
+            "1e400",
+            "1e3.5",
             "--1",
             "1.2.3",
             "0x10",

@@ -61,7 +61,12 @@ impl PatchFile {
             // Into a text, which takes everything.
             let _ = writeln!(text, "\"{sink}\" = \"{source}\"");
         }
-        let mut file = File::create(&self.next)?;
+        // In a folder of several users the name may be another one's link, which is not followed.
+        match fs::remove_file(&self.next) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let mut file = File::create_new(&self.next)?;
         file.write_all(text.as_bytes())?;
         file.sync_all()?;
         drop(file);

@@ -5,16 +5,17 @@ use std::io::{self, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::thread;
 
-use tickbus_base::os::{Interest, PollSet, Ready};
+use tickbus_base::os::{Interest, PollSet, Ready, peer_silence};
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::tcp::{
-    Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare,
+    Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare, watch_peer,
 };
 
 use crate::dispatcher::Dispatcher;
 use crate::door::Door;
 use crate::patch_file::PatchFile;
 use crate::post::Post;
+use crate::saver::Saver;
 use crate::trickle::Trickle;
 
 /// The key of the listener in the poll set; a client's key is its seat.
@@ -28,6 +29,12 @@ const BUFFER: usize = 64 * 1024;
 
 /// How long no client is accepted after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
+
+/// How often peers are looked at that have not confirmed what was sent.
+const LOOK: Nanos = Nanos::from_secs(1);
+
+/// A computer that has confirmed nothing for this long is gone.
+const SILENCE: Nanos = Nanos::from_secs(3);
 
 /// How long the system keeps bytes that a client does not read. Not the dispatcher's limit: who is silent for 60 s is
 /// disconnected, and who only sends need not read.
@@ -109,7 +116,13 @@ impl Listener {
             ready: Vec::new(),
             accept_paused_until: None,
             trickle: Trickle::default(),
+            next_look: Nanos::MAX,
+            saver: None,
+            unsaved: None,
         };
+        if let Some(file) = host.hosting.patch_file {
+            host.saver = Some(Saver::start(file.clone(), host.hosting.stop.clone())?);
+        }
         let mut outcome = Ok(());
         while outcome.is_ok() && !host.hosting.stop.is_stopped() {
             outcome = host.turn();
@@ -117,6 +130,7 @@ impl Listener {
         if let Some(door) = host.hosting.door {
             door.close();
         }
+        host.save_the_rest();
         for seat in 0..host.connections.len() {
             host.close(seat);
         }
@@ -128,6 +142,8 @@ struct Connection {
     stream: TcpStream,
     /// What the set waits for; `None` while it is not in the set, since nothing is wanted from it.
     interest: Option<Interest>,
+    /// Something was written since all was confirmed.
+    is_unconfirmed: bool,
 }
 
 impl Connection {
@@ -163,12 +179,17 @@ struct Host<'d, 'h> {
     ready: Vec<Ready>,
     accept_paused_until: Option<Nanos>,
     trickle: Trickle,
+    /// When peers are looked at that have not confirmed what was sent.
+    next_look: Nanos,
+    /// What saves the patch, if it survives anywhere; `unsaved` is why that failed last.
+    saver: Option<Saver>,
+    unsaved: Option<String>,
 }
 
 impl Host<'_, '_> {
     fn turn(&mut self) -> io::Result<()> {
         let accept = self.accept_paused_until.unwrap_or(Nanos::MAX);
-        let deadline = self.dispatcher.deadline().min(accept);
+        let deadline = self.dispatcher.deadline().min(accept).min(self.next_look);
         self.set.wait(self.hosting.clock, deadline)?;
         let now = self.hosting.clock.now();
         self.ready.clear();
@@ -190,19 +211,10 @@ impl Host<'_, '_> {
             door.serve(self.dispatcher, now);
         }
         self.dispatcher.tick(now);
-        // Everyone who changed the patch in this turn waits for one write of the file.
-        if let Some(patch) = self.dispatcher.unsaved() {
-            let saved = match self.hosting.patch_file {
-                Some(file) => file.save(patch).map_err(|error| error.to_string()),
-                None => Ok(()),
-            };
-            if let Err(why) = &saved {
-                (self.hosting.news)(&format!(
-                    "the patch could not be saved ({why}); what changes now is lost at the end"
-                ));
-            }
-            self.dispatcher.saved(&saved);
+        if now >= self.next_look {
+            self.look(now);
         }
+        self.save(false);
         while let Some(seat) = self.dispatcher.next_touched() {
             self.write(seat)?;
         }
@@ -224,6 +236,75 @@ impl Host<'_, '_> {
             thread::yield_now();
         }
         Ok(())
+    }
+
+    /// Everyone who has changed the patch waits for the disk, one write for all; values do not wait.
+    fn save(&mut self, waits: bool) {
+        let Some(saver) = &mut self.saver else {
+            if self.dispatcher.unsaved().is_some() {
+                self.dispatcher.saved(&Ok(()));
+            }
+            return;
+        };
+        if let Some(saved) = saver.outcome(waits) {
+            self.dispatcher.saved(&saved);
+            match (saved.err(), &mut self.unsaved) {
+                (None, None) => {}
+                (None, before) => {
+                    *before = None;
+                    (self.hosting.news)("the patch is saved again");
+                }
+                (Some(why), before) if before.as_ref() == Some(&why) => {}
+                (Some(why), before) => {
+                    (self.hosting.news)(&format!(
+                        "the patch could not be saved ({why}); what changes now is lost at the end"
+                    ));
+                    *before = Some(why);
+                }
+            }
+        }
+        if let Some(patch) = self.dispatcher.unsaved()
+            && saver.save(patch)
+        {
+            self.dispatcher.saving();
+        }
+    }
+
+    /// What has changed is saved before the end, and answered.
+    fn save_the_rest(&mut self) {
+        if self.saver.is_none() {
+            return;
+        }
+        // The one that is under way, and what has changed since.
+        for _ in 0..3 {
+            self.save(true);
+        }
+        while let Some(seat) = self.dispatcher.next_touched() {
+            // Nothing is waited for any more.
+            let _ = self.write(seat);
+        }
+    }
+
+    /// Closes connections whose other computer has gone without a word.
+    fn look(&mut self, now: Nanos) {
+        self.next_look = Nanos::MAX;
+        for seat in 0..self.connections.len() {
+            let Some(connection) = self.connections[seat]
+                .as_mut()
+                .filter(|it| it.is_unconfirmed)
+            else {
+                continue;
+            };
+            match peer_silence(&connection.stream) {
+                Some(silence) if silence >= SILENCE => {
+                    self.drop_client(seat);
+                    continue;
+                }
+                Some(_) => {}
+                None => connection.is_unconfirmed = false,
+            }
+            self.next_look = now + LOOK;
+        }
     }
 
     fn read(&mut self, now: Nanos, seat: usize) -> io::Result<()> {
@@ -263,6 +344,10 @@ impl Host<'_, '_> {
             match connection.stream.write(bytes) {
                 Ok(count) if count > 0 => {
                     self.dispatcher.wrote(seat, count);
+                    connection.is_unconfirmed = true;
+                    if self.next_look == Nanos::MAX {
+                        self.next_look = self.hosting.clock.now() + LOOK;
+                    }
                     is_blocked = count < length;
                 }
                 Err(error) if is_for_later(&error) => is_blocked = true,
@@ -320,7 +405,7 @@ impl Host<'_, '_> {
                 }
             };
             // If it broke at once, it will come again.
-            if prepare(&stream, PATIENCE).is_err() {
+            if prepare(&stream, PATIENCE).is_err() || watch_peer(&stream).is_err() {
                 continue;
             }
             let seat = match self.dispatcher.connected(now, peer) {
@@ -337,7 +422,11 @@ impl Host<'_, '_> {
                 self.connections.resize_with(seat + 1, || None);
             }
             let interest = Some(Interest::Read);
-            self.connections[seat] = Some(Connection { stream, interest });
+            self.connections[seat] = Some(Connection {
+                stream,
+                interest,
+                is_unconfirmed: false,
+            });
         }
         Ok(())
     }

@@ -19,6 +19,31 @@ fn refused(heard: &[String], code: u16) -> String {
 }
 
 #[test]
+fn what_a_web_site_has_a_browser_send_is_refused_with_its_body() {
+    for head in [
+        "POST / HTTP/1.1\r\nHost: 127.0.0.1:20070\r\n\r\n".to_owned(),
+        format!("GET /{} HTTP/1.1\r\n\r\n", "a".repeat(5000)),
+    ] {
+        let mut lab = Lab::new();
+        let pump = lab.join("VP PUMP Q01 I01");
+        let browser = lab.connect();
+        let request = format!("{head}VR EVIL Q01 I01\r\nCONNECT Q1:PUMP:I1\r\nP Q1=24\r\n");
+        // In the pieces of a slow network, too.
+        for piece in request.as_bytes().chunks(1000) {
+            lab.send(browser, piece);
+        }
+        assert!(lab.dispatcher.is_closing(browser));
+        let heard = lab.hear(browser);
+        assert!(
+            heard.len() == 1 && heard[0].contains("HTTP request"),
+            "{heard:?}"
+        );
+        assert_eq!(lab.hear(pump), [""; 0]);
+        assert_eq!(lab.dispatcher.patch().iter().count(), 0);
+    }
+}
+
+#[test]
 fn version_2_is_answered() {
     let mut lab = Lab::new();
     let logo = lab.connect();
@@ -121,7 +146,7 @@ fn every_mistake_has_its_code_and_changes_nothing() {
         ("P Q1=1Q2=2", 400),
         ("P Q1:1", 400),
         ("P 1=1", 400),
-        ("P Q1=1e3", 400),
+        ("P Q1=1e", 400),
         ("P Q1=123456789012345678901234", 400),
         ("P \u{fc}", 400),
         ("P Q1=1 I1=1", 422),
@@ -542,4 +567,33 @@ fn who_asks_again_for_the_connections_that_it_has_is_answered_without_a_further_
         lab.dispatcher.saved(&Err("disk full".to_owned()));
         refused(&lab.hear(logo)[..1], 500);
     }
+}
+
+#[test]
+fn values_and_further_changes_do_not_wait_for_the_disk() {
+    let mut lab = Lab::new();
+    let pump = lab.join("VP PUMP Q01 I02");
+    let logo = lab.join("VR LOGO Q01 I02 V=2");
+    lab.ask(logo, "CONNECT I1:PUMP:Q1");
+    // Another thread saves from here on.
+    let send = |lab: &mut Lab, seat, line: &str| {
+        lab.dispatcher.arrived(lab.now, seat, line.as_bytes());
+    };
+    send(&mut lab, logo, "CONNECT I2:PUMP:Q1\r\n");
+    assert_eq!(lab.dispatcher.unsaved().map(Patch::len), Some(2));
+    lab.dispatcher.saving();
+    assert!(lab.dispatcher.unsaved().is_none());
+    send(&mut lab, pump, "P Q1=24\r\nCONNECT I1:LOGO:Q1\r\n");
+    let heard = lab.dispatcher.to_write(logo).to_vec();
+    assert_eq!(String::from_utf8_lossy(&heard), "P I1=24 I2=24\r\n");
+    lab.dispatcher.wrote(logo, heard.len());
+    // The change that came meanwhile is not in what was saved.
+    assert_eq!(lab.dispatcher.unsaved().map(Patch::len), Some(3));
+    lab.dispatcher.saved(&Ok(()));
+    assert_eq!(lab.dispatcher.to_write(logo), b"OK CONNECT\r\nP I2=24\r\n");
+    assert!(!lab.dispatcher.wants_bytes(pump), "it waits for its own");
+    lab.dispatcher.saving();
+    lab.dispatcher.saved(&Ok(()));
+    assert!(lab.dispatcher.wants_bytes(pump));
+    assert!(lab.dispatcher.unsaved().is_none());
 }

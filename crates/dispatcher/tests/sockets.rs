@@ -543,3 +543,18 @@ fn change(is_connected: bool) -> String {
         line + &format!(" Q1:FROM:I{at}")
     })
 }
+
+#[test]
+fn a_link_in_the_place_of_the_next_patch_is_not_followed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (other, patch) = (folder.path().join("other"), folder.path().join("p.toml"));
+    std::fs::write(&other, "of another user").expect("there is room");
+    std::os::unix::fs::symlink(&other, folder.path().join("p.toml.new")).expect("a link");
+    let file = PatchFile::new(&patch);
+    file.save(&Patch::new()).expect("it is saved");
+    assert_eq!(
+        std::fs::read_to_string(&other).expect("it is there"),
+        "of another user"
+    );
+    assert_eq!(file.load().expect("right"), Patch::new());
+}

@@ -27,6 +27,8 @@ pub struct PageOptions {
     pub grace: Option<Nanos>,
     /// The picture of the machine as written there: relative to the folder of the driver.cfg.
     pub picture: Option<PathBuf>,
+    /// The file in which its token survives a restart, relative to the folder of the driver.cfg.
+    pub token_file: Option<PathBuf>,
 }
 
 impl Default for PageOptions {
@@ -36,14 +38,15 @@ impl Default for PageOptions {
             listen: Address::local(PORT),
             grace: Some(GRACE),
             picture: None,
+            token_file: None,
         }
     }
 }
 
 impl PageOptions {
     pub(super) fn read(mut table: Table<'_>) -> Option<Self> {
-        let [listen, grace, keep_forced, picture] =
-            ["listen", "grace", "keep_forced", "picture"].map(|key| table.take(key));
+        let [listen, grace, keep_forced, picture, token_file] =
+            ["listen", "grace", "keep_forced", "picture", "token_file"].map(|key| table.take(key));
         table.finish();
         let usual = Self::default();
         let listen = listen.map_or(Some(usual.listen), |value| Address::read(&value));
@@ -74,6 +77,10 @@ impl PageOptions {
             }
             is_svg.then_some(file)
         });
+        let token_file = token_file.map(|value| {
+            let right = "name a file, such as \"page.token\"; it is made";
+            value.label(PATH_LIMIT, right).map(PathBuf::from)
+        });
         let grace = match (keeps?, stated) {
             (true, _) => None,
             (false, None) => usual.grace,
@@ -85,6 +92,10 @@ impl PageOptions {
             picture: match picture {
                 None => None,
                 Some(picture) => Some(picture?),
+            },
+            token_file: match token_file {
+                None => None,
+                Some(file) => Some(file?),
             },
         })
     }
@@ -111,12 +122,14 @@ mod tests {
         assert_eq!(read(""), Ok(None));
         assert_eq!(read("[page]\n"), Ok(Some(PageOptions::default())));
         let page = read(
-            "[page]\nlisten = \"0.0.0.0:0\"\ngrace = \"1min\"\npicture = \"pictures/rig.svg\"\n",
+            "[page]\nlisten = \"0.0.0.0:0\"\ngrace = \"1min\"\npicture = \"pictures/rig.svg\"\n\
+             token_file = \"page.token\"\n",
         );
         let page = page.expect("right").expect("there");
         assert_eq!(page.listen.to_string(), "0.0.0.0:0");
         assert_eq!(page.grace, Some(Nanos::from_secs(60)));
         assert_eq!(page.picture, Some(PathBuf::from("pictures/rig.svg")));
+        assert_eq!(page.token_file, Some(PathBuf::from("page.token")));
         let keeps = read("[page]\nkeep_forced = true\n").expect("right");
         assert_eq!(keeps.expect("there").grace, None);
     }

@@ -22,6 +22,7 @@ pub(crate) const ASSETS: &[Asset] = &[
         kind: STYLE,
         text: include_str!("page.css"),
     },
+    script("/stream.js", tickbus_web::STREAM),
     script("/client.js", tickbus_web::CLIENT),
     script("/lookup.js", tickbus_report::LOOKUP),
     script("/draw.js", tickbus_report::DRAW),

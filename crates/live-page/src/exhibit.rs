@@ -11,6 +11,14 @@ use tickbus_web::Refused;
 use crate::picture::Picture;
 use crate::sheet::Sheet;
 
+/// How old the data of a station are.
+pub(crate) struct Freshness<'a> {
+    pub(crate) name: &'a str,
+    /// `None` if there never were any.
+    pub(crate) age_ms: Option<f64>,
+    pub(crate) stale: bool,
+}
+
 /// Something with signals that is shown on the page.
 ///
 /// The page asks for a copy, takes it over when it has come, and compares it with what it knew.
@@ -46,6 +54,11 @@ pub(crate) trait Exhibit: fmt::Debug + Send {
 
     /// All about it and its signals, as JSON.
     fn json(&self) -> String;
+
+    /// How old the data of its stations are; empty where that means nothing.
+    fn stations(&self) -> Vec<Freshness<'_>> {
+        Vec::new()
+    }
 
     /// The state of its line.
     fn state(&self) -> LinkState;

@@ -260,7 +260,9 @@ fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, Str
     let points = driver.sheet().trend.of(index, now);
     let millis: Vec<i64> = points.iter().map(|(at, _)| at.0 / 1_000_000).collect();
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
-    let json = serde_json::json!({ "ms": millis, "values": values });
+    // At the least: while a page is open it looks far more often.
+    let looks = 1_000_000_000 / IDLE.0;
+    let json = serde_json::json!({ "ms": millis, "values": values, "samples_per_s": looks });
     Some((JSON, json.to_string()))
 }
 
@@ -351,7 +353,7 @@ mod tests {
         let clock: Arc<dyn Clock> = Monotonic::shared();
         let (is_let, taken) = (Arc::default(), Arc::<AtomicUsize>::default());
         let fake = Fake {
-            sheet: Sheet::new(clock.now(), &[], &[]),
+            sheet: Sheet::new(clock.now(), &[]),
             statistics: Statistics::default(),
             is_let: Arc::clone(&is_let),
             looks: 0,

@@ -136,6 +136,11 @@ pub(crate) fn age_now(station: &StationView, silence: Nanos) -> Nanos {
     }
 }
 
+/// Whether the data of a station do not count now.
+pub(crate) fn is_stale_now(station: &StationView, silence: Nanos, max_age: Nanos) -> bool {
+    is_stale(age_now(station, silence), max_age, station.is_valid)
+}
+
 /// In milliseconds, to the microsecond; `None` for never.
 pub(crate) fn millis(span: Nanos) -> Option<f64> {
     (span != Nanos::MAX).then(|| span.as_micros().round() / 1e3)

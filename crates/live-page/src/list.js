@@ -200,13 +200,13 @@ const list = (() => {
       text(element, "raw", signal.isBool ? "" : signal.raw);
       text(element, "edges", signal.latch ? signal.edges.toLocaleString("en") : "");
       text(element, "age", words.span(plant.age(signal)));
-      text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : "");
+      text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : signal.isStale ? "stale" : "");
       text(element, "open", signal.isOpen ? "▾" : "▸");
       flag(element, "bool", signal.isBool);
       flag(element, "on", isOn);
       flag(element, "input", signal.direction === "I");
       flag(element, "forced", signal.isForced);
-      flag(element, "failsafe", signal.isFailSafe && !signal.isForced);
+      flag(element, "failsafe", (signal.isFailSafe || signal.isStale) && !signal.isForced);
       flag(element, "new", plant.isNew(signal));
       set(element, "chosen", signal === chosen, (it, yes) => it.setAttribute("aria-selected", yes));
       set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.open.setAttribute("aria-label", label); it.parts.open.title = label; });

@@ -78,7 +78,7 @@
     if (isNew) {
       // To the last digit: whoever confirms it holds what is there.
       forceValue.value = signal.value === null || signal.isBool ? "" : String(signal.value);
-      if (/^Released?|^Force|is forced|is released/.test(get("status").textContent)) say("");
+      if (!/^Read-only/.test(get("status").textContent)) say("");
     }
     const isLost = !signal.isForced && document.activeElement === get("release");
     get("release").disabled = !signal.isForced;
@@ -247,7 +247,7 @@
     value: (name) => plant.signals.find((signal) => signal.name === name)?.value,
     signal: (name) => {
       const signal = plant.signals.find((it) => it.name === name);
-      return signal && { value: signal.value, raw: signal.raw, edges: signal.edges, isForced: signal.isForced, isFailSafe: signal.isFailSafe };
+      return signal && { value: signal.value, raw: signal.raw, edges: signal.edges, isForced: signal.isForced, isFailSafe: signal.isFailSafe, isStale: signal.isStale };
     },
   };
 })();

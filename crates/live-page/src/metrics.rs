@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use tickbus_base::statistics::Value;
 use tickbus_fieldbus::LinkState;
+use tickbus_image::signal::Signal;
 
-use crate::exhibit::Exhibit;
+use crate::exhibit::{Exhibit, Freshness};
 use crate::model::Model;
-use crate::sheet::FORCED;
-use crate::value::Number;
+use crate::sheet::{FAIL_SAFE, FORCED, STALE, UNKNOWN};
 
 /// Labels in braces.
 struct Labels(String);
@@ -51,21 +51,8 @@ pub(crate) fn text(model: &Model) -> String {
 }
 
 fn write(model: &Model, text: &mut String) -> std::fmt::Result {
-    family(
-        text,
-        "tickbus_signal_value",
-        "gauge",
-        "The value of a signal, in its unit.",
-    )?;
-    for driver in model.drivers() {
-        let labels = Labels::of(driver);
-        for (signal, row) in driver.signals().iter().zip(&driver.sheet().rows) {
-            let unit = signal.unit.as_deref().unwrap_or_default();
-            let of_signal = labels.and("signal", &signal.name).and("unit", unit);
-            let value = Number::of(signal, row.slot).real();
-            sample(text, "tickbus_signal_value", &of_signal, value)?;
-        }
-    }
+    values(model, text)?;
+    stations(model, text)?;
     family(
         text,
         "tickbus_signal_edges",
@@ -133,6 +120,85 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
         }
     }
     Ok(())
+}
+
+/// The values that are live, and which ones are fail-safe.
+fn values(model: &Model, text: &mut String) -> std::fmt::Result {
+    family(
+        text,
+        "tickbus_signal_value",
+        "gauge",
+        "The value of a signal, in its unit; left out while it is stale or fail-safe.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        let stations = driver.stations();
+        let rows = driver.signals().iter().zip(&driver.sheet().rows);
+        for (signal, row) in rows.filter(|(_, row)| row.flags & NOT_LIVE == 0) {
+            let unit = signal.unit.as_deref().unwrap_or_default();
+            let of_signal = of_signal(&labels, &stations, signal).and("unit", unit);
+            sample(text, "tickbus_signal_value", &of_signal, row.live(signal))?;
+        }
+    }
+    family(
+        text,
+        "tickbus_signal_failsafe",
+        "gauge",
+        "1 for each signal that has its fail-safe value.",
+    )?;
+    for driver in model.drivers() {
+        let labels = Labels::of(driver);
+        let stations = driver.stations();
+        let rows = driver.signals().iter().zip(&driver.sheet().rows);
+        for (signal, _) in rows.filter(|(_, row)| row.flags & FAIL_SAFE != 0) {
+            let of_signal = of_signal(&labels, &stations, signal);
+            sample(text, "tickbus_signal_failsafe", &of_signal, 1.0)?;
+        }
+    }
+    Ok(())
+}
+
+/// How old the data of the stations are.
+fn stations(model: &Model, text: &mut String) -> std::fmt::Result {
+    for (name, help) in [
+        (
+            "tickbus_station_stale",
+            "1 if the data of a station do not count.",
+        ),
+        (
+            "tickbus_station_age_seconds",
+            "How old the data of a station are; left out if there never were any.",
+        ),
+    ] {
+        family(text, name, "gauge", help)?;
+        for driver in model.drivers() {
+            let labels = Labels::of(driver);
+            for station in driver.stations() {
+                let of_station = labels.and("station", station.name);
+                let value = if name == "tickbus_station_stale" {
+                    Some(f64::from(u8::from(station.stale)))
+                } else {
+                    station.age_ms.map(|age| age / 1e3)
+                };
+                if let Some(value) = value {
+                    sample(text, name, &of_station, value)?;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What says that a value is not one of now.
+const NOT_LIVE: u8 = FAIL_SAFE | STALE | UNKNOWN;
+
+/// The labels of a signal, with its station if there are several.
+fn of_signal(labels: &Labels, stations: &[Freshness<'_>], signal: &Signal) -> Labels {
+    let labels = labels.and("signal", &signal.name);
+    match stations.get(signal.station) {
+        Some(station) if stations.len() > 1 => labels.and("station", station.name),
+        _ => labels,
+    }
 }
 
 fn family(text: &mut String, name: &str, kind: &str, help: &str) -> std::fmt::Result {

@@ -62,7 +62,12 @@ const pictures = (() => {
       sheet.replaceSync(`${styles.join("\n")}\nsvg:root, :host > svg { display: block; width: 100%; height: auto; max-height: var(--picture-height, none); }`);
       shadow.adoptedStyleSheets = [sheet];
       shadow.append(document.importNode(root, true));
-      return { driver, element, root: shadow.firstElementChild, movers: [] };
+      const notice = document.createElement("p");
+      notice.className = "stale-notice";
+      notice.textContent = "Not live: parts of this picture show fail-safe or stale values.";
+      notice.hidden = true;
+      frame.append(notice);
+      return { driver, element, root: shadow.firstElementChild, movers: [], notice };
     } catch {
       return null;
     }
@@ -161,9 +166,12 @@ const pictures = (() => {
     const passed = Math.min(LONGEST, now - last);
     last = now;
     isBusy = false;
-    for (const { driver, movers, root } of all) {
+    for (const { driver, movers, root, element, notice } of all) {
       if (!root) continue;
       for (const mover of movers) moveOne(driver, mover, root, now, passed);
+      const isStale = movers.some(({ signals }) => signals.some((signal) => signal && (signal.isStale || signal.isFailSafe) && !signal.isForced));
+      element.classList.toggle("is-stale", isStale);
+      notice.hidden = !isStale;
     }
     return isBusy;
   }

@@ -12,7 +12,6 @@ use tickbus_web::Refused;
 use crate::exhibit::Exhibit;
 use crate::line::{self, Line, Station};
 use crate::sheet::{DriverJson, Row, Sheet, SignalJson};
-use crate::value::{Number, raw};
 
 /// A step that takes longer than this, and longer than a tenth of what it may take, is told to be late.
 const LATE: Nanos = Nanos::from_secs(1);
@@ -113,7 +112,7 @@ impl ShownRun {
             }),
             is_other: false,
             signals: Vec::new(),
-            sheet: Sheet::new(now, &[], &[]),
+            sheet: Sheet::new(now, &[]),
             state: told(None),
             since: now,
             pace: Pace {
@@ -156,7 +155,7 @@ impl ShownRun {
         let values: Vec<Slot> = values
             .map(|(signal, value)| slot_of(signal, *value))
             .collect();
-        self.sheet = Sheet::new(now, &self.signals, &values);
+        self.sheet = Sheet::new(now, &values);
     }
 
     fn take_values(&mut self, number: u64) -> bool {
@@ -411,11 +410,12 @@ impl Exhibit for ShownRun {
             direction: None,
             latch: None,
             writable: false,
-            value: Number::of(signal, row.slot),
-            raw: raw(signal.data_type, row.bits),
+            value: row.value(signal),
+            raw: row.raw(signal),
             edges: None,
             age_ms: None,
             failsafe: false,
+            stale: false,
             forced: None,
         });
         let run = DriverJson {

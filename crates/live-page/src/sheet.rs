@@ -11,6 +11,10 @@ use crate::value::{Number, raw};
 pub(crate) const FAIL_SAFE: u8 = 1;
 /// The signal is forced.
 pub(crate) const FORCED: u8 = 2;
+/// The data of its station do not count: they are too old, or their PLC has stopped.
+pub(crate) const STALE: u8 = 4;
+/// No data have ever come, and nothing stands in for them.
+pub(crate) const UNKNOWN: u8 = 8;
 
 /// How often the line is looked at in full.
 const LINE: Nanos = Nanos::from_millis(500);
@@ -27,6 +31,35 @@ pub(crate) struct Row {
     pub(crate) flags: u8,
     /// The number of the state in which this was new.
     pub(crate) number: u64,
+}
+
+impl Row {
+    /// The value, which is none where nothing has ever come.
+    pub(crate) fn value(&self, signal: &Signal) -> Number {
+        if self.flags & UNKNOWN == 0 {
+            Number::of(signal, self.slot)
+        } else {
+            Number::Real(f64::NAN)
+        }
+    }
+
+    /// The raw value, likewise.
+    pub(crate) fn raw(&self, signal: &Signal) -> String {
+        if self.flags & UNKNOWN == 0 {
+            raw(signal.data_type, self.bits)
+        } else {
+            String::new()
+        }
+    }
+
+    /// The value as something that was measured: NaN where it does not count.
+    pub(crate) fn live(&self, signal: &Signal) -> f64 {
+        if self.flags & (STALE | UNKNOWN) == 0 {
+            Number::of(signal, self.slot).real()
+        } else {
+            f64::NAN
+        }
+    }
 }
 
 /// All signals, as they were seen last, and the line as JSON.
@@ -50,20 +83,18 @@ pub(crate) struct Sheet {
 type ChangeJson = (usize, Number, String, Option<u32>, u8);
 
 impl Sheet {
-    /// Of signals that have these values at `now`.
-    pub(crate) fn new(now: Nanos, signals: &[Signal], values: &[Slot]) -> Self {
-        let all = signals.iter().zip(values);
-        let numbers = all.map(|(signal, slot)| Number::of(signal, *slot).real());
+    /// Of signals with these values, which nobody has looked at yet.
+    pub(crate) fn new(now: Nanos, values: &[Slot]) -> Self {
         let row = |slot: &Slot| Row {
             slot: *slot,
             bits: 0,
             edges: 0,
-            flags: 0,
+            flags: STALE | UNKNOWN,
             number: 0,
         };
         Self {
             rows: values.iter().map(row).collect(),
-            trend: Trend::new(now, numbers.collect()),
+            trend: Trend::new(now, values.len()),
             asked: None,
             is_slow: false,
             known: NEVER,
@@ -124,8 +155,7 @@ impl Sheet {
     pub(crate) fn go_on(&mut self, now: Nanos, number: u64, signals: &[Signal]) {
         for (index, (signal, row)) in signals.iter().zip(&self.rows).enumerate() {
             if row.number == number {
-                let value = Number::of(signal, row.slot).real();
-                self.trend.add(index, value, None);
+                self.trend.add(index, row.live(signal), None);
             }
         }
         self.trend.go_on(now);
@@ -139,8 +169,8 @@ impl Sheet {
             .map(|(index, (signal, row))| {
                 (
                     index,
-                    Number::of(signal, row.slot),
-                    raw(signal.data_type, row.bits),
+                    row.value(signal),
+                    row.raw(signal),
                     signal.latch.map(|_| row.edges),
                     row.flags,
                 )
@@ -194,6 +224,7 @@ pub(crate) struct SignalJson<'a> {
     pub(crate) edges: Option<u32>,
     pub(crate) age_ms: Option<f64>,
     pub(crate) failsafe: bool,
+    pub(crate) stale: bool,
     pub(crate) forced: Option<Number>,
 }
 

@@ -10,12 +10,12 @@ use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, Latch, Plan, RawValues, Signal, Slot};
 use tickbus_web::Refused;
 
-use crate::exhibit::Exhibit;
+use crate::exhibit::{Exhibit, Freshness};
 use crate::line::{self, age_now, millis};
 use crate::options::Options;
 use crate::picture::Picture;
-use crate::sheet::{DriverJson, FAIL_SAFE, FORCED, Row, Sheet, SignalJson};
-use crate::value::{Number, parse, raw};
+use crate::sheet::{DriverJson, FAIL_SAFE, FORCED, Row, STALE, Sheet, SignalJson, UNKNOWN};
+use crate::value::{Number, parse};
 
 /// A driver on the page.
 #[derive(Debug)]
@@ -32,6 +32,9 @@ pub(crate) struct Shown {
     ending: Vec<u32>,
     link: Link,
     statistics: Statistics,
+    /// Per station whether its data count, and whether that is new.
+    stale: Vec<bool>,
+    is_turn: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -87,12 +90,14 @@ impl Shown {
         let values: Vec<Slot> = watch.view(|view| view.slots.to_vec());
         let mut driver = Self {
             id,
-            sheet: Sheet::new(now, &watch.config().table.signals, &values),
+            sheet: Sheet::new(now, &values),
             codec: Codec::new(&watch),
             forced: BTreeMap::new(),
             ending: Vec::new(),
             link: watch.link(),
             statistics: Statistics::default(),
+            stale: Vec::new(),
+            is_turn: false,
             watch,
             options,
         };
@@ -107,6 +112,8 @@ impl Shown {
             sheet,
             codec,
             forced,
+            stale,
+            is_turn,
             ..
         } = self;
         let config = watch.config();
@@ -130,6 +137,10 @@ impl Shown {
         }
         codec.take(watch, &values);
         watch.view(|view| {
+            let count = |station| line::is_stale_now(station, silence, config.timing.max_age);
+            let now: Vec<bool> = view.stations.iter().map(count).collect();
+            *is_turn |= now != *stale;
+            *stale = now;
             for (index, signal) in table.signals.iter().enumerate() {
                 let is_fail_safe = if signal.area == writes {
                     has_stopped
@@ -137,8 +148,15 @@ impl Shown {
                     view.stations[signal.station].is_fail_safe
                 };
                 let mut flags = if is_fail_safe { FAIL_SAFE } else { 0 };
+                if signal.area != writes && stale[signal.station] {
+                    flags |= STALE;
+                    if !is_fail_safe && view.stations[signal.station].age == Nanos::MAX {
+                        flags |= UNKNOWN;
+                    }
+                }
                 if forced.contains_key(&index) {
-                    flags |= FORCED;
+                    // What is forced is known.
+                    flags = flags & !(STALE | UNKNOWN) | FORCED;
                 }
                 let seen = Row {
                     slot: values[index],
@@ -150,8 +168,8 @@ impl Shown {
                 // A pulse that was over before it was seen.
                 let row = &sheet.rows[index];
                 let edges = seen.edges.wrapping_sub(row.edges);
-                if edges > 0 && (edges > 1 || seen.slot == row.slot) {
-                    let value = Number::of(signal, seen.slot).real();
+                if edges > 0 && (edges > 1 || seen.slot == row.slot) && row.flags & UNKNOWN == 0 {
+                    let value = seen.live(signal);
                     sheet.trend.add(index, value, Some([0.0, 1.0]));
                 }
                 is_new |= sheet.put(index, seen);
@@ -163,7 +181,8 @@ impl Shown {
     fn update_line(&mut self, now: Nanos, number: u64, with_line: bool) -> bool {
         let link = self.watch.link();
         let is_other = (link.state, link.cause) != (self.link.state, self.link.cause)
-            || (link.state == LinkState::Opening && link.reason != self.link.reason);
+            || (link.state == LinkState::Opening && link.reason != self.link.reason)
+            || std::mem::take(&mut self.is_turn);
         let is_due = with_line && self.sheet.is_line_due(now);
         if !is_other && !is_due {
             return false;
@@ -199,11 +218,12 @@ impl Shown {
                 Latch::Both => "both",
             }),
             writable: true,
-            value: Number::of(signal, row.slot),
-            raw: raw(signal.data_type, row.bits),
+            value: row.value(signal),
+            raw: row.raw(signal),
             edges: signal.latch.map(|_| row.edges),
             age_ms: if is_written { None } else { millis(age) },
             failsafe: row.flags & FAIL_SAFE != 0,
+            stale: row.flags & STALE != 0,
             forced: self
                 .forced
                 .get(&index)
@@ -279,6 +299,21 @@ impl Exhibit for Shown {
             signals: signals.map(|index| self.signal(index)).collect(),
         };
         serde_json::to_string(&driver).expect("texts and numbers")
+    }
+
+    fn stations(&self) -> Vec<Freshness<'_>> {
+        let silence = self.watch.silence();
+        let sections = self.watch.config().table.stations.iter();
+        self.watch.view(|view| {
+            let max_age = self.watch.config().timing.max_age;
+            let stations = sections.zip(&view.stations);
+            let stations = stations.map(|(section, station)| Freshness {
+                name: &section.name,
+                age_ms: millis(age_now(station, silence)),
+                stale: line::is_stale_now(station, silence, max_age),
+            });
+            stations.collect()
+        })
     }
 
     fn state(&self) -> LinkState {

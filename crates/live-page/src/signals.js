@@ -8,8 +8,11 @@ const run = { begin: 0, end: 0, unit: 1e6 };
 const plant = (() => {
   /** How long a value that has changed is shown as new. */
   const NEW = 350;
+  /** A connection that comes back within this time has missed nothing that a trend would show, in milliseconds. */
+  const MISSED = 250;
   const FAIL_SAFE = 1;
   const FORCED = 2;
+  const STALE = 4;
   let layout = null;
   let drivers = [];
   let signals = [];
@@ -35,7 +38,7 @@ const plant = (() => {
       isOpen: false,
       trend: null,
     };
-    take(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED));
+    take(signal, given.value, given.raw, given.edges, (given.failsafe ? FAIL_SAFE : 0) | (given.forced === null ? 0 : FORCED) | (given.stale ? STALE : 0));
     return signal;
   }
 
@@ -45,10 +48,11 @@ const plant = (() => {
     signal.edges = edges;
     signal.isFailSafe = (flags & FAIL_SAFE) !== 0;
     signal.isForced = (flags & FORCED) !== 0;
+    signal.isStale = (flags & STALE) !== 0;
   }
 
   /** The signals as such: the same ones after a restart keep what was opened of them. */
-  function takeAll(given) {
+  function takeAll(given, before) {
     const known = new Map(signals.map((signal) => [keyOf(signal), signal]));
     drivers = given.drivers.map((driver) => ({ ...driver, line: null }));
     signals = [];
@@ -56,7 +60,13 @@ const plant = (() => {
       driver.signals = driver.signals.map((it, index) => signalOf(driver, it, index));
       driver.byName = new Map(driver.signals.map((signal) => [signal.name, signal]));
       for (const signal of driver.signals) {
-        signal.isOpen = known.get(keyOf(signal))?.isOpen ?? false;
+        const old = known.get(keyOf(signal));
+        signal.isOpen = old?.isOpen ?? false;
+        // What was missed meanwhile the server has, coarsely.
+        if (old?.trend && old.index === signal.index && time - before < MISSED) {
+          signal.trend = old.trend;
+          trend.add(signal, time);
+        }
         signals.push(signal);
       }
     }
@@ -76,12 +86,13 @@ const plant = (() => {
     const event = JSON.parse(text);
     // Another server has another clock: what was collected on the old one is not comparable.
     if (event.full && event.time_ms < time) for (const signal of signals) signal.trend = null;
+    const before = time;
     time = event.time_ms;
     heard = performance.now();
     const isOther = event.full === true;
     if (isOther) {
       layout = event.layout;
-      takeAll(event.signals);
+      takeAll(event.signals, before);
     } else if (event.layout !== layout) {
       return { isOther: false, isLine: false };
     }
@@ -105,6 +116,9 @@ const plant = (() => {
   /** A value as a number; NaN if there is none. */
   const number = (signal) => (signal.value === null ? NaN : Number(signal.value));
 
+  /** A value as something that was measured: NaN while it is stale. */
+  const live = (signal) => (signal.isStale ? NaN : number(signal));
+
   /** How old the data of a signal's station are, in milliseconds; null if that is not known. */
   function age(signal) {
     const line = signal.driver.line;
@@ -113,7 +127,7 @@ const plant = (() => {
   }
 
   return {
-    hear, now, number, age, keyOf,
+    hear, now, number, live, age, keyOf,
     isNew: (signal) => performance.now() - signal.changed < NEW,
     get drivers() { return drivers; },
     get signals() { return signals; },

@@ -16,17 +16,22 @@ const trend = (() => {
   async function open(signal) {
     signal.isOpen = true;
     if (signal.trend) return;
-    const mine = { times: [plant.now()], values: [plant.number(signal)] };
+    const mine = { times: [plant.now()], values: [plant.live(signal)], sampled: null };
     signal.trend = mine;
     try {
       const answer = await room.ask(`/trend/${signal.driver.id}/${signal.index}`);
       if (!answer.ok || signal.trend !== mine) return;
-      const { ms, values } = await answer.json();
+      const kept = await answer.json();
       const begin = mine.times[0];
-      const end = ms.findIndex((time) => time >= begin);
-      const kept = end < 0 ? ms.length : end;
-      mine.times = ms.slice(0, kept).concat(mine.times);
-      mine.values = values.slice(0, kept).map((value) => value ?? NaN).concat(mine.values);
+      const end = kept.ms.findIndex((time) => time >= begin);
+      const count = end < 0 ? kept.ms.length : end;
+      const times = kept.ms.slice(0, count).concat(mine.times);
+      const values = kept.values.slice(0, count).map((value) => value ?? NaN).concat(mine.values);
+      // Each point is drawn as a change.
+      const isChange = (_, i) => i === 0 || !Object.is(values[i], values[i - 1]);
+      mine.times = times.filter(isChange);
+      mine.values = values.filter(isChange);
+      mine.sampled = { until: begin, often: kept.samples_per_s };
     } catch {
       // The trend begins now, then.
     }
@@ -40,7 +45,7 @@ const trend = (() => {
   /** A signal has another value. */
   function add(signal, time) {
     const data = signal.trend;
-    const value = plant.number(signal);
+    const value = plant.live(signal);
     if (Object.is(value, data.values.at(-1))) return;
     data.times.push(time);
     data.values.push(value);
@@ -66,6 +71,8 @@ const trend = (() => {
       values: signal.trend.values.slice(first),
     };
     paintGrid(painted, height - axis);
+    paintSampled(painted, signal.trend.sampled, begin, height - axis);
+    paintUnknown(painted, data, height - axis);
     const [top, bottom] = [6, height - axis - 5];
     ctx.save();
     ctx.beginPath();
@@ -93,6 +100,37 @@ const trend = (() => {
     ctx.fillText(ends[1], gutter - 6, bottom - 4);
     ctx.translate(0, height - axis);
     paintAxis(painted, axis);
+  }
+
+  /** Time of which only samples are known, and how many of them. */
+  function paintSampled({ ctx, colours, left, width, to }, sampled, begin, height) {
+    const end = sampled ? (sampled.until - begin) / to * width : 0;
+    if (end <= 0) return;
+    ctx.globalAlpha = 0.5;
+    ctx.fillStyle = colours.idle;
+    ctx.fillRect(left, 0, end, height);
+    ctx.globalAlpha = 1;
+    ctx.fillStyle = colours["idle-text"];
+    ctx.fillRect(left + end - 1, 0, 1, height);
+    ctx.font = SMALL;
+    ctx.textAlign = "right";
+    ctx.textBaseline = "top";
+    const text = fitted(ctx, `${sampled.often} samples a second until here`, end - 8);
+    if (text.length > 3) ctx.fillText(text, left + end - 4, height / 2 - 5);
+  }
+
+  /** Time without a value that counts. */
+  function paintUnknown(painted, { times, values }, height) {
+    const { ctx, colours, left, width, to } = painted;
+    values.forEach((value, i) => {
+      if (!Number.isNaN(value)) return;
+      const x = left + Math.max(0, times[i]) / to * width;
+      const end = left + Math.min(to, times[i + 1] ?? to) / to * width;
+      if (end <= x) return;
+      ctx.fillStyle = colours.stale;
+      ctx.fillRect(x, 0, end - x, height);
+      hatch(painted, x, 0, end - x, height, colours["stale-text"]);
+    });
   }
 
   /** The next length of time, for all trends. */

@@ -33,6 +33,8 @@ pub(crate) struct Trend {
 #[derive(Debug, Default)]
 struct Step {
     at: Nanos,
+    /// When it was closed, which is when the last of its values were seen.
+    end: Nanos,
     changed: Vec<Changed>,
 }
 
@@ -48,15 +50,17 @@ struct Changed {
 pub(crate) type Point = (Nanos, f64);
 
 impl Trend {
-    /// Begins at `now` with these values.
-    pub(crate) fn new(now: Nanos, values: Vec<f64>) -> Self {
-        let signals = i64::try_from(values.len()).unwrap_or(i64::MAX);
+    /// Begins at `now`, with so many signals of which nothing is known.
+    pub(crate) fn new(now: Nanos, signals: usize) -> Self {
+        let values = vec![f64::NAN; signals];
+        let signals = i64::try_from(signals).unwrap_or(i64::MAX);
         let all = signals.saturating_mul(SPAN.0 / STEP.0);
         Self {
             step: STEP.times((all / ENTRIES + 1).max(1)),
             steps: VecDeque::new(),
             open: Step {
                 at: now,
+                end: now,
                 changed: Vec::new(),
             },
             places: vec![None; values.len()],
@@ -97,7 +101,7 @@ impl Trend {
             return;
         }
         let mut step = std::mem::take(&mut self.open);
-        self.open.at = now;
+        (self.open.at, step.end) = (now, now);
         if !step.changed.is_empty() {
             for entry in &step.changed {
                 self.places[entry.signal as usize] = None;
@@ -115,20 +119,22 @@ impl Trend {
         self.begin = self.begin.max(now - SPAN);
     }
 
-    /// The values of a signal, as a line that is drawn in steps.
+    /// The values of a signal, as a line that is drawn in steps; NaN where none counts. Of a step that has only a new value, that was
+    /// seen at its end; what was between is within the step, somewhere.
     pub(crate) fn of(&self, signal: usize, now: Nanos) -> Vec<Point> {
         let mut points = vec![(self.begin, self.first[signal])];
-        let third = Nanos(self.step.0 / 3);
         let index = u32::try_from(signal).unwrap_or(u32::MAX);
         let closed = self.steps.iter().filter_map(|step| {
             let found = step
                 .changed
                 .binary_search_by_key(&index, |entry| entry.signal);
-            found.ok().map(|place| (step.at, step.changed[place]))
+            found
+                .ok()
+                .map(|place| ((step.at, step.end), step.changed[place]))
         });
-        let open =
-            self.places[signal].map(|place| (self.open.at, self.open.changed[place as usize]));
-        for (at, entry) in closed.chain(open) {
+        let open = self.places[signal]
+            .map(|place| ((self.open.at, now), self.open.changed[place as usize]));
+        for ((at, end), entry) in closed.chain(open) {
             let mut add = |at: Nanos, value: f64| {
                 let is_same = |(_, last): &Point| last.total_cmp(&value).is_eq();
                 if !points.last().is_some_and(is_same) {
@@ -142,9 +148,13 @@ impl Trend {
             } else {
                 (entry.greatest, entry.least)
             };
-            add(at, one);
-            add(at + third, other);
-            add(at + third + third, entry.last);
+            if one.total_cmp(&other).is_ne() {
+                add(at, one);
+            }
+            if other.total_cmp(&entry.last).is_ne() {
+                add(Nanos(at.0.midpoint(end.0)), other);
+            }
+            add(end, entry.last);
         }
         points.push((now, self.last[signal]));
         points
@@ -163,9 +173,16 @@ mod tests {
         points.into_iter().map(|(_, value)| value).collect()
     }
 
+    fn known(trend: &Trend, signal: usize, now: Nanos) -> Vec<f64> {
+        let values = values(trend, signal, now).into_iter();
+        values.filter(|value| !value.is_nan()).collect()
+    }
+
     #[test]
     fn a_trend_has_the_changes_and_the_pulses_between_them() {
-        let mut trend = Trend::new(Nanos(0), vec![0.0, 5.0]);
+        let mut trend = Trend::new(Nanos(0), 2);
+        trend.add(0, 0.0, None);
+        trend.add(1, 5.0, None);
         trend.add(0, 1.0, None);
         trend.add(0, 0.0, None);
         trend.add(1, 5.0, None);
@@ -173,13 +190,41 @@ mod tests {
         trend.add(0, 0.0, Some([0.0, 1.0]));
         let now = Nanos(SECOND * 3 / 2);
         trend.go_on(now);
-        assert_eq!(values(&trend, 0, now), [0.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
-        assert_eq!(values(&trend, 1, now), [5.0, 5.0]);
+        assert_eq!(known(&trend, 0, now), [1.0, 0.0, 1.0, 0.0, 0.0]);
+        assert_eq!(known(&trend, 1, now), [5.0, 5.0]);
+    }
+
+    #[test]
+    fn a_value_that_was_looked_at_once_in_a_step_stands_where_it_was_seen() {
+        let mut trend = Trend::new(Nanos(0), 1);
+        trend.add(0, 0.0, None);
+        for half in 1..=4_i64 {
+            let now = Nanos(half * SECOND / 2);
+            trend.add(0, f64::from(u8::from(half >= 3)), None);
+            trend.go_on(now);
+        }
+        let points = trend.of(0, Nanos(2 * SECOND));
+        let rise = points.iter().find(|(_, value)| *value > 0.5);
+        assert_eq!(rise, Some(&(Nanos(3 * SECOND / 2), 1.0)));
+    }
+
+    #[test]
+    fn what_does_not_count_is_a_gap() {
+        let mut trend = Trend::new(Nanos(0), 1);
+        for (second, value) in (1..).zip([4.0, f64::NAN, f64::NAN, 5.0]) {
+            trend.add(0, value, None);
+            trend.go_on(Nanos(second * SECOND));
+        }
+        let points = trend.of(0, Nanos(5 * SECOND));
+        let seconds = points.iter().map(|(at, _)| at.0 / SECOND);
+        assert_eq!(seconds.collect::<Vec<_>>(), [0, 1, 2, 4, 5]);
+        let gaps = points.iter().map(|(_, value)| value.is_nan());
+        assert_eq!(gaps.collect::<Vec<_>>(), [true, false, true, false, false]);
     }
 
     #[test]
     fn a_trend_forgets_what_is_older_than_five_minutes() {
-        let mut trend = Trend::new(Nanos(0), vec![0.0]);
+        let mut trend = Trend::new(Nanos(0), 1);
         for second in 1..=1000_i32 {
             trend.add(0, f64::from(second), None);
             trend.go_on(Nanos(i64::from(second) * SECOND));
@@ -195,7 +240,7 @@ mod tests {
     #[test]
     fn many_signals_take_a_bounded_memory() {
         let count = 5_000;
-        let mut trend = Trend::new(Nanos(0), vec![0.0; count]);
+        let mut trend = Trend::new(Nanos(0), count);
         for second in 1..=700_i32 {
             for signal in 0..count {
                 trend.add(signal, f64::from(second), None);

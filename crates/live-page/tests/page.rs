@@ -514,3 +514,68 @@ fn a_simulation_that_does_not_tick_is_shown_as_it_was_and_says_so() {
     assert_eq!(status, 409, "{text}");
     assert!(text.contains("the driver is closed"), "{text}");
 }
+
+#[test]
+fn what_a_plc_never_sent_is_not_exported_as_live() {
+    let page = Page::open();
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
+                [[station]]\nname = \"North\"\n[[station]]\nname = \"South\"\n\
+                [[signal]]\nname = \"to\"\nstation = \"North\"\naddress = \"%IB0\"\n\
+                [[signal]]\nname = \"from\"\nstation = \"South\"\naddress = \"%QB0\"\n";
+    let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+    let mut slots = driver.initial_slots();
+    let options = Options {
+        grace: None,
+        picture: None,
+    };
+    let _member = page.live.join(driver.watch(), options);
+    let (is_over, page) = (AtomicBool::new(false), &page);
+    thread::scope(|scope| {
+        scope.spawn(|| {
+            for tick in 1.. {
+                driver.exchange(Nanos::from_millis(tick), &mut slots);
+                if is_over.load(Ordering::Relaxed) {
+                    break;
+                }
+                thread::yield_now();
+            }
+            driver.close();
+        });
+        let has = |text: &str, line: &str| text.lines().any(|it| it == line);
+        let mut text = String::new();
+        // The first look may come before the first tick.
+        for _ in 0..100 {
+            text = page.ask("GET /metrics", "", "").1;
+            if text.contains("tickbus_signal_value{") {
+                break;
+            }
+        }
+        let signals = page.get("/signals");
+        is_over.store(true, Ordering::Relaxed);
+        let of = "driver=\"x\",id=\"1\"";
+        let (to, from) = (
+            format!("{{{of},signal=\"to\",station=\"North\""),
+            format!("{{{of},signal=\"from\",station=\"South\""),
+        );
+        assert!(
+            has(&text, &format!("tickbus_signal_value{to},unit=\"\"}} 0")),
+            "{text}"
+        );
+        assert!(
+            !text.contains(&format!("tickbus_signal_value{from}")),
+            "{text}"
+        );
+        assert!(
+            has(&text, &format!("tickbus_signal_failsafe{from}}} 1")),
+            "{text}"
+        );
+        let stale = format!("tickbus_station_stale{{{of},station=\"South\"}} 1");
+        assert!(has(&text, &stale), "{text}");
+        let from = &signals["drivers"][0]["signals"][1];
+        assert_eq!(
+            (&from["stale"], &from["failsafe"]),
+            (&true.into(), &true.into())
+        );
+    });
+}

@@ -25,6 +25,11 @@ const ASSETS: &[Asset] = &[
         text: include_str!("page.css"),
     },
     Asset {
+        path: "/stream.js",
+        kind: "text/javascript; charset=utf-8",
+        text: tickbus_web::STREAM,
+    },
+    Asset {
         path: "/client.js",
         kind: "text/javascript; charset=utf-8",
         text: tickbus_web::CLIENT,

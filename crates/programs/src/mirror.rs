@@ -5,7 +5,8 @@ use tickbus_plc::{Program, ProgramError, Scan};
 
 /// Copies every `%I` byte to the `%Q` byte at the same offset, as far as both images reach.
 ///
-/// Stale inputs are copied as well, as a plug would do.
+/// Stale inputs are copied as well, as a plug would do. Where a mirror stands in for a machine, `%Q` signals that state a `fail_safe`
+/// have that value meanwhile.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mirror;
 

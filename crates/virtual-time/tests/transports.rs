@@ -36,6 +36,40 @@ fn over_tcp(
     })
 }
 
+#[test]
+fn a_browser_is_refused_in_words() {
+    use std::io::{Read as _, Write as _};
+
+    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+    let address = listener.address();
+    let controls = Controls::default();
+    let mut news = Vec::new();
+    thread::scope(|scope| {
+        let controls = &controls;
+        scope.spawn(move || {
+            let mut browser = std::net::TcpStream::connect(address).expect("it listens");
+            let request = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nany bytes";
+            browser.write_all(request).expect("it reads");
+            let mut answer = Vec::new();
+            // However it is closed.
+            let _ = browser.read_to_end(&mut answer);
+            controls.send(tickbus_virtual_time::server::Control::Stop);
+        });
+        let hosting = Hosting {
+            clock: &*Monotonic::shared(),
+            controls,
+            news: &mut |line| news.push(line.to_owned()),
+        };
+        let outcome = listener.run(settings(1, &["a"]), Logic::new(), hosting);
+        outcome.expect_err("nobody has joined");
+    });
+    let refused = news.iter().find(|line| line.contains("was refused"));
+    assert!(
+        refused.is_some_and(|line| line.contains("is an HTTP request")),
+        "{news:?}"
+    );
+}
+
 fn serve(
     listener: tcp::Listener,
     settings: Settings,

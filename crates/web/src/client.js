@@ -3,19 +3,15 @@
 // What the scripts of every page of the room share: the token, asking, and listening to the newest state.
 
 const room = (() => {
-  /** Without a word for this long, what is shown counts as old. The room says something every 2 s. */
-  const PATIENCE = 5000;
+  /** Without a word for this long, what is shown counts as old. The room says something every second. */
+  const PATIENCE = 2500;
   /** Without an answer for this long, nobody waits any more. */
   const LONGEST = 10000;
-  /** The pause before the next attempt to listen. */
-  const PAUSE = 1000;
   let tell = {};
-  /** The connection that is listened to; whoever ends it makes it another one. */
-  let line = null;
+  /** What this tab listens to, with its token. */
+  let mine = null;
   let isOpen = false;
   let heard = 0;
-  /** When it was listened for the first time, or again. */
-  let begun = 0;
 
   /** The token comes behind "#", which is sent to nobody, and leaves the address at once. */
   function takeToken() {
@@ -54,8 +50,6 @@ const room = (() => {
 
   function setAge() {
     const now = performance.now();
-    // A connection may be lost without a word, as when a computer sleeps or changes its network.
-    if (now - Math.max(heard, begun) > PATIENCE) connect();
     tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000));
   }
 
@@ -72,45 +66,35 @@ const room = (() => {
     setAge();
   }
 
-  /** Reads events until the connection ends. An EventSource would do it, but cannot send a token. */
-  async function read(mine) {
-    const answer = await fetch("/events", { headers: headers(), signal: mine.signal });
-    if (!answer.ok) return;
-    isOpen = true;
-    askAccess();
-    const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
-    let parts = [];
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done || line !== mine) return;
-      // The end of an event may come in two pieces.
-      let text = parts.at(-1)?.endsWith("\n") ? parts.pop() + value : value;
-      for (let end; (end = text.indexOf("\n\n")) >= 0; text = text.slice(end + 2)) {
-        hear(parts.join("") + text.slice(0, end));
-        parts = [];
-      }
-      if (text) parts.push(text);
-    }
+  function take({ event, isOpen: isNowOpen }) {
+    if (event !== undefined) return hear(event);
+    isOpen = isNowOpen;
+    if (isOpen) askAccess();
+    setAge();
   }
 
-  async function connect() {
-    line?.abort();
-    const mine = new AbortController();
-    line = mine;
-    isOpen = false;
-    // A browser has few connections to one host for all of its tabs. Whoever has the token is still there, though, and what
-    // was forced stays so.
-    if (document.hidden && !sessionStorage.getItem("token")) return;
-    begun = performance.now();
-    try {
-      await read(mine);
-    } catch {
-      // It broke, or was never there: it is tried again.
+  /** What reads for this tab with this token: a worker for all tabs, or the tab itself. */
+  function source(token) {
+    const takeOwn = (message) => { if (token === mine?.token) take(message); };
+    if (!window.SharedWorker) {
+      const own = stream(token, takeOwn);
+      // A hidden tab leaves its connection to others, unless it has forced something.
+      return { look: own.connect, rest: () => { if (!token) own.stop(); }, leave: own.stop };
     }
-    if (line !== mine) return;
+    const { port } = new SharedWorker("/stream.js", { name: token });
+    port.onmessage = ({ data }) => takeOwn(data);
+    return { look: () => port.postMessage("look"), rest: () => port.postMessage("rest"), leave: () => port.postMessage("leave") };
+  }
+
+  function connect() {
+    const token = sessionStorage.getItem("token") ?? "";
+    if (token !== mine?.token) {
+      mine?.from.leave();
+      mine = { token, from: source(token) };
+    }
     isOpen = false;
-    setAge();
-    setTimeout(() => { if (line === mine) connect(); }, PAUSE);
+    if (document.hidden) mine.from.rest();
+    else mine.from.look();
   }
 
   /**
@@ -125,9 +109,12 @@ const room = (() => {
       takeToken();
       connect();
     });
-    document.addEventListener("visibilitychange", () => {
-      if (!isOpen || !sessionStorage.getItem("token")) connect();
+    document.addEventListener("visibilitychange", connect);
+    window.addEventListener("pagehide", () => {
+      mine.from.leave();
+      mine = null;
     });
+    window.addEventListener("pageshow", ({ persisted }) => { if (persisted) connect(); });
     connect();
     setInterval(setAge, 500);
   }

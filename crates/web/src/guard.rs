@@ -4,11 +4,12 @@
 //! nor send `Authorization` without having been allowed to; by a name of its own that suddenly means this machine (DNS
 //! rebinding) it would be of one origin with the room, but then `Host` has that name.
 
-use std::fmt::Write as _;
 use std::io;
 use std::net::IpAddr;
 
 use hyper::header::{AUTHORIZATION, HOST, HeaderMap, HeaderName, ORIGIN};
+
+use crate::token;
 
 /// Lets requests in.
 pub(crate) struct Guard {
@@ -28,15 +29,13 @@ pub(crate) enum Token {
 impl Guard {
     /// Guards a room that is served as `host`, with a new token.
     pub(crate) fn new(host: &str) -> io::Result<Self> {
-        let mut random = [0; 16];
-        getrandom::fill(&mut random).map_err(io::Error::other)?;
-        let mut token = String::new();
-        for byte in random {
-            // Into a text, which takes everything.
-            let _ = write!(token, "{byte:02x}");
-        }
         let host = host.to_ascii_lowercase();
+        let token = token::fresh()?;
         Ok(Self { token, host })
+    }
+
+    pub(crate) fn set_token(&mut self, token: String) {
+        self.token = token;
     }
 
     pub(crate) fn token(&self) -> &str {
@@ -59,7 +58,11 @@ impl Guard {
             ));
         }
         if headers.contains_key(ORIGIN) {
-            let origin = only(headers, &ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
+            // Behind a proxy the page may come by HTTPS.
+            let origin = only(headers, &ORIGIN).and_then(|origin| {
+                let other = origin.strip_prefix("http://");
+                other.or_else(|| origin.strip_prefix("https://"))
+            });
             if !origin.is_some_and(|origin| origin.eq_ignore_ascii_case(host)) {
                 return Err(OTHER.to_owned());
             }
@@ -167,12 +170,15 @@ mod tests {
     fn a_page_of_another_site_is_refused() {
         let guard = Guard::new("127.0.0.1").expect("random numbers");
         let of = |origin| headers(&[(HOST, "127.0.0.1:80"), (ORIGIN, origin)]);
-        assert_eq!(guard.check_source(&of("http://127.0.0.1:80")), Ok(()));
+        for own in ["http://127.0.0.1:80", "https://127.0.0.1:80"] {
+            assert_eq!(guard.check_source(&of(own)), Ok(()), "{own}");
+        }
         for origin in [
             "http://evil.example",
             "http://127.0.0.1:81",
             "http://127.0.0.1",
-            "https://127.0.0.1:80",
+            "https://127.0.0.1:81",
+            "ftp://127.0.0.1:80",
             "null",
             "",
         ] {

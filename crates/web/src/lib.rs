@@ -13,9 +13,13 @@ mod patient;
 mod room;
 mod serve;
 mod site;
+mod token;
 
 pub use room::{Limits, Room, Serving};
 pub use site::{Answer, Asset, Change, Differences, Document, Outcome, Refused, Site, State, Verb};
 
 /// What the scripts of every page share: the token, asking, listening.
 pub const CLIENT: &str = include_str!("client.js");
+
+/// The script that reads the events, as a worker for all tabs of a browser; `client.js` expects it at `/stream.js`.
+pub const STREAM: &str = include_str!("stream.js");

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::io;
 use std::net::{SocketAddr, TcpListener};
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicUsize;
 use std::thread::{self, JoinHandle};
@@ -21,6 +22,7 @@ use crate::guard::Guard;
 use crate::patient::Patient;
 use crate::serve::{Hall, answer};
 use crate::site::Site;
+use crate::token;
 
 /// The longest head of a request, in bytes: four times what a browser sends.
 const HEAD: usize = 16 * 1024;
@@ -85,6 +87,21 @@ impl Room {
             host,
             limits,
         })
+    }
+
+    /// Takes the token from this file, so that an address that was opened stays right after a restart. A file that does not exist is
+    /// made, for its owner alone.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be read or made, holds no token, or other users may read it.
+    pub fn keep_token(&mut self, file: &Path) -> io::Result<()> {
+        let kept = token::kept(file, self.guard.token()).map_err(|error| {
+            let file = file.display();
+            io::Error::new(error.kind(), format!("{file}: {error}"))
+        })?;
+        self.guard.set_token(kept);
+        Ok(())
     }
 
     /// The address that it listens on.

@@ -25,7 +25,7 @@ const BODY: usize = 4096;
 
 /// A viewer hears something at least this often while the site answers; a page that does not knows that what it shows
 /// is old.
-const BEAT: Duration = Duration::from_secs(2);
+const BEAT: Duration = Duration::from_secs(1);
 
 /// The page and its own files; nothing from elsewhere, nothing inline, in nobody's frame.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
@@ -250,13 +250,12 @@ async fn body(hall: &Hall, request: Request<Incoming>) -> Result<String, Refusal
 }
 
 fn no_token(token: Token) -> Refusal {
-    let what = if token == Token::Wrong {
-        "the token is not this room's"
+    let text = if token == Token::Wrong {
+        "the token is not this room's, as after a restart; open the address that is printed now"
     } else {
-        "there is no token"
+        "there is no token; send Authorization: Bearer and the token of the printed address"
     };
-    let text = format!("{what}; send Authorization: Bearer and the token of the printed address");
-    (StatusCode::UNAUTHORIZED, text)
+    (StatusCode::UNAUTHORIZED, text.to_owned())
 }
 
 fn nobody() -> Refusal {

@@ -494,3 +494,32 @@ fn ten_thousand_connections_come_and_go() {
     }
     while !fixture.ask("GET /", "", "").starts_with("HTTP/1.1 200") {}
 }
+
+#[cfg(unix)]
+#[test]
+fn a_token_in_a_file_survives_a_restart_and_is_for_its_owner_alone() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("page.token");
+    let open = || Room::bind(&Address::local(0), Limits::default()).expect("a free port");
+    let token = |room: &Room| room.url().split_once("#token=").map(|it| it.1.to_owned());
+    let mut first = open();
+    first.keep_token(&file).expect("it is made");
+    let mode = std::fs::metadata(&file).expect("made").permissions().mode();
+    assert_eq!(mode & 0o777, 0o600);
+    let mut second = open();
+    assert_ne!(token(&second), token(&first));
+    second.keep_token(&file).expect("it is read");
+    assert_eq!(token(&second), token(&first));
+    for (text, mode, words) in [
+        ("0\n", 0o600, "something else"),
+        ("0123456789abcdef0123456789abcdef\n", 0o644, "chmod 600"),
+    ] {
+        std::fs::write(&file, text).expect("there is room");
+        let permissions = std::fs::Permissions::from_mode(mode);
+        std::fs::set_permissions(&file, permissions).expect("it is ours");
+        let refused = open().keep_token(&file).expect_err(text).to_string();
+        assert!(refused.contains(words), "{refused}");
+    }
+}

@@ -10,6 +10,7 @@ mod named_memory;
 mod open_files;
 #[cfg(unix)]
 mod own_file;
+mod peer_silence;
 mod poll;
 mod poll_set;
 #[cfg(unix)]
@@ -35,6 +36,7 @@ pub use named_memory::NamedMemory;
 pub use open_files::raise_open_files;
 #[cfg(unix)]
 pub use own_file::own_file;
+pub use peer_silence::peer_silence;
 pub use poll::Interest;
 pub use poll_set::{PollSet, Ready};
 #[cfg(unix)]

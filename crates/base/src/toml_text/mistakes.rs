@@ -217,9 +217,16 @@ pub fn printable(text: &str) -> String {
     text.chars().flat_map(escaped).collect()
 }
 
+/// Whether a character is shown as nothing: a control character, or one that turns the direction of the text around it, so that a name
+/// reads as another.
+pub(super) fn is_unprintable(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
 fn escaped(c: char) -> impl Iterator<Item = char> {
-    let escape = c.is_control().then(|| c.escape_default());
-    let plain = (!c.is_control()).then_some(c);
+    let escape = is_unprintable(c).then(|| c.escape_default());
+    let plain = (!is_unprintable(c)).then_some(c);
     escape.into_iter().flatten().chain(plain)
 }
 
@@ -254,6 +261,7 @@ mod tests {
     #[test]
     fn shown_text_is_short_and_printable() {
         assert_eq!(shown("a\tb\u{1b}"), "a\\tb\\u{1b}");
+        assert_eq!(shown("\u{202e}gnp.exe"), "\\u{202e}gnp.exe");
         assert_eq!(shown(&"é".repeat(41)), format!("{}…", "é".repeat(40)));
     }
 }

@@ -5,6 +5,7 @@ use std::ops::RangeInclusive;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::mistakes::is_unprintable;
 use super::{Collector, did_you_mean, nearest, shown};
 use crate::Mistake;
 use crate::time::Nanos;
@@ -256,7 +257,7 @@ impl<'a> Value<'a> {
         let key = &self.key;
         if text.trim().is_empty() {
             self.wrong(format!("{key} is empty"), right);
-        } else if text.chars().any(char::is_control) {
+        } else if text.chars().any(is_unprintable) {
             self.wrong(
                 format!("{key} has a control character in it: \"{}\"", shown(text)),
                 "write it with printable characters only",

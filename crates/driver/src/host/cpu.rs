@@ -9,12 +9,12 @@ use crate::recording::ScanRecorder;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
-use tickbus_image::signal::Area;
+use tickbus_image::signal::{Area, Signal, fail_safe_frame};
 use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, copy_frame, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
-use super::faults::FrameFaults;
+use super::faults::{FrameFaults, take_over};
 use super::scan_counters::CountedArea;
 use super::watched::{ScannedStation, WatchedScans};
 
@@ -42,6 +42,8 @@ pub(super) struct Unit {
     /// Where the edges of its outputs and inputs are counted.
     counted: (Option<CountedArea>, Option<CountedArea>),
     pub(super) inputs: Inputs,
+    /// What a machine takes from a PLC that is not there; `None` at a PLC's end.
+    fail_safe: Option<FailSafe>,
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
     beats: FrameBeats,
@@ -68,6 +70,7 @@ impl Unit {
                 scan_counters.place(station, reads),
             ),
             inputs: Inputs::new(frame(config, station, reads)),
+            fail_safe: (role == Role::Device).then(|| FailSafe::new(config, station, reads)),
             outputs_before: outputs.clone(),
             outputs,
             beats: FrameBeats::new(config, role, station),
@@ -110,6 +113,7 @@ impl Unit {
             program,
             counted: (written, read),
             inputs,
+            fail_safe,
             outputs,
             outputs_before,
             beats,
@@ -125,11 +129,28 @@ impl Unit {
             now,
             alive: self.is_alive,
             cycle: arrival.sequence,
-            inputs: &inputs.bytes,
+            inputs: match fail_safe {
+                Some(fail_safe) if !self.is_alive => fail_safe.apply(&inputs.bytes),
+                _ => &inputs.bytes,
+            },
             outputs,
         });
         beats.beat(now, outputs);
         scan_counters.count(*written, outputs_before, outputs);
+    }
+
+    /// Its inputs as the program saw them.
+    fn inputs(&self) -> &[u8] {
+        match &self.fail_safe {
+            Some(fail_safe) if !self.is_alive => &fail_safe.seen,
+            _ => &self.inputs.bytes,
+        }
+    }
+
+    /// Whether all of these were fail-safe values.
+    fn is_fail_safe(&self) -> bool {
+        let is_whole = self.fail_safe.as_ref().is_some_and(|it| it.is_whole);
+        is_whole && !self.is_alive
     }
 
     /// Its outputs as the program left them.
@@ -157,6 +178,42 @@ impl Unit {
             Some(Arrival { fresh: true, .. }) => Code::Fresh,
             _ => Code::Unchanged,
         }
+    }
+}
+
+/// The values that a machine takes from a PLC that is not there: those that the signals state. The others stay, as behind a plug.
+struct FailSafe {
+    stated: Vec<Signal>,
+    /// Whether all signals state one.
+    is_whole: bool,
+    frame: Box<[u8]>,
+    /// What the program sees.
+    seen: Box<[u8]>,
+}
+
+impl FailSafe {
+    fn new(config: &Config, station: usize, area: Area) -> Self {
+        let table = &config.table;
+        let of_it = |it: &&Signal| it.station == station && it.area == area;
+        let signals: Vec<&Signal> = table.signals.iter().filter(of_it).collect();
+        let stated = signals.iter().filter(|it| it.states_fail_safe);
+        let stated: Vec<Signal> = stated.copied().cloned().collect();
+        let frame = fail_safe_frame(table, station, area);
+        Self {
+            is_whole: stated.len() == signals.len(),
+            stated,
+            seen: frame.clone(),
+            frame,
+        }
+    }
+
+    #[inline]
+    fn apply(&mut self, inputs: &[u8]) -> &[u8] {
+        copy_frame(&mut self.seen, inputs);
+        for signal in &self.stated {
+            take_over(signal, &self.frame, &mut self.seen);
+        }
+        &self.seen
     }
 }
 
@@ -264,7 +321,7 @@ impl Cpu {
             }
         });
         if let (Some(tape), Some(unit)) = (&mut self.tape, units.first()) {
-            tape.scan(now, unit.code(), &unit.inputs.bytes, &unit.outputs);
+            tape.scan(now, unit.code(), unit.inputs(), &unit.outputs);
         }
     }
 
@@ -282,8 +339,9 @@ impl Cpu {
             let stations = self.units.iter().map(|unit| ScannedStation {
                 station: unit.station,
                 status: unit.code(),
-                inputs: &unit.inputs.bytes,
+                inputs: unit.inputs(),
                 outputs: &unit.outputs,
+                is_fail_safe: unit.is_fail_safe(),
             });
             let (scans, _) = self.scan_counters.scans();
             watched.show((now, scans), &self.tick, stations);
@@ -384,6 +442,47 @@ mod tests {
             *told.lock().expect("no panic"),
             [[true; 2], [false; 2], [true; 2]].concat()
         );
+    }
+
+    #[test]
+    fn a_machine_takes_the_fail_safe_values_that_are_stated_when_its_plc_is_gone() {
+        /// Keeps what each scan sees.
+        struct Seen(Arc<Mutex<Vec<Vec<u8>>>>);
+
+        impl Program for Seen {
+            fn name(&self) -> &'static str {
+                "seen"
+            }
+
+            fn input_bytes(&self) -> usize {
+                2
+            }
+
+            fn output_bytes(&self) -> usize {
+                0
+            }
+
+            fn scan(&mut self, scan: &mut Scan<'_>) {
+                self.0.lock().expect("no panic").push(scan.inputs.to_vec());
+            }
+        }
+
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                    [[signal]]\nname = \"a\"\naddress = \"%QB0\"\nfail_safe = 7\n\
+                    [[signal]]\nname = \"b\"\naddress = \"%QB1\"\n";
+        let config = tickbus_driver_cfg::Config::parse("driver.cfg", text).expect("right");
+        let seen = Arc::default();
+        let program = Box::new(Seen(Arc::clone(&seen)));
+        let (mut cpu, mut bus) = half(program, &config, Role::Device);
+        bus.received(0, Nanos::from_millis(10), &[170, 171], true);
+        bus.hand_over();
+        cpu.scan(Nanos::from_millis(10), true);
+        cpu.scan(Nanos::from_secs(60), true);
+        bus.received(0, Nanos::from_secs(61), &[170, 171], true);
+        bus.hand_over();
+        cpu.scan(Nanos::from_secs(61), true);
+        let seen = seen.lock().expect("no panic").clone();
+        assert_eq!(seen, [[170, 171], [7, 171], [170, 171]]);
     }
 
     #[test]

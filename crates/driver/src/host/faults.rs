@@ -160,7 +160,7 @@ impl FrameFaults {
 }
 
 /// Copies the bits of one signal.
-fn take_over(signal: &Signal, from: &[u8], to: &mut [u8]) {
+pub(super) fn take_over(signal: &Signal, from: &[u8], to: &mut [u8]) {
     if signal.data_type == DataType::Bool {
         let mask = 1 << signal.bit;
         to[signal.byte] = (to[signal.byte] & !mask) | (from[signal.byte] & mask);

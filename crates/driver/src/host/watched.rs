@@ -31,6 +31,8 @@ pub(super) struct ScannedStation<'a> {
     pub(super) status: Code,
     pub(super) inputs: &'a [u8],
     pub(super) outputs: &'a [u8],
+    /// Whether these inputs are fail-safe values.
+    pub(super) is_fail_safe: bool,
 }
 
 impl WatchedScans {
@@ -98,8 +100,7 @@ impl WatchedScans {
                     },
                     age,
                     is_valid,
-                    // A program is told, and sees what came last.
-                    is_fail_safe: false,
+                    is_fail_safe: station.is_fail_safe,
                     cycles: image.received(index),
                 };
                 code = code.worse(seen.status);

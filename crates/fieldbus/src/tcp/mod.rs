@@ -5,6 +5,7 @@ mod address;
 mod connect;
 mod dial;
 mod dialler;
+mod http;
 mod listen;
 mod resolve;
 mod server;
@@ -16,10 +17,11 @@ pub use address::{Address, Host};
 pub use connect::{connect, reach};
 pub use dial::{Call, Caller, Stream, dial};
 pub use dialler::Dialler;
+pub use http::{IS_HTTP, begins_like_http};
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
-pub use stream::{close_gracefully, is_for_later, prepare};
+pub use stream::{close_gracefully, is_for_later, prepare, watch_peer};
 
 /// The system cannot wait on this thread, or for this socket.
 pub fn no_wait(error: &std::io::Error) -> BusError {

@@ -50,3 +50,24 @@ pub fn prepare(stream: &TcpStream, patience: Nanos) -> io::Result<()> {
         .with_interval(pause);
     socket.set_tcp_keepalive(&keepalive)
 }
+
+/// Replaces the patience of [`prepare`] for a peer that need not read: the system asks its computer every second whether the
+/// connection is still there, and ends it after two questions without an answer. While data are on their way it does not ask;
+/// [`peer_silence`](tickbus_base::os::peer_silence) tells of those.
+///
+/// # Errors
+///
+/// The system refuses one of these settings.
+pub fn watch_peer(stream: &TcpStream) -> io::Result<()> {
+    let socket = SockRef::from(stream);
+    // A limit would count for a peer as well that is there and does not read.
+    #[cfg(any(target_os = "linux", target_os = "android"))]
+    socket.set_tcp_user_timeout(None)?;
+    let second = std::time::Duration::from_secs(1);
+    let keepalive = socket2::TcpKeepalive::new()
+        .with_time(second)
+        .with_interval(second);
+    #[cfg(not(windows))]
+    let keepalive = keepalive.with_retries(2);
+    socket.set_tcp_keepalive(&keepalive)
+}

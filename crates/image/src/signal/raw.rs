@@ -99,6 +99,7 @@ fn bits_of(table: &SignalTable) -> SignalTable {
         },
         scale: None,
         fail_safe: Slot::default(),
+        states_fail_safe: false,
         ..signal.clone()
     });
     SignalTable {

@@ -134,6 +134,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         latch: latch.and_then(|value| fitting_latch(&value, latched.flatten()?, data_type)),
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
+        states_fail_safe: fail_safe.is_some(),
         dead_band: dead_band
             .and_then(|value| fitting_dead_band(&value, band.flatten()?, data_type))
             .unwrap_or_default(),

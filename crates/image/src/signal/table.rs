@@ -43,6 +43,8 @@ pub struct Signal {
     /// The value in its place when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
     /// engineering units, as the signal's own slot would hold it.
     pub fail_safe: Slot,
+    /// Whether that value was stated, and is not merely the usual 0.
+    pub states_fail_safe: bool,
     /// How far the value may move, in engineering units, before a bus that sends on change sends it; zero
     /// sends every change. Never negative, and zero on a BOOL.
     pub dead_band: f64,
@@ -67,6 +69,7 @@ impl Signal {
             latch: None,
             hold: Nanos::ZERO,
             fail_safe: Slot::default(),
+            states_fail_safe: false,
             dead_band: 0.0,
             range: None,
         }

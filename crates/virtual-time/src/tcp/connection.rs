@@ -4,7 +4,7 @@ use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{close_gracefully, prepare};
+use tickbus_fieldbus::tcp::{IS_HTTP, begins_like_http, close_gracefully, prepare};
 
 use super::is_later;
 use crate::server::ToClient;
@@ -81,7 +81,13 @@ impl Connection {
     /// Takes the next frame that is complete, without its header.
     pub(super) fn frame(&mut self) -> Result<Option<&[u8]>, String> {
         let arrived = &self.buffer[self.start..self.end];
-        let frame = wire::frame(arrived)?;
+        let frame = wire::frame(arrived).map_err(|why| {
+            if begins_like_http(arrived) {
+                IS_HTTP.to_owned()
+            } else {
+                why
+            }
+        })?;
         if let Some(frame) = frame {
             self.start += wire::HEADER + frame.len();
         }

@@ -28,7 +28,7 @@
  * become those of another driver.
  *
  * THREADS. One thread at a time ticks a driver and moves its values; a second one that ticks is answered by TB_BUSY. All other
- * functions can be called by any thread: they wait for a tick that is in their way, at most 100 ms (tb_close 2 s), before they
+ * functions can be called by any thread: they wait for a tick that is in their way, at most 2 s, before they
  * return TB_BUSY. Any thread may read tb_buffer itself at any time. No function throws, exits, or touches the process's signal
  * handlers. Ask tb_last_error before tb_close: afterwards the line's reason is gone.
  *

@@ -72,8 +72,8 @@ class Driver(_native.Driver):
     ``exchange()`` sends first and then receives, so that an answer goes out with the next tick. Neither waits for the bus,
     unless it is a stepped one; there the interpreter's lock is released meanwhile.
 
-    One thread at a time uses a driver. A call that meets a tick of another thread waits for it, at most 100 ms (``close()`` 2 s);
-    then it raises ``FieldbusError`` with ``Status.BUSY``.
+    One thread at a time uses a driver. A call that meets a tick of another thread waits for it, at most 2 s; then it
+    raises ``FieldbusError`` with ``Status.BUSY``.
     """
 
     __slots__ = ("__weakref__",)

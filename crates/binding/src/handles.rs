@@ -48,14 +48,12 @@ const VISITED: u64 = 3;
 /// The tenant has panicked, and waits to be closed.
 const FAILED: u64 = 4;
 
-/// How long a visit waits for a tick, and a tick for a visit.
-const PATIENCE: Nanos = Nanos::from_millis(100);
-/// How long closing waits: longer, since a driver that stays open loses the end of its recording and its farewell to the PLC.
-const CLOSE_PATIENCE: Nanos = Nanos::from_secs(2);
+/// How long a visit waits for a tick, and a tick for a visit: on a busy machine the other thread may have no processor for long.
+const PATIENCE: Nanos = Nanos::from_secs(2);
 /// In how many rounds a visit looks at the place at least, before it gives up.
 const LEAST_ROUNDS: u32 = 20;
 /// How long a visit only yields between two rounds; afterwards it also sleeps.
-const AWAKE: Nanos = PATIENCE;
+const AWAKE: Nanos = Nanos::from_millis(100);
 /// How long it then sleeps, once in [`LEAST_ROUNDS`].
 const NAP: Nanos = Nanos::from_millis(1);
 /// In a round, how often to look at the place before the processor is given to another thread: some microseconds.
@@ -183,7 +181,7 @@ impl<T, const N: usize> Handles<T, N> {
         done
     }
 
-    /// Any other call: as [`tick`](Self::tick), and waits for a tick that is in its way, at most 100 ms.
+    /// Any other call: as [`tick`](Self::tick), and waits for a tick that is in its way, at most 2 s.
     ///
     /// # Errors
     ///
@@ -211,7 +209,7 @@ impl<T, const N: usize> Handles<T, N> {
     ///
     /// The handle was never open, is closed already, or in use by other threads for all this time.
     pub fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
-        self.close_within(CLOSE_PATIENCE, handle, close)
+        self.close_within(PATIENCE, handle, close)
     }
 
     fn close_within<R>(

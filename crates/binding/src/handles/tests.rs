@@ -79,9 +79,7 @@ fn a_tenant_in_use_is_busy_and_stays_open() {
     let handles: Handles<u32, 1> = Handles::new();
     let handle = open(&handles, 1);
     let answers = handles.tick(handle, |_| {
-        let visit = handles
-            .visit(handle, |_| ())
-            .map_err(|refusal| refusal.code);
+        let visit = handles.enter(handle, OPEN, Nanos::ZERO).map(drop);
         let close = handles.close_within(Nanos::ZERO, handle, |_| ());
         (handles.tick(handle, |_| ()), visit, close)
     });

@@ -53,7 +53,7 @@ import java.util.stream.Stream;
  * threads calls that at the end of each event that ticks. {@link #statistics}, {@link #inject}, {@link #faults} and
  * {@link #close} can be called by any thread, also by a shutdown hook. They wait for the tick that is in their way, and a
  * simulation that ticks without a pause lets them in. They throw {@link Status#BUSY} only if one tick takes longer than
- * 100 ms ({@code close} 2 s), as on a stepped bus whose PLC is slow. A tick that meets one of them waits until it is done.
+ * 2 s, as on a stepped bus whose PLC is slow. A tick that meets one of them waits until it is done.
  * Different drivers are independent of each other.
  *
  * <p><b>The end.</b> Close a driver by try-with-resources. A driver to which nothing refers any more is closed, and its name

@@ -4,6 +4,7 @@ fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     find_compiler();
     link();
+    name();
 }
 
 /// `TICKBUS_LINK_ARG` is an option for the linker of a release; `tools/build` sets it where the linker has it.
@@ -15,6 +16,13 @@ fn link() {
     println!("cargo::rerun-if-env-changed={OPTION}");
     if let Ok(option) = std::env::var(OPTION) {
         println!("cargo::rustc-link-arg={option}");
+    }
+}
+
+/// Other programs find the library by this name, however its file is called.
+fn name() {
+    if std::env::var("CARGO_CFG_TARGET_OS").as_deref() == Ok("linux") {
+        println!("cargo::rustc-cdylib-link-arg=-Wl,-soname,libtickbus.so");
     }
 }
 

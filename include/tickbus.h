@@ -4,11 +4,12 @@
  * ticks:
  *
  *     tb_driver plc;
- *     if (tb_open("driver.cfg", NULL, &plc) < 0) { fputs(tb_last_error(), stderr); return 1; }
- *     tb_buffer *values = tb_buffer_of(plc);
  *     tb_signal valve, level;
- *     tb_find(plc, "Valve", &valve);
- *     tb_find(plc, "Level", &level);
+ *     if (tb_open("driver.cfg", NULL, &plc) < 0 || tb_find(plc, "Valve", &valve) < 0 || tb_find(plc, "Level", &level) < 0) {
+ *         fputs(tb_last_error(), stderr);
+ *         return 1;
+ *     }
+ *     tb_buffer *values = tb_buffer_of(plc);
  *     for (;;) {
  *         int status = tb_receive(plc);          // TB_FRESH, TB_UNCHANGED, TB_STALE; below 0 a failure
  *         run(tb_get_bool(values, &valve));      // your machine
@@ -19,15 +20,20 @@
  * examples/c/tank.c is a whole one; docs/c-api.md explains it. Link with libtickbus.so (tickbus.dll, libtickbus.dylib).
  *
  * VALUES are in the unit of their signal, scaled as driver.cfg says. Directions are the PLC's: a simulated machine writes %I and
- * reads %Q. What is set out of range is sent as the nearest value that fits.
+ * reads %Q. What is set out of range is sent as the nearest value that fits, NaN as the signal's fail-safe value; the statistics
+ * count both.
  *
  * HANDLES are numbers: one that was never open, or is closed already, is answered by TB_NOT_OPEN or TB_CLOSED. The buffer
  * of a driver stays valid memory after tb_close, until the end of the process; its values then mean nothing, and may
  * become those of another driver.
  *
- * THREADS. One thread at a time calls a driver's functions and moves its values; a second one is answered by TB_BUSY. Any
- * thread may read tb_buffer itself at any time. No function throws, exits, or touches the
- * process's signal handlers. Ask tb_last_error before tb_close: afterwards the line's reason is gone.
+ * THREADS. One thread at a time ticks a driver and moves its values; a second one that ticks is answered by TB_BUSY. All other
+ * functions can be called by any thread: they wait for a tick that is in their way, at most 2 s, before they
+ * return TB_BUSY. Any thread may read tb_buffer itself at any time. No function throws, exits, or touches the process's signal
+ * handlers. Ask tb_last_error before tb_close: afterwards the line's reason is gone.
+ *
+ * END. When the process ends by exit() or by the end of main, drivers that are open are closed (not on Windows). A signal
+ * that kills the process ends it without that: handle SIGTERM and SIGINT, leave the loop, and call tb_close.
  *
  * FORK. A forked child has none of the driver's threads: it must not call a driver that its parent has opened.
  *
@@ -78,7 +84,7 @@ enum tb_kind { TB_REAL = 0, TB_INTEGER = 1, TB_NATURAL = 2 };
 
 /* What simulator and driver share. All times are in nanoseconds. */
 typedef struct tb_buffer {
-    uint64_t version;        /* of this layout: 1 */
+    uint64_t version;        /* of this layout: 2 */
     int64_t status;          /* of the last tb_exchange, tb_receive or tb_send that did not fail with TB_INTERNAL */
     uint64_t sequence;       /* bus cycles that have arrived */
     int64_t age;             /* of the values read last */
@@ -86,6 +92,9 @@ typedef struct tb_buffer {
     int64_t granted;         /* on a stepped bus: how far the simulation may go before it has to exchange again */
     uint64_t ticks;          /* how many there were */
     uint64_t slot_count;     /* slots that follow: see tb_slots */
+    uint64_t saturated;      /* counted by tb_set: values beyond a 64-bit integer */
+    uint64_t not_a_number;   /* counted by tb_set: NaN for a 64-bit integer */
+    tb_slot spare;           /* of a signal that was not found */
 } tb_buffer;
 
 /* A signal. The texts are valid until the end of the process. */
@@ -99,6 +108,7 @@ typedef struct tb_signal {
     int32_t edges;       /* where the number of edges is that came with the last exchange; -1: none are counted */
     int32_t is_written;  /* 1 if the simulator writes it, 0 if it reads it */
     int32_t kind;        /* what its slot holds: TB_REAL; TB_INTEGER for LINT, TB_NATURAL for ULINT and LWORD */
+    tb_slot fail_safe;   /* what its slot holds at first; sent for NaN */
 } tb_signal;
 
 /* A change of a signal, for buses with `events = true`. */
@@ -135,7 +145,8 @@ TB_IMPORT tb_buffer *tb_buffer_of(tb_driver driver);
 /* How many signals there are, or a status below 0. */
 TB_IMPORT int32_t tb_signal_count(tb_driver driver);
 
-/* A signal by its index, from 0, in the order of driver.cfg; or by its name. TB_BAD_ARGUMENT: there is none. */
+/* A signal by its index, from 0, in the order of driver.cfg; or by its name. On failure `signal` is one that reads 0 and cannot
+ * be set. TB_BAD_ARGUMENT: the driver has no such signal. */
 TB_IMPORT int32_t tb_signal_at(tb_driver driver, int32_t index, tb_signal *signal);
 TB_IMPORT int32_t tb_find(tb_driver driver, const char *name, tb_signal *signal);
 
@@ -161,6 +172,17 @@ TB_IMPORT int32_t tb_faults(tb_driver driver, char *text, size_t room);
  * driver.cfg has no [page]. Returns as tb_statistics does. */
 TB_IMPORT int32_t tb_page(tb_driver driver, char *text, size_t room);
 
+/* Paces a loop by the computer's clock: waits until *due, then moves it on by `period` (nanoseconds, above 0). *due is 0 before the
+ * first turn, which begins at once. Returns by how many nanoseconds this turn begins late, or a status below 0. A late turn does
+ * not delay the next one; turns that were missed are left out.
+ *
+ *     int64_t due = 0;
+ *     for (;;) { int64_t lag = tb_wait_until(&due, 10000000); ... one step of 10 ms ... } */
+TB_IMPORT int64_t tb_wait_until(int64_t *due, int64_t period);
+
+/* The version of the library, such as "0.1.0". */
+TB_IMPORT const char *tb_version(void);
+
 /* Why the last failed call of this thread failed, and what to do; "" if none has. Valid until this thread's next call. */
 TB_IMPORT const char *tb_last_error(void);
 
@@ -184,21 +206,30 @@ static inline double tb_whole(double value) {
 }
 
 /* Sets a signal, to be sent with the next tb_exchange or tb_send. For a BOOL everything but 0 is true. What its slot cannot
- * hold becomes the nearest value that it can; write integers beyond 2^53 into the slot itself. */
-static inline void tb_set(tb_buffer *values, const tb_signal *signal, double value) {
+ * hold becomes the nearest value that it can; write integers beyond 2^53 into the slot itself. Returns 0; or TB_BAD_ARGUMENT,
+ * and does nothing, if the PLC writes this signal or it was not found. */
+static inline int32_t tb_set(tb_buffer *values, const tb_signal *signal, double value) {
+    if (!signal->is_written) return TB_BAD_ARGUMENT;
     tb_slot *slot = tb_slots(values) + signal->slot;
     if (signal->kind == TB_REAL) {
         slot->real = value;
-        return;
+        return TB_FRESH;
     }
     double whole = tb_whole(value);
-    if (signal->kind == TB_NATURAL) {
-        slot->natural = whole >= 18446744073709551616.0 ? UINT64_MAX : whole > 0 ? (uint64_t)whole : 0;
-    } else if (whole >= -9223372036854775808.0 && whole < 9223372036854775808.0) {
-        slot->integer = (int64_t)whole;
+    double least = signal->kind == TB_NATURAL ? 0 : -9223372036854775808.0;
+    double beyond = signal->kind == TB_NATURAL ? 18446744073709551616.0 : 9223372036854775808.0;
+    if (whole != whole) {
+        *slot = signal->fail_safe;
+        values->not_a_number++;
+    } else if (whole >= least && whole < beyond) {
+        if (signal->kind == TB_NATURAL) slot->natural = (uint64_t)whole;
+        else slot->integer = (int64_t)whole;
     } else {
-        slot->integer = whole > 0 ? INT64_MAX : whole < 0 ? INT64_MIN : 0;
+        if (signal->kind == TB_NATURAL) slot->natural = whole > 0 ? UINT64_MAX : 0;
+        else slot->integer = whole > 0 ? INT64_MAX : INT64_MIN;
+        values->saturated++;
     }
+    return TB_FRESH;
 }
 
 /* How many edges came with the last exchange; 0 if none are counted. */

@@ -8,19 +8,23 @@
     reason = "exported names and the pointers that a caller in C hands in"
 )]
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::catch_unwind;
 use std::path::Path;
 use std::ptr::{NonNull, null_mut};
+#[cfg(unix)]
+use std::sync::Once;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::page::{self, Place};
 use once_cell::sync::Lazy;
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Pace, Stop};
 use tickbus_base::toml_text::nearest;
 use tickbus_binding::{
-    Device, EVENT_WORDS, EVENTS, Handles, Refusal, Shared, closing, faults, open, read_fault,
+    Device, EVENT_WORDS, EVENTS, Handles, Refusal, SPARE_SLOT, Shared, SlotKind, closing, faults,
+    open, read_fault,
 };
 use tickbus_driver::Code;
 use tickbus_image::signal::Signal;
@@ -35,16 +39,16 @@ static RETIRED: Mutex<Vec<Buffer>> = Mutex::new(Vec::new());
 /// Texts that were handed out: their pointers stay valid.
 static TEXTS: Lazy<Mutex<HashSet<&'static CStr>>> = Lazy::new(Mutex::default);
 
-thread_local! {
-    static LAST: RefCell<Last> = const { RefCell::new(Last::None) };
-}
+/// Armed by the first driver.
+#[cfg(unix)]
+static AT_EXIT: Once = Once::new();
 
-/// Why this thread's last failed call failed.
-enum Last {
-    None,
-    /// A tick; its text is made when it is asked for.
-    Tick(i64, Code),
-    Told(CString),
+thread_local! {
+    /// Why this thread's last failed call failed.
+    static LAST: RefCell<CString> = RefCell::default();
+    /// If that was a tick: its driver and code. The text is made when it is asked for. Without a destructor, which would be
+    /// registered in memory that is allocated by the tick.
+    static LAST_TICK: Cell<Option<(i64, Code)>> = const { Cell::new(None) };
 }
 
 /// `tb_signal` of the header.
@@ -59,6 +63,23 @@ struct CSignal {
     edges: i32,
     is_written: i32,
     kind: i32,
+    fail_safe: u64,
+}
+
+impl CSignal {
+    /// A signal that does not exist: reads 0, and cannot be set.
+    const NONE: Self = Self {
+        name: c"".as_ptr(),
+        address: c"".as_ptr(),
+        data_type: c"".as_ptr(),
+        unit: c"".as_ptr(),
+        station: c"".as_ptr(),
+        slot: SPARE_SLOT,
+        edges: -1,
+        is_written: 0,
+        kind: SlotKind::Real as i32,
+        fail_safe: 0,
+    };
 }
 
 /// Memory of a buffer: a number of words that are never given back. Not a slice, since a caller may write there at any time.
@@ -78,7 +99,7 @@ struct Opened {
 
 impl Opened {
     fn close(self) {
-        self.device.close();
+        drop(self.device.close());
         retired().push(self.buffer);
     }
 }
@@ -114,16 +135,19 @@ fn permanent(text: &str) -> *const c_char {
     kept.as_ptr()
 }
 
-/// Keeps why this thread's last failed call failed. A thread that is ending, as in a handler of `atexit`, may have no place for it.
-fn remember(why: Last) {
-    let _ = LAST.try_with(|last| last.replace(why));
+/// Closes the drivers that are open when the process ends.
+#[cfg(unix)]
+fn close_all() {
+    closing(|| DRIVERS.close_all(Opened::close));
 }
 
 /// Keeps why a call failed, and returns its code.
 fn failed(refusal: &Refusal) -> i32 {
     let text = refusal.to_string().replace('\0', " ");
     let text = CString::new(text).unwrap_or_default();
-    remember(Last::Told(text));
+    // A thread that is ending, as in a handler of `atexit`, may have no place for it.
+    let _ = LAST.try_with(|last| last.replace(text));
+    LAST_TICK.set(None);
     refusal.code.code()
 }
 
@@ -133,10 +157,10 @@ fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
 }
 
 fn tick(driver: i64, work: impl FnOnce(&mut Device<Option<Place>>) -> Code) -> i32 {
-    let code = DRIVERS.with(driver, |opened| work(&mut opened.device));
+    let code = DRIVERS.tick(driver, |opened| work(&mut opened.device));
     let code = code.unwrap_or_else(|refused| refused);
     if code.code() < 0 {
-        remember(Last::Tick(driver, code));
+        LAST_TICK.set(Some((driver, code)));
     }
     code.code()
 }
@@ -180,10 +204,9 @@ fn why(driver: i64, code: Code) -> Refusal {
     if code != Code::BusFailed {
         return DRIVERS.reason(driver, code);
     }
-    let snapshot = DRIVERS.with(driver, |opened| opened.device.snapshot());
-    match snapshot {
+    match DRIVERS.visit(driver, |opened| opened.device.snapshot()) {
         Ok(snapshot) => Refusal::of_tick(code, &snapshot),
-        Err(_) => DRIVERS.reason(driver, code),
+        Err(_) => Refusal::plain(code),
     }
 }
 
@@ -218,7 +241,10 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
         let shared =
             shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
         let device = Device::new(opened, shared);
-        let handle = place.fill(Opened { device, buffer });
+        #[cfg(unix)]
+        AT_EXIT.call_once(|| tickbus_base::os::at_exit(close_all));
+        let name = device.config().name.clone();
+        let handle = place.fill(&name, Opened { device, buffer });
         // SAFETY: as above.
         unsafe { driver.write(handle) };
         Ok(Code::Fresh.code())
@@ -252,7 +278,7 @@ extern "C" fn tb_send(driver: i64) -> i32 {
 extern "C" fn tb_buffer_of(driver: i64) -> *mut u64 {
     let mut words = null_mut();
     answer(|| {
-        words = DRIVERS.with_reason(driver, |opened| opened.buffer.words.as_ptr())?;
+        words = DRIVERS.visit(driver, |opened| opened.buffer.words.as_ptr())?;
         Ok(0)
     });
     words
@@ -261,7 +287,7 @@ extern "C" fn tb_buffer_of(driver: i64) -> *mut u64 {
 #[unsafe(no_mangle)]
 extern "C" fn tb_signal_count(driver: i64) -> i32 {
     answer(|| {
-        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
         Ok(i32::try_from(config.table.signals.len()).unwrap_or(i32::MAX))
     })
 }
@@ -275,7 +301,9 @@ unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal)
         let find = |signals: &[Signal]| {
             let found = usize::try_from(index).ok().filter(|&at| at < signals.len());
             let last = signals.len().saturating_sub(1);
-            found.ok_or_else(|| format!("there is no signal {index}; expected 0 to {last}"))
+            found.ok_or_else(|| {
+                no_signal(format!("there is no signal {index}; expected 0 to {last}"))
+            })
         };
         // SAFETY: the caller's promise.
         unsafe { describe(driver, signal, find) }
@@ -288,19 +316,27 @@ unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal)
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSignal) -> i32 {
     answer(|| {
-        // SAFETY: the caller's promises.
-        let name = unsafe { text(name, "name") }?;
         let find = |signals: &[Signal]| {
+            // SAFETY: the caller's promise.
+            let name = unsafe { text(name, "name") }?;
             let found = signals.iter().position(|signal| signal.name == name);
             let names = signals.iter().map(|signal| &*signal.name);
-            found.ok_or_else(|| match nearest(name, names) {
-                Some(near) => format!("there is no signal \"{name}\"; did you mean \"{near}\"?"),
-                None => format!("there is no signal \"{name}\""),
+            found.ok_or_else(|| {
+                no_signal(match nearest(name, names) {
+                    Some(near) => {
+                        format!("there is no signal \"{name}\"; did you mean \"{near}\"?")
+                    }
+                    None => format!("there is no signal \"{name}\""),
+                })
             })
         };
-        // SAFETY: as above.
+        // SAFETY: the caller's promise.
         unsafe { describe(driver, signal, find) }
     })
+}
+
+fn no_signal(text: String) -> Refusal {
+    Refusal::new(Code::BadArgument, text)
 }
 
 /// Describes the signal whose index `find` gives.
@@ -311,16 +347,18 @@ unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSig
 unsafe fn describe(
     driver: i64,
     into: *mut CSignal,
-    find: impl FnOnce(&[Signal]) -> Result<usize, String>,
+    find: impl FnOnce(&[Signal]) -> Result<usize, Refusal>,
 ) -> Result<i32, Refusal> {
     if into.is_null() {
         return Err(Refusal::new(Code::BadArgument, "signal is NULL"));
     }
-    let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
-    let index = find(&config.table.signals);
-    let index = index.map_err(|why| Refusal::new(Code::BadArgument, why))?;
+    // What a caller uses who does not look at the status.
+    // SAFETY: the caller's promise.
+    unsafe { into.write(CSignal::NONE) };
+    let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
+    let index = find(&config.table.signals)?;
     let number = |slot| i32::try_from(slot).unwrap_or(i32::MAX);
-    let description = DRIVERS.with_reason(driver, |opened| {
+    let description = DRIVERS.visit(driver, |opened| {
         opened.device.describe(index, |signal| CSignal {
             name: permanent(signal.name),
             address: permanent(&signal.address),
@@ -331,9 +369,10 @@ unsafe fn describe(
             edges: signal.edges.map_or(-1, number),
             is_written: signal.is_written.into(),
             kind: signal.kind as i32,
+            fail_safe: signal.fail_safe.0,
         })
     })?;
-    // SAFETY: the caller's promise.
+    // SAFETY: as above.
     unsafe { into.write(description) };
     Ok(Code::Fresh.code())
 }
@@ -344,7 +383,7 @@ unsafe fn describe(
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_statistics(driver: i64, into: *mut c_char, room: usize) -> i32 {
     answer(|| {
-        let snapshot = DRIVERS.with_reason(driver, |opened| opened.device.snapshot())?;
+        let snapshot = DRIVERS.visit(driver, |opened| opened.device.snapshot())?;
         // SAFETY: the caller's promise.
         Ok(unsafe { hand_over(&snapshot.to_string(), into, room) })
     })
@@ -361,8 +400,7 @@ unsafe extern "C" fn tb_events(driver: i64, into: *mut i64, room: usize) -> i32 
         }
         let mut words = [0; EVENTS * EVENT_WORDS];
         let room = room.min(EVENTS) * EVENT_WORDS;
-        let count =
-            DRIVERS.with_reason(driver, |opened| opened.device.events(&mut words[..room]))?;
+        let count = DRIVERS.visit(driver, |opened| opened.device.events(&mut words[..room]))?;
         // SAFETY: the caller's promise; an event is three words.
         unsafe { into.copy_from_nonoverlapping(words.as_ptr(), count * EVENT_WORDS) };
         Ok(i32::try_from(count).unwrap_or(i32::MAX))
@@ -377,9 +415,9 @@ unsafe extern "C" fn tb_inject(driver: i64, fault: *const c_char) -> i32 {
     answer(|| {
         // SAFETY: the caller's promise.
         let fault = unsafe { text(fault, "fault") }?;
-        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
         let fault = read_fault(fault, &config)?;
-        let id = DRIVERS.with_reason(driver, |opened| opened.device.inject(&fault))??;
+        let id = DRIVERS.visit(driver, |opened| opened.device.inject(&fault))??;
         Ok(i32::try_from(id).unwrap_or(i32::MAX))
     })
 }
@@ -389,7 +427,7 @@ extern "C" fn tb_end_fault(driver: i64, fault: i32) -> i32 {
     answer(|| {
         let id = u32::try_from(fault).unwrap_or_default();
         Ok(DRIVERS
-            .with_reason(driver, |opened| opened.device.end_fault(id))?
+            .visit(driver, |opened| opened.device.end_fault(id))?
             .into())
     })
 }
@@ -400,7 +438,7 @@ extern "C" fn tb_end_fault(driver: i64, fault: i32) -> i32 {
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i32 {
     answer(|| {
-        let board = DRIVERS.with_reason(driver, |opened| opened.device.board())?;
+        let board = DRIVERS.visit(driver, |opened| opened.device.board())?;
         // SAFETY: the caller's promise.
         Ok(unsafe { hand_over(&faults(&board), into, room) })
     })
@@ -412,26 +450,56 @@ unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_page(driver: i64, into: *mut c_char, room: usize) -> i32 {
     answer(|| {
-        let config = DRIVERS.with_reason(driver, |opened| opened.device.config())?;
+        let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
         let url = config.page.is_some().then(page::url).flatten();
         // SAFETY: the caller's promise.
         Ok(unsafe { hand_over(&url.unwrap_or_default(), into, room) })
     })
 }
 
+/// # Safety
+///
+/// `due` must be null or point to an `int64_t`.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_wait_until(due: *mut i64, period: i64) -> i64 {
+    let mut lag = Nanos::ZERO;
+    let waited = answer(|| {
+        if due.is_null() || period <= 0 {
+            let text = "due is NULL, or period is not above 0";
+            return Err(Refusal::new(Code::BadArgument, text));
+        }
+        let clock = Monotonic::shared();
+        // SAFETY: the caller's promise, here and below.
+        let at = match unsafe { due.read() } {
+            0 => clock.now(),
+            at => Nanos(at),
+        };
+        clock.wait_until(at, &Stop::new());
+        let now = clock.now();
+        lag = now - at;
+        let mut pace = Pace::new(at, Nanos(period));
+        pace.take(now);
+        // SAFETY: as above.
+        unsafe { due.write(pace.due().0) };
+        Ok(Code::Fresh.code())
+    });
+    if waited < 0 { waited.into() } else { lag.0 }
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_version() -> *const c_char {
+    const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), "\0");
+    VERSION.as_ptr().cast()
+}
+
 #[unsafe(no_mangle)]
 extern "C" fn tb_last_error() -> *const c_char {
-    let told = |last: &RefCell<Last>| {
-        let mut last = last.borrow_mut();
-        if let Last::Tick(driver, code) = *last {
-            let text = why(driver, code).to_string();
-            *last = Last::Told(CString::new(text.replace('\0', " ")).unwrap_or_default());
+    let text = catch_unwind(|| {
+        if let Some((driver, code)) = LAST_TICK.get() {
+            failed(&why(driver, code));
         }
-        match &*last {
-            Last::Told(text) => text.as_ptr(),
-            _ => c"".as_ptr(),
-        }
-    };
-    let text = catch_unwind(|| LAST.try_with(told).unwrap_or(c"".as_ptr()));
+        let told = LAST.try_with(|last| last.borrow().as_ptr());
+        told.unwrap_or(c"".as_ptr())
+    });
     text.unwrap_or(c"a panic while the reason was looked for".as_ptr())
 }

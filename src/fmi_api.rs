@@ -211,7 +211,7 @@ fn call_once(
     handle: *mut c_void,
     work: &mut dyn FnMut(&mut Instance) -> Result<(), String>,
 ) -> c_int {
-    let done = INSTANCES.with(handle as i64, |tenant| tenant.work(work));
+    let done = INSTANCES.tick(handle as i64, |tenant| tenant.work(work));
     match done {
         Ok(None) => Status::Ok as c_int,
         Ok(Some(told)) => tell(told),
@@ -293,7 +293,7 @@ fn instantiate(
             journal: journal.clone(),
             broken: None,
         });
-        Ok(place.fill(tenant) as *mut c_void)
+        Ok(place.fill(token, tenant) as *mut c_void)
     }));
     let made = made
         .unwrap_or_else(|payload| Err(format!("a defect of tickbus: {}", panic_message(payload))));
@@ -327,7 +327,7 @@ fn free(handle: *mut c_void) {
 
 /// Whether the tool wants every change of the line.
 fn set_logging(handle: *mut c_void, all: bool) -> c_int {
-    let done = INSTANCES.with(handle as i64, |tenant| tenant.journal.all = all);
+    let done = INSTANCES.tick(handle as i64, |tenant| tenant.journal.all = all);
     done.map_or_else(unknown, |()| Status::Ok as c_int)
 }
 

@@ -15,6 +15,8 @@ mod open;
 use std::ffi::c_void;
 use std::panic::catch_unwind;
 use std::path::Path;
+#[cfg(unix)]
+use std::sync::Once;
 
 use jni::objects::{JClass, JLongArray, JObject, JString};
 use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jboolean, jclass, jint, jlong};
@@ -30,6 +32,17 @@ use failure::{Failure, ThrowFieldbusException};
 
 /// Every driver that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
+
+/// Armed by the first driver.
+#[cfg(unix)]
+static AT_EXIT: Once = Once::new();
+
+/// Closes the drivers that are open when the process ends, after the JVM's shutdown hooks.
+#[cfg(unix)]
+fn close_all() {
+    // The JVM has ended, and takes no reference back any more.
+    closing(|| DRIVERS.close_all(|device| std::mem::forget(device.close())));
+}
 
 /// Called by the JVM when it loads the library.
 ///
@@ -72,7 +85,7 @@ extern "system" fn Java_tickbus_Tickbus_xChangeData(
 ) -> jint {
     // The handle table catches a panic of the driver; nothing else here can panic.
     DRIVERS
-        .with(handle, Device::exchange)
+        .tick(handle, Device::exchange)
         .unwrap_or_else(|refused| refused)
         .code()
 }
@@ -85,7 +98,7 @@ extern "system" fn Java_tickbus_Tickbus_receiveNative(
     handle: jlong,
 ) -> jint {
     DRIVERS
-        .with(handle, Device::receive)
+        .tick(handle, Device::receive)
         .unwrap_or_else(|refused| refused)
         .code()
 }
@@ -98,7 +111,7 @@ extern "system" fn Java_tickbus_Tickbus_sendNative(
     handle: jlong,
 ) -> jint {
     DRIVERS
-        .with(handle, Device::send)
+        .tick(handle, Device::send)
         .unwrap_or_else(|refused| refused)
         .code()
 }
@@ -111,8 +124,31 @@ extern "system" fn Java_tickbus_Tickbus_finalizeNative<'local>(
     handle: jlong,
 ) {
     env.with_env(|_| {
-        let closed = closing(|| DRIVERS.close(handle, Device::close));
+        let closed = closing(|| DRIVERS.close(handle, |device| drop(device.close())));
         Ok::<(), Failure>(closed.map_err(Refusal::plain)?)
+    })
+    .resolve::<ThrowFieldbusException>();
+}
+
+/// `static native void forgottenNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_forgottenNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) {
+    env.with_env(|_| {
+        let close = |device: Device<_>| {
+            let config = device.config();
+            drop(device.close());
+            log::warn!(
+                "driver \"{}\" of {} was never closed, and nothing refers to it any more; it is closed now; \
+                 open it in a try-with-resources, or call close()",
+                config.name,
+                config.path.display()
+            );
+        };
+        Ok::<(), Failure>(DRIVERS.close(handle, close).map_err(Refusal::plain)?)
     })
     .resolve::<ThrowFieldbusException>();
 }
@@ -236,7 +272,10 @@ fn initialize(
         tables.try_to_string(env)?
     };
     let device = open::open(env, &open::file_of(&path), &tables, layout)?;
-    Ok(place.fill(device))
+    #[cfg(unix)]
+    AT_EXIT.call_once(|| tickbus_base::os::at_exit(close_all));
+    let name = device.config().name.clone();
+    Ok(place.fill(&name, device))
 }
 
 fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jint, Failure> {
@@ -272,5 +311,5 @@ fn report<'local>(
 
 /// Calls `work` with the driver of `handle`.
 fn with<R>(handle: jlong, work: impl FnOnce(&mut Device<open::Keep>) -> R) -> Result<R, Failure> {
-    Ok(DRIVERS.with_reason(handle, work)?)
+    Ok(DRIVERS.visit(handle, work)?)
 }

@@ -170,17 +170,37 @@ latch   = "rising"
 name    = "whole"
 address = "%IL8"
 type    = "LINT"
+fail_safe = -7
 
 [[signal]]
 name    = "natural"
 address = "%IL16"
 type    = "ULINT"
+fail_safe = 42
 "#;
     fs::write(folder.path().join("values.cfg"), config).expect("there is room");
     let program = compile(&["cc", "-std=c11"], "tests/c/values.c", folder.path());
     let output = run(&program, folder.path(), &["values.cfg"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{:?} {said}", output.status);
+}
+
+#[test]
+fn a_process_that_ends_closes_what_it_has_left_open() {
+    let folder = folder_with_tank();
+    let program = compile(
+        &["cc", "-std=c99", "-D_POSIX_C_SOURCE=200809L"],
+        "tests/c/forgotten.c",
+        folder.path(),
+    );
+    for end in ["return", "exit", "fork"] {
+        let output = run(&program, folder.path(), &["tank.cfg", end]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{end}: {:?} {said}", output.status);
+        let recorded = fs::read_to_string(folder.path().join("last.csv")).expect("recorded");
+        let last = recorded.lines().last().expect("a line");
+        assert!(last.contains("47.11"), "{end}: {recorded}");
+    }
 }
 
 #[test]

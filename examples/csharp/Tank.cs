@@ -3,7 +3,7 @@ using System;
 using System.Runtime.InteropServices;
 
 static class Tank {
-    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; } // tb_signal
+    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; public long FailSafe; } // tb_signal
 
     [DllImport("tickbus")] static extern int tb_open(string path, string tables, out long driver);
     [DllImport("tickbus")] static extern int tb_find(long driver, string name, out Signal signal);
@@ -21,7 +21,7 @@ static class Tank {
 
     static void Main(string[] arguments) {
         Check(tb_open(arguments.Length > 0 ? arguments[0] : "tank.cfg", null, out long plc));
-        Func<string, int> slot = name => { Check(tb_find(plc, name, out Signal signal)); return 64 + 8 * signal.Slot; };
+        Func<string, int> slot = name => { Check(tb_find(plc, name, out Signal signal)); return 88 + 8 * signal.Slot; };
         int valve = slot("Valve"), low = slot("Level low"), level = slot("Level"), time = 32; // bytes of the tb_buffer
         IntPtr values = tb_buffer_of(plc);
         Func<int, double> get = at => BitConverter.Int64BitsToDouble(Marshal.ReadInt64(values, at));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyMemoryView, PyTuple};
+use pyo3::types::{PyIterator, PyMemoryView, PyTuple};
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::nearest;
@@ -190,6 +190,21 @@ impl Driver {
         self.signal(py, name)
     }
 
+    /// The names of the signals, in the order of driver.cfg.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        let names = self.signals.iter().map(|signal| signal.get().name());
+        PyTuple::new(py, names.collect::<Vec<_>>())?.try_iter()
+    }
+
+    fn __len__(&self) -> usize {
+        self.signals.len()
+    }
+
+    /// A driver is true, even without signals.
+    fn __bool__(&self) -> bool {
+        true
+    }
+
     fn __contains__(&self, name: &Bound<'_, PyAny>) -> bool {
         name.extract::<String>()
             .is_ok_and(|name| self.by_name.contains_key(&name))
@@ -219,7 +234,7 @@ impl Driver {
 
     /// The events since the last call, at most 4096 at once.
     fn events(&self, py: Python<'_>) -> PyResult<Vec<Event>> {
-        let events = Self::done(py, self.handle.events())?;
+        let events = Self::done(py, py.detach(|| self.handle.events()))?;
         let with_signal = events.iter().filter_map(|event| {
             let signal = self.signals.get(usize::try_from(event.signal).ok()?)?;
             Some((signal, event))
@@ -299,7 +314,7 @@ impl Driver {
     }
 
     fn _statistics(&self, py: Python<'_>) -> PyResult<String> {
-        let snapshot = Self::done(py, self.handle.snapshot())?;
+        let snapshot = Self::done(py, py.detach(|| self.handle.snapshot()))?;
         Ok(snapshot.to_string())
     }
 
@@ -309,15 +324,15 @@ impl Driver {
             let fault = read_fault(fault, &config)?;
             self.handle.inject(&fault)
         };
-        Self::done(py, Refusal::instead_of_panic(read))
+        Self::done(py, py.detach(|| Refusal::instead_of_panic(read)))
     }
 
     fn _end_fault(&self, py: Python<'_>, id: u32) -> PyResult<bool> {
-        Self::done(py, self.handle.end_fault(id))
+        Self::done(py, py.detach(|| self.handle.end_fault(id)))
     }
 
     fn _faults(&self, py: Python<'_>) -> PyResult<String> {
-        let board = Self::done(py, self.handle.board())?;
+        let board = Self::done(py, py.detach(|| self.handle.board()))?;
         Ok(faults(&board))
     }
 

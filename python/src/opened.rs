@@ -22,9 +22,6 @@ static DRIVERS: Handles<Opened> = Handles::new();
 /// How often this process and those before it have been forked.
 static FORKS: AtomicU64 = AtomicU64::new(0);
 
-/// How often a call that meets another one tries again: a tick, while the other one copies statistics, or the reverse.
-const PATIENCE: u32 = 200;
-
 /// The most events that a call hands over: as many as the driver's ring holds.
 const MOST_EVENTS: usize = 4096;
 /// The most that are taken at once.
@@ -137,6 +134,13 @@ pub(crate) struct Facts {
     pub(crate) signals: Vec<Description>,
 }
 
+/// Why a forked child cannot use its parent's driver.
+fn forked_child() -> Refusal {
+    let text = "this driver was opened by the parent process, and a forked child has none of its threads; \
+                open it in the child, or start the child by \"spawn\"";
+    Refusal::new(Code::NotOpen, text)
+}
+
 impl Handle {
     /// Opens what a driver.cfg describes, with `tables` in place of its own.
     pub(crate) fn open(path: &Path, tables: &str) -> Result<Facts, Refusal> {
@@ -160,13 +164,14 @@ impl Handle {
             let slots = driver.initial_slots();
             let memory = Arc::new(Memory::new(&slots));
             let is_stepped = driver.is_stepped();
-            let number = place.fill(Opened {
+            let opened = Opened {
                 written: runs(slots.len(), is_written),
                 read: runs(slots.len(), |slot| !is_written(slot)),
                 driver,
                 slots,
                 memory: Arc::clone(&memory),
-            });
+            };
+            let number = place.fill(&config.name, opened);
             Ok(Facts {
                 handle: Self {
                     number,
@@ -186,47 +191,39 @@ impl Handle {
         self.forks != FORKS.load(Ordering::Relaxed)
     }
 
-    /// Calls `work` with the driver, if it is this process's and open. A call that meets another thread's tries again for a while.
-    fn with<R>(&self, mut work: impl FnMut(&mut Opened) -> R) -> Result<R, Code> {
+    /// Calls `work` with the driver, if it is this process's and open; waits for a tick that is in its way.
+    fn visit<R>(&self, work: impl FnOnce(&mut Opened) -> R) -> Result<R, Refusal> {
         if self.is_forked() {
-            return Err(Code::NotOpen);
+            return Err(forked_child());
         }
-        let mut patience = PATIENCE;
-        loop {
-            match DRIVERS.with(self.number, &mut work) {
-                Err(Code::Busy) if patience > 0 => std::thread::yield_now(),
-                other => return other,
-            }
-            patience -= 1;
-        }
+        DRIVERS.visit(self.number, work)
     }
 
-    fn with_reason<R>(&self, work: impl FnMut(&mut Opened) -> R) -> Result<R, Refusal> {
-        self.with(work).map_err(|code| self.reason(code))
-    }
-
-    /// A tick or a half of one; a code below zero if it failed.
+    /// A tick or a half of one; a code below zero if it failed. Waits for another thread's tick, too.
     pub(crate) fn tick(&self, half: Half, time: Option<Nanos>) -> Code {
-        self.with(|opened| opened.tick(half, time))
-            .unwrap_or_else(|refused| refused)
+        if self.is_forked() {
+            return Code::NotOpen;
+        }
+        let tick = |opened: &mut Opened| opened.tick(half, time);
+        match DRIVERS.tick(self.number, tick) {
+            Err(Code::Busy) => DRIVERS
+                .visit(self.number, tick)
+                .unwrap_or_else(|refusal| refusal.code),
+            done => done.unwrap_or_else(|refused| refused),
+        }
     }
 
     /// Why a call failed with this code.
     #[cold]
     pub(crate) fn reason(&self, code: Code) -> Refusal {
-        if self.is_forked() {
-            let text = "this driver was opened by the parent process, and a forked child has none of its threads; \
-                        open it in the child, or start the child by \"spawn\"";
-            return Refusal::new(Code::NotOpen, text);
-        }
-        match self.with(|opened| opened.driver.snapshot()) {
+        match self.visit(|opened| opened.driver.snapshot()) {
             Ok(snapshot) => Refusal::of_tick(code, &snapshot),
-            Err(_) => DRIVERS.reason(self.number, code),
+            Err(refusal) => refusal,
         }
     }
 
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Refusal> {
-        self.with_reason(|opened| opened.driver.snapshot())
+        self.visit(|opened| opened.driver.snapshot())
     }
 
     pub(crate) fn is_over(&self) -> Result<bool, Refusal> {
@@ -234,23 +231,23 @@ impl Handle {
     }
 
     pub(crate) fn config(&self) -> Result<Arc<Config>, Refusal> {
-        self.with_reason(|opened| Arc::clone(opened.driver.config()))
+        self.visit(|opened| Arc::clone(opened.driver.config()))
     }
 
     pub(crate) fn events(&self) -> Result<Vec<Event>, Refusal> {
-        self.with_reason(Opened::events)
+        self.visit(Opened::events)
     }
 
     pub(crate) fn inject(&self, fault: &Fault) -> Result<u32, Refusal> {
-        self.with_reason(|opened| tickbus_binding::inject(&mut opened.driver, fault))?
+        self.visit(|opened| tickbus_binding::inject(&mut opened.driver, fault))?
     }
 
     pub(crate) fn end_fault(&self, id: u32) -> Result<bool, Refusal> {
-        self.with_reason(|opened| opened.driver.end_fault(id))
+        self.visit(|opened| opened.driver.end_fault(id))
     }
 
     pub(crate) fn board(&self) -> Result<Arc<FaultBoard>, Refusal> {
-        self.with_reason(|opened| Arc::clone(opened.driver.board()))
+        self.visit(|opened| Arc::clone(opened.driver.board()))
     }
 
     /// Closes the driver; does nothing if it is closed already, or the parent process's.
@@ -259,14 +256,9 @@ impl Handle {
             return Ok(());
         }
         Refusal::instead_of_panic(|| {
-            let mut patience = PATIENCE;
-            loop {
-                match closing(|| DRIVERS.close(self.number, Opened::close)) {
-                    Ok(()) | Err(Code::Closed | Code::NotOpen) => break,
-                    Err(Code::Busy) if patience > 0 => std::thread::yield_now(),
-                    Err(code) => return Err(Refusal::plain(code)),
-                }
-                patience -= 1;
+            match closing(|| DRIVERS.close(self.number, Opened::close)) {
+                Ok(()) | Err(Code::Closed | Code::NotOpen) => {}
+                Err(code) => return Err(Refusal::plain(code)),
             }
             self.memory.close();
             Ok(())

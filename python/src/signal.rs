@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use pyo3::IntoPyObjectExt as _;
-use pyo3::exceptions::{PyAttributeError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyAttributeError, PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use tickbus_binding::{Refusal, SignalDescription, SlotKind};
@@ -121,6 +121,12 @@ impl Signal {
     fn number(&self, value: &Bound<'_, PyAny>) -> PyResult<f64> {
         // Not what can merely be read as a number, such as a text.
         let number: f64 = value.extract().map_err(|error: PyErr| {
+            if error.is_instance_of::<PyOverflowError>(value.py()) {
+                let name = &self.description.name;
+                return PyValueError::new_err(format!(
+                    "signal '{name}' cannot be set to an integer beyond the range of a float"
+                ));
+            }
             if !error.is_instance_of::<PyTypeError>(value.py()) {
                 return error;
             }

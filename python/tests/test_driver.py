@@ -316,3 +316,31 @@ def test_the_tank_of_the_manual_runs(tmp_path, monkeypatch):
     exec(program, found)
     # The mirror opens the valve below 150 mm, a scan later: it stays there.
     assert 145 < found["mm"] < 155
+
+
+def test_a_loop_keeps_to_the_clock_and_leaves_out_what_it_missed():
+    now = [1000]
+    turns = tickbus._driver._turns(10, lambda: now[0], lambda seconds: now.__setitem__(0, now[0] + round(seconds * 1e9)))
+    seen = []
+    for late in (0, 13, 0, 37, 0):
+        turn = next(turns)
+        seen.append((round(turn.time * 1e9), round(turn.lag * 1e9), turn.missed))
+        now[0] += late
+    assert seen == [(0, 0, 0), (10, 0, 0), (23 - 3, 3, 0), (30, 0, 0), (60, 7, 2)]
+
+
+def test_a_driver_has_the_names_of_its_signals(line):
+    assert list(line) == [signal.name for signal in line.signals]
+    assert len(line) == len(line.signals)
+    assert bool(line)
+
+
+def test_a_missing_file_is_a_file_not_found_error(tmp_path):
+    with pytest.raises(FileNotFoundError, match=r"no such\.cfg") as caught:
+        tickbus.open(tmp_path / "no such.cfg")
+    assert caught.value.status is Status.BAD_CONFIG
+
+
+def test_an_integer_beyond_a_float_is_a_value_error(line):
+    with pytest.raises(ValueError, match="beyond the range of a float"):
+        line["Height"].value = 10**400

@@ -7,8 +7,8 @@
     with tickbus.open("tank.cfg") as plc:
         valve, level = plc["Valve"], plc["Level"]
         mm = 100.0
-        while simulating:
-            plc.receive()                       # Status.FRESH, UNCHANGED or STALE
+        for turn in plc.every("10ms"):          # by the computer's clock
+            plc.receive(turn.time)              # Status.FRESH, UNCHANGED or STALE
             mm += 2 if valve.value else -1      # your machine
             level.value = mm
             plc.send()
@@ -16,8 +16,8 @@
 Directions are the PLC's: a simulated machine writes ``%I`` and reads ``%Q``. ``tickbus.testing`` tests PLC programs with pytest.
 """
 
-from ._driver import Driver, Fault, open, report
-from ._errors import FieldbusError, UnknownSignalError
+from ._driver import Driver, Fault, Turn, open, report
+from ._errors import FieldbusError, MissingFileError, UnknownSignalError
 from ._native import Event, Signal, __version__
 from ._status import Status
 
@@ -26,8 +26,10 @@ __all__ = [
     "Event",
     "Fault",
     "FieldbusError",
+    "MissingFileError",
     "Signal",
     "Status",
+    "Turn",
     "UnknownSignalError",
     "__version__",
     "open",

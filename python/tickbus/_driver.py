@@ -1,17 +1,19 @@
 """An open driver."""
 
 import atexit
+import itertools
 import os
 import re
+import time
 import warnings
 import weakref
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
-from . import _native, _toml
-from ._errors import FieldbusError
+from . import _durations, _native, _toml
+from ._errors import FieldbusError, MissingFileError
 from ._status import Status
 
 _ENTRY = re.compile(r"((?:[^=\\]|\\.)+)=(.*)")
@@ -28,9 +30,39 @@ def open(path: str | os.PathLike[str], overlay: _toml.Tables | None = None) -> "
                                    "record": {"file": "run.vcd"}})
 
     It is a mapping of such tables, or the same as a text in TOML. Raises ``FieldbusError`` with ``Status.BAD_CONFIG`` and every
-    mistake at its line and column, or with the reason why the bus cannot be opened.
+    mistake at its line and column, or with the reason why the bus cannot be opened; ``MissingFileError`` if there is no such file.
     """
-    return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "")
+    try:
+        return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "")
+    except FieldbusError as error:
+        if error.status is Status.BAD_CONFIG and not Path(path).exists():
+            raise MissingFileError(error.code, error.message) from None
+        raise
+
+
+class Turn(NamedTuple):
+    """One turn of a loop over ``Driver.every``."""
+
+    time: float
+    """When it was due, in seconds since the loop began: the simulation's time, if it keeps pace with the clock."""
+    lag: float
+    """By how many seconds it begins late."""
+    missed: int
+    """How many turns before it were left out, since they could not begin before the next one was due."""
+
+
+def _turns(period: int, now: Callable[[], int], sleep: Callable[[float], None]) -> Iterator[Turn]:
+    begin, number = now(), 0
+    while True:
+        wait = begin + number * period - now()
+        if wait > 0:
+            sleep(wait / 10**9)
+            continue
+        missed = -wait // period
+        number += missed
+        lag = -wait - missed * period
+        yield Turn(number * period / 10**9, lag / 10**9, missed)
+        number += 1
 
 
 class Driver(_native.Driver):
@@ -40,14 +72,31 @@ class Driver(_native.Driver):
     ``exchange()`` sends first and then receives, so that an answer goes out with the next tick. Neither waits for the bus,
     unless it is a stepped one; there the interpreter's lock is released meanwhile.
 
-    One thread at a time uses a driver. On a stepped bus, a call that meets a tick of another thread raises ``FieldbusError``
-    with ``Status.BUSY``.
+    One thread at a time uses a driver. A call that meets a tick of another thread waits for it, at most 2 s; then it
+    raises ``FieldbusError`` with ``Status.BUSY``.
     """
 
     __slots__ = ("__weakref__",)
 
     def __init__(self, path: str, overlay: str = "") -> None:
         _open.add(self)
+
+    def every(self, period: str) -> Iterator[Turn]:
+        """Pace a loop by the computer's clock: a turn in each period, such as ``"10ms"``, until the driver is closed::
+
+            for turn in plc.every("10ms"):
+                plc.receive(turn.time)
+                ...
+                plc.send()
+
+        A late turn does not delay the next one. Turns that were missed, as on a busy computer, are left out: a burst would
+        only carry outdated values. ``turn.lag`` and ``turn.missed`` report both.
+        """
+        nanos = _durations.parse(period)
+        if nanos == 0:
+            raise ValueError(f'"{period}" is no period; write a duration above 0, such as "10ms"')
+        turns = _turns(nanos, time.monotonic_ns, time.sleep)
+        return itertools.takewhile(lambda turn: not self.closed, turns)
 
     def statistics(self) -> dict[str, str]:
         """The state of the line and all counters, by key: docs/statistics.md has their meanings."""

@@ -20,5 +20,9 @@ class FieldbusError(Exception):
         return self.message
 
 
+class MissingFileError(FieldbusError, FileNotFoundError):
+    """There is no driver.cfg of this name. It is a ``FileNotFoundError``, too."""
+
+
 class UnknownSignalError(FieldbusError, KeyError):
     """No signal of the driver has this name; the message has the nearest one. It is a ``KeyError``, too."""

@@ -38,6 +38,14 @@ static void *ticks(void *counts) {
     return NULL;
 }
 
+static void *ticks_until_closed(void *nothing) {
+    for (;;) {
+        int status = tb_exchange(shared);
+        if (status == TB_CLOSED) return nothing;
+        EXPECT(status >= 0, 1, NULL);
+    }
+}
+
 /* When static objects and the thread's own are gone. */
 static void at_the_end(void) {
     if (tb_exchange(shared) != TB_CLOSED || tb_close(shared) != TB_CLOSED) _Exit(3);
@@ -72,6 +80,10 @@ int main(int count, char **arguments) {
     EXPECT(tb_open(arguments[1], NULL, &driver), TB_FRESH, NULL);
     EXPECT(tb_signal_count(driver), 3, NULL);
     EXPECT(tb_find(driver, "Valv", &signal), TB_BAD_ARGUMENT, "did you mean \"Valve\"?");
+    /* A caller who does not look at that reads 0, and sets nothing. */
+    tb_buffer *values = tb_buffer_of(driver);
+    EXPECT(tb_set(values, &signal, 1), TB_BAD_ARGUMENT, NULL);
+    EXPECT(tb_get(values, &signal) == 0 && tb_edges(values, &signal) == 0 && *signal.name == 0, 1, NULL);
     EXPECT(tb_find(driver, NULL, &signal), TB_BAD_ARGUMENT, "name is NULL");
     EXPECT(tb_find(driver, "Valve", NULL), TB_BAD_ARGUMENT, "signal is NULL");
     EXPECT(tb_signal_at(driver, 3, &signal), TB_BAD_ARGUMENT, "expected 0 to 2");
@@ -80,6 +92,19 @@ int main(int count, char **arguments) {
     EXPECT(strcmp(signal.name, "Level") | strcmp(signal.address, "%IW2") | strcmp(signal.type, "INT"), 0, NULL);
     EXPECT(strcmp(signal.unit, "mm") | strcmp(signal.station, ""), 0, NULL);
     EXPECT(signal.is_written == 1 && signal.kind == TB_REAL && signal.edges == -1, 1, NULL);
+
+    /* The clock of a loop: a turn begins when it is due, or late; and those that were missed are left out. */
+    int64_t due = 0, second;
+    EXPECT(tb_wait_until(NULL, 1000000), TB_BAD_ARGUMENT, "due is NULL");
+    EXPECT(tb_wait_until(&due, 0), TB_BAD_ARGUMENT, "period");
+    EXPECT(tb_wait_until(&due, 1000000) >= 0 && due > 0, 1, NULL);
+    second = due;
+    EXPECT(tb_wait_until(&due, 1000000) >= 0, 1, NULL);
+    EXPECT(due > second && (due - second) % 1000000 == 0, 1, NULL);
+    due = second - 1500000;
+    int64_t lag = tb_wait_until(&due, 1000000);
+    EXPECT(lag >= 1500000 && due >= second + 500000 && (due - second) % 1000000 == 500000, 1, NULL);
+    EXPECT(strcmp(tb_version(), "0.1.0"), 0, NULL);
 
     /* A text that does not fit is cut, ends with 0, and its length is told. */
     int length = tb_statistics(driver, NULL, 0);
@@ -108,12 +133,20 @@ int main(int count, char **arguments) {
     if (pthread_create(&thread, NULL, ticks, counts[0]) != 0) return 2;
     ticks(counts[1]);
     pthread_join(thread, NULL);
-    tb_buffer *values = tb_buffer_of(driver);
     EXPECT(values->ticks, counts[0][0] + counts[1][0], NULL);
     EXPECT(values->ticks > 0, 1, NULL);
 
+    /* Beside a thread that ticks without a pause, everything else gets in; and closing, too. */
+    EXPECT(pthread_create(&thread, NULL, ticks_until_closed, NULL), 0, NULL);
+    for (int i = 0; i < 200; i++) {
+        EXPECT(tb_statistics(driver, text, sizeof text) > 0, 1, NULL);
+        EXPECT((fault = tb_inject(driver, "kind = \"stuck\"\nsignal = \"Level\"\nvalue = 12.0\nat = \"1000h\"")) > 0, 1, NULL);
+        EXPECT(tb_end_fault(driver, fault), 1, NULL);
+    }
+
     /* After closing, the buffer is memory still. */
     EXPECT(tb_close(driver), TB_FRESH, NULL);
+    pthread_join(thread, NULL);
     tb_set(values, &signal, 1.0);
     EXPECT(tb_exchange(driver), TB_CLOSED, "CLOSED (-3)");
     EXPECT(tb_close(driver), TB_CLOSED, "open it again");

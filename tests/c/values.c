@@ -3,12 +3,13 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <tickbus.h>
 
-_Static_assert(sizeof(tb_buffer) == 64 && sizeof(tb_slot) == 8, "the header is eight words");
+_Static_assert(sizeof(tb_buffer) == 88 && sizeof(tb_slot) == 8, "the header is eleven words");
 _Static_assert(offsetof(tb_buffer, status) == 8 && offsetof(tb_buffer, age) == 24, "words");
 _Static_assert(offsetof(tb_buffer, simulation_time) == 32 && offsetof(tb_buffer, slot_count) == 56, "words");
-_Static_assert(sizeof(tb_signal) == 5 * sizeof(char *) + 16, "no gaps");
+_Static_assert(sizeof(tb_signal) == 5 * sizeof(char *) + 24, "no gaps");
 _Static_assert(sizeof(tb_event) == 24, "three words");
 
 static tb_driver plc;
@@ -45,7 +46,7 @@ int main(int count, char **arguments) {
         return 1;
     }
     values = tb_buffer_of(plc);
-    same("version", (double)values->version, 1);
+    same("version", (double)values->version, 2);
     same("slots", (double)values->slot_count, tb_signal_count(plc) + 1);
     same("time", (double)values->simulation_time, (double)TB_NO_TIME);
     tb_signal whole = find("whole"), natural = find("natural"), pulse = find("pulse"), answer = find("answer");
@@ -61,13 +62,26 @@ int main(int count, char **arguments) {
     tb_set(values, &whole, -1e30);
     same("-1e30", tb_slots(values)[whole.slot].integer == INT64_MIN, 1);
     tb_set(values, &whole, NAN);
-    same("NaN", tb_get(values, &whole), 0);
+    same("NaN", tb_get(values, &whole), -7);
+    same("NaN of a ULINT", (tb_set(values, &natural, NAN), tb_get(values, &natural)), 42);
+    same("saturated", (double)values->saturated, 2);
+    same("not a number", (double)values->not_a_number, 2);
     tb_set(values, &natural, -1);
     same("-1", tb_get(values, &natural), 0);
     tb_set(values, &natural, 18446744073709551615.0);
     same("2^64", tb_slots(values)[natural.slot].natural == UINT64_MAX, 1);
     tb_slots(values)[natural.slot].natural = UINT64_C(0x8000000000000001);
     same("2^63", tb_get(values, &natural), 9223372036854775808.0);
+
+    same("set what the PLC writes", tb_set(values, &answer, 1), TB_BAD_ARGUMENT);
+    same("what the PLC writes", tb_get(values, &answer), 0);
+
+    /* The statistics count them, and those of the other types. */
+    tick();
+    char text[8192];
+    tb_statistics(plc, text, sizeof text);
+    same("saturated", strstr(text, "\nsaturated=4\n") != NULL, 1);
+    same("not_a_number", strstr(text, "\nnot_a_number=2\n") != NULL, 1);
 
     /* The mirror brings each pulse back: every edge is counted, and is an event. */
     uint32_t edges = 0;
@@ -78,6 +92,6 @@ int main(int count, char **arguments) {
     }
     same("edges", edges, 5);
     same("edges of what is written", tb_edges(values, &pulse), 0);
-    same("ticks", (double)values->ticks, 20);
+    same("ticks", (double)values->ticks, 21);
     return tb_close(plc) < 0;
 }

@@ -2,7 +2,7 @@
 
 use tickbus_driver::Driver;
 use tickbus_fieldbus::Role;
-use tickbus_image::signal::{Area, DataType};
+use tickbus_image::signal::{Area, DataType, Slot};
 
 /// How a slot holds its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +37,8 @@ pub struct SignalDescription<'d> {
     pub slot: usize,
     /// The slot in which its edges are counted.
     pub edges: Option<usize>,
+    /// What its slot holds for a value that is not a number.
+    pub fail_safe: Slot,
 }
 
 impl<'d> SignalDescription<'d> {
@@ -62,6 +64,7 @@ impl<'d> SignalDescription<'d> {
             },
             slot: index,
             edges: driver.slots().edges[index],
+            fail_safe: signal.fail_safe,
         }
     }
 }

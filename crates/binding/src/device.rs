@@ -83,7 +83,10 @@ impl<K> Device<K> {
 
     /// The data of the statistics; they are formatted after the driver is released.
     pub fn snapshot(&self) -> Snapshot {
-        self.driver.snapshot()
+        let mut snapshot = self.driver.snapshot();
+        let counted = [Word::Saturated, Word::NotANumber].map(|word| self.shared.read(word));
+        snapshot.add_conversions(counted);
+        snapshot
     }
 
     /// What a simulator has to know of a signal, by its index.
@@ -132,9 +135,11 @@ impl<K> Device<K> {
         count
     }
 
-    /// Closes the driver; a tick that was begun and not answered is recorded with what was written last.
-    pub fn close(mut self) {
+    /// Closes the driver; a tick that was begun and not answered is recorded with what was written last. Returns what it
+    /// shared, which nobody uses any more.
+    pub fn close(mut self) -> Shared<K> {
         self.driver.end_tick(self.shared.slots());
         self.driver.close();
+        self.shared
     }
 }

@@ -1,8 +1,11 @@
 //! The table of open drivers: checked ids instead of pointers.
 //!
-//! A handle is an index into a fixed table, and a generation that distinguishes the current tenant of the
+//! A handle is an index into a table, and a generation that distinguishes the current tenant of the
 //! place from all previous ones. Any number either denotes a tenant that is open now, or is answered with a
 //! status code.
+//!
+//! One thread at a time has a tenant. A tick never waits for another tick. All other calls are visits: a visit waits for the
+//! tick that is in its way, and the end of a tick lets a waiting visit in.
 
 #![allow(
     unsafe_code,
@@ -11,31 +14,52 @@
 
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_driver::Code;
 
 use crate::panics::panic_message;
 use crate::refusal::Refusal;
 
 /// How many drivers can be open in one process at once.
-pub const MAX_DRIVERS: usize = 64;
+pub const MAX_DRIVERS: usize = BLOCK * (1 + MORE_BLOCKS);
+
+/// Places in a block. The first block is always there, the others are made when they are needed, and stay.
+const BLOCK: usize = 64;
+const MORE_BLOCKS: usize = 63;
 
 /// A handle's low bits are the index, the rest the generation.
-const INDEX_BITS: u32 = 8;
+const INDEX_BITS: u32 = 12;
 const _: () = assert!(MAX_DRIVERS <= 1 << INDEX_BITS);
 
 /// A place's word: its generation, and in the low bits one of the states below.
-const STATE_BITS: u32 = 2;
+const STATE_BITS: u32 = 3;
 const STATE: u64 = (1 << STATE_BITS) - 1;
 /// There is no tenant.
 const FREE: u64 = 0;
 /// There is a tenant, not in use at the moment.
 const OPEN: u64 = 1;
-/// One thread is using the tenant.
-const CLAIMED: u64 = 2;
+/// A tick is using the tenant.
+const TICKING: u64 = 2;
+/// Another call is using the tenant.
+const VISITED: u64 = 3;
 /// The tenant has panicked, and waits to be closed.
-const FAILED: u64 = 3;
+const FAILED: u64 = 4;
+
+/// How long a visit waits for a tick, and a tick for a visit: on a busy machine the other thread may have no processor for long.
+const PATIENCE: Nanos = Nanos::from_secs(2);
+/// In how many rounds a visit looks at the place at least, before it gives up.
+const LEAST_ROUNDS: u32 = 20;
+/// How long a visit only yields between two rounds; afterwards it also sleeps.
+const AWAKE: Nanos = Nanos::from_millis(100);
+/// How long it then sleeps, once in [`LEAST_ROUNDS`].
+const NAP: Nanos = Nanos::from_millis(1);
+/// In a round, how often to look at the place before the processor is given to another thread: some microseconds.
+const SPINS: u32 = 200;
+/// How many names of drivers a refusal has.
+const NAMES: usize = 8;
 
 const fn word(generation: u64, state: u64) -> u64 {
     generation << STATE_BITS | state
@@ -45,23 +69,27 @@ const fn word(generation: u64, state: u64) -> u64 {
 #[repr(align(128))]
 struct HandleEntry<T> {
     word: AtomicU64,
-    /// Only accessed by the thread that has moved the word to [`CLAIMED`], until it moves it on.
+    /// Whether a visit waits for the end of a tick. A hint: a wish that is lost is made again.
+    wanted: AtomicBool,
+    /// Only accessed by the thread that has moved the word to [`TICKING`] or [`VISITED`], until it moves it on.
     content: UnsafeCell<Content<T>>,
 }
 
 struct Content<T> {
     tenant: Option<T>,
+    name: String,
     /// The text of the panic that ended in [`FAILED`].
     panic: String,
 }
 
-/// A table of tenants of type `T`.
-pub struct Handles<T, const N: usize = MAX_DRIVERS> {
-    places: [HandleEntry<T>; N],
+/// A table of tenants of type `T`, in blocks of `N` places.
+pub struct Handles<T, const N: usize = BLOCK> {
+    first: [HandleEntry<T>; N],
+    more: [OnceLock<Box<[HandleEntry<T>]>>; MORE_BLOCKS],
 }
 
 // SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` alone,
-// which exists only between a successful compare-and-exchange to CLAIMED (acquire) and the store that
+// which exists only between a successful compare-and-exchange to TICKING or VISITED (acquire) and the store that
 // ends it (release), so one thread at a time has it, and sees all that the one before it did. A tenant
 // may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
 unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
@@ -75,71 +103,94 @@ impl<T, const N: usize> Default for Handles<T, N> {
 impl<T, const N: usize> Handles<T, N> {
     /// An empty table.
     pub const fn new() -> Self {
-        let places = [const {
-            HandleEntry {
-                word: AtomicU64::new(word(0, FREE)),
-                content: UnsafeCell::new(Content {
-                    tenant: None,
-                    panic: String::new(),
-                }),
-            }
-        }; N];
-        Self { places }
+        Self {
+            first: [const { HandleEntry::new() }; N],
+            more: [const { OnceLock::new() }; MORE_BLOCKS],
+        }
     }
 
     /// Reserves a place for a tenant that has yet to be created.
     ///
     /// # Errors
     ///
-    /// `TOO_MANY_DRIVERS`: all places are taken.
+    /// `TOO_MANY_DRIVERS`, with names of those that are open: all places are taken.
     pub fn reserve(&self) -> Result<Reservation<'_, T>, Refusal> {
-        for (index, place) in self.places.iter().enumerate() {
+        for index in 0..N * (1 + MORE_BLOCKS) {
+            let place = match index.checked_sub(N) {
+                None => &self.first[index],
+                Some(index) => &self.more[index / N].get_or_init(block::<T, N>)[index % N],
+            };
             let found = place.word.load(Ordering::Relaxed);
             let generation = (found >> STATE_BITS) + 1;
             if found & STATE == FREE
-                && let Some(claim) = Claim::take(place, found, generation, FREE)
+                && let Some(claim) = Claim::take(place, found, word(generation, VISITED), FREE)
             {
                 return Ok(Reservation { claim, index });
             }
         }
-        let text = format!("{N} drivers are open, and that is the most");
-        Err(Refusal::new(Code::TooManyDrivers, text))
+        Err(Refusal::new(Code::TooManyDrivers, self.crowd()))
     }
 
-    /// Calls `work` with the tenant, which no other thread can access in the meantime.
+    /// Why there is no place left.
+    fn crowd(&self) -> String {
+        let most = N * (1 + MORE_BLOCKS);
+        let mut names = Vec::new();
+        for place in self.places() {
+            let found = place.word.load(Ordering::Relaxed);
+            if names.len() <= NAMES
+                && found & STATE == OPEN
+                && let Some(mut claim) =
+                    Claim::take(place, found, word(found >> STATE_BITS, VISITED), OPEN)
+                && let name = format!("\"{}\"", claim.content().name)
+                && !names.contains(&name)
+            {
+                names.push(name);
+            }
+        }
+        let more = names.len() > NAMES;
+        names.truncate(NAMES);
+        let (names, more) = (names.join(", "), if more { " and others" } else { "" });
+        format!("{most} drivers are open, and that is the most: {names}{more}")
+    }
+
+    /// All places that were made.
+    fn places(&self) -> impl Iterator<Item = &HandleEntry<T>> {
+        let more = self.more.iter().filter_map(OnceLock::get);
+        self.first.iter().chain(more.flatten())
+    }
+
+    /// A tick: calls `work` with the tenant, which no other thread can access in the meantime. Then lets a visit in that waits.
     ///
     /// A panic in `work` marks the tenant as failed; from then on it returns INTERNAL until closed.
     ///
     /// # Errors
     ///
-    /// The handle was never open, is closed, in use by another thread, or its tenant has failed.
+    /// The handle was never open, is closed, in a tick of another thread, or its tenant has failed.
     #[inline]
-    pub fn with<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
-        let mut claim = self.claim(handle, OPEN)?;
-        let Some(tenant) = claim.content().tenant.as_mut() else {
-            return Err(Code::Internal);
+    pub fn tick<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+        let (place, generation) = self.place(handle).ok_or(Code::NotOpen)?;
+        let claimed = word(generation, TICKING);
+        let claim = match Claim::take(place, word(generation, OPEN), claimed, OPEN) {
+            Some(claim) => claim,
+            None => place.after_visit(generation)?,
         };
-        match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
-            Ok(done) => Ok(done),
-            Err(payload) => {
-                claim.content().panic = panic_message(payload);
-                claim.end = FAILED;
-                Err(Code::Internal)
-            }
+        let done = claim.run(work);
+        if place.wanted.load(Ordering::Relaxed) {
+            place.let_in(generation);
         }
+        done
     }
 
-    /// As [`with`](Self::with); a failed tenant is refused with the message of its panic.
+    /// Any other call: as [`tick`](Self::tick), and waits for a tick that is in its way, at most 2 s.
     ///
     /// # Errors
     ///
-    /// As [`with`](Self::with).
-    pub fn with_reason<R>(
-        &self,
-        handle: i64,
-        work: impl FnOnce(&mut T) -> R,
-    ) -> Result<R, Refusal> {
-        self.with(handle, work)
+    /// The handle was never open, is closed, in use by other threads for all this time, or its tenant has failed; then with the
+    /// message of the panic.
+    pub fn visit<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Refusal> {
+        let claim = self.enter(handle, OPEN, PATIENCE);
+        claim
+            .and_then(|claim| claim.run(work))
             .map_err(|code| self.reason(handle, code))
     }
 
@@ -152,42 +203,164 @@ impl<T, const N: usize> Handles<T, N> {
     }
 
     /// Ends a tenancy: `close` is called with the tenant, failed or not. The place is free and the handle
-    /// closed from then on, however long `close` takes.
+    /// closed from then on, however long `close` takes. Waits for a tick that is in its way, at most 2 s.
     ///
     /// # Errors
     ///
-    /// The handle was never open, is closed already, or in use by another thread.
+    /// The handle was never open, is closed already, or in use by other threads for all this time.
     pub fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
-        let mut claim = match self.claim(handle, OPEN) {
-            Err(Code::Internal) => self.claim(handle, FAILED)?,
+        self.close_within(PATIENCE, handle, close)
+    }
+
+    fn close_within<R>(
+        &self,
+        patience: Nanos,
+        handle: i64,
+        close: impl FnOnce(T) -> R,
+    ) -> Result<R, Code> {
+        let claim = match self.enter(handle, OPEN, patience) {
+            Err(Code::Internal) => self.enter(handle, FAILED, patience)?,
             other => other?,
         };
-        claim.end = FREE;
-        claim.content().panic = String::new();
-        let tenant = claim.content().tenant.take();
-        drop(claim);
-        tenant.map(close).ok_or(Code::Internal)
+        claim.vacate().map(close).ok_or(Code::Internal)
+    }
+
+    /// Ends all tenancies, as at the end of the process. Leaves alone what another thread does not end to use.
+    pub fn close_all(&self, mut close: impl FnMut(T)) {
+        for place in self.places() {
+            let found = place.word.load(Ordering::Relaxed);
+            let generation = found >> STATE_BITS;
+            let state = if found & STATE == FAILED {
+                FAILED
+            } else {
+                OPEN
+            };
+            if let Ok(claim) = place.wait(generation, state, PATIENCE)
+                && let Some(tenant) = claim.vacate()
+            {
+                close(tenant);
+            }
+        }
     }
 
     /// The message of the panic that made this handle's tenant fail.
     fn panic_of(&self, handle: i64) -> Option<String> {
-        let mut claim = self.claim(handle, FAILED).ok()?;
+        let (place, generation) = self.place(handle)?;
+        let (failed, claimed) = (word(generation, FAILED), word(generation, VISITED));
+        let mut claim = Claim::take(place, failed, claimed, FAILED)?;
         Some(claim.content().panic.clone())
     }
 
+    /// The place of a handle, if there is one, and the generation that its tenant must have.
     #[inline]
-    fn claim(&self, handle: i64, from: u64) -> Result<Claim<'_, T>, Code> {
+    fn place(&self, handle: i64) -> Option<(&HandleEntry<T>, u64)> {
         // A negative handle becomes a generation that no place will ever reach.
         let handle = handle.cast_unsigned();
         let generation = handle >> INDEX_BITS;
         let index = usize::try_from(handle & ((1 << INDEX_BITS) - 1)).unwrap_or(usize::MAX);
-        let place = self.places.get(index).ok_or(Code::NotOpen)?;
-        Claim::take(place, word(generation, from), generation, from)
-            .ok_or_else(|| place.refusal(generation))
+        let place = match self.first.get(index) {
+            Some(place) => place,
+            None => self.more.get((index - N) / N)?.get()?.get(index % N)?,
+        };
+        Some((place, generation))
+    }
+
+    fn enter(&self, handle: i64, from: u64, patience: Nanos) -> Result<Claim<'_, T>, Code> {
+        let (place, generation) = self.place(handle).ok_or(Code::NotOpen)?;
+        place.wait(generation, from, patience)
     }
 }
 
+/// A further block of free places.
+fn block<T, const N: usize>() -> Box<[HandleEntry<T>]> {
+    (0..N).map(|_| HandleEntry::new()).collect()
+}
+
 impl<T> HandleEntry<T> {
+    const fn new() -> Self {
+        Self {
+            word: AtomicU64::new(word(0, FREE)),
+            wanted: AtomicBool::new(false),
+            content: UnsafeCell::new(Content {
+                tenant: None,
+                name: String::new(),
+                panic: String::new(),
+            }),
+        }
+    }
+
+    /// Claims a place in the state `from` for a visit, and waits for another thread that has it.
+    fn wait(&self, generation: u64, from: u64, patience: Nanos) -> Result<Claim<'_, T>, Code> {
+        let (found, claimed) = (word(generation, from), word(generation, VISITED));
+        let take = || Claim::take(self, found, claimed, from);
+        if let Some(claim) = take() {
+            return Ok(claim);
+        }
+        let clock = Monotonic::shared();
+        let begin = clock.now();
+        for round in 1_u32.. {
+            self.wanted.store(true, Ordering::Relaxed);
+            let waited = clock.now() - begin;
+            for _ in 0..SPINS {
+                if let Some(claim) = take() {
+                    self.wanted.store(false, Ordering::Relaxed);
+                    return Ok(claim);
+                }
+                match self.refusal(generation) {
+                    Code::Busy => std::hint::spin_loop(),
+                    refused => return Err(refused),
+                }
+            }
+            // On a busy machine the time may have passed without a processor for this thread.
+            if waited > patience && round >= LEAST_ROUNDS {
+                break;
+            }
+            if waited > AWAKE && round % LEAST_ROUNDS == 0 {
+                clock.wait_until(clock.now() + NAP, &Stop::new());
+            } else {
+                std::thread::yield_now();
+            }
+        }
+        Err(Code::Busy)
+    }
+
+    /// Claims a place for a tick, after the visit that is in its way.
+    #[cold]
+    fn after_visit(&self, generation: u64) -> Result<Claim<'_, T>, Code> {
+        let (open, claimed) = (word(generation, OPEN), word(generation, TICKING));
+        let mut begin = None;
+        loop {
+            for _ in 0..SPINS {
+                if let Some(claim) = Claim::take(self, open, claimed, OPEN) {
+                    return Ok(claim);
+                }
+                let found = self.word.load(Ordering::Relaxed);
+                if found != open && found != word(generation, VISITED) {
+                    return Err(self.refusal(generation));
+                }
+                std::hint::spin_loop();
+            }
+            std::thread::yield_now();
+            let now = Monotonic::shared().now();
+            if now - *begin.get_or_insert(now) > PATIENCE {
+                return Err(Code::Busy);
+            }
+        }
+    }
+
+    /// Once, after a tick: lets a visit in that waits, unless it has no processor.
+    #[cold]
+    fn let_in(&self, generation: u64) {
+        self.wanted.store(false, Ordering::Relaxed);
+        for _ in 0..SPINS {
+            if self.word.load(Ordering::Relaxed) != word(generation, OPEN) {
+                return;
+            }
+            std::hint::spin_loop();
+        }
+        std::thread::yield_now();
+    }
+
     /// Why a claim with this generation failed.
     #[cold]
     fn refusal(&self, generation: u64) -> Code {
@@ -209,41 +382,63 @@ impl<T> HandleEntry<T> {
 /// Exclusive use of a place; ends when dropped.
 struct Claim<'a, T> {
     place: &'a HandleEntry<T>,
-    generation: u64,
-    /// The state in which the place is left.
+    /// The word with which the place is left.
     end: u64,
 }
 
 impl<'a, T> Claim<'a, T> {
+    /// Moves the word from `found` to `claimed`; the place is left in the state `end`.
     #[inline]
-    fn take(place: &'a HandleEntry<T>, found: u64, generation: u64, end: u64) -> Option<Self> {
-        let claimed = generation << STATE_BITS | CLAIMED;
+    fn take(place: &'a HandleEntry<T>, found: u64, claimed: u64, end: u64) -> Option<Self> {
         place
             .word
             .compare_exchange(found, claimed, Ordering::Acquire, Ordering::Relaxed)
             .is_ok()
             // Made only on success: dropping a claim moves the word.
-            .then(|| Self {
-                place,
-                generation,
-                end,
-            })
+            .then_some(claimed & !STATE | end)
+            .map(|end| Self { place, end })
     }
 
     #[inline]
     fn content(&mut self) -> &mut Content<T> {
-        // SAFETY: this claim moved the word to CLAIMED, which succeeds for one thread at a time and
+        // SAFETY: this claim moved the word to TICKING or VISITED, which succeeds for one thread at a time and
         // only from a state in which no claim exists; `&mut self` keeps this thread to one reference.
         unsafe { &mut *self.place.content.get() }
+    }
+
+    fn leave_as(&mut self, state: u64) {
+        self.end = self.end & !STATE | state;
+    }
+
+    /// Calls `work` with the tenant, and ends.
+    #[inline]
+    fn run<R>(mut self, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+        let Some(tenant) = self.content().tenant.as_mut() else {
+            return Err(Code::Internal);
+        };
+        match catch_unwind(AssertUnwindSafe(|| work(tenant))) {
+            Ok(done) => Ok(done),
+            Err(payload) => {
+                self.content().panic = panic_message(payload);
+                self.leave_as(FAILED);
+                Err(Code::Internal)
+            }
+        }
+    }
+
+    /// Takes the tenant out, and leaves the place free.
+    fn vacate(mut self) -> Option<T> {
+        self.leave_as(FREE);
+        self.content().panic = String::new();
+        self.content().name = String::new();
+        self.content().tenant.take()
     }
 }
 
 impl<T> Drop for Claim<'_, T> {
     #[inline]
     fn drop(&mut self) {
-        self.place
-            .word
-            .store(word(self.generation, self.end), Ordering::Release);
+        self.place.word.store(self.end, Ordering::Release);
     }
 }
 
@@ -254,158 +449,16 @@ pub struct Reservation<'a, T> {
 }
 
 impl<T> Reservation<'_, T> {
-    /// Adds the tenant and returns its handle, which is positive.
-    pub fn fill(mut self, tenant: T) -> i64 {
-        self.claim.content().tenant = Some(tenant);
-        self.claim.end = OPEN;
-        (self.claim.generation << INDEX_BITS | self.index as u64).cast_signed()
+    /// Adds the tenant under a name for people, and returns its handle, which is positive.
+    pub fn fill(mut self, name: &str, tenant: T) -> i64 {
+        let content = self.claim.content();
+        content.tenant = Some(tenant);
+        name.clone_into(&mut content.name);
+        self.claim.leave_as(OPEN);
+        let generation = self.claim.end >> STATE_BITS;
+        (generation << INDEX_BITS | self.index as u64).cast_signed()
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::sync::Barrier;
-    use std::sync::atomic::AtomicUsize;
-
-    fn open<const N: usize>(handles: &Handles<u32, N>, tenant: u32) -> i64 {
-        handles.reserve().expect("a place is free").fill(tenant)
-    }
-
-    #[test]
-    fn what_was_never_opened_is_not_open() {
-        let handles: Handles<u32, 3> = Handles::new();
-        let real = open(&handles, 7);
-        for handle in [
-            0,
-            1,
-            2,
-            3,
-            255,
-            -1,
-            i64::MIN,
-            i64::MAX,
-            real + 1,
-            real + 256,
-            real | 1 << 62,
-        ] {
-            assert_eq!(
-                handles.with(handle, |_| ()),
-                Err(Code::NotOpen),
-                "{handle:#x}"
-            );
-            assert_eq!(
-                handles.close(handle, |_| ()),
-                Err(Code::NotOpen),
-                "{handle:#x}"
-            );
-        }
-        assert_eq!(handles.with(real, |tenant| *tenant), Ok(7));
-    }
-
-    #[test]
-    fn a_stale_handle_stays_closed_though_its_place_has_a_new_tenant() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let old = open(&handles, 1);
-        assert_eq!(handles.close(old, |tenant| tenant), Ok(1));
-        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
-        let new = open(&handles, 2);
-        assert_eq!(handles.with(old, |_| ()), Err(Code::Closed));
-        assert_eq!(handles.close(old, |_| ()), Err(Code::Closed));
-        assert_eq!(handles.with(new, |tenant| *tenant), Ok(2));
-    }
-
-    #[test]
-    fn places_run_out_and_come_back() {
-        let handles: Handles<u32, 2> = Handles::new();
-        let first = open(&handles, 1);
-        open(&handles, 2);
-        let refusal = handles.reserve().err().expect("both places are taken");
-        assert_eq!(refusal.code, Code::TooManyDrivers);
-        handles.close(first, drop).expect("it is open");
-        drop(handles.reserve().expect("the place is free again"));
-        open(&handles, 3);
-    }
-
-    #[test]
-    fn a_tenant_in_use_is_busy_and_stays_open() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let handle = open(&handles, 1);
-        let answers = handles.with(handle, |_| {
-            (handles.with(handle, |_| ()), handles.close(handle, |_| ()))
-        });
-        assert_eq!(answers, Ok((Err(Code::Busy), Err(Code::Busy))));
-        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(1));
-    }
-
-    #[test]
-    fn a_panic_fails_the_tenant_until_it_is_closed() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let handle = open(&handles, 1);
-        let text = "formatted at run time".to_owned();
-        assert_eq!(
-            handles.with(handle, |_| panic!("{text}")),
-            Err::<(), _>(Code::Internal)
-        );
-        assert_eq!(handles.with(handle, |_| ()), Err(Code::Internal));
-        assert_eq!(handles.panic_of(handle), Some(text));
-        assert_eq!(handles.close(handle, |tenant| tenant), Ok(1));
-        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
-        assert_eq!(handles.panic_of(handle), None);
-    }
-
-    #[test]
-    fn a_tenant_that_takes_its_time_to_close_keeps_nobody_waiting() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let handle = open(&handles, 1);
-        let met = handles.close(handle, |_| {
-            let next = open(&handles, 2);
-            (
-                handles.with(handle, |_| ()),
-                handles.with(next, |tenant| *tenant),
-            )
-        });
-        assert_eq!(met, Ok((Err(Code::Closed), Ok(2))));
-    }
-
-    #[test]
-    fn a_panic_while_closing_frees_the_place() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let handle = open(&handles, 1);
-        let closing = catch_unwind(AssertUnwindSafe(|| {
-            handles.close(handle, |_| panic!("stuck"))
-        }));
-        assert_eq!(panic_message(closing.expect_err("close panicked")), "stuck");
-        assert_eq!(handles.with(handle, |_| ()), Err(Code::Closed));
-        open(&handles, 2);
-    }
-
-    #[test]
-    fn two_threads_never_have_the_tenant_at_once() {
-        let handles: Handles<u32, 1> = Handles::new();
-        let handle = open(&handles, 0);
-        let (inside, start) = (AtomicUsize::new(0), Barrier::new(2));
-        let rounds = if cfg!(miri) { 200 } else { 100_000 };
-        let work = || {
-            start.wait();
-            let mut done = 0;
-            for _ in 0..rounds {
-                let entered = handles.with(handle, |tenant| {
-                    assert_eq!(inside.fetch_add(1, Ordering::Relaxed), 0);
-                    *tenant += 1;
-                    assert_eq!(inside.fetch_sub(1, Ordering::Relaxed), 1);
-                });
-                match entered {
-                    Ok(()) => done += 1,
-                    Err(refusal) => assert_eq!(refusal, Code::Busy),
-                }
-            }
-            done
-        };
-        let done: u32 = std::thread::scope(|scope| {
-            let other = scope.spawn(work);
-            work() + other.join().expect("no panic")
-        });
-        assert_eq!(handles.with(handle, |tenant| *tenant), Ok(done));
-    }
-}
+mod tests;

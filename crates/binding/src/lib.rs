@@ -20,4 +20,4 @@ pub use handles::{Handles, MAX_DRIVERS, Reservation};
 pub use opening::{closing, open};
 pub use panics::panic_message;
 pub use refusal::Refusal;
-pub use shared::{NO_TIME, Shared, Word};
+pub use shared::{NO_TIME, SPARE_SLOT, Shared, Word};

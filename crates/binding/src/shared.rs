@@ -2,7 +2,8 @@
 //!
 //! Words of 8 bytes in native byte order. Word 0 version of this layout, 1 status, 2 sequence, 3 age
 //! in nanoseconds, 4 simulation time in nanoseconds (the simulator writes it; [`NO_TIME`] until then), 5 granted time in
-//! nanoseconds, 6 ticks so far, 7 number of slots; the slots begin at word 8.
+//! nanoseconds, 6 ticks so far, 7 number of slots, 8 values that the simulator saturated while it converted them, 9 those
+//! that were not a number, 10 a spare slot for a signal that does not exist; the slots begin at word 11.
 
 #![allow(unsafe_code, reason = "the memory belongs to the other language")]
 
@@ -12,13 +13,16 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use tickbus_image::signal::Slot;
 
 /// Version of the layout; the other side compares it with its own.
-const VERSION: u64 = 1;
+const VERSION: u64 = 2;
 
 /// The simulation time as long as none was given.
 pub const NO_TIME: u64 = i64::MIN.cast_unsigned();
 
 /// Words before the first slot.
-const HEADER: usize = 8;
+const HEADER: usize = 11;
+
+/// The spare slot, counted from the first slot.
+pub const SPARE_SLOT: i32 = -1;
 
 /// One word of the header.
 #[derive(Clone, Copy)]
@@ -40,6 +44,10 @@ pub enum Word {
     Ticks = 6,
     /// How many slots follow.
     SlotCount = 7,
+    /// How many values were beyond their 64-bit integer, by the simulator.
+    Saturated = 8,
+    /// How many were not a number, and had to become an integer, by the simulator.
+    NotANumber = 9,
 }
 
 /// The shared buffer of one driver, and the owner of its memory.
@@ -126,22 +134,25 @@ mod tests {
 
     #[test]
     fn the_header_stands_before_the_slots() {
-        let mut memory = vec![u64::MAX; 11];
+        let mut memory = vec![u64::MAX; 14];
         let start = NonNull::new(memory.as_mut_ptr().cast()).expect("a vector has memory");
-        // SAFETY: 11 words are the header and three slots; the vector outlives `shared`.
+        // SAFETY: 14 words are the header and three slots; the vector outlives `shared`.
         let mut shared = unsafe { Shared::new(start, 3, ()) }.expect("a vector of u64 is aligned");
         shared.slots()[2] = Slot(42);
         shared.write(Word::Sequence, 5);
         assert_eq!(shared.read(Word::Sequence), 5);
-        assert_eq!(Shared::<()>::bytes(3), 88);
-        assert_eq!(memory, [VERSION, 0, 5, 0, NO_TIME, 0, 0, 3, 0, 0, 42]);
+        assert_eq!(Shared::<()>::bytes(3), 112);
+        assert_eq!(
+            memory,
+            [VERSION, 0, 5, 0, NO_TIME, 0, 0, 3, 0, 0, 0, 0, 0, 42]
+        );
     }
 
     #[test]
     fn memory_that_is_not_aligned_is_refused() {
-        let mut memory = [0_u64; 10];
+        let mut memory = [0_u64; 13];
         let start = NonNull::new(memory.as_mut_ptr().cast::<u8>()).expect("an array has memory");
-        // SAFETY: one byte into ten words leaves more than the nine words that one slot needs.
+        // SAFETY: one byte into 13 words leaves more than the 12 words that one slot needs.
         assert!(unsafe { Shared::new(start.add(1), 1, ()) }.is_none());
     }
 }

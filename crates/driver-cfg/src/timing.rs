@@ -22,6 +22,9 @@ const LEAST_CYCLE: Nanos = Nanos::from_micros(50);
 /// The shortest `watchdog`: pauses of a busy machine must not look like a stopped simulation.
 const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
 
+/// The longest of these times: the age of data that never came must be beyond it.
+const LONGEST: Nanos = Nanos::from_secs(24 * 3600);
+
 /// The shortest pause in `reconnect`: each attempt writes a line to the log.
 const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
@@ -65,7 +68,7 @@ impl<'a> TimingKeys<'a> {
     pub(super) fn read(&self, of_bus: Option<Nanos>) -> Option<Timing> {
         let span = |value: &Option<Value<'_>>, least, why| match value {
             None => Some(None),
-            Some(value) => value.duration_from(least, why).map(Some),
+            Some(value) => value.duration_between(least, why, LONGEST).map(Some),
         };
         let no_rhythm = "no operating system keeps to a shorter bus cycle than 50us";
         let no_stop = "a pause of a few milliseconds is no stop of the simulation";

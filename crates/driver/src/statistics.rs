@@ -33,6 +33,13 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// Adds values that were saturated, and those that were not a number, which the simulator's language has converted.
+    pub fn add_conversions(&mut self, [saturated, not_a_number]: [u64; 2]) {
+        let counters = &mut self.counters;
+        counters.saturated = counters.saturated.wrapping_add(saturated);
+        counters.not_a_number = counters.not_a_number.wrapping_add(not_a_number);
+    }
+
     /// The statistics.
     pub fn statistics(&self) -> Statistics {
         let ages = self.stations.iter().map(|(age, _, _)| *age);

@@ -3,7 +3,7 @@ using System.Runtime.InteropServices;
 
 // Doors FILE TABLES TICKS: the run of test_doors.py, in C#.
 static class Doors {
-    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; }
+    struct Signal { public IntPtr Name, Address, Type, Unit, Station; public int Slot, Edges, IsWritten, Kind; public long FailSafe; }
 
     [DllImport("tickbus")] static extern int tb_open(string path, string tables, out long driver);
     [DllImport("tickbus")] static extern int tb_signal_count(long driver);
@@ -40,7 +40,7 @@ static class Doors {
             foreach (var signal in signals) {
                 if (signal.IsWritten == 0) continue;
                 seed = unchecked(seed * 6364136223846793005UL + 1442695040888963407UL);
-                if (seed >> 58 == 0) Marshal.WriteInt64(values, 64 + 8 * signal.Slot, Bits(signal, seed));
+                if (seed >> 58 == 0) Marshal.WriteInt64(values, 88 + 8 * signal.Slot, Bits(signal, seed));
             }
             Check(tick % 2 == 1 ? tb_send(plc) : tb_exchange(plc));
         }

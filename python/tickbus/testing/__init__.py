@@ -13,8 +13,8 @@ The plug-in for pytest, which is there as soon as tickbus is installed, hands a 
         plc.await_(on("Running lamp")).within(40)
 """
 
+from .._durations import minutes, ms, s, ticks
 from ._conditions import Condition, above, below, falls, is_, near, off, on, rises, when
-from ._durations import minutes, ms, s, ticks
 from ._plc import Await, Expectation, Machine, Plc
 
 __all__ = [

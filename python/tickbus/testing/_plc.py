@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, TypeAlias
 
+from .. import _durations
 from .._driver import Driver, Fault
+from .._durations import Unit
 from .._native import Signal
-from . import _durations
 from ._conditions import Bound, Condition
-from ._durations import Unit
 from ._watch import Watch
 
 _PRESS = "200ms"

@@ -4,8 +4,8 @@ import math
 from collections import deque
 from decimal import Decimal
 
+from .. import _durations
 from .._native import Signal
-from . import _durations
 
 _KEPT = 8
 

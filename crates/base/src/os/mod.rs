@@ -1,5 +1,7 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
+#[cfg(unix)]
+mod at_exit;
 mod library;
 #[cfg(unix)]
 mod linked_terminal;
@@ -23,6 +25,8 @@ mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
+#[cfg(unix)]
+pub use at_exit::at_exit;
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;

@@ -362,6 +362,19 @@ impl<'a> Value<'a> {
         Some(span)
     }
 
+    /// As [`duration_from`](Self::duration_from), and not longer than `most`.
+    pub fn duration_between(&self, least: Nanos, why: &str, most: Nanos) -> Option<Nanos> {
+        let span = self.duration_from(least, why)?;
+        if span > most {
+            self.wrong(
+                format!("{} is {span}, which is too long", self.key),
+                format!("write at most \"{most}\""),
+            );
+            return None;
+        }
+        Some(span)
+    }
+
     /// One of the names in `choices`; `kinds` is their collective name, such as "roles".
     pub fn choice<T: Copy>(&self, kinds: &str, choices: &[(&str, T)]) -> Option<T> {
         let names: Vec<&str> = choices.iter().map(|(name, _)| *name).collect();

@@ -15,7 +15,7 @@ import tickbus.Tickbus;
  * Connects a simulator to a PLC's fieldbus, as one {@code .cfg} file describes it.
  *
  * <p>Its components are the signals in the order of the file; then {@code <name>.edges} for each latched
- * signal that the PLC writes: how many edges came with this tick; then {@code bus.age} in seconds,
+ * signal that the PLC writes: how many edges came with this tick; then {@code bus.age} in seconds, infinite until data arrive,
  * {@code bus.sequence} and {@code bus.status}: 0 fresh, 1 unchanged, 2 stale.
  *
  * <p>All calls come from one thread, as the control interface says.
@@ -101,7 +101,8 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
         for (Signal signal : latched) {
             inputs[at++] = signal.edges();
         }
-        inputs[at++] = bus.ageNanos() * SECONDS_PER_NANO;
+        long age = bus.ageNanos();
+        inputs[at++] = age == Long.MAX_VALUE ? Double.POSITIVE_INFINITY : age * SECONDS_PER_NANO;
         inputs[at++] = bus.sequence();
         inputs[at] = status;
         deliverHardwareInputs(inputs);

@@ -1,31 +1,32 @@
 package tickbus;
 
+import java.nio.LongBuffer;
+
 /**
  * Converts doubles to the 64-bit integers that some slots hold, and counts those that did not fit, as the native
  * library does for all other types.
  */
 final class Conversions {
-    // Only written by the ticking thread; read by any thread that asks for statistics.
-    private volatile long saturated;
-    private volatile long notANumber;
+    /** The shared buffer, whose header has the counts. */
+    private final LongBuffer words;
+
+    Conversions(LongBuffer words) {
+        this.words = words;
+    }
 
     /** The bits of the slot for a value: the nearest number that fits; the fail-safe value for NaN. */
     long slot(IntegerKind kind, double value, long failSafe) {
         if (Double.isNaN(value)) {
-            notANumber++;
+            count(Layout.WORD_NOT_A_NUMBER);
             return failSafe;
         }
         if (!kind.holds(value)) {
-            saturated++;
+            count(Layout.WORD_SATURATED);
         }
         return kind.fromDouble(value);
     }
 
-    long saturated() {
-        return saturated;
-    }
-
-    long notANumber() {
-        return notANumber;
+    private void count(int word) {
+        words.put(word, words.get(word) + 1);
     }
 }

@@ -16,15 +16,17 @@ import java.util.List;
  */
 final class Layout {
     /** The version of the buffer's layout that this class implements. */
-    static final long VERSION = 1;
+    static final long VERSION = 2;
     static final int WORD_VERSION = 0;
     static final int WORD_SEQUENCE = 2;
     static final int WORD_AGE = 3;
     static final int WORD_SIMULATION_TIME = 4;
     static final int WORD_GRANTED = 5;
     static final int WORD_SLOT_COUNT = 7;
+    static final int WORD_SATURATED = 8;
+    static final int WORD_NOT_A_NUMBER = 9;
     /** The first slot. */
-    static final int SLOTS = 8;
+    static final int SLOTS = 11;
 
     /** One signal, as the native library describes it. */
     record Entry(

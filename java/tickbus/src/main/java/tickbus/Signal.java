@@ -121,6 +121,16 @@ public final class Signal {
     }
 
     /**
+     * Sets the signal to 1 or 0; the same as {@link #setBoolean}.
+     *
+     * @param value true for 1
+     * @throws IllegalStateException if the PLC writes this signal
+     */
+    public void set(boolean value) {
+        setBoolean(value);
+    }
+
+    /**
      * The signal's value as an integer.
      *
      * @return exact for every unscaled integer type; an LWORD or ULINT is to be read as unsigned. For other values

@@ -2,6 +2,7 @@ package tickbus;
 
 import java.lang.invoke.MethodHandles;
 import java.lang.invoke.VarHandle;
+import java.lang.ref.Cleaner;
 import java.nio.LongBuffer;
 import java.nio.file.Path;
 import java.util.Collections;
@@ -50,20 +51,27 @@ import java.util.stream.Stream;
  * and setters of the signals belong to it. Another thread's tick throws {@link Status#BUSY} and does nothing, until
  * the ticking thread has ended or has called {@link #releaseThread}. A simulation engine whose events run on changing
  * threads calls that at the end of each event that ticks. {@link #statistics}, {@link #inject}, {@link #faults} and
- * {@link #close} can be called by any thread; during a call of a tick they throw {@link Status#BUSY}, and a tick that
- * meets one of them waits until it is done. Different drivers are independent of each other.
+ * {@link #close} can be called by any thread, also by a shutdown hook. They wait for the tick that is in their way, and a
+ * simulation that ticks without a pause lets them in. They throw {@link Status#BUSY} only if one tick takes longer than
+ * 2 s, as on a stepped bus whose PLC is slow. A tick that meets one of them waits until it is done.
+ * Different drivers are independent of each other.
+ *
+ * <p><b>The end.</b> Close a driver by try-with-resources. A driver to which nothing refers any more is closed, and its name
+ * logged, when the garbage collector finds it. When the JVM ends, open drivers are closed after its shutdown hooks (not on
+ * Windows; there close them in a hook). SIGTERM and SIGINT are such an end,
+ * SIGKILL is not.
  *
  * <p>After {@link #close} every method but {@link #close}, {@link #id}, {@link #name} and {@link #toString}
  * throws {@link FieldbusException} with {@link Status#CLOSED}.
  */
 public final class Tickbus implements AutoCloseable {
     private static final VarHandle TICKER;
+    /** Closes forgotten drivers. */
+    private static final Cleaner CLEANER = Cleaner.create();
     /** The most events fetched by one native call. */
     private static final int EVENTS = 64;
     /** The most events handed over by one call: as many as the driver's ring holds. */
     private static final int MOST_EVENTS = 4096;
-    /** How often a call that meets a running exchange is retried. */
-    private static final int PATIENCE = 100;
     /** Longs per event: signal, slot, time. */
     private static final int EVENT_WORDS = 3;
 
@@ -91,7 +99,7 @@ public final class Tickbus implements AutoCloseable {
     private final LongBuffer words;
     private final List<Signal> signals;
     private final Map<String, Signal> byName = new HashMap<>();
-    private final Conversions conversions = new Conversions();
+    private final Conversions conversions;
     private final SignalGroup written;
     private final SignalGroup read;
     /** Fetched events; those from {@code nextEvent} to {@code endOfEvents} have not been handed over yet. */
@@ -104,18 +112,40 @@ public final class Tickbus implements AutoCloseable {
      */
     private Thread ticker;
     private volatile boolean closed;
+    private final Forgotten forgotten;
+    private final Cleaner.Cleanable cleanable;
 
     private Tickbus(long handle, Layout layout) {
         this.handle = handle;
         this.id = layout.id();
         this.name = layout.name();
         this.words = layout.words();
+        this.conversions = new Conversions(words);
         LongBuffer slots = layout.slots();
         this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
         signals.forEach(signal -> byName.put(signal.name(), signal));
         this.written = new SignalGroup(layout, signals.stream().filter(Signal::isWritten).toList(), conversions);
         this.read = new SignalGroup(layout, signals.stream().filter(signal -> !signal.isWritten()).toList(),
             conversions);
+        this.forgotten = new Forgotten(handle);
+        this.cleanable = CLEANER.register(this, forgotten);
+    }
+
+    /** Closes a driver to which nothing refers any more, and logs its name. Must not refer to it, either. */
+    private static final class Forgotten implements Runnable {
+        private final long handle;
+        private volatile boolean closed;
+
+        Forgotten(long handle) {
+            this.handle = handle;
+        }
+
+        @Override
+        public void run() {
+            if (!closed) {
+                forgottenNative(handle);
+            }
+        }
     }
 
     /**
@@ -374,14 +404,12 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public Map<String, String> statistics() {
-        Map<String, String> statistics = StatisticsText.read(whenIdle(() -> statisticsNative(handle)));
-        add(statistics, "saturated", conversions.saturated());
-        add(statistics, "not_a_number", conversions.notANumber());
-        return Collections.unmodifiableMap(statistics);
+        return Collections.unmodifiableMap(StatisticsText.read(statisticsNative(handle)));
     }
 
-    private static void add(Map<String, String> statistics, String key, long count) {
-        statistics.computeIfPresent(key, (same, text) -> Long.toString(Long.parseLong(text) + count));
+    /** For tests. */
+    long handle() {
+        return handle;
     }
 
     /** For the signals of this driver. */
@@ -401,7 +429,7 @@ public final class Tickbus implements AutoCloseable {
      */
     public InjectedFault inject(String fault) {
         Objects.requireNonNull(fault, "fault");
-        int id = whenIdle(() -> injectNative(handle, fault));
+        int id = injectNative(handle, fault);
         // The fault is injected: to throw BUSY now would say that it is not.
         return untilIdle(this::faults).stream().filter(one -> one.id() == id).findFirst().orElseThrow();
     }
@@ -425,7 +453,7 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public Optional<String> page() {
-        return Optional.of(whenIdle(() -> pageNative(handle))).filter(address -> !address.isEmpty());
+        return Optional.of(pageNative(handle)).filter(address -> !address.isEmpty());
     }
 
     InjectedFault.State faultState(int id) {
@@ -438,7 +466,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     void endFault(int id) {
-        whenIdle(() -> endFaultNative(handle, id));
+        endFaultNative(handle, id);
     }
 
     private Optional<String[]> faultLine(int id) {
@@ -446,7 +474,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     private Stream<String[]> faultLines() {
-        return whenIdle(() -> faultsNative(handle)).lines().map(line -> line.split("\t", FAULT_FIELDS));
+        return faultsNative(handle).lines().map(line -> line.split("\t", FAULT_FIELDS));
     }
 
     /**
@@ -454,7 +482,7 @@ public final class Tickbus implements AutoCloseable {
      *
      * <p>One call hands over at most 4096, the capacity of the driver's ring, so that a PLC which writes faster than
      * the handler works does not hold up the tick forever. If the handler throws, the event counts as handed over,
-     * and the next call continues after it.
+     * and the next call continues after it. If the handler closes the driver, it gets no further event.
      *
      * @param handler called on this thread, for each event
      * @return how many events there were
@@ -465,7 +493,8 @@ public final class Tickbus implements AutoCloseable {
         mustBeTicker();
         mustBeOpen();
         int total = 0;
-        while (total < MOST_EVENTS && (nextEvent < endOfEvents || takeEvents())) {
+        // The handler may close the driver.
+        while (total < MOST_EVENTS && !closed && (nextEvent < endOfEvents || takeEvents())) {
             int at = nextEvent;
             nextEvent += EVENT_WORDS;
             total++;
@@ -495,7 +524,8 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Closes the connection. Closing twice is allowed.
      *
-     * @throws FieldbusException {@link Status#BUSY} if another thread is in an exchange; the driver stays open
+     * @throws FieldbusException {@link Status#BUSY} if another thread has been in one exchange for 2 s; the driver stays
+     *     open
      */
     @Override
     public synchronized void close() {
@@ -503,10 +533,7 @@ public final class Tickbus implements AutoCloseable {
             return;
         }
         try {
-            whenIdle(() -> {
-                finalizeNative(handle);
-                return null;
-            });
+            finalizeNative(handle);
         } catch (FieldbusException e) {
             // The native side has closed the driver, unless it was in use.
             if (e.status() != Status.BUSY) {
@@ -528,6 +555,8 @@ public final class Tickbus implements AutoCloseable {
     private void closed() {
         closed = true;
         signals.forEach(Signal::close);
+        forgotten.closed = true;
+        cleanable.clean();
     }
 
     /** Name and id. */
@@ -560,20 +589,6 @@ public final class Tickbus implements AutoCloseable {
         if (!free || !TICKER.compareAndSet(this, former, Thread.currentThread())) {
             throw new FieldbusException(Status.BUSY, "'" + name + "' is ticked by " + (free ? "another thread" : former)
                 + "; tick it from that thread, end that thread, or call releaseThread() there first");
-        }
-    }
-
-    /** Makes a native call that a running exchange of the ticking thread blocks, usually for less than 1 us. */
-    private static <T> T whenIdle(Supplier<T> call) {
-        for (int attempt = 1;; attempt++) {
-            try {
-                return call.get();
-            } catch (FieldbusException e) {
-                if (e.status() != Status.BUSY || attempt == PATIENCE) {
-                    throw e;
-                }
-                Thread.onSpinWait();
-            }
         }
     }
 
@@ -639,6 +654,9 @@ public final class Tickbus implements AutoCloseable {
 
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);
+
+    /** Closes a driver that nobody has closed, and logs its name; throws {@link FieldbusException}. */
+    static native void forgottenNative(long handle);
 
     /** Text for {@link StatisticsText}; throws {@link FieldbusException}. */
     static native String statisticsNative(long handle);

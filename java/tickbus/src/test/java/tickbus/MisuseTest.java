@@ -254,7 +254,8 @@ class MisuseTest {
             Callable<Integer> looks = () -> {
                 int seen = 0;
                 while (!ticked.get()) {
-                    seen += served(bus::statistics) ? 1 : 0;
+                    bus.statistics();
+                    seen++;
                 }
                 return seen;
             };
@@ -308,34 +309,73 @@ class MisuseTest {
     }
 
     @Test
-    void aDriverClosesBetweenTwoExchangesOrNotAtAll() throws Exception {
+    void aDriverClosesBetweenTwoExchangesOfAThreadThatNeverPauses() throws Exception {
         for (int round = 0; round < 50; round++) {
             Tickbus bus = Tickbus.open(mirror());
             Callable<Integer> ticking = () -> {
                 int ticks = 0;
-                // Nothing guarantees that close wins against a thread that never pauses.
-                for (int i = 0; i < 2000; i++) {
+                while (true) {
                     try {
                         bus.exchange();
                         ticks++;
                     } catch (FieldbusException e) {
-                        if (e.status() == Status.CLOSED) {
-                            break;
-                        }
-                        assertEquals(Status.BUSY, e.status(), e::getMessage);
+                        assertEquals(Status.CLOSED, e.status(), e::getMessage);
+                        return ticks;
                     }
                 }
-                return ticks;
             };
             Callable<Integer> closing = () -> {
-                int refused = 0;
-                while (!served(bus::close)) {
-                    refused++;
-                }
-                return refused;
+                bus.close();
+                return 0;
             };
             atOnce(ticking, closing);
             assertStatus(Status.CLOSED, bus::exchange);
+        }
+    }
+
+    @Test
+    void aForgottenDriverIsClosed() throws Exception {
+        long handle = forgotten();
+        while (Tickbus.xChangeData(handle) >= 0) {
+            System.gc();
+            Thread.sleep(1);
+        }
+        assertEquals(Status.CLOSED.code(), Tickbus.xChangeData(handle));
+    }
+
+    /** The handle of a driver that nobody has closed, and to which nothing refers. */
+    private long forgotten() {
+        return Tickbus.open(mirror()).handle();
+    }
+
+    @Test
+    void aHandlerThatClosesTheDriverGetsNoFurtherEvent() {
+        Path cfg = DriverCfg.mirror(1).fieldbus("events = true").signal("in", "%IX0.0").signal("out", "%QX0.0").write(directory);
+        Tickbus bus = Tickbus.open(cfg);
+        for (int i = 0; i < 20; i++) {
+            bus.signal("in").set(i % 2 == 0);
+            bus.exchange();
+        }
+        assertEquals(1, bus.pollEvents((signal, value, time) -> bus.close()));
+    }
+
+    /** Ends a JVM in the middle of a tick, with its driver open. */
+    private String recordedAtTheEnd(String how) throws Exception {
+        Path recording = directory.resolve(how + ".csv");
+        Path cfg = DriverCfg.mirror(1).signal("in", "%IW0").signal("out", "%QX0.0").write(directory);
+        ChildJvm.Outcome outcome = new ChildJvm().with("--enable-native-access=ALL-UNNAMED")
+            .with("-Dtickbus.native.dir=" + System.getProperty("tickbus.native.dir"))
+            .with("-cp", ChildJvm.classPath(), EndInATick.class.getName(), cfg.toString(), recording.toString(), how).run();
+        assertEquals(new ChildJvm.Outcome(how.equals("hook") ? 3 : 0, how.equals("hook") ? "closed\n" : ""), outcome);
+        List<String> lines = Files.readAllLines(recording);
+        return lines.get(lines.size() - 1);
+    }
+
+    @Test
+    void theEndOfTheJvmClosesWhatIsOpen() throws Exception {
+        for (String how : List.of("return", "exit", "hook")) {
+            String last = recordedAtTheEnd(how);
+            assertTrue(last.contains("4711"), how + ": " + last);
         }
     }
 

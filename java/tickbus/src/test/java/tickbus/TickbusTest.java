@@ -459,17 +459,13 @@ class TickbusTest {
     }
 
     @Test
-    void severalDriversAreOpenAtOnceUntilThereIsNoPlaceLeft() {
+    void manyDriversAreOpenAtOnce() {
         List<Tickbus> open = new ArrayList<>();
         Path cfg = DriverCfg.mirror(1).signal("in", "%IX0.0").signal("out", "%QX0.0").write(directory);
         try {
-            FieldbusException full = assertThrows(FieldbusException.class, () -> {
-                for (int i = 0; i < 1000; i++) {
-                    open.add(Tickbus.open(cfg));
-                }
-            });
-            assertEquals(Status.TOO_MANY_DRIVERS, full.status());
-            assertEquals(64, open.size());
+            for (int i = 0; i < 200; i++) {
+                open.add(Tickbus.open(cfg));
+            }
             for (int i = 0; i < open.size(); i++) {
                 open.get(i).signal("in").setBoolean(i % 2 == 0);
             }

@@ -12,9 +12,13 @@ use tickbus_import::{Client, ImportOptions, Imported, condensed, import};
 /// Make a driver.cfg from a list of PLC tags: name, address, type, comment.
 ///
 /// Takes workbooks (XLSX) and CSV with semicolons, commas or tabs, with or without headings, as spreadsheets and TIA Portal
-/// (XLSX, SDF, XML) write them; PLCopen XML; L5X and the tag CSV of Studio 5000; TwinCAT's .TcPOU and .TcGVL, Structured
+/// (XLSX, SDF, XML) write them; PLCopen XML; L5X and the tag CSV of Studio 5000; TwinCAT's `.TcPOU` and `.TcGVL`, Structured
 /// Text, and the mapping export of CODESYS; and the lists of PLC4X and KEPServer, whose addresses of registers and
 /// data blocks become [fieldbus.at] of a client bus. What cannot be used is reported with its place.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The list.

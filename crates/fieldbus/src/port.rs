@@ -5,11 +5,13 @@
 //! [`sent`](Port::sent) learns what the peer has.
 
 mod calls;
+mod ending;
 mod faults;
 mod frames;
 mod image;
 
 pub use calls::CallWatch;
+pub use ending::{Farewell, Outputs};
 pub use frames::{Frames, Receipt};
 
 use std::fmt::Arguments;
@@ -53,6 +55,8 @@ impl Port {
                 changes: Vec::new(),
                 status,
                 last_cycle: None,
+                blind: None,
+                ending: None,
             },
             faults: FaultLayer::default(),
             clock,
@@ -124,6 +128,7 @@ impl Port {
     /// what is handed in is lost.
     #[inline]
     pub fn is_up(&mut self, now: Nanos) -> bool {
+        self.look_for_end();
         self.faults.attend(now, &mut self.image);
         !self.faults.is_down()
     }
@@ -184,6 +189,7 @@ impl Port {
     /// of it. Data in transit when a line breaks are lost, pulses included.
     #[inline]
     pub fn sent(&mut self, receipt: &Receipt) {
+        self.had(receipt);
         for station in receipt.stations.clone() {
             let bits = receipt.bits.as_ref();
             self.faults.sent(station, bits, &mut self.image);

@@ -18,7 +18,7 @@ use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Port, Role, Stepped};
+use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
 use tickbus_plc::{Program, Report};
 use tickbus_record as record;
 
@@ -155,7 +155,7 @@ impl HostThread {
         // looks at its own end.
         let is_own = role == config.role;
         let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
-        let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
+        let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
@@ -176,8 +176,12 @@ impl HostThread {
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
-                    let reconnect = config.timing.reconnect.clone();
-                    let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
+                    let mut timing = config.timing.clone();
+                    if !is_own {
+                        // The machine at the other end of this line closes with the program.
+                        (timing.at_close, timing.while_stale) = (Outputs::Hold, Outputs::Hold);
+                    }
+                    let bus = BusThread::start(bus, port, &timing, status.clone(), &name);
                     let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                     let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
                     let scans = {
@@ -192,6 +196,7 @@ impl HostThread {
                     (stop, Some(bus), Box::new(scans))
                 }
                 Scanned::InSteps { mut bus, stop } => {
+                    let mut port = port;
                     let scans = {
                         let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
                         let status = status.clone();

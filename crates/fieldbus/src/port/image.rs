@@ -5,8 +5,13 @@ use std::ops::Range;
 use tickbus_base::time::Nanos;
 use tickbus_image::{BusEnd, Event};
 
+use super::ending::Ending;
+use crate::staleness::is_stale;
 use crate::validity::Validity;
 use crate::{Cause, ChangeEvents, LinkState, LinkStatus, PlcState};
+
+/// A watchdog that has run out, however young the last tick is.
+const OVER: Option<Nanos> = Some(Nanos(-1));
 
 /// A bus's access to the image and to the state of its line, without injected faults.
 #[derive(Debug)]
@@ -19,6 +24,9 @@ pub(super) struct ImagePort {
     pub(super) validity: Validity,
     /// When the first station's last frame arrived while the line was running.
     pub(super) last_cycle: Option<Nanos>,
+    /// Per station, whether its last cycle found its peer stale; `None` if that does not change what is sent.
+    pub(super) blind: Option<Box<[bool]>>,
+    pub(super) ending: Option<Ending>,
 }
 
 impl ImagePort {
@@ -30,7 +38,25 @@ impl ImagePort {
     /// The bytes that a station sends at `now`.
     #[inline]
     pub(super) fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
-        self.image.stations[station].outgoing(now, self.watchdog)
+        let watchdog = if self.is_untrusted(station, now) {
+            OVER
+        } else {
+            self.watchdog
+        };
+        self.image.stations[station].outgoing(now, watchdog)
+    }
+
+    /// Whether the fail-safe values are to be sent, although the simulation ticks.
+    fn is_untrusted(&mut self, station: usize, now: Nanos) -> bool {
+        let is_ending = self.ending.as_ref().is_some_and(Ending::is_begun);
+        let Some(blind) = &mut self.blind else {
+            return is_ending;
+        };
+        let age = self.image.stations[station].peer_age(now);
+        let is_stale = is_stale(age, self.status.max_age(), self.validity.is_valid(station));
+        // A process that was held up finds everything stale once, and has not asked yet.
+        let was_stale = std::mem::replace(&mut blind[station], is_stale);
+        is_ending || (is_stale && was_stale)
     }
 
     /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.

@@ -75,10 +75,12 @@ impl Transfer<'_> {
                 return;
             };
             self.frames.fill(space, &mut frames);
+            // Of these frames: the driver may begin to close now.
+            let receipt = frames.receipt();
             // A check that sends nothing cannot be lost.
             if session.made(now, |before, now| self.frames.differ(before, now)) {
                 let taken = port.take(stations, now);
-                self.connection.receipt = taken.map(|frames| frames.receipt());
+                self.connection.receipt = taken.map(|_| receipt);
                 if self.connection.receipt.is_none() {
                     session.lost();
                 }

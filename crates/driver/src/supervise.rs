@@ -83,7 +83,7 @@ impl BusThread {
             return;
         };
         let link = self.status.link();
-        if !matches!(link.state, LinkState::Running | LinkState::Stale) {
+        if !farewell.is_due() || link.cause == Cause::Injected {
             return;
         }
         farewell.begin();
@@ -145,6 +145,7 @@ fn serve(
                 return;
             }
         };
+        port.line_ended();
         if status.runs() > runs {
             attempt = 0;
         }

@@ -27,14 +27,26 @@ impl Outputs {
 /// Lets another thread end the exchange of a [`Port`] with the fail-safe values.
 #[derive(Debug)]
 pub struct Farewell {
-    begun: Arc<AtomicBool>,
+    shared: Arc<Shared>,
     done: Receiver<()>,
 }
 
+#[derive(Debug, Default)]
+struct Shared {
+    begun: AtomicBool,
+    /// The peer has got something since the line was opened.
+    is_used: AtomicBool,
+}
+
 impl Farewell {
+    /// Whether a peer has got anything by this line. Otherwise nobody is left with it.
+    pub fn is_due(&self) -> bool {
+        self.shared.is_used.load(Ordering::Relaxed)
+    }
+
     /// From now on every station sends its fail-safe values.
     pub fn begin(&self) {
-        self.begun.store(true, Ordering::Relaxed);
+        self.shared.begun.store(true, Ordering::Relaxed);
     }
 
     /// Waits until the peers of all stations have these values, or the bus has ended; at most for `limit`. Returns
@@ -47,7 +59,7 @@ impl Farewell {
 /// The port's side of a [`Farewell`].
 #[derive(Debug)]
 pub(super) struct Ending {
-    begun: Arc<AtomicBool>,
+    shared: Arc<Shared>,
     /// As the last cycle found it: all frames of a cycle are of one kind.
     is_begun: bool,
     /// Per station, the cycles after which its peer has the last values.
@@ -58,19 +70,19 @@ pub(super) struct Ending {
 impl Ending {
     fn new(stations: usize, cycles: u32) -> (Self, Farewell) {
         let (sender, done) = mpsc::channel();
-        let begun = Arc::<AtomicBool>::default();
+        let shared = Arc::<Shared>::default();
         let ending = Self {
-            begun: Arc::clone(&begun),
+            shared: Arc::clone(&shared),
             is_begun: false,
             missing: vec![cycles; stations].into(),
             done: sender,
         };
-        (ending, Farewell { begun, done })
+        (ending, Farewell { shared, done })
     }
 
     /// A cycle begins.
     fn look(&mut self) {
-        self.is_begun = self.begun.load(Ordering::Relaxed);
+        self.is_begun = self.shared.begun.load(Ordering::Relaxed);
     }
 
     pub(super) fn is_begun(&self) -> bool {
@@ -109,6 +121,13 @@ impl Port {
         self.image.ending.as_ref().is_some_and(Ending::is_begun)
     }
 
+    /// The line has failed, and its peer is out of reach.
+    pub fn line_ended(&mut self) {
+        if let Some(ending) = &self.image.ending {
+            ending.shared.is_used.store(false, Ordering::Relaxed);
+        }
+    }
+
     /// A cycle begins.
     #[inline]
     pub(super) fn look_for_end(&mut self) {
@@ -132,6 +151,9 @@ impl Port {
     /// The peer has the frames of this receipt.
     #[inline]
     pub(super) fn had(&mut self, receipt: &Receipt) {
+        if let Some(ending) = &self.image.ending {
+            ending.shared.is_used.store(true, Ordering::Relaxed);
+        }
         if receipt.is_last {
             self.had_last(receipt);
         }

@@ -34,12 +34,12 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
-    /// The peer has got something since the line was opened.
+    /// Something was sent since the line was opened.
     is_used: AtomicBool,
 }
 
 impl Farewell {
-    /// Whether a peer has got anything by this line. Otherwise nobody is left with it.
+    /// Whether a peer may have got anything by this line.
     pub fn is_due(&self) -> bool {
         self.shared.is_used.load(Ordering::Relaxed)
     }
@@ -49,8 +49,8 @@ impl Farewell {
         self.shared.begun.store(true, Ordering::Relaxed);
     }
 
-    /// Waits until the peers of all stations have these values, or the bus has ended; at most for `limit`. Returns
-    /// whether the peers have them.
+    /// Waits until the peers of all stations have these values, or the line has ended; at most for `limit`. Returns
+    /// whether that was in time.
     pub fn wait(&self, limit: Duration) -> bool {
         self.done.recv_timeout(limit) != Err(RecvTimeoutError::Timeout)
     }
@@ -89,6 +89,11 @@ impl Ending {
         self.is_begun
     }
 
+    /// A frame is about to be sent.
+    pub(super) fn is_used(&self) {
+        self.shared.is_used.store(true, Ordering::Relaxed);
+    }
+
     /// A peer has whole frames.
     fn sent(&mut self, stations: Range<usize>) {
         for cycles in &mut self.missing[stations] {
@@ -121,10 +126,13 @@ impl Port {
         self.image.ending.as_ref().is_some_and(Ending::is_begun)
     }
 
-    /// The line has failed, and its peer is out of reach.
+    /// The line has failed, and its peer is out of reach: nobody waits for it.
     pub fn line_ended(&mut self) {
         if let Some(ending) = &self.image.ending {
             ending.shared.is_used.store(false, Ordering::Relaxed);
+            if ending.shared.begun.load(Ordering::Relaxed) {
+                let _ = ending.done.send(());
+            }
         }
     }
 
@@ -151,9 +159,6 @@ impl Port {
     /// The peer has the frames of this receipt.
     #[inline]
     pub(super) fn had(&mut self, receipt: &Receipt) {
-        if let Some(ending) = &self.image.ending {
-            ending.shared.is_used.store(true, Ordering::Relaxed);
-        }
         if receipt.is_last {
             self.had_last(receipt);
         }

@@ -68,8 +68,12 @@ impl Transfer<'_> {
         let session = &mut self.connection.session;
         if let Some(space) = session.due(now) {
             let stations = self.frames.stations();
-            let Some(mut frames) = port.look(stations.clone(), now) else {
-                // The line is down: the record stays as it is, and what has changed is sent when the line is back.
+            let is_up = stations
+                .clone()
+                .any(|station| port.is_station_up(station, now));
+            let frames = is_up.then(|| port.look(stations.clone(), now)).flatten();
+            let Some(mut frames) = frames else {
+                // The line is down, or all its stations are: the record stays as it is, and what has changed is sent when the line is back.
                 session.made(now, |_, _| false);
                 session.withdraw();
                 return;

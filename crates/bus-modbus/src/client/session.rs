@@ -404,8 +404,9 @@ impl ClientSession<'_> {
         let mut rest = station..self.stations.len();
         // A station that refuses to be read may still take the last values.
         let is_ending = port.is_ending();
-        let Some(next) = rest.find(|station| is_ending || !self.stations[*station].rests(now))
-        else {
+        let Some(next) = rest.find(|station| {
+            (is_ending || !self.stations[*station].rests(now)) && port.is_station_up(*station, now)
+        }) else {
             return Ok(());
         };
         let Some(mut frames) = port.look(next..next + 1, now) else {

@@ -27,6 +27,11 @@ impl Frames<'_> {
         self.port.outgoing(station, self.now)
     }
 
+    /// Whether the line can carry anything to this station.
+    pub fn is_station_up(&self, station: usize) -> bool {
+        !self.port.faults.is_cut(station)
+    }
+
     /// Whether these are the last frames: a station that refused may still take the values of its end.
     pub fn is_ending(&self) -> bool {
         self.port.is_ending()

@@ -16,7 +16,7 @@ use crate::{DriverError, SlotMap};
 use tickbus_base::os::{dropped_log_lines, wake_on_time};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
 use tickbus_plc::{Program, Report};
@@ -176,11 +176,7 @@ impl HostThread {
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
-                    let mut timing = config.timing.clone();
-                    if !is_own {
-                        // The machine at the other end of this line closes with the program.
-                        (timing.at_close, timing.while_stale) = (Outputs::Hold, Outputs::Hold);
-                    }
+                    let timing = timing(config, is_own);
                     let bus = BusThread::start(bus, port, &timing, status.clone(), &name);
                     let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                     let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
@@ -245,6 +241,16 @@ impl HostThread {
             bus,
         })
     }
+}
+
+/// The times of a program's line, and what it leaves behind there.
+fn timing(config: &Config, is_own_end: bool) -> Timing {
+    let mut timing = config.timing.clone();
+    if !is_own_end {
+        // The machine at the other end of this line closes with the program.
+        (timing.at_close, timing.while_stale) = (Outputs::Hold, Outputs::Hold);
+    }
+    timing
 }
 
 /// What belongs to the statistics of a program and its line.

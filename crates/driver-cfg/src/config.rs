@@ -407,13 +407,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
         is_for_both: stated.is_none(),
         own_role: stated.unwrap_or_default(),
         life_signs,
-        timing: spans.read(Line {
-            role,
-            cycle: bus.as_ref().and_then(|bus| bus.cycle()),
-            is_client: bus
-                .as_ref()
-                .is_some_and(|bus| bus.kind().ends_with("-client")),
-        }),
+        timing: spans.read(Line::of(role, bus.as_ref())),
         sizes,
         at,
         bus,

@@ -1,5 +1,6 @@
 //! Cycle times and time-outs of `[fieldbus]`.
 
+use crate::Options;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 use tickbus_fieldbus::{Outputs, Role};
@@ -41,6 +42,17 @@ pub(super) struct Line {
     pub(super) cycle: Option<Nanos>,
     /// Whether this end writes into a memory of the peer, which keeps the values.
     pub(super) is_client: bool,
+}
+
+impl Line {
+    /// The end with `role` of `bus`; `None` if that is wrong in the file.
+    pub(super) fn of(role: Role, bus: Option<&Options>) -> Self {
+        Self {
+            role,
+            cycle: bus.and_then(|bus| bus.cycle()),
+            is_client: bus.is_some_and(|bus| bus.kind().ends_with("-client")),
+        }
+    }
 }
 
 /// Cycle times and time-outs of a driver.

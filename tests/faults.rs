@@ -505,6 +505,47 @@ fn one_station_of_two_is_gone() {
 }
 
 #[test]
+fn the_other_end_of_a_loopback_sees_that_one_station_is_down() {
+    let link = Link::new();
+    let open = |role: &str, clock: &Arc<Manual>| {
+        let mut text = format!(
+            "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"{}\"\n\
+             role = \"{role}\"\ncycle = \"1ms\"\nmax_age = \"300ms\"\n",
+            link.0
+        );
+        for station in ["one", "two"] {
+            text += &format!("[[station]]\nname = \"{station}\"\n");
+        }
+        for station in ["one", "two"] {
+            text += &format!(
+                "[[signal]]\nname = \"{station}\"\nstation = \"{station}\"\naddress = \"%IB0\"\n"
+            );
+        }
+        End::open(&text, clock)
+    };
+    let clock = Manual::new();
+    let (mut device, mut controller) = (open("device", &clock), open("controller", &clock));
+    let stale =
+        |end: &End| ["one", "two"].map(|name| end.statistic(&format!("station.{name}.stale")));
+    let mut until = |right: [&str; 2], fault: Option<&str>| {
+        if let Some(fault) = fault {
+            device.driver.inject_text(fault).expect("a right fault");
+        }
+        await_that("the controller sees it", || {
+            pass(&clock, 2);
+            device.tick();
+            controller.tick();
+            stale(&controller) == right
+        });
+    };
+    until(["false", "false"], None);
+    until(
+        ["false", "true"],
+        Some("kind = \"station-down\"\nstation = \"two\""),
+    );
+}
+
+#[test]
 fn a_hosted_program_gets_wrong_inputs_and_its_outputs_arrive_wrong() {
     let (link, clock) = (Link::new(), Manual::new());
     let mut device = End::open(&config(&link, "device", ""), &clock);
@@ -666,7 +707,7 @@ fn a_program_of_its_own_takes_faults_from_its_command_line() {
         "[[fault]]\nkind = \"stuck\"\nsignal = \"a\"\nvalue = true\n",
     );
     let (code, out, err) = run(&right);
-    assert_eq!(code, Some(0), "{out}\n{err}");
+    assert_eq!(code, Some(3), "nobody is at the other end: {out}\n{err}");
     assert!(out.contains("\nfault.active=stuck a\n"), "{out}");
     assert!(
         out.contains("\nplc.rises.b=1\n"),

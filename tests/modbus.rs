@@ -601,6 +601,35 @@ fn a_client_that_leaves_takes_the_values_of_its_unit_alone() {
 }
 
 #[test]
+fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
+    for (further, refused) in [("", false), ("writers = 1", true)] {
+        let (mut device, mut first) = device(further);
+        let mut second = client(device.address());
+        let (speed, echo) = ([6, 0, 1, 0, 9], [6, 0, 2, 0, 9]);
+        assert_eq!(ask(&mut first, 1, &speed), speed);
+        assert_eq!(ask(&mut second, 1, &echo), echo, "that is no one else's");
+        let other = [6, 0, 1, 0, 8];
+        logged::expect("each undoes what the other one does");
+        let answer = ask(&mut second, 2, &other);
+        assert_eq!(
+            answer,
+            if refused {
+                vec![0x86, 6]
+            } else {
+                other.to_vec()
+            }
+        );
+        device.until_speed(if refused { 9 } else { 8 });
+        assert_eq!(device.end.statistic("modbus-server.second_writer"), "1");
+        leave(first);
+        device.until("the first one is gone", |_| {
+            ask(&mut second, 3, &other) == other
+        });
+        device.until_speed(8);
+    }
+}
+
+#[test]
 fn function_3_reads_the_inputs_behind_the_outputs() {
     let (mut device, mut stream) = device("");
     device.end.set("position", 5.0);

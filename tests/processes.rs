@@ -3,6 +3,7 @@
 #![allow(missing_docs, reason = "tests")]
 
 use std::io::{BufRead as _, BufReader, Lines};
+use std::net::TcpListener;
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
@@ -276,6 +277,26 @@ fn sigterm_and_a_duration_end_a_command_in_good_order() {
 
     let (lines, status) = Process::start(&["mirror", path, "--duration", "20ms"]).end();
     assert!(status.success() && lines.last().expect("a line").starts_with("mirror: ok "));
+}
+
+#[test]
+fn a_command_whose_line_never_ran_fails() {
+    let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let address = taken.local_addr().expect("it is bound").to_string();
+    let file = save(&config(&format!("address = \"{address}\"")));
+    let path = file.path().to_str().expect("a plain name");
+    let fails = |mut process: Process, title: &str| {
+        process.until(&format!("{title}: failed: "));
+        process.signal("TERM");
+        let (lines, status) = process.end();
+        let last = lines.last().expect("a line");
+        let right = format!("{title}: failed reason=the line never ran: ");
+        assert!(last.starts_with(&right), "{last}");
+        assert_eq!(status.code(), Some(3));
+    };
+    fails(Process::start(&["mirror", path]), "mirror");
+    drop(taken);
+    fails(Process::start(&["plc", "mirror", "--config", path]), "plc");
 }
 
 fn refused(arguments: &[&str]) -> (String, Option<i32>) {

@@ -178,6 +178,7 @@ fn inputs_are_not_written_and_flags_are_scratch() {
 
 #[test]
 fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
+    logged::expect("each undoes what the other one does");
     let (mut device, at) = server("");
     let mut panel = Client::new(at);
     panel.read(INPUTS, 0, 6);

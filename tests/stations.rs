@@ -12,7 +12,7 @@ mod peers;
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
 use std::os::fd::AsRawFd as _;
 use tickbus_conformance as conformance;
@@ -98,6 +98,33 @@ fn a_fault_that_is_over_leaves_nothing_behind_on_a_station_whose_neighbour_is_aw
     assert_eq!((stale("a"), stale("b")), ("true".into(), "false".into()));
     assert_ne!(device.end.statistic("station.b.bus_cycles"), "0");
     assert_eq!(device.end.statistic("station.a.bus_cycles"), "0");
+}
+
+/// The records that have arrived since the last call.
+fn records(mut peer: &TcpStream) -> usize {
+    peer.set_nonblocking(true).expect("a TCP option");
+    let count = peer.read(&mut [0; 4096]).unwrap_or(0);
+    peer.set_nonblocking(false).expect("a TCP option");
+    count
+}
+
+#[test]
+fn a_station_that_is_down_sends_nothing_and_its_neighbour_does() {
+    let (mut device, [a, b]) = device();
+    let (mut a, mut b) = (client(a), client(b));
+    until_heard(&mut device, &mut [("a", &mut a), ("b", &mut b)], 1);
+    let fault = inject(&mut device, "kind = \"station-down\"\nstation = \"b\"");
+    records(&a);
+    device.until("a cycle passes", |_| records(&a) > 0);
+    while records(&b) > 0 {}
+    let mut sent = 0;
+    device.until("20 cycles pass", |_| {
+        sent += records(&a);
+        sent > 20
+    });
+    assert_eq!(records(&b), 0);
+    assert!(device.end.driver.end_fault(fault));
+    device.until("it is back", |_| records(&b) > 0);
 }
 
 #[test]

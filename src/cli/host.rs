@@ -179,10 +179,13 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let hash = host.fact("sdsp.hash").map(|hash| format!(" hash={hash}"));
     let hash = hash.unwrap_or_default();
     let fault = host.fault();
+    let unmet = host.has_only_failed().then(|| never_ran(&host.link()));
     // A scan that never ends is detected here if the command was too short to detect it before.
     let unended = host.close();
     let fault = fault.or(unended);
-    let failure = fault.or_else(|| report.as_ref().and_then(|report| report.failure()));
+    let failure = fault
+        .or_else(|| report.as_ref().and_then(|report| report.failure()))
+        .or(unmet);
     if told.is_ok() {
         let mut out = io::stdout().lock();
         if arguments.stats.is_some() {
@@ -201,6 +204,11 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     } else {
         Outcome::Done
     }
+}
+
+/// Why a command fails whose line has never come up.
+pub(super) fn never_ran(link: &Link) -> String {
+    format!("the line never ran: {}", link.reason)
 }
 
 /// Shows what a command runs on the page that its driver.cfg asks for, and prints the address.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::Outcome;
-use super::host::{ToldFaults, is_news, recording, span};
+use super::host::{ToldFaults, is_news, never_ran, recording, span};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::{CommandLineEnd, Config};
@@ -388,7 +388,13 @@ fn tick(
     line.looked = Nanos::ZERO - LOOK;
     line.look(clock.now());
     let ended = machine.end();
-    let failure = failure.or(ended.err().map(|why| why.to_string()));
+    let unmet = || {
+        let driver = &line.driver;
+        driver.has_only_failed().then(|| never_ran(&driver.link()))
+    };
+    let failure = failure
+        .or(ended.err().map(|why| why.to_string()))
+        .or_else(unmet);
     let statistics = stats.then(|| line.driver.statistics());
     let hash = line.driver.fact("sdsp.hash");
     let hash = hash.map_or_else(String::new, |hash| format!(" hash={hash}"));

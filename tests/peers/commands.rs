@@ -53,8 +53,13 @@ impl Running {
 
     /// Interrupts it; returns the last line and the exit code.
     pub fn interrupt(self) -> (String, Option<i32>) {
+        self.signal(Signal::INT)
+    }
+
+    /// Sends it this signal; returns the last line and the exit code.
+    pub fn signal(self, signal: Signal) -> (String, Option<i32>) {
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
-        kill_process(pid.expect("it runs"), Signal::INT).expect("it runs");
+        kill_process(pid.expect("it runs"), signal).expect("it runs");
         self.end()
     }
 

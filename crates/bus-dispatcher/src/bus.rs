@@ -106,10 +106,15 @@ impl Membership<'_> {
         let Some(mut frames) = port.look(stations.clone(), now) else {
             return;
         };
+        let (receipt, is_ending) = (frames.receipt(), frames.is_ending());
         if !outputs.look(&mut frames) {
+            if is_ending {
+                // The dispatcher has been told the last values before.
+                self.receipt.get_or_insert(receipt);
+            }
             return;
         }
-        self.receipt = port.take(stations, now).map(|frames| frames.receipt());
+        self.receipt = port.take(stations, now).map(|_| receipt);
         let client = self.receipt.is_some().then_some(client);
         outputs.say(client, port);
     }

@@ -80,6 +80,11 @@ impl IviClient {
 }
 
 impl Free for IviClient {
+    fn last_cycles(&self) -> u32 {
+        // A reader is given commands, and keeps no outputs.
+        0
+    }
+
     #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = &self.options.line;

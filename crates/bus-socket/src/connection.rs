@@ -68,17 +68,23 @@ impl Transfer<'_> {
         let session = &mut self.connection.session;
         if let Some(space) = session.due(now) {
             let stations = self.frames.stations();
-            let Some(mut frames) = port.look(stations.clone(), now) else {
-                // The line is down: the record stays as it is, and what has changed is sent when the line is back.
+            let is_up = stations
+                .clone()
+                .any(|station| port.is_station_up(station, now));
+            let frames = is_up.then(|| port.look(stations.clone(), now)).flatten();
+            let Some(mut frames) = frames else {
+                // The line is down, or all its stations are: the record stays as it is, and what has changed is sent when the line is back.
                 session.made(now, |_, _| false);
                 session.withdraw();
                 return;
             };
             self.frames.fill(space, &mut frames);
+            // Of these frames: the driver may begin to close now.
+            let receipt = frames.receipt();
             // A check that sends nothing cannot be lost.
             if session.made(now, |before, now| self.frames.differ(before, now)) {
                 let taken = port.take(stations, now);
-                self.connection.receipt = taken.map(|frames| frames.receipt());
+                self.connection.receipt = taken.map(|_| receipt);
                 if self.connection.receipt.is_none() {
                     session.lost();
                 }

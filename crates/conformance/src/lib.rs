@@ -14,8 +14,8 @@ pub mod standin;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use resources::Resources;
-use rig::{Bus, End, MAX_AGE, Rig, await_that, config, pass};
-use tickbus_base::time::{Manual, Nanos};
+use rig::{Bus, End, MAX_AGE, Rig, await_that, config, eventually, pass};
+use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{Cause, LinkState};
@@ -169,6 +169,36 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
         found.code == Code::Stale
     });
     assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
+}
+
+/// A controller that closes switches off what it has switched on, and says so in time.
+pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
+    let clock = Monotonic::shared();
+    let open = |role| {
+        let text = config(bus, role, "events = true").replace("300ms", "20s");
+        End::open(&text, &clock)
+    };
+    let (mut device, mut controller) = (open("device"), open("controller"));
+    controller.set("run", 1.0);
+    controller.set("speed", 10.0);
+    eventually("the machine runs", || {
+        let has_met = controller.tick().code != Code::Stale;
+        device.tick();
+        (has_met && device.get("run") == 1.0 && device.get("speed") == 10.0).then_some(())
+    });
+    controller.driver.close();
+    let mut events = vec![tickbus_image::Event::default(); 64];
+    let mut last = [f64::NAN; 2];
+    // Events come from what has arrived, not from a line that is stale.
+    eventually("the machine has the fail-safe values", || {
+        let count = device.driver.poll_events(&mut events);
+        for event in &events[..count] {
+            if let Some(last) = last.get_mut(event.signal as usize) {
+                *last = event.value.real();
+            }
+        }
+        (last == [0.0, -1.0]).then_some(())
+    });
 }
 
 pub fn keeps_events_in_order(bus: &impl Bus) {
@@ -461,7 +491,7 @@ macro_rules! conformance {
                 opens_and_exchanges_both_ways exchanges_whole_images_only keeps_edges_both_ways
                 answers_within_the_tick keeps_events_in_order is_stale_without_its_peer_and_recovers
                 the_watchdog_bites_when_the_simulation_stops sees_through_a_peer_that_lies
-                opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
+                leaves_the_fail_safe_values_behind opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
                 refuses_bad_configuration is_stale_while_a_signal_that_has_to_change_does_not
             );
 

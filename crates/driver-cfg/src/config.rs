@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::layout;
-use super::timing::{Timing, TimingKeys};
+use super::timing::{Line, Timing, TimingKeys};
 use crate::{Options, PageOptions};
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
@@ -407,7 +407,7 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
         is_for_both: stated.is_none(),
         own_role: stated.unwrap_or_default(),
         life_signs,
-        timing: spans.read(bus.as_ref().and_then(|bus| bus.cycle())),
+        timing: spans.read(Line::of(role, bus.as_ref())),
         sizes,
         at,
         bus,

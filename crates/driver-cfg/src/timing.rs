@@ -1,7 +1,9 @@
 //! Cycle times and time-outs of `[fieldbus]`.
 
+use crate::Options;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
+use tickbus_fieldbus::{Outputs, Role};
 
 /// The default pauses between attempts to reach the peer.
 pub(super) const RECONNECT: [Nanos; 6] = [
@@ -25,11 +27,36 @@ const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
 /// The longest of these times: the age of data that never came must be beyond it.
 const LONGEST: Nanos = Nanos::from_secs(24 * 3600);
 
+/// The value of `watchdog` that disables it.
+const OFF: &str = "off";
+
 /// The shortest pause in `reconnect`: each attempt writes a line to the log.
 const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
 /// The most pauses in `reconnect`.
 const RECONNECT_LIMIT: usize = 100;
+
+/// The bus that a driver has, as far as its times depend on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Line {
+    /// The end of it.
+    pub(super) role: Role,
+    /// The bus's own cycle.
+    pub(super) cycle: Option<Nanos>,
+    /// Whether this end writes into a memory of the peer, which keeps the values.
+    pub(super) is_client: bool,
+}
+
+impl Line {
+    /// The end with `role` of `bus`; `None` if that is wrong in the file.
+    pub(super) fn of(role: Role, bus: Option<&Options>) -> Self {
+        Self {
+            role,
+            cycle: bus.and_then(|bus| bus.cycle()),
+            is_client: bus.is_some_and(|bus| bus.kind().ends_with("-client")),
+        }
+    }
+}
 
 /// Cycle times and time-outs of a driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,6 +67,10 @@ pub struct Timing {
     pub max_age: Nanos,
     /// A simulation that has not ticked for longer than this has stopped; `None` disables the check.
     pub watchdog: Option<Nanos>,
+    /// What the peer has after this end has closed.
+    pub at_close: Outputs,
+    /// What the peer gets while this end knows nothing of it.
+    pub while_stale: Outputs,
     /// Pauses between attempts to reach the peer; the last one repeats. Never empty, all positive.
     pub reconnect: Vec<Nanos>,
 }
@@ -49,23 +80,28 @@ pub(super) struct TimingKeys<'a> {
     cycle: Option<Value<'a>>,
     max_age: Option<Value<'a>>,
     watchdog: Option<Value<'a>>,
+    at_close: Option<Value<'a>>,
+    while_stale: Option<Value<'a>>,
     reconnect: Option<Value<'a>>,
 }
 
 impl<'a> TimingKeys<'a> {
     pub(super) fn take(table: &mut Table<'a>) -> Self {
-        let [cycle, max_age, watchdog] =
-            ["cycle", "max_age", "watchdog"].map(|key| table.take(key));
+        let [cycle, max_age, watchdog, at_close, while_stale] =
+            ["cycle", "max_age", "watchdog", "at_close", "while_stale"].map(|key| table.take(key));
         Self {
             cycle,
             max_age,
             watchdog,
+            at_close,
+            while_stale,
             reconnect: table.take("reconnect"),
         }
     }
 
-    /// Reads them, for a bus whose default cycle is `of_bus`.
-    pub(super) fn read(&self, of_bus: Option<Nanos>) -> Option<Timing> {
+    /// Reads them, for this line.
+    pub(super) fn read(&self, line: Line) -> Option<Timing> {
+        let of_bus = line.cycle;
         let span = |value: &Option<Value<'_>>, least, why| match value {
             None => Some(None),
             Some(value) => value.duration_between(least, why, LONGEST).map(Some),
@@ -75,8 +111,21 @@ impl<'a> TimingKeys<'a> {
         let spans = (
             span(&self.cycle, LEAST_CYCLE, no_rhythm),
             span(&self.max_age, Nanos(1), ""),
-            span(&self.watchdog, LEAST_WATCHDOG, no_stop),
+            match &self.watchdog {
+                Some(value) if value.as_text() == Some(OFF) => Some(Some(None)),
+                Some(value) => value
+                    .duration_from(LEAST_WATCHDOG, no_stop)
+                    .map(|span| Some(Some(span))),
+                None => Some(None),
+            },
         );
+        let outputs = |value: &Option<Value<'_>>| match value {
+            None => Some(None),
+            Some(value) => value
+                .choice("kinds of outputs", &Outputs::CHOICES)
+                .map(Some),
+        };
+        let ends = (outputs(&self.at_close), outputs(&self.while_stale));
         let reconnect = match &self.reconnect {
             None => Some(RECONNECT.to_vec()),
             Some(value) => read_reconnect(value),
@@ -98,10 +147,31 @@ impl<'a> TimingKeys<'a> {
         }
         let ten_cycles = stated_cycle.or(of_bus).unwrap_or_default().times(10);
         let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
+        // A controller that stops must not leave its outputs on. It may scan as slowly as the other end may answer.
+        let usual_watchdog = match line.role {
+            Role::Controller => Some(max_age.max(ten_cycles).max(LEAST_MAX_AGE)),
+            Role::Device => None,
+        };
+        let usually = |applies| {
+            if applies {
+                Outputs::FailSafe
+            } else {
+                Outputs::Hold
+            }
+        };
+        let is_controller = line.role == Role::Controller;
+        let while_stale = ends.1?.unwrap_or(Outputs::FailSafe);
         Some(Timing {
             cycle: stated_cycle,
             max_age,
-            watchdog,
+            watchdog: watchdog.unwrap_or(usual_watchdog),
+            at_close: ends.0?.unwrap_or(usually(is_controller || line.is_client)),
+            // A machine does not depend on its PLC: sensors go on.
+            while_stale: if is_controller {
+                while_stale
+            } else {
+                Outputs::Hold
+            },
             reconnect: reconnect?,
         })
     }

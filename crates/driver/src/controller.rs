@@ -139,6 +139,11 @@ impl Host {
         self.0.is_over()
     }
 
+    /// Whether the line has failed, and has never come up.
+    pub fn has_only_failed(&self) -> bool {
+        self.0.status.has_only_failed()
+    }
+
     /// What the bus has told about itself under this key of the statistics.
     pub fn fact(&self, key: &'static str) -> Option<String> {
         self.0.status.fact(key)

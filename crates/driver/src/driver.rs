@@ -96,6 +96,11 @@ impl Driver {
         self.status.link()
     }
 
+    /// Whether the line has failed, and has never come up.
+    pub fn has_only_failed(&self) -> bool {
+        self.status.has_only_failed()
+    }
+
     /// The counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         self.snapshot().to_string()

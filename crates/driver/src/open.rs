@@ -69,8 +69,8 @@ impl Driver {
         }
         let line = match bus {
             Bus::Free(bus) => {
-                let reconnect = config.timing.reconnect.clone();
-                let thread = BusThread::start(bus, port, reconnect, status.clone(), &config.name);
+                let timing = &config.timing;
+                let thread = BusThread::start(bus, port, timing, status.clone(), &config.name);
                 BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
             }
             Bus::Stepped(bus) => BusHandle::Stepped {
@@ -119,8 +119,9 @@ impl Driver {
         Ok(driver)
     }
 
-    /// Closes the driver: stops its threads and waits for them to end. Logs its last statistics. A tick that
-    /// has begun is recorded only if [`end_tick`](Self::end_tick) has ended it.
+    /// Closes the driver: leaves the peer with the fail-safe values if `at_close` asks for that, stops its threads and
+    /// waits for them to end. Logs its last statistics. A tick that has begun is recorded only if
+    /// [`end_tick`](Self::end_tick) has ended it.
     pub fn close(self) {
         self.board.tell(self.status.driver());
         if log::log_enabled!(log::Level::Info) {

@@ -8,9 +8,13 @@ use std::thread::JoinHandle;
 
 use tickbus_base::os::wake_on_time;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::{BusError, Cause, Free, LinkState, LinkStatus, Port};
+use tickbus_driver_cfg::Timing;
+use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};
 
-/// A bus thread; dropping it stops the bus and waits for its end.
+/// The longest wait for a peer to take the last values.
+const LONGEST_FAREWELL: Nanos = Nanos::from_secs(2);
+
+/// A bus thread; dropping it sends the fail-safe values if its driver asks for that, stops the bus and waits for its end.
 ///
 /// A bus that does not end within its `close_timeout` is in a call that never returns. Its thread is left
 /// behind with everything it uses, because nothing can be freed safely.
@@ -20,21 +24,31 @@ pub(super) struct BusThread {
     name: String,
     status: LinkStatus,
     close_timeout: Nanos,
+    /// How the fail-safe values are sent at the end; `None` if the peer keeps what it has.
+    farewell: Option<Farewell>,
     /// Disconnected when the thread ends.
     ended: Receiver<()>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl BusThread {
-    /// Starts a thread that serves `bus`, with the pauses in `reconnect` between attempts (the last one
-    /// repeats).
+    /// Starts a thread that serves `bus`, with the pauses of `timing` between attempts (the last one
+    /// repeats), and with what `timing` says of outputs.
     pub(super) fn start(
         bus: Box<dyn Free>,
-        port: Port,
-        reconnect: Vec<Nanos>,
+        mut port: Port,
+        timing: &Timing,
         status: LinkStatus,
         name: &str,
     ) -> std::io::Result<Self> {
+        let cycles = bus.last_cycles();
+        if cycles > 0 {
+            port.set_while_stale(timing.while_stale);
+        }
+        // A clock that stands still between two calls brings no further cycle.
+        let is_due = timing.at_close == Outputs::FailSafe && port.clock().is_steady();
+        let farewell = (is_due && cycles > 0).then(|| port.farewell(cycles));
+        let reconnect = timing.reconnect.clone();
         let stop = Stop::new();
         let close_timeout = bus.close_timeout();
         let (end, ended) = mpsc::channel();
@@ -57,14 +71,38 @@ impl BusThread {
             name: name.to_owned(),
             status,
             close_timeout,
+            farewell,
             ended,
             thread: Some(thread),
         })
+    }
+
+    /// Leaves the peer with the fail-safe values, if there is a peer.
+    fn take_leave(&self) {
+        let Some(farewell) = &self.farewell else {
+            return;
+        };
+        let link = self.status.link();
+        if !farewell.is_due() || link.cause == Cause::Injected {
+            return;
+        }
+        farewell.begin();
+        self.stop.wake();
+        let limit = self.status.max_age().min(LONGEST_FAREWELL);
+        if !farewell.wait(limit.to_duration()) {
+            log::warn!(
+                "driver \"{}\": closes, and the peer has not confirmed the fail-safe values within {limit}; it may keep \
+                 the last ones ({})",
+                self.name,
+                link.reason
+            );
+        }
     }
 }
 
 impl Drop for BusThread {
     fn drop(&mut self) {
+        self.take_leave();
         self.stop.stop();
         if self.ended.recv_timeout(self.close_timeout.to_duration()) == Err(Timeout) {
             log::error!(
@@ -107,6 +145,7 @@ fn serve(
                 return;
             }
         };
+        port.line_ended();
         if status.runs() > runs {
             attempt = 0;
         }

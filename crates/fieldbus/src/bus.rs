@@ -32,6 +32,13 @@ pub trait Free: Send {
     /// fresh start needs must be created here.
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError>;
 
+    /// How many cycles with the fail-safe values end the exchange when the driver closes: more than one where somebody else
+    /// carries the values to the peer later, and none where the peer keeps no outputs. Then a stale line changes nothing
+    /// of what is sent, either.
+    fn last_cycles(&self) -> u32 {
+        1
+    }
+
     /// How long closing waits for [`run`](Self::run) to end, in real time. After that the thread is left
     /// behind.
     fn close_timeout(&self) -> Nanos {

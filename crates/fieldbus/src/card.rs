@@ -347,6 +347,11 @@ impl<V: Vendor> Free for CardBus<V> {
         port.watching_calls(&name, |port| self.run_watched(port, stop))
     }
 
+    fn last_cycles(&self) -> u32 {
+        // The card sends in its own cycle what one exchange hands over, and is closed after the next one.
+        2
+    }
+
     fn close_timeout(&self) -> Nanos {
         // What is in progress uses its time first; then the card is closed, and the library unloaded.
         let [open, close] = self.vendor.limits();

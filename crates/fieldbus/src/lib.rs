@@ -33,7 +33,7 @@ pub use error::BusError;
 pub use events::Events;
 pub use kind::{BusKind, BusOptions, BusSetup, Hosted, NamedFile, OpenError};
 pub use link::{Cause, Link, LinkState, LinkStatus};
-pub use port::{CallWatch, Frames, Port, Receipt};
+pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use role::Role;
 pub use tickbus_image::is_stale;

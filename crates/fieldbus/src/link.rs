@@ -289,6 +289,12 @@ impl LinkStatus {
         self.lock().entered[LinkState::Running as usize]
     }
 
+    /// Whether the line has failed, and has never come up. A line that waits for its first peer has not failed.
+    pub fn has_only_failed(&self) -> bool {
+        let entered = &self.lock().entered;
+        entered[LinkState::Running as usize] == 0 && entered[LinkState::Failed as usize] > 0
+    }
+
     /// The current state, cause and reason.
     pub fn link(&self) -> Link {
         self.lock().link.clone()

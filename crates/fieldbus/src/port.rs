@@ -5,11 +5,13 @@
 //! [`sent`](Port::sent) learns what the peer has.
 
 mod calls;
+mod ending;
 mod faults;
 mod frames;
 mod image;
 
 pub use calls::CallWatch;
+pub use ending::{Farewell, Outputs};
 pub use frames::{Frames, Receipt};
 
 use std::fmt::Arguments;
@@ -54,6 +56,8 @@ impl Port {
                 status,
                 last_cycle: None,
                 is_held: false,
+                blind: None,
+                ending: None,
             },
             faults: FaultLayer::default(),
             clock,
@@ -125,6 +129,7 @@ impl Port {
     /// what is handed in is lost.
     #[inline]
     pub fn is_up(&mut self, now: Nanos) -> bool {
+        self.look_for_end();
         self.faults.attend(now, &mut self.image);
         !self.faults.is_down()
     }
@@ -190,6 +195,7 @@ impl Port {
     /// of it. Data in transit when a line breaks are lost, pulses included.
     #[inline]
     pub fn sent(&mut self, receipt: &Receipt) {
+        self.had(receipt);
         for station in receipt.stations.clone() {
             let bits = receipt.bits.as_ref();
             self.faults.sent(station, bits, &mut self.image);

@@ -93,12 +93,10 @@ impl BusEnd {
     ///
     /// A pulse counts as sent only when [`sent`](Self::sent) is called.
     pub fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
-        let station = &mut self.stations[station];
         if self.is_dead {
-            station.tx_shaper.pass_instead(&station.tx_fail_safe);
-            station.outgoing.copy_from_slice(&station.tx_fail_safe);
-            return &station.outgoing;
+            return self.outgoing_instead(station);
         }
+        let station = &mut self.stations[station];
         let (shaper, place, frame) = (&mut station.tx_shaper, &station.tx, self.tx.value());
         copy_frame(&mut station.outgoing, &frame.bytes[place.bytes.clone()]);
         let edges = &frame.edges[place.edges.clone()];
@@ -107,6 +105,14 @@ impl BusEnd {
         } else {
             shaper.pass(&station.outgoing);
         }
+        &station.outgoing
+    }
+
+    /// The fail-safe bytes of a station to send in an exchange, whatever the simulation writes. They show no pulses.
+    pub fn outgoing_instead(&mut self, station: usize) -> &[u8] {
+        let station = &mut self.stations[station];
+        station.tx_shaper.pass_instead(&station.tx_fail_safe);
+        station.outgoing.copy_from_slice(&station.tx_fail_safe);
         &station.outgoing
     }
 

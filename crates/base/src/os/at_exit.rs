@@ -6,8 +6,10 @@ use std::ffi::c_int;
 use std::panic::catch_unwind;
 use std::sync::{Mutex, PoisonError};
 
-/// What to call, each with the process that asked for it: a forked child inherits the list, but none of the threads.
-static CALLS: Mutex<Vec<(u32, fn())>> = Mutex::new(Vec::new());
+/// What to call, with the process that asked for it: a forked child inherits the list, but none of the threads.
+type Call = (u32, fn());
+
+static CALLS: Mutex<Vec<Call>> = Mutex::new(Vec::new());
 
 unsafe extern "C" {
     fn atexit(function: extern "C" fn()) -> c_int;

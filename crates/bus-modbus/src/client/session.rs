@@ -402,7 +402,11 @@ impl ClientSession<'_> {
     /// Begins with the first station, from this one on, that is not resting in this cycle, or ends the cycle.
     fn begin(&mut self, station: usize, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let mut rest = station..self.stations.len();
-        let Some(next) = rest.find(|station| !self.stations[*station].rests(now)) else {
+        // A station that refuses to be read may still take the last values.
+        let is_ending = port.is_ending();
+        let Some(next) = rest.find(|station| {
+            (is_ending || !self.stations[*station].rests(now)) && port.is_station_up(*station, now)
+        }) else {
             return Ok(());
         };
         let Some(mut frames) = port.look(next..next + 1, now) else {

@@ -5,7 +5,7 @@ use crate::stations::{Stations, UnitRange};
 use crate::{ElementAddress, INPUTS, Map, Side, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::tcp::{Address, Writers};
 use tickbus_image::signal::SignalTable;
 
 use super::super::element_address::SHAPE;
@@ -29,6 +29,8 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at the same time.
     pub clients: usize,
+    /// Whether a client is refused that writes what another one has written lately.
+    pub is_single_writer: bool,
 }
 
 impl ServerOptions {
@@ -38,6 +40,7 @@ impl ServerOptions {
         let unit = table.take("unit");
         let inputs = table.take("inputs");
         let clients = table.take("clients");
+        let is_single_writer = Writers::read(table);
 
         let units = match &line {
             Some(Line::Serial(_) | Line::RtuOverTcp(_)) => UnitRange::ServedOnSerial,
@@ -63,6 +66,7 @@ impl ServerOptions {
             window: window?,
             stations: stations?,
             clients: clients?,
+            is_single_writer: is_single_writer?,
         })
     }
 }

@@ -10,7 +10,7 @@ use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{BROADCAST, Carried, ServedUnits};
+use super::units::{BROADCAST, Carried, ServedUnits, Source};
 
 /// After this many consecutive requests that equal the previous answer, the log explains the setting for a
 /// line with echo. (A client that writes one value repeatedly looks the same, and is answered as usual.)
@@ -33,7 +33,10 @@ pub(super) fn serve(
     let mut server = Server {
         line,
         // A line has a single client.
-        writes: vec![true; units.len()].into(),
+        source: Source {
+            writes: vec![true; units.len()].into(),
+            writer: None,
+        },
         units,
         framer: Framer::new(line.silence),
         echo: line.new_echo(),
@@ -48,8 +51,7 @@ pub(super) fn serve(
 struct Server<'a> {
     line: &'a Serial,
     units: &'a mut ServedUnits,
-    /// The stations that the client has written to.
-    writes: Box<[bool]>,
+    source: Source,
     framer: Framer,
     /// The echo of what is sent, if the line is known to have one.
     echo: Option<Echo>,
@@ -66,7 +68,7 @@ impl Server<'_> {
         let Self {
             line,
             units,
-            writes,
+            source,
             framer,
             suspicion,
             reply,
@@ -103,7 +105,7 @@ impl Server<'_> {
             *written = 0;
             *carried = None;
             if number == BROADCAST {
-                if units.broadcast(now, pdu, writes, port) {
+                if units.broadcast(now, pdu, source, port) {
                     port.running("a client is talking");
                 }
                 return;
@@ -114,7 +116,7 @@ impl Server<'_> {
                 return;
             };
             *carried = rtu::append(number, reply, |reply| {
-                units.answer(station, now, pdu, writes, reply, port)
+                units.answer(station, now, pdu, source, reply, port)
             });
             port.running("a client is talking");
         });

@@ -1,12 +1,15 @@
 //! The units of a server over TCP, with either framing.
 
+use std::net::SocketAddr;
+use std::sync::Arc;
+
 use crate::mbap::{self, ADU_LIMIT, Telegram};
 use crate::{Exception, answer, refuse, rtu};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
 use tickbus_fieldbus::{BusError, Port};
 
-use super::units::{BROADCAST, Carried, ServedUnits};
+use super::units::{BROADCAST, Carried, ServedUnits, Source};
 
 /// The most unconfirmed answers remembered per client.
 const REMEMBERED: usize = 64;
@@ -25,8 +28,7 @@ pub(super) struct TcpService<'a> {
 pub(super) struct Client {
     /// What its unconfirmed answers carry.
     carried: Vec<Carried>,
-    /// The stations that it has written to.
-    writes: Box<[bool]>,
+    source: Source,
 }
 
 impl Client {
@@ -54,12 +56,12 @@ impl TcpService<'_> {
         let Some((unit, pdu, length)) = split else {
             return Ok(0);
         };
-        let writes = &mut client.writes;
+        let source = &mut client.source;
         if unit == BROADCAST {
-            self.units.broadcast(now, pdu, writes, port);
+            self.units.broadcast(now, pdu, source, port);
         } else if let Some(station) = self.units.station(unit) {
             let carried = rtu::append(unit, reply, |reply| {
-                self.units.answer(station, now, pdu, writes, reply, port)
+                self.units.answer(station, now, pdu, source, reply, port)
             });
             client.remember(carried);
         } else {
@@ -85,10 +87,13 @@ impl Service for TcpService<'_> {
         }
     }
 
-    fn welcome(&mut self, _now: Nanos) -> Client {
+    fn welcome(&mut self, peer: SocketAddr, _now: Nanos) -> Client {
         Client {
             carried: Vec::new(),
-            writes: vec![false; self.units.len()].into(),
+            source: Source {
+                writes: vec![false; self.units.len()].into(),
+                writer: Some(Arc::new(peer)),
+            },
         }
     }
 
@@ -115,8 +120,8 @@ impl Service for TcpService<'_> {
         } = telegram;
         let carried = mbap::append(transaction, unit, reply, |reply| {
             if let Some(station) = self.units.station(unit) {
-                let writes = &mut client.writes;
-                return self.units.answer(station, now, pdu, writes, reply, port);
+                let source = &mut client.source;
+                return self.units.answer(station, now, pdu, source, reply, port);
             }
             port.count("modbus-server.unknown_unit");
             refuse(pdu[0], Exception::GATEWAY_TARGET_FAILED, reply);

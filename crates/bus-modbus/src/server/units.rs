@@ -1,11 +1,12 @@
 //! The units of a server: each a station of the driver.
 
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::tcp::{Writer, Writers};
 use tickbus_fieldbus::{BusSetup, Events, Port, Receipt};
 use tickbus_image::signal::fail_safe_frame;
 
 use super::ServerOptions;
-use crate::{Done, Exception, Function, Identification, Map, Tables, answer};
+use crate::{Done, Exception, Function, Identification, Map, Tables, answer, refuse};
 
 /// The unit number that addresses all units, with RTU.
 pub(super) const BROADCAST: u8 = 0;
@@ -33,6 +34,16 @@ struct Unit {
     generation: u64,
     /// Whether any client has ever written.
     has_writer: bool,
+    writers: Writers,
+}
+
+/// Where requests come from.
+#[derive(Debug)]
+pub(super) struct Source {
+    /// The stations that it has written to.
+    pub(super) writes: Box<[bool]>,
+    /// The client; `None` on a line that has one master.
+    pub(super) writer: Option<Writer>,
 }
 
 /// What an answer carries of a station's frame: it counts as sent once the client has the answer.
@@ -59,6 +70,7 @@ impl ServedUnits {
                 shown: vec![0; table.stations[station].bytes(sent)].into(),
                 generation: 0,
                 has_writer: false,
+                writers: Writers::new(options.is_single_writer),
             }
         };
         Self {
@@ -81,13 +93,12 @@ impl ServedUnits {
     }
 
     /// Answers a request to a station that arrived at `now`, and appends the answer's PDU to `reply`.
-    /// `writes` says for each station whether this client has written to it.
     pub(super) fn answer(
         &mut self,
         station: usize,
         now: Nanos,
         pdu: &[u8],
-        writes: &mut [bool],
+        source: &mut Source,
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Option<Carried> {
@@ -95,7 +106,8 @@ impl ServedUnits {
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
         // If nothing goes out, the request takes effect, and its answer is lost.
-        let receipt = if writes_only {
+        let is_up = port.is_station_up(station, now);
+        let receipt = if writes_only || !is_up {
             None
         } else {
             port.take(station..station + 1, now).map(|mut frames| {
@@ -107,8 +119,10 @@ impl ServedUnits {
                 frames.receipt()
             })
         };
-        let is_lost = !writes_only && receipt.is_none();
+        let is_lost = !is_up || !writes_only && receipt.is_none();
         let before = reply.len();
+        // Only what is refused is restored.
+        let held = unit.writers.is_single().then(|| unit.holds.clone());
         let mut tables = Tables {
             map: unit.map,
             sends: &unit.shown,
@@ -129,8 +143,21 @@ impl ServedUnits {
                 return None;
             }
             (None, Some(bits)) => {
+                let found = (&*port, "modbus-server.second_writer");
+                let may_write = source
+                    .writer
+                    .as_ref()
+                    .is_none_or(|writer| unit.writers.may_write(writer, bits.clone(), now, found));
+                if let (false, Some(held)) = (may_write, held) {
+                    unit.holds = held;
+                    if !is_lost {
+                        reply.truncate(before);
+                        refuse(pdu[0], Exception::SERVER_DEVICE_BUSY, reply);
+                    }
+                    return None;
+                }
                 unit.has_writer = true;
-                writes[station] = true;
+                source.writes[station] = true;
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
                     port.received_parts(station, now, frame, [bits]);
@@ -139,7 +166,7 @@ impl ServedUnits {
                 }
             }
             // A client that only reads must not make the values of one that writes look recent.
-            (None, None) if writes[station] || !unit.has_writer => port.touch(station, now),
+            (None, None) if source.writes[station] || !unit.has_writer => port.touch(station, now),
             (None, None) => {}
         }
         Some(Carried {
@@ -155,7 +182,7 @@ impl ServedUnits {
         &mut self,
         now: Nanos,
         pdu: &[u8],
-        writes: &mut [bool],
+        source: &mut Source,
         port: &mut Port,
     ) -> bool {
         if !Function::of(pdu[0]).is_some_and(Function::writes) {
@@ -163,7 +190,7 @@ impl ServedUnits {
         }
         let mut nobody_hears = Vec::new();
         for station in 0..self.len() {
-            self.answer(station, now, pdu, writes, &mut nobody_hears, port);
+            self.answer(station, now, pdu, source, &mut nobody_hears, port);
         }
         true
     }

@@ -172,8 +172,12 @@ impl<'a> Connection<'a> {
         let Some(mut frames) = port.take_all(now) else {
             return Ok(());
         };
+        let is_ending = frames.is_ending();
         for (index, station) in self.stations.iter_mut().enumerate() {
-            if station.resume.is_some_and(|resume| resume <= now) {
+            if station
+                .resume
+                .is_some_and(|resume| resume <= now || is_ending)
+            {
                 station.resume = None;
                 self.session.suspend(index, false);
             }

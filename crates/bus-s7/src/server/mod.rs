@@ -3,10 +3,12 @@
 mod map;
 mod options;
 
+use std::net::SocketAddr;
 use std::ops::Range;
+use std::sync::Arc;
 
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{self, Address, Limits};
+use tickbus_fieldbus::tcp::{self, Address, Limits, Writer, Writers};
 use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Role};
 use tickbus_image::signal::fail_safe_frame;
 
@@ -40,6 +42,7 @@ impl S7Server {
             changed: Vec::new(),
             addressed: false,
             has_writer: false,
+            writers: Writers::new(options.is_single_writer),
         });
         let facts = Facts {
             identity: Identity::of_driver(setup.name),
@@ -114,6 +117,7 @@ struct StationMemory {
     addressed: bool,
     /// Whether any client has ever written.
     has_writer: bool,
+    writers: Writers,
 }
 
 /// One client.
@@ -121,6 +125,7 @@ struct StationMemory {
 struct Client {
     conversation: ServerSession,
     number: u64,
+    writer: Writer,
     /// The stations that it has written to.
     writes: Box<[bool]>,
     /// For what answers to it carry.
@@ -138,11 +143,12 @@ impl tcp::Service for Service {
         }
     }
 
-    fn welcome(&mut self, _now: Nanos) -> Client {
+    fn welcome(&mut self, peer: SocketAddr, _now: Nanos) -> Client {
         self.welcomed += 1;
         Client {
             conversation: ServerSession::default(),
             number: self.welcomed,
+            writer: Arc::new(peer),
             writes: vec![false; self.memory.stations.len()].into(),
             receipts: Vec::new(),
         }
@@ -162,6 +168,7 @@ impl tcp::Service for Service {
             station: self.memory.map.station_of(client.conversation.called()),
             shared: &mut self.memory,
             writes: &mut client.writes,
+            writer: &client.writer,
             receipts: &mut client.receipts,
             port,
             now,
@@ -205,6 +212,7 @@ struct Jobs<'a> {
     /// The station whose inputs and outputs the client is connected to.
     station: Option<usize>,
     writes: &'a mut [bool],
+    writer: &'a Writer,
     receipts: &'a mut Vec<Receipt>,
     port: &'a mut Port,
     now: Nanos,
@@ -244,7 +252,12 @@ impl Jobs<'_> {
         }
         let station = &mut self.shared.stations[place.station];
         let first = range.start * 8;
-        station.changed.push(first + bits.start..first + bits.end);
+        let changed = first + bits.start..first + bits.end;
+        let found = (&*self.port, "s7.second_writer");
+        if !(station.writers).may_write(self.writer, changed.clone(), self.now, found) {
+            return Err(ReturnCode::ACCESS);
+        }
+        station.changed.push(changed);
         Ok(&mut station.written[range])
     }
 

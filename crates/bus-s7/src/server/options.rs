@@ -4,7 +4,7 @@ use crate::length::{LONGEST, read_length};
 use crate::tsap::{RACK, SLOT};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_fieldbus::tcp::{Address, Writers};
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
@@ -29,6 +29,8 @@ pub struct ServerOptions {
     pub pdu: u16,
     /// The most clients at the same time.
     pub clients: usize,
+    /// Whether a client is refused that writes what another one has written lately.
+    pub is_single_writer: bool,
     /// Rack and slot of each station; empty if there are no `[[station]]` tables.
     pub slots: Vec<Option<(u8, u8)>>,
 }
@@ -75,13 +77,14 @@ impl ServerOptions {
         Ok(())
     }
 
-    /// Reads `address`, `db`, `m_bytes`, `pdu` and `clients`.
+    /// Reads `address`, `db`, `m_bytes`, `pdu`, `clients` and `writers`.
     pub fn read(table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let blocks = table.take("db");
         let flags = table.take("m_bytes");
         let unit = table.take("pdu");
         let clients = table.take("clients");
+        let is_single_writer = Writers::read(table);
 
         let address = address.as_ref().map_or(Some(ADDRESS), Address::read);
         let blocks = blocks.as_ref().map_or(Some(Vec::new()), read_blocks);
@@ -98,6 +101,7 @@ impl ServerOptions {
             flags: flags?,
             pdu: unit?,
             clients: clients?,
+            is_single_writer: is_single_writer?,
             slots: Vec::new(),
         })
     }

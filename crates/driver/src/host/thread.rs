@@ -16,9 +16,9 @@ use crate::{DriverError, SlotMap};
 use tickbus_base::os::{dropped_log_lines, wake_on_time};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Port, Role, Stepped};
+use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
 use tickbus_plc::{Program, Report};
 use tickbus_record as record;
 
@@ -158,7 +158,7 @@ impl HostThread {
         // looks at its own end.
         let is_own = role == config.role;
         let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
-        let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
+        let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
@@ -179,8 +179,8 @@ impl HostThread {
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
-                    let reconnect = config.timing.reconnect.clone();
-                    let bus = BusThread::start(bus, port, reconnect, status.clone(), &name);
+                    let timing = timing(config, is_own);
+                    let bus = BusThread::start(bus, port, &timing, status.clone(), &name);
                     let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                     let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
                     let scans = {
@@ -195,6 +195,7 @@ impl HostThread {
                     (stop, Some(bus), Box::new(scans))
                 }
                 Scanned::InSteps { mut bus, stop } => {
+                    let mut port = port;
                     let scans = {
                         let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
                         let status = status.clone();
@@ -243,6 +244,16 @@ impl HostThread {
             bus,
         })
     }
+}
+
+/// The times of a program's line, and what it leaves behind there.
+fn timing(config: &Config, is_own_end: bool) -> Timing {
+    let mut timing = config.timing.clone();
+    if !is_own_end {
+        // The machine at the other end of this line closes with the program.
+        (timing.at_close, timing.while_stale) = (Outputs::Hold, Outputs::Hold);
+    }
+    timing
 }
 
 /// What belongs to the statistics of a program and its line.

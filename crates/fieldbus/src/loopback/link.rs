@@ -23,8 +23,8 @@ struct Lane {
     sizes: Vec<(usize, usize)>,
     /// The last frames sent, of all stations.
     frames: Vec<Vec<u8>>,
-    /// The other end has not taken the frames yet.
-    waiting: bool,
+    /// Per station, whether the other end has yet to take its frame.
+    waiting: Vec<bool>,
 }
 
 fn lane(role: Role) -> usize {
@@ -114,12 +114,12 @@ impl End {
                 role.name(),
             )));
         }
-        let frames = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
+        let frames: Vec<Vec<u8>> = sizes.iter().map(|(tx, _)| vec![0; *tx]).collect();
         locked.lanes[lane(role)] = Lane {
             attached: true,
+            waiting: vec![false; frames.len()],
             sizes,
             frames,
-            waiting: false,
         };
         drop(locked);
         Ok(Self {
@@ -144,13 +144,14 @@ impl End {
         }
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
-        if std::mem::take(&mut theirs.waiting) {
-            port.together(|port| {
-                for (station, frame) in theirs.frames.iter().enumerate() {
+        port.together(|port| {
+            let frames = theirs.frames.iter().zip(&mut theirs.waiting);
+            for (station, (frame, waiting)) in frames.enumerate() {
+                if std::mem::take(waiting) {
                     port.received(station, now, frame);
                 }
-            });
-        }
+            }
+        });
         drop(line);
         port.running("the other end is there");
     }
@@ -165,16 +166,17 @@ impl End {
         }
         let mut line = lock(&self.line);
         let mine = &mut line.lanes[lane(self.role)];
-        if !mine.waiting
+        if !mine.waiting.contains(&true)
             && let Some(receipt) = self.offered.take()
         {
             port.sent(&receipt);
         }
         if let Some(mut frames) = port.take_all(now) {
-            for (station, frame) in mine.frames.iter_mut().enumerate() {
+            let lanes = mine.frames.iter_mut().zip(&mut mine.waiting);
+            for (station, (frame, waiting)) in lanes.enumerate() {
                 frame.copy_from_slice(frames.frame(station));
+                *waiting = frames.is_station_up(station);
             }
-            mine.waiting = true;
             self.offered = Some(frames.receipt());
         }
     }
@@ -190,7 +192,7 @@ impl End {
             return true;
         }
         // Frames that the previous other end did not take are outdated for the next one.
-        line.lanes[lane(self.role)].waiting = false;
+        line.lanes[lane(self.role)].waiting.fill(false);
         self.offered = None;
         drop(line);
         if std::mem::take(&mut self.met) && !self.is_private {

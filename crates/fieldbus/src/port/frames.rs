@@ -27,6 +27,16 @@ impl Frames<'_> {
         self.port.outgoing(station, self.now)
     }
 
+    /// Whether the line can carry anything to this station.
+    pub fn is_station_up(&self, station: usize) -> bool {
+        !self.port.faults.is_cut(station)
+    }
+
+    /// Whether these are the last frames: a station that refused may still take the values of its end.
+    pub fn is_ending(&self) -> bool {
+        self.port.is_ending()
+    }
+
     /// The stations that were taken.
     #[inline]
     pub fn stations(&self) -> Range<usize> {
@@ -39,6 +49,7 @@ impl Frames<'_> {
         Receipt {
             stations: self.stations.clone(),
             bits: None,
+            is_last: self.port.is_ending(),
         }
     }
 }
@@ -49,6 +60,8 @@ impl Frames<'_> {
 pub struct Receipt {
     pub(super) stations: Range<usize>,
     pub(super) bits: Option<Range<usize>>,
+    /// The frames have the fail-safe values of a driver that closes.
+    pub(super) is_last: bool,
 }
 
 impl Receipt {
@@ -63,6 +76,7 @@ impl Receipt {
         Self {
             stations: station..station + 1,
             bits: self.bits.clone(),
+            is_last: self.is_last,
         }
     }
 

@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use tickbus_base::time::Nanos;
-use tickbus_image::{BusEnd, Event};
+use tickbus_image::{BusEnd, Event, is_stale};
 
+use super::ending::Ending;
 use crate::validity::Validity;
 use crate::{Cause, ChangeEvents, LinkState, LinkStatus, PlcState};
 
@@ -21,6 +22,9 @@ pub(super) struct ImagePort {
     pub(super) last_cycle: Option<Nanos>,
     /// What is handed in belongs together with what is still to come.
     pub(super) is_held: bool,
+    /// Per station, whether its last cycle found its peer stale; `None` if that does not change what is sent.
+    pub(super) blind: Option<Box<[bool]>>,
+    pub(super) ending: Option<Ending>,
 }
 
 impl ImagePort {
@@ -32,7 +36,27 @@ impl ImagePort {
     /// The bytes that a station sends at `now`.
     #[inline]
     pub(super) fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
-        self.image.outgoing(station, now)
+        if self.is_untrusted(station, now) {
+            self.image.outgoing_instead(station)
+        } else {
+            self.image.outgoing(station, now)
+        }
+    }
+
+    /// Whether the fail-safe values are to be sent, although the simulation ticks.
+    fn is_untrusted(&mut self, station: usize, now: Nanos) -> bool {
+        let is_ending = self.ending.as_ref().is_some_and(|ending| {
+            ending.is_used();
+            ending.is_begun()
+        });
+        let Some(blind) = &mut self.blind else {
+            return is_ending;
+        };
+        let age = self.image.peer_age(station, now);
+        let is_stale = is_stale(age, self.status.max_age(), self.validity.is_valid(station));
+        // A process that was held up finds everything stale once, and has not asked yet.
+        let was_stale = std::mem::replace(&mut blind[station], is_stale);
+        is_ending || (is_stale && was_stale)
     }
 
     /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.

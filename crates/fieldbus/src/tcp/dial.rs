@@ -246,7 +246,11 @@ impl<S: Stream> Call<S> {
                 Ok(0) => self.blocked = true,
                 Ok(count) => caller.wrote(now, count, port),
                 Err(error) if is_for_later(&error) => self.blocked = true,
-                Err(error) => return Err(caller.broke(&error)),
+                Err(error) => {
+                    // A peer that has closed may have sent its last values first.
+                    let _ = self.read_all(caller, port);
+                    return Err(caller.broke(&error));
+                }
             }
         }
         Ok(())

@@ -42,8 +42,8 @@ pub trait Service {
     /// The limits for clients.
     fn limits(&self) -> Limits;
 
-    /// A client has connected.
-    fn welcome(&mut self, now: Nanos) -> Self::Client;
+    /// A client has connected from `peer`.
+    fn welcome(&mut self, peer: SocketAddr, now: Nanos) -> Self::Client;
 
     /// Examines the bytes received from a client and not yet consumed.
     ///
@@ -411,7 +411,7 @@ impl<S: Service> Server<'_, S> {
         let place = self.clients.insert(Client {
             stream,
             peer,
-            state: self.service.welcome(now),
+            state: self.service.welcome(peer, now),
             heard: now,
             speaks: false,
             begun: Vec::new(),

@@ -27,7 +27,7 @@ impl Service for Echo {
         LIMITS
     }
 
-    fn welcome(&mut self, _now: Nanos) -> usize {
+    fn welcome(&mut self, _peer: SocketAddr, _now: Nanos) -> usize {
         0
     }
 

@@ -1,0 +1,180 @@
+//! What a controller leaves behind at a device that somebody else has written: when it closes, when it is ended, when it
+//! stops, and while it sees nothing.
+#![cfg(unix)]
+#![allow(
+    missing_docs,
+    unreachable_pub,
+    clippy::float_cmp,
+    reason = "tests; the values are small whole numbers"
+)]
+
+#[path = "peers/commands.rs"]
+mod commands;
+#[allow(dead_code, reason = "each test uses a part of it")]
+#[path = "peers/modbus_plc.rs"]
+mod modbus_plc;
+#[allow(unused_macros, reason = "each test uses a part of it")]
+mod peers;
+
+use std::io::Read as _;
+use std::net::TcpListener;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use commands::Running;
+use modbus_plc::{Habit, Plc};
+use peers::Alone;
+use rustix::process::Signal;
+use tickbus::time::{Clock, Monotonic};
+use tickbus_conformance as conformance;
+
+use conformance::rig::{End, eventually, logged, statistic};
+
+/// A controller that switches a motor, register 10 of `plc`, by what it sees in register 0.
+fn controller(plc: &Plc, further: &str) -> String {
+    let address = plc.address;
+    format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"{address}\"\n\
+         role = \"controller\"\nwrite_to = \"modbus device at {address}, unit 1\"\ncycle = \"1ms\"\n\
+         reconnect = [\"10ms\"]\n{further}\n\
+         [fieldbus.at]\n\"run\" = \"input-register offset:0\"\n\"motor\" = \"holding-register offset:10\"\n\
+         [[signal]]\nname = \"run\"\naddress = \"%IW0\"\ntype = \"INT\"\n\
+         [[signal]]\nname = \"motor\"\naddress = \"%QW0\"\ntype = \"INT\"\nfail_safe = 7\n"
+    )
+}
+
+fn motor(plc: &Plc) -> u16 {
+    plc.with(|memory| memory.registers[1][10])
+}
+
+/// Starts the motor in real time.
+fn started<C: Clock + 'static>(plc: &Plc, text: &str, clock: &Arc<C>) -> End {
+    let mut end = End::open(text, clock);
+    end.set("motor", 1.0);
+    eventually("the motor runs", || {
+        end.tick();
+        (motor(plc) == 1).then_some(())
+    });
+    end
+}
+
+#[test]
+fn closing_leaves_the_motor_at_its_fail_safe_value_or_on_if_that_is_asked_for() {
+    for (further, left) in [("", 7), ("at_close = \"hold\"", 1)] {
+        let plc = Plc::start(|_, _| Habit::Answers);
+        let text = controller(&plc, &format!("max_age = \"20s\"\n{further}"));
+        started(&plc, &text, &Monotonic::shared()).driver.close();
+        assert_eq!(motor(&plc), left, "{further}");
+    }
+}
+
+#[test]
+fn closing_writes_even_to_a_device_that_refuses_to_be_read() {
+    static REFUSES: AtomicBool = AtomicBool::new(false);
+    let plc = Plc::start(|_, function| match function {
+        4 if REFUSES.load(Ordering::Relaxed) => Habit::Refuses(4),
+        _ => Habit::Answers,
+    });
+    let text = controller(&plc, "max_age = \"1s\"\nwhile_stale = \"hold\"");
+    let end = started(&plc, &text, &Monotonic::shared());
+    REFUSES.store(true, Ordering::Relaxed);
+    eventually("the controller knows", || {
+        statistic(&end.driver, "modbus-client.refused").map(drop)
+    });
+    logged::expect("has not confirmed the fail-safe values within 1s");
+    end.driver.close();
+    assert_eq!(motor(&plc), 7);
+}
+
+#[test]
+fn a_process_that_is_terminated_leaves_the_motor_at_its_fail_safe_value() {
+    for signal in [Signal::TERM, Signal::INT] {
+        let plc = Plc::start(|_, _| Habit::Answers);
+        plc.with(|memory| memory.registers[0][0] = 1);
+        let file = tempfile::Builder::new().suffix(".cfg").tempfile();
+        let file = file.expect("a temporary file");
+        let text = controller(&plc, "max_age = \"20s\"");
+        std::fs::write(file.path(), text).expect("it can be written");
+        let path = file.path().to_str().expect("text");
+        let process = Running::of("plc", &["mirror", "--config", path]);
+        eventually("the motor runs", || (motor(&plc) == 1).then_some(()));
+        let (last, code) = process.signal(signal);
+        assert_eq!(code, Some(0), "{last}");
+        assert_eq!(motor(&plc), 7, "{signal:?}: {last}");
+    }
+}
+
+#[test]
+fn a_controller_that_sees_nothing_stops_the_motor_unless_it_shall_hold_it() {
+    static REFUSES: AtomicBool = AtomicBool::new(false);
+    for (further, left) in [("", 7), ("while_stale = \"hold\"", 1)] {
+        REFUSES.store(false, Ordering::Relaxed);
+        let plc = Plc::start(|_, function| match function {
+            4 if REFUSES.load(Ordering::Relaxed) => Habit::Refuses(4),
+            _ => Habit::Answers,
+        });
+        let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
+        let mut cell = Alone::open(&text);
+        cell.end.set("motor", 1.0);
+        cell.until("the motor runs", |_| motor(&plc) == 1);
+        REFUSES.store(true, Ordering::Relaxed);
+        let asked = || plc.with(|memory| memory.asked.iter().filter(|asked| asked.1 == 4).count());
+        let before = asked();
+        // It is asked again every second, and writes first each time.
+        cell.until("it was asked thrice", |_| asked() > before + 3);
+        assert_eq!(motor(&plc), left, "{further}");
+        REFUSES.store(false, Ordering::Relaxed);
+        cell.until("the motor runs again", |_| motor(&plc) == 1);
+        cell.end.driver.close();
+    }
+}
+
+#[test]
+fn a_controller_that_stops_has_a_watchdog_unless_it_is_switched_off() {
+    for (further, left) in [("", 7), ("watchdog = \"off\"", 1)] {
+        let plc = Plc::start(|_, _| Habit::Answers);
+        let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
+        let mut cell = Alone::open(&text);
+        cell.end.set("motor", 1.0);
+        cell.until("the motor runs", |_| motor(&plc) == 1);
+        let stopped = cell.now();
+        eventually("the watchdog would have bitten", || {
+            conformance::rig::pass(&cell.clock, 1);
+            (cell.now() - stopped > tickbus::time::Nanos::from_millis(400)).then_some(())
+        });
+        let asked = || plc.with(|memory| memory.asked.len());
+        let before = asked();
+        eventually("it is written once more", || {
+            conformance::rig::pass(&cell.clock, 1);
+            (asked() > before + 4).then_some(())
+        });
+        assert_eq!(motor(&plc), left, "{further}");
+        cell.end.driver.close();
+    }
+}
+
+#[test]
+fn the_last_record_of_a_socket_has_the_fail_safe_values() {
+    for (further, left) in [("", 7), ("at_close = \"hold\"", 1)] {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = listener.local_addr().expect("it is bound");
+        let text = format!(
+            "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"socket\"\nrole = \"controller\"\n\
+             address = \"{address}\"\ncycle = \"1ms\"\nmax_age = \"20s\"\n{further}\n\
+             [[signal]]\nname = \"motor\"\naddress = \"%QB0\"\nfail_safe = 7\n"
+        );
+        let mut end = End::open(&text, &Monotonic::shared());
+        end.set("motor", 1.0);
+        end.tick();
+        let (mut peer, _) = listener.accept().expect("it connects");
+        let mut record = [0];
+        while record != [1] {
+            end.tick();
+            peer.read_exact(&mut record).expect("a record");
+        }
+        end.driver.close();
+        let mut rest = Vec::new();
+        peer.read_to_end(&mut rest).expect("it closes properly");
+        assert_eq!(rest.last().copied().unwrap_or(1), left, "{further}");
+    }
+}

@@ -16,7 +16,7 @@ use tickbus_fieldbus::faults::TickTime;
 use tickbus_fieldbus::{BusError, LinkState};
 use tickbus_image::signal::Slot;
 
-use super::bus_handle::BusHandle;
+use super::bus_handle::{BusHandle, SteppedBus};
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
 use super::{Code, Driver, Exchange};
@@ -277,7 +277,7 @@ impl Driver {
         }
         match &mut self.line {
             BusHandle::Free(_) => Ok(()),
-            BusHandle::Stepped { bus, port, .. } => bus.send(now, port),
+            BusHandle::Stepped { bus, port, .. } => bus.as_stepped().send(now, port),
         }
     }
 
@@ -286,7 +286,7 @@ impl Driver {
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
         let (granted, done) = match &mut self.line {
             BusHandle::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
-            BusHandle::Stepped { bus, port, .. } => match bus.receive(now, port) {
+            BusHandle::Stepped { bus, port, .. } => match bus.as_stepped().receive(now, port) {
                 Ok(granted) => (granted, Ok(())),
                 Err(error) => (now, Err(error)),
             },
@@ -297,6 +297,15 @@ impl Driver {
             sequence += arrival.sequence;
             age = age.max(arrival.age);
             code = code.worse(station.status);
+        }
+        if let BusHandle::Stepped {
+            bus: SteppedBus::Replay(replay),
+            port,
+            ..
+        } = &mut self.line
+            && !port.is_distorted(now)
+        {
+            (code, age) = replay.show(age, &mut self.stations, slots);
         }
         if let Some(extras) = &mut self.extras {
             extras.received(slots);

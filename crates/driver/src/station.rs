@@ -53,6 +53,14 @@ impl Station {
         self.tick.is_valid()
     }
 
+    /// The slots hold what a recording has instead of what was received, and this was its status. The next
+    /// [`receive`](Self::receive) shows what was received again.
+    pub(super) fn shown_instead(&mut self, status: Code) {
+        self.status = status;
+        self.stale = status == Code::Stale;
+        self.tick.shown_instead();
+    }
+
     #[inline]
     pub(super) fn send(&mut self, now: Nanos, slots: &[Slot], counters: &mut TickCounters) {
         match self.encode.word(slots) {

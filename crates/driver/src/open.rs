@@ -38,7 +38,12 @@ impl Driver {
         let (bus, program) = bus::open(&config, &clock, None)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait for the recorder, so that none of its ticks is dropped.
-        let recorder = recorder(&config, &slots, matches!(bus, OpenBus::Stepped(_)))?;
+        let recorder = recorder(
+            &config,
+            &slots,
+            Some(tx),
+            matches!(bus, OpenBus::Stepped(_)),
+        )?;
         let simulation_time = Manual::new();
         let clock = match &bus {
             OpenBus::Free(_) => clock,

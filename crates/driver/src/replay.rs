@@ -251,6 +251,7 @@ impl Replay {
             return;
         }
         self.uncompared = false;
+        self.differences.compared();
         self.scan_counters.compared.fetch_add(1, Ordering::Relaxed);
         let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
         let mut found = 0;

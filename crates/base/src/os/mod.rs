@@ -1,5 +1,6 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
+mod file_lock;
 mod library;
 #[cfg(unix)]
 mod linked_terminal;
@@ -21,6 +22,7 @@ mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
+pub use file_lock::{Lock, lock_file, lock_holder, unlock_file};
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;

@@ -162,6 +162,25 @@ public final class Tickbus implements AutoCloseable {
         }
     }
 
+    /**
+     * Describes the driver of a configuration file, and opens nothing: no fieldbus, no recording, no live page. The
+     * result has id, name and signals; it is closed from the start, so that a tick throws {@link Status#CLOSED}.
+     *
+     * @param driverCfg the driver.cfg
+     * @return the description
+     * @throws FieldbusException {@link Status#BAD_CONFIG} or {@link Status#LIBRARY}, as {@link #open(Path)}
+     */
+    public static Tickbus look(Path driverCfg) {
+        Objects.requireNonNull(driverCfg, "driverCfg");
+        NativeLibrary.load();
+        Layout layout = new Layout();
+        lookNative(nameOf(driverCfg), layout);
+        layout.allocateAlone();
+        Tickbus described = new Tickbus(0, layout);
+        described.closed();
+        return described;
+    }
+
     /** The file's name for native code: its URI if the JVM's file encoding cannot represent the path as text. */
     private static String nameOf(Path file) {
         String name = file.toString();
@@ -626,6 +645,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
+    static native void lookNative(String driverCfg, Layout layout);
+
     static native long initializeNative(String driverCfg, String tables, Layout layout);
 
     /** The tick; returns a status code and never throws, for any handle. */

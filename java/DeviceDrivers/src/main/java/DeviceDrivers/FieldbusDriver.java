@@ -46,7 +46,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
      * Describes the driver of a file, and opens nothing: for a simulator that only lists its components.
      *
      * @param cfg the driver.cfg
-     * @return a driver that has components, id and name, and is closed
+     * @return a driver that has components, id and name, and cannot tick
      * @throws FieldbusException as {@link Tickbus#look}
      */
     public static FieldbusDriver look(Path cfg) {

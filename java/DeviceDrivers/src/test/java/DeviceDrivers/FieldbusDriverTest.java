@@ -71,9 +71,9 @@ class FieldbusDriverTest {
         assertEquals(open.components(), looked.components());
         assertEquals(7, looked.id());
         assertEquals("Mirror", looked.name());
-        FieldbusException closed = assertThrows(FieldbusException.class,
+        FieldbusException refused = assertThrows(FieldbusException.class,
             () -> looked.updateComponentValues(new double[2]));
-        assertEquals(Status.CLOSED, closed.status());
+        assertEquals(Status.NOT_OPEN, refused.status());
         looked.exit();
         open.exit();
         assertEquals("the recording of yesterday", Files.readString(record));

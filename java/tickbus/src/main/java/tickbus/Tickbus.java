@@ -58,6 +58,8 @@ import java.util.stream.Stream;
  */
 public final class Tickbus implements AutoCloseable {
     private static final VarHandle TICKER;
+    /** No driver's handle. */
+    private static final long NO_HANDLE = 0;
     /** The most events fetched by one native call. */
     private static final int EVENTS = 64;
     /** The most events handed over by one call: as many as the driver's ring holds. */
@@ -164,7 +166,7 @@ public final class Tickbus implements AutoCloseable {
 
     /**
      * Describes the driver of a configuration file, and opens nothing: no fieldbus, no recording, no live page. The
-     * result has id, name and signals; it is closed from the start, so that a tick throws {@link Status#CLOSED}.
+     * result has id, name and signals; a tick throws {@link Status#NOT_OPEN}. It need not be closed.
      *
      * @param driverCfg the driver.cfg
      * @return the description
@@ -176,9 +178,7 @@ public final class Tickbus implements AutoCloseable {
         Layout layout = new Layout();
         lookNative(nameOf(driverCfg), layout);
         layout.allocateAlone();
-        Tickbus described = new Tickbus(0, layout);
-        described.closed();
-        return described;
+        return new Tickbus(NO_HANDLE, layout);
     }
 
     /** The file's name for native code: its URI if the JVM's file encoding cannot represent the path as text. */
@@ -518,7 +518,7 @@ public final class Tickbus implements AutoCloseable {
      */
     @Override
     public synchronized void close() {
-        if (closed) {
+        if (closed || handle == NO_HANDLE) {
             return;
         }
         try {

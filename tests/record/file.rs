@@ -182,6 +182,35 @@ fn a_recording_has_what_was_on_the_line() {
 }
 
 #[test]
+fn commands_that_only_look_open_no_recording_and_no_port() {
+    let folder = Folder::new();
+    // Whoever serves here fails.
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = taken.local_addr().expect("bound");
+    let text = format!(
+        "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"{address}\"\n\
+         [page]\nlisten = \"{address}\"\n[record]\nfile = \"run.csv\"\n\
+         [[signal]]\nname = \"go\"\naddress = \"%QX0.0\"\n"
+    );
+    let recorded = "bus.tick,bus.time_ns,bus.status,bus.dropped,go\n1,0,0,0,1\n";
+    fs::write(folder.path("driver.cfg"), text).expect("written");
+    fs::write(folder.path("run.csv"), recorded).expect("written");
+    for arguments in [
+        &["check", "driver.cfg"][..],
+        &["export", "driver.cfg", "--for", "codesys", "--out", "out"],
+        &["report", "run.csv"],
+    ] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(arguments)
+            .current_dir(folder.0.path())
+            .output()
+            .expect("tickbus runs");
+        assert!(output.status.success(), "{arguments:?} {output:?}");
+        assert_eq!(folder.text("run.csv"), recorded, "{arguments:?}");
+    }
+}
+
+#[test]
 fn the_statistics_tell_what_is_recorded() {
     let folder = Folder::new();
     let mut run = Run::open(&folder, &rig(RIG, "run.csv"));

@@ -76,6 +76,21 @@ extern "system" fn Java_tickbus_Tickbus_initializeNative<'local>(
         .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native void lookNative(String driverCfg, Layout layout)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_lookNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    driver_cfg: JString<'local>,
+    layout: JObject<'local>,
+) {
+    env.with_env(|env| {
+        let path = driver_cfg.try_to_string(env)?;
+        open::look(env, &open::file_of(&path), &layout)
+    })
+    .resolve::<ThrowFieldbusException>();
+}
+
 /// `static native int xChangeData(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_xChangeData(

@@ -596,6 +596,7 @@ fn a_cut_recording_replays_up_to_its_last_whole_tick() {
         reason.contains("tick 39 was its last, the recording is cut"),
         "{reason}"
     );
+    run.driver.close();
     // Damage in the middle is an error, reported with its line.
     let broken = whole.replacen("#80000000\n", "#8000\n", 1);
     fs::write(folder.path("run.vcd"), broken).expect("written");

@@ -12,7 +12,8 @@ use jni::{Env, jni_sig, jni_str};
 
 use tickbus_base::percent_decoded;
 use tickbus_binding::{Device, Shared, SignalDescription, SlotKind};
-use tickbus_driver::{Code, Driver};
+use tickbus_driver::{Code, Driver, SlotMap};
+use tickbus_driver_cfg::Config;
 
 use super::failure::Failure;
 use crate::page::{self, Place};
@@ -63,7 +64,23 @@ fn describe(
     place: Option<Place>,
     layout: &JObject<'_>,
 ) -> Result<Shared<Keep>, Failure> {
-    let config = driver.config();
+    describe_driver(env, driver.config(), driver.slots(), layout)?;
+    buffer(env, driver.slots().count, place, layout)
+}
+
+/// Describes the driver of the file to `layout`, and opens nothing.
+pub(super) fn look(env: &mut Env<'_>, path: &Path, layout: &JObject<'_>) -> Result<(), Failure> {
+    let config = tickbus_binding::load(path, "")?;
+    let slots = SlotMap::new(&config.table, config.role);
+    describe_driver(env, &config, &slots, layout)
+}
+
+fn describe_driver(
+    env: &mut Env<'_>,
+    config: &Config,
+    slots: &SlotMap,
+    layout: &JObject<'_>,
+) -> Result<(), Failure> {
     let name = env.new_string(&config.name)?;
     env.call_method(
         layout,
@@ -72,11 +89,11 @@ fn describe(
         &[JValue::Int(config.id), JValue::Object(&name)],
     )?;
     for index in 0..config.table.signals.len() {
-        let signal = SignalDescription::of(driver, index);
+        let signal = SignalDescription::in_config(config, slots, index);
         // One frame per signal, because local references would accumulate otherwise.
         env.with_local_frame(8, |env| describe_signal(env, layout, &signal))?;
     }
-    buffer(env, driver.slots().count, place, layout)
+    Ok(())
 }
 
 fn describe_signal(

@@ -76,6 +76,141 @@ fn a_file_is_recorded_to_by_one_driver_and_must_be_possible() {
 }
 
 #[test]
+fn only_a_tick_overwrites_a_recording() {
+    let folder = Folder::new();
+    let open = || Run::open(&folder, &rig(RIG, "run.vcd"));
+    open().driver.close();
+    let empty = folder.text("run.vcd");
+    assert!(
+        empty.contains("$comment end \"ticks=0 dropped=0\" $end"),
+        "{empty}"
+    );
+    let mut run = open();
+    run.ticks(1..=50);
+    run.driver.close();
+    let recorded = folder.bytes("run.vcd");
+    open().driver.close();
+    assert!(folder.bytes("run.vcd") == recorded);
+    let replay = rig("replay = \"run.vcd\"", "");
+    let mut run = Run::open(&folder, &replay);
+    run.ticks(1..=50);
+    run.driver.close();
+    let list = folder.bytes("run.vcd.diff");
+    assert!(!list.is_empty());
+    Run::open(&folder, &replay).driver.close();
+    assert!(folder.bytes("run.vcd.diff") == list);
+    let mut run = open();
+    run.ticks(1..=1);
+    run.driver.close();
+    assert!(folder.bytes("run.vcd").len() < recorded.len());
+}
+
+/// A file under a lock of the kind that another process would have.
+#[cfg(unix)]
+#[test]
+fn a_file_that_another_process_uses_is_neither_recorded_to_nor_replayed() {
+    use tickbus::os::{Lock, lock_file};
+
+    let folder = Folder::new();
+    let mut run = Run::open(&folder, &rig(RIG, "run.vcd"));
+    run.ticks(1..=50);
+    let other = fs::File::open(folder.path("run.vcd")).expect("opens");
+    assert!(!lock_file(&other, Lock::Shared).expect("there are locks"));
+    run.driver.close();
+    let recorded = folder.bytes("run.vcd");
+    let replay = rig("replay = \"run.vcd\"", "");
+    assert!(lock_file(&other, Lock::Exclusive).expect("there are locks"));
+    let error = folder.refusal(&replay);
+    assert!(
+        error.contains("process ") && error.contains(" records to this file; "),
+        "{error}"
+    );
+    assert!(lock_file(&other, Lock::Shared).expect("there are locks"));
+    let error = folder.refusal(&rig(RIG, "run.vcd"));
+    assert!(
+        error.contains(" records to this file, or replays it; "),
+        "{error}"
+    );
+    assert!(folder.bytes("run.vcd") == recorded);
+    let run = Run::open(&folder, &replay);
+    assert!(!lock_file(&other, Lock::Exclusive).expect("there are locks"));
+    run.driver.close();
+    assert!(lock_file(&other, Lock::Exclusive).expect("there are locks"));
+}
+
+#[test]
+fn a_recording_has_what_was_on_the_line() {
+    let folder = Folder::new();
+    let mut text =
+        "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                scan = \"1ms\"\nmode = \"stepped\"\n[record]\nfile = \"line.csv\"\n"
+            .to_owned();
+    let kinds = [
+        "INT\"\nscale = { raw = [-32768, 32767], value = [-592.6, 592.6] }",
+        "SINT\"\nfail_safe = 7",
+        "REAL\"",
+    ];
+    for (number, kind) in kinds.iter().enumerate() {
+        for area in ["I", "Q"] {
+            let letter = ["W", "B", "D"][number];
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"{area}{number}\"\naddress = \"%{area}{letter}{}\"\ntype = \"{kind}\n",
+                4 * number
+            );
+        }
+    }
+    let mut run = Run::open(&folder, &text);
+    for (tick, value) in (1..).zip([600.0, 1e300, -1e9, 25.000_1, f64::NAN, 0.1]) {
+        for name in ["I0", "I1", "I2"] {
+            run.set(name, value);
+        }
+        run.exchange(tick);
+    }
+    let config = run.driver.config().clone();
+    run.driver.close();
+    let rows = read(&folder.path("line.csv"), &config);
+    assert_eq!(rows.len(), 6);
+    for row in &rows {
+        for pair in row.values.chunks(2) {
+            // The peer has the same codec, and sends back what came.
+            assert_eq!(pair[0], pair[1], "{row:?}");
+        }
+    }
+    assert_eq!(rows[0].values[2].real().to_bits(), 127_f64.to_bits());
+    assert_eq!(rows[4].values[2].real().to_bits(), 7_f64.to_bits());
+}
+
+#[test]
+fn commands_that_only_look_open_no_recording_and_no_port() {
+    let folder = Folder::new();
+    // Whoever serves here fails.
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
+    let address = taken.local_addr().expect("bound");
+    let text = format!(
+        "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"{address}\"\n\
+         [page]\nlisten = \"{address}\"\n[record]\nfile = \"run.csv\"\n\
+         [[signal]]\nname = \"go\"\naddress = \"%QX0.0\"\n"
+    );
+    let recorded = "bus.tick,bus.time_ns,bus.status,bus.dropped,go\n1,0,0,0,1\n";
+    fs::write(folder.path("driver.cfg"), text).expect("written");
+    fs::write(folder.path("run.csv"), recorded).expect("written");
+    for arguments in [
+        &["check", "driver.cfg"][..],
+        &["export", "driver.cfg", "--for", "codesys", "--out", "out"],
+        &["report", "run.csv"],
+    ] {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_tickbus"))
+            .args(arguments)
+            .current_dir(folder.0.path())
+            .output()
+            .expect("tickbus runs");
+        assert!(output.status.success(), "{arguments:?} {output:?}");
+        assert_eq!(folder.text("run.csv"), recorded, "{arguments:?}");
+    }
+}
+
+#[test]
 fn the_statistics_tell_what_is_recorded() {
     let folder = Folder::new();
     let mut run = Run::open(&folder, &rig(RIG, "run.csv"));

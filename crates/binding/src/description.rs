@@ -1,6 +1,7 @@
 //! Signals, as a simulator has to know them.
 
-use tickbus_driver::Driver;
+use tickbus_driver::{Driver, SlotMap};
+use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, DataType, Slot};
 
@@ -44,7 +45,11 @@ pub struct SignalDescription<'d> {
 impl<'d> SignalDescription<'d> {
     /// The signal with this index.
     pub fn of(driver: &'d Driver, index: usize) -> Self {
-        let config = driver.config();
+        Self::in_config(driver.config(), driver.slots(), index)
+    }
+
+    /// The signal with this index of a driver that need not be open.
+    pub fn in_config(config: &'d Config, slots: &SlotMap, index: usize) -> Self {
         let signal = &config.table.signals[index];
         let written = match config.role {
             Role::Device => Area::Input,
@@ -63,7 +68,7 @@ impl<'d> SignalDescription<'d> {
                 _ => SlotKind::Unsigned,
             },
             slot: index,
-            edges: driver.slots().edges[index],
+            edges: slots.edges[index],
             fail_safe: signal.fail_safe,
         }
     }

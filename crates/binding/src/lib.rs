@@ -17,7 +17,7 @@ pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
 pub use fault::{faults, inject, read_fault};
 pub use handles::{Handles, MAX_DRIVERS, Reservation};
-pub use opening::{closing, open};
+pub use opening::{closing, load, open};
 pub use panics::panic_message;
 pub use refusal::Refusal;
 pub use shared::{NO_TIME, SPARE_SLOT, Shared, Word};

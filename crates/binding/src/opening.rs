@@ -20,14 +20,22 @@ const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 ///
 /// `BAD_CONFIG` with every mistake of the file, or why the bus cannot be opened.
 pub fn open(path: &Path, tables: &str) -> Result<Driver, Refusal> {
+    Ok(Driver::open(load(path, tables)?, Monotonic::shared())?)
+}
+
+/// Reads the file that describes a driver, with `tables` in place of its own; empty for none.
+///
+/// # Errors
+///
+/// `BAD_CONFIG` with every mistake of the file.
+pub fn load(path: &Path, tables: &str) -> Result<Config, Refusal> {
     let config = Config::load(path).and_then(|config| config.overlaid(TABLES, tables));
-    let config = config.map_err(|mistakes| {
+    config.map_err(|mistakes| {
         Refusal::new(
             Code::BadConfig,
             format!("driver.cfg cannot be used:\n{mistakes}"),
         )
-    })?;
-    Ok(Driver::open(config, Monotonic::shared())?)
+    })
 }
 
 /// Closes a driver by `close`, and lets its last messages reach stderr: the process may end right after this.

@@ -7,11 +7,12 @@ use tickbus_base::time::{Clock, Nanos};
 use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::loopback::{Mode, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
-use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role};
+use tickbus_fieldbus::{BusSetup, Hosted, OpenError, Role};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
 use super::DriverError;
+use super::bus_handle::{OpenBus, SteppedBus};
 use super::frames::area_bytes;
 use super::host::{HostThread, Program, ScanSetup, SteppedHost, check_fit, program_error};
 use super::replay::Replay;
@@ -23,14 +24,14 @@ pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
     hosted: Option<Hosted<'_>>,
-) -> Result<(Bus, Option<Program>), DriverError> {
+) -> Result<(OpenBus, Option<Program>), DriverError> {
     if let Options::Loopback(options) = &config.bus {
         match &options.peer {
             Peer::Link(_) => {}
             Peer::Replay(file) => {
                 let (replay, scan_counters) = Replay::open(config, &config.folder().join(file))?;
                 return Ok((
-                    Bus::Stepped(Box::new(replay)),
+                    OpenBus::Stepped(SteppedBus::Replay(Box::new(replay))),
                     Some(Program::Replay(scan_counters)),
                 ));
             }
@@ -60,7 +61,7 @@ pub(super) fn open(
             OpenError::Unsupported(what) => DriverError::Unsupported(format!("{file}: {what}")),
         }
     })?;
-    Ok((bus, None))
+    Ok((bus.into(), None))
 }
 
 /// The loopback with a PLC program at its other end, by its name, options and scan interval.
@@ -69,7 +70,7 @@ fn open_hosted(
     mode: Mode,
     (name, options, scan): (&str, &[(String, String)], Option<Nanos>),
     clock: &Arc<dyn Clock>,
-) -> Result<(Bus, Option<Program>), DriverError> {
+) -> Result<(OpenBus, Option<Program>), DriverError> {
     let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
     let folder = config.path.parent().unwrap_or(Path::new(""));
     let mut program = tickbus_programs::program_beside(folder, name, options)
@@ -79,7 +80,7 @@ fn open_hosted(
     if mode == Mode::Stepped {
         let (host, scan_counters) = SteppedHost::new(program, config, scan);
         return Ok((
-            Bus::Stepped(Box::new(host)),
+            OpenBus::Stepped(SteppedBus::Any(Box::new(host))),
             Some(Program::Stepped(scan_counters)),
         ));
     }
@@ -107,7 +108,7 @@ fn open_hosted(
         clock,
     )?;
     Ok((
-        Bus::Free(bus(device)),
+        OpenBus::Free(bus(device)),
         Some(Program::Thread(Box::new(host))),
     ))
 }

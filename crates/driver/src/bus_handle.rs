@@ -3,9 +3,25 @@
 use std::sync::Arc;
 
 use tickbus_base::time::Manual;
-use tickbus_fieldbus::{Port, Stepped};
+use tickbus_fieldbus::{Bus, Free, Lead, Port, Stepped};
 
+use super::replay::Replay;
 use super::supervise::BusThread;
+
+/// An opened bus that does not run yet.
+pub(super) enum OpenBus {
+    /// Needs a thread.
+    Free(Box<dyn Free>),
+    /// Runs on the tick.
+    Stepped(SteppedBus),
+}
+
+/// A bus that runs on the tick.
+pub(super) enum SteppedBus {
+    Any(Box<dyn Stepped>),
+    /// Knows the values that the tick shows, and not only frames.
+    Replay(Box<Replay>),
+}
 
 /// How the bus runs.
 #[expect(clippy::large_enum_variant, reason = "there is one in a driver")]
@@ -15,10 +31,37 @@ pub(super) enum BusHandle {
     Free(BusThread),
     /// On the tick, in simulation time.
     Stepped {
-        bus: Box<dyn Stepped>,
+        bus: SteppedBus,
         port: Port,
         time: Arc<Manual>,
     },
+}
+
+impl From<Bus> for OpenBus {
+    fn from(bus: Bus) -> Self {
+        match bus {
+            Bus::Free(bus) => Self::Free(bus),
+            Bus::Stepped(bus) => Self::Stepped(SteppedBus::Any(bus)),
+        }
+    }
+}
+
+impl SteppedBus {
+    #[inline]
+    pub(super) fn as_stepped(&mut self) -> &mut dyn Stepped {
+        match self {
+            Self::Any(bus) => &mut **bus,
+            Self::Replay(replay) => &mut **replay,
+        }
+    }
+
+    /// Who hands out the time.
+    pub(super) fn lead(&self) -> Lead {
+        match self {
+            Self::Any(bus) => bus.lead(),
+            Self::Replay(replay) => replay.lead(),
+        }
+    }
 }
 
 impl std::fmt::Debug for BusHandle {

@@ -8,6 +8,7 @@ use tickbus_fieldbus::faults::FaultStatus;
 use tickbus_fieldbus::{Bus, Hosted, Lead, Link};
 use tickbus_plc::Program;
 
+use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
 use super::recording::ScanRecorder;
 use super::watch::Watch;
@@ -72,14 +73,17 @@ impl Host {
             interval,
             stop: &stop,
         };
-        let bus = match bus::open(config, &clock, Some(hosted))? {
-            (Bus::Stepped(bus), None) if bus.lead() == Lead::Simulation => {
+        let bus = match bus::open(config, &clock, Some(hosted))?.0 {
+            OpenBus::Free(bus) => Bus::Free(bus),
+            OpenBus::Stepped(SteppedBus::Any(bus)) if bus.lead() != Lead::Simulation => {
+                Bus::Stepped(bus)
+            }
+            OpenBus::Stepped(_) => {
                 return Err(unfit(
                     "this bus runs on the ticks of a simulation, so that no PLC program can run on it by itself",
                     "choose mode = \"free\" and a \"link\", or another kind of bus",
                 ));
             }
-            (bus, _) => bus,
         };
         let title = format!("plc {}", program.name());
         let role = config.role;

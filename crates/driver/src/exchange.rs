@@ -17,7 +17,7 @@ use tickbus_fieldbus::{BusError, LinkState};
 use tickbus_image::TickEnd;
 use tickbus_image::signal::{Conversions, Slot};
 
-use super::bus_handle::BusHandle;
+use super::bus_handle::{BusHandle, SteppedBus};
 use super::station::Station;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
@@ -266,7 +266,7 @@ impl Driver {
             return Err(went_back(before, time));
         }
         // Asked first: a time that is refused must not become the one before which no other counts.
-        bus.accepts(time)?;
+        bus.as_stepped().accepts(time)?;
         self.given = given;
         shown.set(time);
         Ok(time)
@@ -310,7 +310,7 @@ impl Driver {
         }
         match &mut self.line {
             BusHandle::Free(_) => Ok(()),
-            BusHandle::Stepped { bus, port, .. } => bus.send(now, port),
+            BusHandle::Stepped { bus, port, .. } => bus.as_stepped().send(now, port),
         }
     }
 
@@ -319,7 +319,7 @@ impl Driver {
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
         let (granted, done) = match &mut self.line {
             BusHandle::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
-            BusHandle::Stepped { bus, port, .. } => match bus.receive(now, port) {
+            BusHandle::Stepped { bus, port, .. } => match bus.as_stepped().receive(now, port) {
                 Ok(granted) => (granted, Ok(())),
                 Err(error) => (now, Err(error)),
             },
@@ -331,6 +331,15 @@ impl Driver {
             let arrival = station.receive(image, (now, self.max_age), slots, &self.slots);
             age = age.max(arrival.age);
             code = code.worse(station.status);
+        }
+        if let BusHandle::Stepped {
+            bus: SteppedBus::Replay(replay),
+            port,
+            ..
+        } = &mut self.line
+            && !port.is_distorted(now)
+        {
+            (code, age) = replay.show(age, image, &mut self.stations, slots);
         }
         if let Some(extras) = &mut self.extras {
             extras.received(slots);

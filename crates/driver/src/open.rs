@@ -6,11 +6,11 @@ use tickbus_axis::Reflexes;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Bus, Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
+use tickbus_fieldbus::{Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
 use tickbus_image::image;
 
 use super::bus;
-use super::bus_handle::BusHandle;
+use super::bus_handle::{BusHandle, OpenBus};
 use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
@@ -38,11 +38,16 @@ impl Driver {
         let (bus, program) = bus::open(&config, &clock, None)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait for the recorder, so that none of its ticks is dropped.
-        let recorder = recorder(&config, &slots, matches!(bus, Bus::Stepped(_)))?;
+        let recorder = recorder(
+            &config,
+            &slots,
+            Some(tx),
+            matches!(bus, OpenBus::Stepped(_)),
+        )?;
         let simulation_time = Manual::new();
         let clock = match &bus {
-            Bus::Free(_) => clock,
-            Bus::Stepped(_) => Arc::clone(&simulation_time) as _,
+            OpenBus::Free(_) => clock,
+            OpenBus::Stepped(_) => Arc::clone(&simulation_time) as _,
         };
         // Before the bus starts: what has to be found out for it would be time in which the bus finds no tick.
         let quick = QuickClock::new(Arc::clone(&clock));
@@ -68,12 +73,12 @@ impl Driver {
             );
         }
         let line = match bus {
-            Bus::Free(bus) => {
+            OpenBus::Free(bus) => {
                 let timing = &config.timing;
                 let thread = BusThread::start(bus, port, timing, status.clone(), &config.name);
                 BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
             }
-            Bus::Stepped(bus) => BusHandle::Stepped {
+            OpenBus::Stepped(bus) => BusHandle::Stepped {
                 bus,
                 port,
                 time: simulation_time,

@@ -4,16 +4,17 @@ use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Role;
-use tickbus_image::signal::{Plan, Slot};
-use tickbus_record::{Columns, Recorder, RecorderCounters, When};
+use tickbus_image::signal::{Area, Plan, Slot};
+use tickbus_record::{Columns, Recorder, RecorderCounters, Rows, When};
 
 use super::{Code, DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
 
-/// Starts the recording that `config` asks for.
+/// Starts the recording that `config` asks for. The values of the area `sent` have yet to pass the codec.
 pub(super) fn recorder(
     config: &Config,
     slots: &SlotMap,
+    sent: Option<Area>,
     lossless: bool,
 ) -> Result<Option<Recorder>, DriverError> {
     let wanted = config.record.as_ref();
@@ -26,7 +27,11 @@ pub(super) fn recorder(
         &config.table,
         &slots.edges,
     );
-    let recorder = Recorder::start(options, config.folder(), columns, lossless)?;
+    let rows = match sent {
+        Some(area) => Rows::sending(columns, &config.table, area),
+        None => columns.into(),
+    };
+    let recorder = Recorder::start(options, config.folder(), rows, lossless)?;
     Ok(Some(recorder))
 }
 
@@ -51,7 +56,7 @@ impl ScanRecorder {
     ) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
         let (writes, reads) = role.areas();
-        let recorder = recorder(config, &map, lossless)?;
+        let recorder = recorder(config, &map, None, lossless)?;
         Ok(recorder.map(|recorder| Self {
             recorder,
             reads: Plan::new(&config.table, 0, reads),

@@ -1,8 +1,14 @@
 //! A recording as the other end of the line: what the recorded peer sent drives this end, and what this end
 //! sends is compared with what it sent in the recording.
+//!
+//! The tick shows the recorded values, counts and statuses as they are. No sequence of frames could lead to all of them:
+//! what arrived while data did not count is not in the recording. The frames that a replay hands in besides keep the line
+//! alive, make events, and stand in while faults of the line are injected.
 
 mod differences;
 mod station;
+#[cfg(all(test, not(loom)))]
+mod tests;
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -11,12 +17,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use self::differences::Differences;
 use self::station::Station;
-use super::DriverError;
+use super::{Code, DriverError};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::did_you_mean;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, Port, Stepped};
+use tickbus_image::TickEnd;
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record::{Columns, FileClaim, Recording, RecordingError, Tick, ValueKind};
 
@@ -74,6 +81,8 @@ pub(super) struct Replay {
     present: Tick,
     /// This driver's slots with the recorded values.
     slots: Vec<Slot>,
+    /// A recorded tick fell on this one.
+    is_new: bool,
     /// When this end last sent.
     sent: Option<Nanos>,
     /// The current tick has not been compared yet.
@@ -139,6 +148,7 @@ impl Replay {
             more,
             broken: None,
             slots,
+            is_new: false,
             sent: None,
             uncompared: false,
             offset: None,
@@ -166,40 +176,73 @@ impl Replay {
             self.broken = Some(error);
             false
         });
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            let status = match self.map.stations[index] {
+                Some(column) => self.present.stations[column],
+                None => self.present.status,
+            };
+            station.advance(status, &self.present, &self.slots, &self.map.signals);
+        }
+        self.take_values();
+        self.scan_counters.ticks.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Takes the recorded values of the last tick.
+    fn take_values(&mut self) {
         for (slot, column) in self.slots.iter_mut().zip(&self.map.signals) {
             if let Some(column) = column {
                 *slot = self.present.values[*column];
             }
         }
-        self.scan_counters.ticks.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// Hands in the frames of the current tick, as the driver received them when it was recorded.
-    fn deliver(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
-        let next = self.more.then_some(&self.next);
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            let status = |tick: &Tick| match self.map.stations[index] {
-                Some(column) => tick.stations[column],
-                None => tick.status,
-            };
-            let after = next.map(|next| (status(next), next));
-            match status(&self.present) {
-                status @ (FRESH | UNCHANGED) => {
-                    let (slots, columns) = (&self.slots, &self.map.signals);
-                    let present = (status, &self.present);
-                    let fed = station.feed(slots, present, after, columns, |frame| {
-                        port.received(index, now, frame);
-                    });
-                    fed.map_err(BusError::Protocol)?;
-                    port.touch(index, now);
+    /// Shows what the recorded tick showed, in place of what came through the image: puts values and counts of edges into
+    /// `slots`, and sets the statuses of the stations. Returns the status of all, and the age of the data.
+    pub(super) fn show(
+        &self,
+        mut age: Nanos,
+        image: &mut TickEnd,
+        stations: &mut [super::station::Station],
+        slots: &mut [Slot],
+    ) -> (Code, Nanos) {
+        let has_ended = self.scan_counters.ended.load(Ordering::Relaxed);
+        let mut all = Code::Fresh;
+        for (station, own) in stations.iter_mut().zip(&self.stations) {
+            // After the end of a recording, data become stale as on any line.
+            if self.is_new || !(has_ended && station.status == Code::Stale) {
+                let code = own.code().unwrap_or(station.status);
+                if code == Code::Stale {
+                    age = age.max(self.max_age + Nanos(1));
                 }
-                // Just older than permitted, so that this driver shows stale as the recorded one did.
+                own.show(&self.slots, slots);
+                station.shown_instead(image, code);
+            }
+            all = all.worse(station.status);
+        }
+        (all, age)
+    }
+
+    /// Tells of every latched signal that this end reads how many edges there were so far.
+    pub(super) fn edges(&self, mut tell: impl FnMut(usize, u32)) {
+        for station in &self.stations {
+            station.edges(&mut tell);
+        }
+    }
+
+    /// Hands in the last recorded values as frames.
+    fn deliver(&mut self, now: Nanos, port: &mut Port) {
+        for (index, station) in self.stations.iter_mut().enumerate() {
+            match station.status {
+                FRESH | UNCHANGED => match self.is_new.then(|| station.frame(&self.slots)) {
+                    Some(Some(frame)) => port.received(index, now, frame),
+                    _ => port.touch(index, now),
+                },
+                // Just older than permitted, so that the line is stale as the recorded one was.
                 STALE => port.touch(index, now - self.max_age - Nanos(1)),
                 // A failed exchange received nothing.
                 _ => {}
             }
         }
-        Ok(())
     }
 
     /// Compares what this end sends with what it sent in the recording, once the current tick has both: a
@@ -210,6 +253,7 @@ impl Replay {
             return;
         }
         self.uncompared = false;
+        self.differences.compared();
         self.scan_counters.compared.fetch_add(1, Ordering::Relaxed);
         let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
         let mut found = 0;
@@ -250,13 +294,25 @@ impl Stepped for Replay {
     }
 
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
-        let mut taken = false;
+        self.is_new = false;
+        self.stations.iter_mut().for_each(Station::begin);
+        if self.offset.is_some() {
+            // The levels may have been shaped in the tick before.
+            self.take_values();
+        }
         while let Some(due) = self.due(now).filter(|due| *due <= now) {
             self.offset.get_or_insert(due - self.next.time);
             self.advance();
-            self.deliver(now, port)?;
-            taken = true;
+            self.is_new = true;
         }
+        // The peer was also there between two recorded ticks.
+        if self.is_new || self.more {
+            self.deliver(now, port);
+        }
+        for station in &mut self.stations {
+            station.shape(now, &mut self.slots);
+        }
+        let taken = self.is_new;
         if taken {
             port.running("the recording is replayed");
             self.uncompared = true;
@@ -267,11 +323,6 @@ impl Stepped for Replay {
                     self.present.number
                 )));
             }
-        } else if self.more && self.present.status != STALE {
-            // The peer was also there between two recorded ticks.
-            port.together(|port| {
-                (0..self.stations.len()).for_each(|station| port.touch(station, now));
-            });
         }
         if let Some(due) = self.due(now) {
             return Ok(due.max(now));

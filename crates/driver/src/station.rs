@@ -30,6 +30,14 @@ impl Station {
         }
     }
 
+    /// The slots hold what a recording has instead of what was received, and this was its status. The next
+    /// [`receive`](Self::receive) shows what was received again.
+    pub(super) fn shown_instead(&mut self, image: &mut TickEnd, status: Code) {
+        self.status = status;
+        self.stale = status == Code::Stale;
+        image.overridden(self.index);
+    }
+
     /// Receives from the frame taken over last into the slots, and sets the status.
     #[inline]
     pub(super) fn receive(

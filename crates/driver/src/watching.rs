@@ -10,6 +10,7 @@ use tickbus_fieldbus::faults::{FaultBoard, Faults};
 use tickbus_image::signal::Slot;
 use tickbus_record::RecorderCounters;
 
+use super::bus_handle::{BusHandle, SteppedBus};
 use super::extras::Extras;
 use super::host::{Program, ProgramCounters};
 use super::statistics::Snapshot;
@@ -166,6 +167,13 @@ impl Driver {
             };
             self.image
                 .edges(index, |signal, count| view.edges[signal] = count);
+        }
+        if let BusHandle::Stepped {
+            bus: SteppedBus::Replay(replay),
+            ..
+        } = &self.line
+        {
+            replay.edges(|signal, count| view.edges[signal] = count);
         }
         view.now = now;
         view.tick = self.counters.ticks;

@@ -268,6 +268,14 @@ impl Port {
         self.image.station_left(station, now, cause, why);
     }
 
+    /// Whether injected faults of the line are active, or frames that they held back have yet to arrive: what is handed
+    /// in is then not what the tick gets.
+    #[inline]
+    pub fn is_distorted(&mut self, now: Nanos) -> bool {
+        self.faults.attend(now, &mut self.image);
+        self.faults.is_distorting()
+    }
+
     /// Whether the line can carry anything to and from this station at `now`.
     pub fn is_station_up(&mut self, station: usize, now: Nanos) -> bool {
         self.faults.attend(now, &mut self.image);

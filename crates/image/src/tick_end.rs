@@ -252,9 +252,13 @@ impl TickEnd {
     /// The shaper continues from what the peer showed last: if a level is on by its fail-safe value, and the
     /// peer switches it on when it returns, it must not drop in between to show that edge.
     pub fn shown_instead(&mut self, station: usize, receiver: &mut impl Receiver) {
-        let shown = &mut self.shown[station];
-        shown.forced = true;
-        no_edges(&shown.shaper, receiver);
+        self.overridden(station);
+        no_edges(&self.shown[station].shaper, receiver);
+    }
+
+    /// As [`shown_instead`](Self::shown_instead), with edges that are not the frame's either.
+    pub fn overridden(&mut self, station: usize) {
+        self.shown[station].forced = true;
     }
 
     /// The bytes of a station as they came last, whether they count or not.

@@ -11,6 +11,7 @@ mod options;
 mod places;
 mod reading;
 mod recorder;
+mod rows;
 mod sink;
 mod vcd;
 
@@ -28,6 +29,7 @@ pub use options::{Format, Options, When, file_of};
 pub use places::FileClaim;
 pub use reading::{Recording, RecordingError};
 pub use recorder::{Recorder, RecorderCounters, RecorderError};
+pub use rows::Rows;
 
 /// The version of the layout of these files; they state it at the beginning.
 const VERSION: u32 = 1;

@@ -1,13 +1,14 @@
-//! The files that this process records to or replays: none is used for both at once, and none is recorded to
-//! twice.
+//! The files that are recorded to or replayed: none is used for both at once, and none is recorded to twice, by this
+//! process or another.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, Metadata};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use super::RecordingError;
+use tickbus_base::os::{Lock, lock_file, lock_holder, unlock_file};
 
 /// How each file in use is used.
 static IN_USE: Mutex<BTreeMap<Identity, Use>> = Mutex::new(BTreeMap::new());
@@ -29,27 +30,47 @@ enum Use {
 
 /// A claim on a file: exclusive for a recording, shared among replays.
 #[derive(Debug)]
-pub struct FileClaim(Identity);
+pub struct FileClaim {
+    id: Identity,
+    /// Holds the lock against other processes.
+    file: File,
+}
 
 impl FileClaim {
-    /// Claims a file for a recording; if it is in use already, gives how.
+    /// Opens the file at `path` to write at its end, and claims it; if it is in use already, gives how. What it has stays
+    /// until [`truncate`](Self::truncate). A device is used as it is, without a claim.
     ///
     /// # Errors
     ///
-    /// The system cannot identify the file.
-    pub(super) fn to_record(path: &Path, file: &File) -> io::Result<Result<Self, &'static str>> {
-        let id = identity(path, &file.metadata()?)?;
+    /// The system cannot open or identify the file.
+    pub fn to_write(path: &Path) -> io::Result<Result<(File, Option<Self>), String>> {
+        let mut options = OpenOptions::new();
+        options.write(true).create(true).truncate(false);
+        // A writer at the end leaves no hole where another program cuts the file. Elsewhere it could not truncate.
+        let file = options.append(cfg!(unix)).open(path)?;
+        let metadata = file.metadata()?;
+        if !metadata.is_file() {
+            return Ok(Ok((file, None)));
+        }
+        let id = identity(path, &metadata)?;
         let mut in_use = lock();
-        Ok(match in_use.get(&id) {
-            Some(Use::Recorded) => Err("another driver of this process records to this file"),
+        let known = match in_use.get(&id) {
+            Some(Use::Recorded) => Some("another driver of this process records to this file"),
             Some(Use::Replayed(_)) => {
-                Err("this file is being replayed, and recording would destroy it")
+                Some("this file is being replayed, and recording would destroy it")
             }
-            None => {
-                in_use.insert(id.to_owned(), Use::Recorded);
-                Ok(Self(id))
-            }
-        })
+            None => None,
+        };
+        if let Some(known) = known {
+            return Ok(Err(known.to_owned()));
+        }
+        if !is_locked(&file, Lock::Exclusive) {
+            let other = process(&file);
+            return Ok(Err(format!("{other} records to this file, or replays it")));
+        }
+        let own = file.try_clone()?;
+        in_use.insert(id.to_owned(), Use::Recorded);
+        Ok(Ok((file, Some(Self { id, file: own }))))
     }
 
     /// Claims the file at `path` for a replay; several replays may share a file.
@@ -58,36 +79,79 @@ impl FileClaim {
     ///
     /// The file does not exist, or is being recorded to.
     pub fn to_replay(path: &Path) -> Result<Self, RecordingError> {
-        let id = fs::metadata(path).and_then(|metadata| identity(path, &metadata));
-        let id = id.map_err(|error| {
+        let opened = fs::metadata(path).and_then(|metadata| {
+            if !metadata.is_file() {
+                // To open a pipe would wait for a writer.
+                return Err(io::Error::other("it is no file"));
+            }
+            Ok((identity(path, &metadata)?, File::open(path)?))
+        });
+        let (id, file) = opened.map_err(|error| {
             RecordingError::of_file(
                 path,
                 format!("the recording cannot be read: {error}"),
                 "check its name and permissions",
             )
         })?;
+        let recorded = |who: &str| {
+            RecordingError::of_file(
+                path,
+                format!("{who} records to this file"),
+                "close it before the file is replayed",
+            )
+        };
         let mut in_use = lock();
-        match in_use.entry(id.to_owned()).or_insert(Use::Replayed(0)) {
-            Use::Replayed(count) => *count += 1,
-            Use::Recorded => {
-                return Err(RecordingError::of_file(
-                    path,
-                    "a driver of this process records to this file",
-                    "close it before the file is replayed",
-                ));
-            }
+        if in_use.get(&id) == Some(&Use::Recorded) {
+            return Err(recorded("a driver of this process"));
         }
-        Ok(Self(id))
+        if !is_locked(&file, Lock::Shared) {
+            return Err(recorded(&process(&file)));
+        }
+        if let Use::Replayed(count) = in_use.entry(id.to_owned()).or_insert(Use::Replayed(0)) {
+            *count += 1;
+        }
+        Ok(Self { id, file })
+    }
+
+    /// Whether the file has nothing.
+    pub(super) fn is_empty(&self) -> bool {
+        self.file
+            .metadata()
+            .is_ok_and(|metadata| metadata.len() == 0)
+    }
+
+    /// Discards what the file has.
+    ///
+    /// # Errors
+    ///
+    /// The system refuses it.
+    pub fn truncate(&self) -> io::Result<()> {
+        self.file.set_len(0)
     }
 }
 
 impl Drop for FileClaim {
     fn drop(&mut self) {
         let mut in_use = lock();
-        match in_use.get_mut(&self.0) {
+        match in_use.get_mut(&self.id) {
             Some(Use::Replayed(count)) if *count > 1 => *count -= 1,
-            _ => drop(in_use.remove(&self.0)),
+            _ => drop(in_use.remove(&self.id)),
         }
+        // A child of this process may have inherited the open file.
+        unlock_file(&self.file);
+    }
+}
+
+/// Locks a file against other processes. Some file systems have no locks, and are used without.
+fn is_locked(file: &File, lock: Lock) -> bool {
+    lock_file(file, lock).unwrap_or(true)
+}
+
+/// The process that has locked this file, in words.
+fn process(file: &File) -> String {
+    match lock_holder(file) {
+        Some(id) => format!("process {id}"),
+        None => "another process".to_owned(),
     }
 }
 

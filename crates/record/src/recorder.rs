@@ -1,6 +1,6 @@
 //! The recorder: takes ticks from the tick, and writes them on its own thread.
 
-use std::fs::{File, OpenOptions};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout};
@@ -12,6 +12,7 @@ use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
 use super::file::{Out, Target};
 use super::places::FileClaim;
+use super::rows::Rows;
 use super::sink::Sink;
 use super::vcd::VcdSink;
 use super::{Format, Options};
@@ -163,41 +164,27 @@ fn is_pipe(_path: &Path) -> bool {
     false
 }
 
-/// Creates the file at `path`, once it is certain that nothing else in this process uses it. A device is used
-/// as it is.
-fn create(path: &Path) -> Result<(File, Option<FileClaim>), RecorderError> {
+/// Opens the file at `path`, once it is certain that nothing else uses it.
+fn open(path: &Path) -> Result<(File, Option<FileClaim>), RecorderError> {
     let shown = path.display();
-    let cannot = |error: std::io::Error| {
-        RecorderError::File(format!(
-            "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
-        ))
-    };
     if is_pipe(path) {
         return Err(RecorderError::File(format!(
             "{shown}: this is a pipe, and a recording is a file; name a file in [record]"
         )));
     }
-    // Truncated only after it is known to be unused.
-    let open = OpenOptions::new()
-        .write(true)
-        .create(true)
-        .truncate(false)
-        .open(path);
-    let file = open.map_err(cannot)?;
-    if !file.metadata().map_err(cannot)?.is_file() {
-        return Ok((file, None));
-    }
-    let place = FileClaim::to_record(path, &file)
-        .map_err(cannot)?
-        .map_err(|why| {
-            RecorderError::File(format!("{shown}: {why}; name another file in [record]"))
-        })?;
-    file.set_len(0).map_err(cannot)?;
-    Ok((file, Some(place)))
+    let opened = FileClaim::to_write(path).map_err(|error| {
+        RecorderError::File(format!(
+            "{shown}: the recording cannot be made: {error}; check the folder and its permissions"
+        ))
+    })?;
+    opened.map_err(|why| {
+        RecorderError::File(format!("{shown}: {why}; name another file in [record]"))
+    })
 }
 
 impl Recorder {
-    /// Creates the file that `options` name, relative to `folder`, and starts the thread that writes to it.
+    /// Opens the file that `options` name, relative to `folder`, and starts the thread that writes to it. What the file
+    /// has is overwritten by the first tick.
     ///
     /// If the ring is full, a `lossless` recorder makes the tick wait until there is room; any other drops
     /// the tick and counts it.
@@ -208,36 +195,30 @@ impl Recorder {
     pub fn start(
         options: &Options,
         folder: &Path,
-        columns: Columns,
+        rows: Rows,
         lossless: bool,
     ) -> Result<Self, RecorderError> {
         let path = folder.join(&options.file);
-        let (file, place) = create(&path)?;
+        let (file, place) = open(&path)?;
+        let columns = &rows.columns;
         let words = HEAD + columns.stations.len() + columns.columns.len();
         let ticks = options.ticks(words);
         let target = Box::new(file);
-        Self::over(
-            target,
-            options.format,
-            columns,
-            ticks,
-            lossless,
-            path,
-            place,
-        )
-        .map_err(RecorderError::Thread)
+        Self::over(target, options.format, rows, ticks, lossless, path, place)
+            .map_err(RecorderError::Thread)
     }
 
     /// As [`start`](Self::start), for any target.
     pub(super) fn over(
         target: Box<dyn Target>,
         format: Format,
-        columns: Columns,
+        rows: Rows,
         ticks: usize,
         lossless: bool,
         path: PathBuf,
         place: Option<FileClaim>,
     ) -> std::io::Result<Self> {
+        let columns = &rows.columns;
         let head = HEAD + columns.stations.len();
         let slots = columns.columns.len();
         let (ring, reader) = row_ring(ticks, head + slots);
@@ -250,14 +231,16 @@ impl Recorder {
         let writing = Writing {
             ring: reader,
             words: vec![0; head + slots].into(),
-            tick: Tick::new(&columns),
+            tick: Tick::new(columns),
             kinds: columns.columns.iter().map(|column| column.kind).collect(),
-            sink: format.sink(columns),
+            sink: format.sink(columns.clone()),
+            rows,
+            has_begun: false,
             out: Out::new(target),
             before: None,
             scans: Arc::clone(&scans),
             bell: Arc::clone(&bell),
-            _place: place,
+            place,
         };
         let thread = std::thread::Builder::new()
             .name("record".to_owned())
@@ -366,12 +349,15 @@ struct Writing {
     tick: Tick,
     kinds: Box<[super::ValueKind]>,
     sink: Box<dyn Sink>,
+    rows: Rows,
+    /// The file has the beginning of this recording, or will with the next flush.
+    has_begun: bool,
     out: Out,
     /// Number and time of the previous tick.
     before: Option<(u64, Nanos)>,
     scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
-    _place: Option<FileClaim>,
+    place: Option<FileClaim>,
 }
 
 impl Writing {
@@ -398,9 +384,6 @@ impl Writing {
     }
 
     fn write(&mut self) -> std::io::Result<()> {
-        self.sink.header(self.out.buffer());
-        self.out.whole(0);
-        self.out.flush()?;
         let mut looks = 0;
         loop {
             let stopped = self.bell.lock().stop;
@@ -419,6 +402,13 @@ impl Writing {
             }
             state.rung = false;
         }
+        if !self.has_begun {
+            // A run without a tick leaves the recording of an earlier one.
+            if self.place.as_ref().is_some_and(|place| !place.is_empty()) {
+                return Ok(());
+            }
+            self.begin()?;
+        }
         let scans = &self.scans;
         let ticks = scans.ticks.load(Ordering::Relaxed);
         let dropped = scans.dropped.load(Ordering::Relaxed);
@@ -428,9 +418,23 @@ impl Writing {
         self.out.flush()
     }
 
+    /// Begins the file.
+    fn begin(&mut self) -> std::io::Result<()> {
+        if let Some(place) = &self.place {
+            place.truncate()?;
+        }
+        self.sink.header(self.out.buffer());
+        self.out.whole(0);
+        self.has_begun = true;
+        Ok(())
+    }
+
     /// Writes everything that the ring holds.
     fn drain(&mut self) -> std::io::Result<()> {
         while self.ring.take(&mut self.words) {
+            if !self.has_begun {
+                self.begin()?;
+            }
             self.unpack();
             self.sink.tick(&self.tick, self.out.buffer());
             let ticks = self.scans.ticks.fetch_add(1, Ordering::Relaxed) + 1;
@@ -456,8 +460,12 @@ impl Writing {
         for (place, word) in tick.stations.iter_mut().zip(&head[HEAD..]) {
             *place = status(*word);
         }
-        for ((value, word), kind) in tick.values.iter_mut().zip(slots).zip(&self.kinds) {
-            *value = kind.kept(Slot(*word));
+        for (value, word) in tick.values.iter_mut().zip(slots) {
+            *value = Slot(*word);
+        }
+        self.rows.put_on_the_line(&mut tick.values);
+        for (value, kind) in tick.values.iter_mut().zip(&self.kinds) {
+            *value = kind.kept(*value);
         }
         let first = (tick.number.saturating_sub(1), Nanos::ZERO);
         let (number, time) = self.before.unwrap_or(first);

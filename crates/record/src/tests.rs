@@ -325,8 +325,16 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
     let target = Box::new(disc.clone());
     let path = PathBuf::from("run");
     let _logged = logged::Watch::new();
-    let mut recorder =
-        Recorder::over(target, format, columns.clone(), 8, lossless, path, None).expect("a thread");
+    let mut recorder = Recorder::over(
+        target,
+        format,
+        columns.clone().into(),
+        8,
+        lossless,
+        path,
+        None,
+    )
+    .expect("a thread");
     let mut slots = Tick::new(&columns).values;
     for number in 1..=count {
         slots[3] = Slot::from_real(number as f64 / 8.0);
@@ -436,8 +444,16 @@ fn a_file_that_takes_nothing_does_not_keep_its_recorder_from_closing() {
     let (answers, stuck) = std::sync::mpsc::channel();
     let target = Box::new(Stuck(stuck));
     let path = PathBuf::from("run");
-    let mut recorder = Recorder::over(target, Format::Csv, columns.clone(), 8, false, path, None)
-        .expect("a thread");
+    let mut recorder = Recorder::over(
+        target,
+        Format::Csv,
+        columns.clone().into(),
+        8,
+        false,
+        path,
+        None,
+    )
+    .expect("a thread");
     recorder.close_timeout = std::time::Duration::from_millis(20);
     let slots = Tick::new(&columns).values;
     recorder.record(1, Nanos(0), 0, std::iter::empty(), &slots);
@@ -455,7 +471,7 @@ fn time_that_goes_back_is_recorded_as_standing_still() {
     let mut recorder = Recorder::over(
         target,
         Format::Vcd,
-        columns.clone(),
+        columns.clone().into(),
         8,
         true,
         "run".into(),

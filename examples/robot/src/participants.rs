@@ -27,6 +27,7 @@ fn declaration(name: &str, multiple: i64, writes: [&str; 2], reads: [&str; 2]) -
     Declaration {
         name: name.to_owned(),
         multiple: multiple.expect("a step is a multiple of the server's"),
+        interval: None,
         writes: writes
             .map(|name| Variable::new(name, DataType::Lreal))
             .to_vec(),

@@ -2,6 +2,7 @@
 
 #[cfg(unix)]
 mod at_exit;
+mod file_lock;
 mod library;
 #[cfg(unix)]
 mod linked_terminal;
@@ -27,6 +28,7 @@ mod timer_slack;
 
 #[cfg(unix)]
 pub use at_exit::at_exit;
+pub use file_lock::{Lock, lock_file, lock_holder, unlock_file};
 pub use library::{Library, one_line};
 #[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;

@@ -5,9 +5,9 @@ use std::io::{self, ErrorKind};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _};
 use std::path::{Path, PathBuf};
 
-use rustix::fs::{FlockOperation, OFlags, flock};
+use rustix::fs::OFlags;
 
-use super::SharedMemory;
+use super::{Lock, SharedMemory, lock_file, unlock_file};
 use crate::time::{Clock as _, Monotonic, Nanos, Stop};
 
 /// How often the file may be taken away while it is made.
@@ -71,7 +71,7 @@ impl NamedMemory {
                 Err(error) => return Err(error),
             };
             // Until it is locked it looks as if it had been left behind.
-            if !lock(&file)? || !is_at(&file, path) {
+            if !lock_file(&file, Lock::Exclusive)? || !is_at(&file, path) {
                 continue;
             }
             let words = SharedMemory::words_for(bytes).max(1) * size_of::<u64>();
@@ -122,10 +122,9 @@ impl NamedMemory {
         if self.served.is_some() {
             return true;
         }
-        let is_free = flock(&self.file, FlockOperation::NonBlockingLockShared).is_ok();
+        let is_free = lock_file(&self.file, Lock::Shared).is_ok_and(|is_free| is_free);
         if is_free {
-            // If this fails, closing does it.
-            let _ = flock(&self.file, FlockOperation::Unlock);
+            unlock_file(&self.file);
         }
         !is_free
     }
@@ -152,20 +151,11 @@ fn opened(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// Locks a file as its server; false if another one has.
-fn lock(file: &File) -> io::Result<bool> {
-    match flock(file, FlockOperation::NonBlockingLockExclusive) {
-        Ok(()) => Ok(true),
-        Err(error) if io::Error::from(error).kind() == ErrorKind::WouldBlock => Ok(false),
-        Err(error) => Err(error.into()),
-    }
-}
-
-/// The same, for some 50 ms.
+/// Locks a file as its server, trying for some 50 ms; false if another one has.
 fn lock_soon(file: &File) -> io::Result<bool> {
     let clock = Monotonic::shared();
     for _ in 0..50 {
-        if lock(file)? {
+        if lock_file(file, Lock::Exclusive)? {
             return Ok(true);
         }
         clock.wait_until(clock.now() + Nanos::from_millis(1), &Stop::new());

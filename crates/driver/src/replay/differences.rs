@@ -1,11 +1,11 @@
 //! The list of differences found by a replay: a file beside the recording.
 
 use std::fs::File;
-use std::io::{BufWriter, Write as _};
+use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use tickbus_image::signal::Slot;
-use tickbus_record::{Tick, ValueKind};
+use tickbus_record::{FileClaim, Tick, ValueKind};
 
 /// The most differences listed; further ones are counted.
 const MOST_LISTED: u64 = 100_000;
@@ -20,36 +20,53 @@ const FLUSHED: u64 = 1_000;
 pub(super) struct Differences {
     recording: PathBuf,
     path: PathBuf,
+    has_begun: bool,
     file: Option<BufWriter<File>>,
+    /// Dropped after the file.
+    place: Option<FileClaim>,
     listed: u64,
 }
 
 impl Differences {
-    /// Starts the list for the recording at `path`, in `<path>.diff`.
+    /// The list for the recording at `path`, in `<path>.diff`.
     pub(super) fn new(recording: &Path) -> Self {
         let mut path = recording.to_owned().into_os_string();
         path.push(".diff");
-        let path = PathBuf::from(path);
-        let begun = File::create(&path).and_then(|file| {
+        Self {
+            recording: recording.to_owned(),
+            path: PathBuf::from(path),
+            has_begun: false,
+            file: None,
+            place: None,
+            listed: 0,
+        }
+    }
+
+    /// A tick is compared: the first one begins the list, and overwrites that of an earlier replay.
+    pub(super) fn compared(&mut self) {
+        if self.has_begun {
+            return;
+        }
+        self.has_begun = true;
+        let begun = FileClaim::to_write(&self.path).and_then(|opened| {
+            let (file, place) = opened.map_err(io::Error::other)?;
+            if let Some(place) = &place {
+                place.truncate()?;
+            }
+            self.place = place;
             let mut file = BufWriter::new(file);
             writeln!(file, "tick,time_ns,signal,expected,seen")?;
             file.flush()?;
             Ok(file)
         });
-        let file = begun
+        self.file = begun
             .inspect_err(|error| {
                 log::warn!(
                     "{}: differences cannot be listed here: {error}; the first {MOST_LOGGED} go to the log",
-                    path.display()
+                    self.path.display()
                 );
             })
             .ok();
-        Self {
-            recording: recording.to_owned(),
-            path,
-            file,
-            listed: 0,
-        }
     }
 
     /// Lists one difference.
@@ -112,12 +129,16 @@ impl Differences {
         if let Some(file) = &mut self.file {
             let _ = file.flush();
         }
-        let (recording, list) = (self.recording.display(), self.path.display());
+        let recording = self.recording.display();
         if differences == 0 {
             log::info!("{recording}: replayed, {compared} ticks compared, no difference");
         } else {
+            let listed = match &self.file {
+                Some(_) => format!("listed in {}", self.path.display()),
+                None => format!("the first {MOST_LOGGED} are in the log"),
+            };
             log::warn!(
-                "{recording}: replayed, {compared} ticks compared, {differences} differences, listed in {list}"
+                "{recording}: replayed, {compared} ticks compared, {differences} differences, {listed}"
             );
         }
     }

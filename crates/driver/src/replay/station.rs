@@ -1,22 +1,26 @@
-//! One station of a replay: the frames that it receives again, and those that it is expected to send.
+//! One station of a replay: what it shows again of what it received, and what it is expected to send.
 
+use crate::Code;
+use crate::SlotMap;
 use crate::frames::{area_bytes, directions};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Area, Latch, Plan, Slot};
-use tickbus_image::{DirectStream, LatchedBit, latched_bits};
+use tickbus_image::{DirectStream, LatchedBit, PulseShaper};
 use tickbus_record::{Tick, ValueKind};
 
-use super::UNCHANGED;
-
-/// The most edges of one signal in one tick; no bus carries more.
-const MOST_EDGES: f64 = 10_000.0;
+use super::{FRESH, STALE, UNCHANGED};
 
 /// A latched bit that this end receives.
 struct Latched {
     bit: LatchedBit,
     /// The column with its edge count.
-    edges: Option<usize>,
+    column: Option<usize>,
+    /// The slot with its edge count.
+    slot: Option<usize>,
+    /// Its edges in the current tick, and in all.
+    count: u32,
+    total: u32,
 }
 
 /// A signal that this end sends.
@@ -29,17 +33,25 @@ struct Sent {
 pub(super) struct Station {
     receive: Plan,
     send: Plan,
+    /// The signals that it receives.
+    received: Vec<usize>,
     latched: Vec<Latched>,
     sent: Vec<Sent>,
-    /// The last received frame, and the one being made.
+    /// Its status in the last recorded tick.
+    pub(super) status: i32,
+    /// The recorded ticks that fell on the current one, and whether any of them was fresh.
+    ticks: usize,
+    is_fresh: bool,
+    /// The last frame handed in, and the one being made.
     fed: Box<[u8]>,
     frame: Box<[u8]>,
+    /// Shows the edges of several recorded ticks that fell on one, of which it has these counts.
+    shaper: PulseShaper,
+    owed: Box<[u32]>,
     /// The last frame that this end sent.
     seen: Box<[u8]>,
-    /// Turns recorded values into the expected frame, with pulses and hold times.
+    /// Makes the expected frame of recorded values, with pulses and hold times.
     expected: DirectStream,
-    /// Bits with edges in the current tick: byte, mask, number of toggles, previous level.
-    toggling: Vec<(usize, u8, usize, bool)>,
     /// Slots for the comparison.
     slots: [Vec<Slot>; 2],
 }
@@ -49,108 +61,159 @@ impl Station {
     /// count.
     pub(super) fn all(config: &Config, edges: &[Option<usize>]) -> Vec<Self> {
         let (tx, rx) = config.role.areas();
+        let map = SlotMap::new(&config.table, config.role);
         let directions = directions(&config.table, config.role);
         let stations = directions.into_iter().enumerate();
         stations
             .map(|(index, directions)| {
                 let table = &config.table;
-                let latched = latched_bits(table, index, rx).into_iter();
-                let signals = table.signals.iter().enumerate();
+                let of = |area: Area| {
+                    let signals = table.signals.iter().enumerate();
+                    signals
+                        .filter(move |(_, signal)| signal.station == index && signal.area == area)
+                };
                 let frame = |area: Area| vec![0; area_bytes(table, index, area)].into();
+                // The recorded levels were held already.
+                let bits: Box<[LatchedBit]> = directions
+                    .rx_latched
+                    .iter()
+                    .map(|bit| LatchedBit {
+                        hold: Nanos::ZERO,
+                        ..*bit
+                    })
+                    .collect();
                 Self {
                     receive: Plan::new(table, index, rx),
                     send: Plan::new(table, index, tx),
-                    latched: latched
+                    received: of(rx).map(|(number, _)| number).collect(),
+                    latched: bits
+                        .iter()
                         .map(|bit| Latched {
-                            bit,
-                            edges: edges[bit.signal],
+                            bit: *bit,
+                            column: edges[bit.signal],
+                            slot: map.edges[bit.signal],
+                            count: 0,
+                            total: 0,
                         })
                         .collect(),
-                    sent: signals
-                        .filter(|(_, signal)| signal.station == index && signal.area == tx)
+                    sent: of(tx)
                         .map(|(number, signal)| Sent {
                             signal: number,
                             name: signal.name.clone(),
                             kind: ValueKind::of(signal.data_type, signal.scale.is_some()),
                         })
                         .collect(),
-                    fed: directions.rx_fail_safe.clone(),
+                    status: STALE,
+                    ticks: 0,
+                    is_fresh: false,
+                    owed: vec![0; bits.len()].into(),
+                    shaper: PulseShaper::new(bits, &directions.rx_fail_safe),
+                    fed: directions.rx_fail_safe,
                     frame: frame(rx),
                     seen: frame(tx),
                     expected: DirectStream::new(directions.tx_fail_safe, directions.tx_latched),
-                    toggling: Vec::new(),
                     slots: [(); 2].map(|()| vec![Slot::default(); table.signals.len()]),
                 }
             })
             .collect()
     }
 
-    /// Hands to `receive` the frames that make this driver show the values in `slots` and count the edges in
-    /// `present`, which comes with its own status; `after` is the following tick with its status. An exchange
-    /// that found nothing new gets no frame, unless it shows a change nevertheless.
-    ///
-    /// # Errors
-    ///
-    /// There are more edges than any bus carries.
-    pub(super) fn feed(
+    /// A tick begins, on which no recorded tick has fallen yet.
+    pub(super) fn begin(&mut self) {
+        (self.ticks, self.is_fresh) = (0, false);
+        for latched in &mut self.latched {
+            latched.count = 0;
+        }
+    }
+
+    /// A recorded tick falls on the current one; `before` are the values until then.
+    pub(super) fn advance(
         &mut self,
-        slots: &[Slot],
-        (status, present): (i32, &Tick),
-        after: Option<(i32, &Tick)>,
+        status: i32,
+        tick: &Tick,
+        before: &[Slot],
         columns: &[Option<usize>],
-        mut receive: impl FnMut(&[u8]),
-    ) -> Result<(), String> {
+    ) {
+        self.status = status;
+        self.is_fresh |= status == FRESH;
+        self.ticks += 1;
+        for latched in &mut self.latched {
+            let signal = latched.bit.signal;
+            let count = match (latched.column, columns[signal]) {
+                (Some(column), _) => whole(tick.values[column].real()),
+                // It was not latched when it was recorded.
+                (None, Some(column)) => {
+                    let [was, is] = [before[signal], tick.values[column]].map(is_on);
+                    u32::from(was != is && counts(latched.bit.latch, is))
+                }
+                (None, None) => 0,
+            };
+            latched.count = latched.count.wrapping_add(count);
+            latched.total = latched.total.wrapping_add(count);
+        }
+    }
+
+    /// The frame to hand in for these values, unless it brings nothing new.
+    pub(super) fn frame(&mut self, slots: &[Slot]) -> Option<&[u8]> {
         self.receive.encode(slots, &mut self.frame);
-        // The recorded level of a latched bit was shaped: a pulse that was over is shown for one tick. The
-        // frames must make the driver shape it in the same way.
-        self.toggling.clear();
-        let mut frames = 1;
-        for latched in &self.latched {
-            let (byte, mask) = (latched.bit.byte, latched.bit.mask);
-            let count = latched
-                .edges
-                .map_or(0.0, |column| present.values[column].real());
-            if count > MOST_EDGES {
-                return Err(format!(
-                    "tick {} of the recording has {count} edges of one signal",
-                    present.number
-                ));
-            }
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "checked above; a cast saturates at 0"
-            )]
-            let count = count as usize;
-            if count == 0 {
-                continue;
-            }
-            let was = self.fed[byte] & mask != 0;
-            let shown = self.frame[byte] & mask != 0;
-            // A pulse that was over falls back in a tick without a frame.
-            let falls_back = after.is_some_and(|(status, tick)| {
-                let column = columns[latched.bit.signal];
-                let next = column.map(|column| tick.values[column].real() != 0.0);
-                status == UNCHANGED && next == Some(!shown)
-            });
-            let (level, toggles) = latched.way(was, shown, count, falls_back);
-            set(&mut self.frame, byte, mask, level);
-            frames = frames.max(toggles);
-            self.toggling.push((byte, mask, toggles, was));
-        }
-        if status == UNCHANGED && frames == 1 && self.frame == self.fed {
-            return Ok(());
-        }
-        for left in (0..frames).rev() {
-            // All bits reach their final level together, so bits with fewer toggles start later.
-            for (byte, mask, toggles, was) in &self.toggling {
-                let done = toggles.saturating_sub(left);
-                set(&mut self.frame, *byte, *mask, *was != (done % 2 == 1));
-            }
-            receive(&self.frame);
+        if !self.is_fresh && self.frame == self.fed {
+            return None;
         }
         self.fed.copy_from_slice(&self.frame);
-        Ok(())
+        Some(&self.fed)
+    }
+
+    /// Shapes the levels in `slots`: where several recorded ticks fall on one, their edges are seen, too.
+    pub(super) fn shape(&mut self, now: Nanos, slots: &mut [Slot]) {
+        if self.latched.is_empty() {
+            return;
+        }
+        if self.ticks > 1 {
+            for (owed, latched) in self.owed.iter_mut().zip(&self.latched) {
+                *owed = owed.wrapping_add(latched.count);
+            }
+        }
+        self.receive.encode(slots, &mut self.frame);
+        let counts = matches!(self.status, FRESH | UNCHANGED);
+        if counts && self.shaper.needs_shaping(&self.owed) {
+            self.shaper.shape(&self.owed, now, &mut self.frame);
+            for Latched { bit, .. } in &self.latched {
+                let level = self.frame[bit.byte] & bit.mask != 0;
+                slots[bit.signal] = Slot::from_real(f64::from(u8::from(level)));
+            }
+        } else {
+            self.shaper.pass(&self.frame);
+        }
+        self.shaper.confirm();
+    }
+
+    /// The status to show in the current tick; `None` where the recording has nothing but that the exchange failed.
+    pub(super) fn code(&self) -> Option<Code> {
+        match self.status {
+            FRESH | UNCHANGED if self.is_fresh => Some(Code::Fresh),
+            FRESH | UNCHANGED => Some(Code::Unchanged),
+            STALE => Some(Code::Stale),
+            _ => None,
+        }
+    }
+
+    /// Puts what this station received into `slots`, of which `values` has the values.
+    pub(super) fn show(&self, values: &[Slot], slots: &mut [Slot]) {
+        for signal in &self.received {
+            slots[*signal] = values[*signal];
+        }
+        for latched in &self.latched {
+            if let Some(slot) = latched.slot {
+                slots[slot] = Slot::from_real(f64::from(latched.count));
+            }
+        }
+    }
+
+    /// Tells of every latched signal how many edges there were so far.
+    pub(super) fn edges(&self, tell: &mut impl FnMut(usize, u32)) {
+        for latched in &self.latched {
+            tell(latched.bit.signal, latched.total);
+        }
     }
 
     /// Records the frame that this end sends.
@@ -173,71 +236,37 @@ impl Station {
             self.send.decode(frame, expected);
             self.send.decode(&self.seen, seen);
             for Sent { signal, name, kind } in &self.sent {
-                if expected[*signal] != seen[*signal] {
-                    differs(*signal, *kind, name, expected[*signal], seen[*signal]);
+                let (expected, seen) = (expected[*signal], seen[*signal]);
+                // Of a scaled value that was on the line, the codec may make the next one.
+                let is_recorded = *kind != ValueKind::Bit && slots[*signal] == seen;
+                if expected != seen && !is_recorded {
+                    differs(*signal, *kind, name, expected, seen);
                 }
             }
         }
     }
 }
 
-impl Latched {
-    /// The level at the end of a tick with `count` edges that matter, at least one, and the number of toggles
-    /// from the level `was` to it. The tick showed `shown`.
-    fn way(&self, was: bool, shown: bool, count: usize, falls_back: bool) -> (bool, usize) {
-        let counted = match self.bit.latch {
-            Latch::Both => return (was != (count % 2 == 1), count),
-            Latch::Rising => true,
-            Latch::Falling => false,
-        };
-        let level = counted != (shown == counted && falls_back);
-        // An edge that counts is always preceded by one that does not, except the first if the level already
-        // allows it.
-        let toggles = 2 * count - usize::from(was != counted) + usize::from(level != counted);
-        (level, toggles)
+/// Whether an edge to this level counts.
+fn counts(latch: Latch, level: bool) -> bool {
+    match latch {
+        Latch::Rising => level,
+        Latch::Falling => !level,
+        Latch::Both => true,
     }
 }
 
-fn set(frame: &mut [u8], byte: usize, mask: u8, level: bool) {
-    if level {
-        frame[byte] |= mask;
-    } else {
-        frame[byte] &= !mask;
-    }
+fn is_on(slot: Slot) -> bool {
+    slot.real() != 0.0
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Replays the toggles, and counts the edges.
-    #[test]
-    fn ways_have_the_edges_that_they_should() {
-        for latch in [Latch::Rising, Latch::Falling, Latch::Both] {
-            let bit = LatchedBit {
-                signal: 0,
-                byte: 0,
-                mask: 1,
-                latch,
-                hold: Nanos::ZERO,
-            };
-            let latched = Latched { bit, edges: None };
-            for case in 0..8 {
-                let [was, shown, falls_back] = [1, 2, 4].map(|bit| case & bit != 0);
-                for count in 1..5 {
-                    let (end, toggles) = latched.way(was, shown, count, falls_back);
-                    let (mut level, mut counted) = (was, 0);
-                    for _ in 0..toggles {
-                        level = !level;
-                        counted += usize::from(match latch {
-                            Latch::Rising => level,
-                            Latch::Falling => !level,
-                            Latch::Both => true,
-                        });
-                    }
-                    assert_eq!((level, counted), (end, count), "{latch:?} {case} {count}");
-                }
-            }
-        }
-    }
+/// A recorded count.
+fn whole(count: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast saturates"
+    )]
+    let count = count as u32;
+    count
 }

@@ -188,6 +188,14 @@ impl FaultLayer {
         }
     }
 
+    /// Whether a fault is active, or frames are held back.
+    #[inline]
+    pub(super) fn is_distorting(&self) -> bool {
+        self.line
+            .as_ref()
+            .is_some_and(|line| !line.active().is_empty() || line.due() != Nanos::MAX)
+    }
+
     /// Whether nothing goes to this station, and nothing comes from it.
     #[inline]
     pub(super) fn is_cut(&self, station: usize) -> bool {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::*;
 use crate::Driver;
-use crate::bus_handle::BusHandle;
+use crate::bus_handle::{BusHandle, SteppedBus};
 use crate::host::cpu::{Cpu, half};
 use tickbus_base::time::{Clock, Manual};
 use tickbus_fieldbus::LinkStatus;
@@ -178,7 +178,7 @@ fn a_program_on_the_tick_sees_and_shows_what_one_behind_an_image_does() {
         let BusHandle::Stepped { bus, .. } = &mut driver.line else {
             panic!("it is stepped");
         };
-        *bus = host;
+        *bus = SteppedBus::Any(host);
         let slots = driver.initial_slots();
         (driver, slots)
     });

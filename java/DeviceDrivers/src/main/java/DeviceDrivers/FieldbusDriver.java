@@ -39,7 +39,22 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
      * @throws FieldbusException as {@link Tickbus#open}
      */
     public FieldbusDriver(Path cfg) {
-        bus = Tickbus.open(cfg);
+        this(Tickbus.open(cfg));
+    }
+
+    /**
+     * Describes the driver of a file, and opens nothing: for a simulator that only lists its components.
+     *
+     * @param cfg the driver.cfg
+     * @return a driver that has components, id and name, and cannot tick
+     * @throws FieldbusException as {@link Tickbus#look}
+     */
+    public static FieldbusDriver look(Path cfg) {
+        return new FieldbusDriver(Tickbus.look(cfg));
+    }
+
+    private FieldbusDriver(Tickbus bus) {
+        this.bus = bus;
         latched = bus.signals().stream().filter(Signal::isLatched).toArray(Signal[]::new);
         components = describe(bus.signals());
         inputs = new double[(int) components.stream()

@@ -24,7 +24,11 @@ class FieldbusDriverTest {
     Path directory;
 
     private FieldbusDriver open() throws IOException {
-        return new FieldbusDriver(Files.writeString(directory.resolve("rig.cfg"), """
+        return new FieldbusDriver(file(""));
+    }
+
+    private Path file(String more) throws IOException {
+        return Files.writeString(directory.resolve("rig.cfg"), """
             [driver]
             id = 7
             name = "Mirror"
@@ -55,7 +59,24 @@ class FieldbusDriverTest {
             address = "%IW2"
             type = "INT"
             unit = "mm/s"
-            """));
+            """ + more);
+    }
+
+    @Test
+    void aDriverThatIsOnlyLookedAtOpensNothing() throws IOException {
+        Path record = Files.writeString(directory.resolve("run.vcd"), "the recording of yesterday");
+        Path cfg = file("[record]\nfile = \"run.vcd\"\n");
+        FieldbusDriver open = new FieldbusDriver(cfg);
+        FieldbusDriver looked = FieldbusDriver.look(cfg);
+        assertEquals(open.components(), looked.components());
+        assertEquals(7, looked.id());
+        assertEquals("Mirror", looked.name());
+        FieldbusException refused = assertThrows(FieldbusException.class,
+            () -> looked.updateComponentValues(new double[2]));
+        assertEquals(Status.NOT_OPEN, refused.status());
+        looked.exit();
+        open.exit();
+        assertEquals("the recording of yesterday", Files.readString(record));
     }
 
     @Test

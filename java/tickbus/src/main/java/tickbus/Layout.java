@@ -48,6 +48,13 @@ final class Layout {
         return buffer;
     }
 
+    /** Memory for a driver that is described and not opened. */
+    void allocateAlone() {
+        int slots = signals.size() + (int) signals.stream().filter(signal -> signal.edgesSlot() >= 0).count();
+        allocate((SLOTS + slots) * Long.BYTES);
+        words.put(WORD_SLOT_COUNT, slots);
+    }
+
     /** Called by the native library. */
     void driver(int id, String name) {
         this.id = id;

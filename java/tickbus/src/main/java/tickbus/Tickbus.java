@@ -68,6 +68,8 @@ public final class Tickbus implements AutoCloseable {
     private static final VarHandle TICKER;
     /** Closes forgotten drivers. */
     private static final Cleaner CLEANER = Cleaner.create();
+    /** No driver's handle. */
+    private static final long NO_HANDLE = 0;
     /** The most events fetched by one native call. */
     private static final int EVENTS = 64;
     /** The most events handed over by one call: as many as the driver's ring holds. */
@@ -190,6 +192,23 @@ public final class Tickbus implements AutoCloseable {
             finalizeNative(handle);
             throw e;
         }
+    }
+
+    /**
+     * Describes the driver of a configuration file, and opens nothing: no fieldbus, no recording, no live page. The
+     * result has id, name and signals; a tick throws {@link Status#NOT_OPEN}. It need not be closed.
+     *
+     * @param driverCfg the driver.cfg
+     * @return the description
+     * @throws FieldbusException {@link Status#BAD_CONFIG} or {@link Status#LIBRARY}, as {@link #open(Path)}
+     */
+    public static Tickbus look(Path driverCfg) {
+        Objects.requireNonNull(driverCfg, "driverCfg");
+        NativeLibrary.load();
+        Layout layout = new Layout();
+        lookNative(nameOf(driverCfg), layout);
+        layout.allocateAlone();
+        return new Tickbus(NO_HANDLE, layout);
     }
 
     /** The file's name for native code: its URI if the JVM's file encoding cannot represent the path as text. */
@@ -529,7 +548,7 @@ public final class Tickbus implements AutoCloseable {
      */
     @Override
     public synchronized void close() {
-        if (closed) {
+        if (closed || handle == NO_HANDLE) {
             return;
         }
         try {
@@ -641,6 +660,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /** Opens a driver and describes it to {@code layout}; throws {@link FieldbusException}. */
+    static native void lookNative(String driverCfg, Layout layout);
+
     static native long initializeNative(String driverCfg, String tables, Layout layout);
 
     /** The tick; returns a status code and never throws, for any handle. */

@@ -88,7 +88,7 @@ public final class Main {
                 return 0;
             }
             if (arguments.has("--list")) {
-                try (DriverSet drivers = DeviceDriverFolder.scan(arguments.path("--drivers")).open()) {
+                try (DriverSet drivers = DeviceDriverFolder.scan(arguments.path("--drivers")).look()) {
                     out.print(drivers.list());
                 }
                 return 0;

@@ -2,8 +2,9 @@ package tickbus.simulator;
 
 import controlinterface.ControlInterfaceDeviceDriver;
 import java.io.IOException;
-import java.lang.reflect.Constructor;
 import java.lang.reflect.InvocationTargetException;
+import java.lang.reflect.Method;
+import java.lang.reflect.Modifier;
 import java.net.MalformedURLException;
 import java.net.URL;
 import java.net.URLClassLoader;
@@ -14,6 +15,7 @@ import java.util.ArrayList;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.function.Function;
 import java.util.jar.JarFile;
 import java.util.jar.Manifest;
 
@@ -133,13 +135,43 @@ public final class DeviceDriverFolder {
      * @throws DriverFailure if a driver fails to open; those opened before it are closed again
      */
     public DriverSet open() {
+        return make(DeviceDriverFolder::constructor);
+    }
+
+    /**
+     * Describes the driver of each {@code .cfg} file: by the public static method {@code look} of the driver class,
+     * which takes the file's {@link Path} and opens nothing. A class without one is opened.
+     *
+     * @return all of them, for {@link DriverSet#list}
+     * @throws WrongInput as {@link #open}
+     * @throws DriverFailure as {@link #open}
+     */
+    public DriverSet look() {
+        return make(type -> {
+            try {
+                Method look = type.getMethod("look", Path.class);
+                return Modifier.isStatic(look.getModifiers())
+                        ? cfg -> (ControlInterfaceDeviceDriver) look.invoke(null, cfg)
+                        : constructor(type);
+            } catch (NoSuchMethodException e) {
+                return constructor(type);
+            }
+        });
+    }
+
+    /** Makes a driver of its file. */
+    private interface Maker {
+        ControlInterfaceDeviceDriver make(Path cfg) throws ReflectiveOperationException;
+    }
+
+    private DriverSet make(Function<Class<? extends ControlInterfaceDeviceDriver>, Maker> how) {
         URLClassLoader loader = new URLClassLoader("DeviceDriver folder", urls(),
                 DeviceDriverFolder.class.getClassLoader());
         List<ControlInterfaceDeviceDriver> drivers = new ArrayList<>();
         try {
-            Constructor<? extends ControlInterfaceDeviceDriver> constructor = constructor(loader);
+            Maker maker = maker(how, loader);
             for (Map.Entry<Integer, Path> one : configurations.entrySet()) {
-                ControlInterfaceDeviceDriver driver = open(constructor, one.getValue());
+                ControlInterfaceDeviceDriver driver = make(maker, one.getValue());
                 drivers.add(driver);
                 if (driver.id() != one.getKey()) {
                     throw new WrongInput(one.getValue().getFileName() + ": its driver says that it has the id "
@@ -169,34 +201,46 @@ public final class DeviceDriverFolder {
         return urls.toArray(URL[]::new);
     }
 
-    private Constructor<? extends ControlInterfaceDeviceDriver> constructor(ClassLoader loader) {
+    private Maker maker(Function<Class<? extends ControlInterfaceDeviceDriver>, Maker> how, ClassLoader loader) {
         try {
-            return Class.forName(driverClass, true, loader).asSubclass(ControlInterfaceDeviceDriver.class)
-                    .getConstructor(Path.class);
+            return how.apply(driverClass(loader));
+        } catch (LinkageError e) {
+            throw new DriverFailure("the driver class " + driverClass + " cannot be loaded", e);
+        }
+    }
+
+    private Class<? extends ControlInterfaceDeviceDriver> driverClass(ClassLoader loader) {
+        try {
+            return Class.forName(driverClass, true, loader).asSubclass(ControlInterfaceDeviceDriver.class);
         } catch (ClassNotFoundException e) {
             throw new WrongInput("no jar in the folder has the class " + driverClass + " that " + DRIVER_CLASS
                     + " names", e);
         } catch (ClassCastException e) {
             throw new WrongInput("the driver class " + driverClass + " does not extend "
                     + ControlInterfaceDeviceDriver.class.getName(), e);
-        } catch (NoSuchMethodException e) {
-            throw new WrongInput("the driver class " + driverClass
-                    + " has no public constructor that takes a java.nio.file.Path, its .cfg file", e);
-        } catch (LinkageError e) {
-            throw new DriverFailure("the driver class " + driverClass + " cannot be loaded", e);
         }
     }
 
-    private ControlInterfaceDeviceDriver open(
-            Constructor<? extends ControlInterfaceDeviceDriver> constructor, Path cfg) {
+    private static Maker constructor(Class<? extends ControlInterfaceDeviceDriver> type) {
         try {
-            return constructor.newInstance(cfg);
+            return type.getConstructor(Path.class)::newInstance;
+        } catch (NoSuchMethodException e) {
+            throw new WrongInput("the driver class " + type.getName()
+                    + " has no public constructor that takes a java.nio.file.Path, its .cfg file", e);
+        }
+    }
+
+    private ControlInterfaceDeviceDriver make(Maker maker, Path cfg) {
+        try {
+            return maker.make(cfg);
         } catch (InvocationTargetException e) {
             throw new DriverFailure("the driver of " + cfg.getFileName() + " failed to open", e.getCause());
         } catch (InstantiationException e) {
             throw new WrongInput("the driver class " + driverClass + " is abstract", e);
         } catch (IllegalAccessException e) {
             throw new WrongInput("the driver class " + driverClass + " is not public", e);
+        } catch (ReflectiveOperationException e) {
+            throw new DriverFailure("the driver of " + cfg.getFileName() + " cannot be made", e);
         }
     }
 }

@@ -60,6 +60,19 @@ class DeviceDriverFolderTest {
     }
 
     @Test
+    void aClassThatCanDescribeItsDriversIsNotOpenedToList() throws IOException {
+        DriverJar.write(work, folder.resolve("driver.jar"), "drivers.Shy", "drivers.Good", "drivers.Shy");
+        cfg("a.cfg", "[driver]\nid = 1\n");
+        try (DriverSet drivers = DeviceDriverFolder.scan(folder).look()) {
+            assertEquals("look ", log());
+            assertTrue(drivers.list().contains("  1:level"), drivers.list());
+        }
+        cfg("a.cfg", "[driver]\nid = 1\n# fail");
+        DriverFailure failure = assertThrows(DriverFailure.class, () -> DeviceDriverFolder.scan(folder).look());
+        assertTrue(failure.getCause().getMessage().contains("the card is missing"), failure.toString());
+    }
+
+    @Test
     void theClassMayBeInAnotherJarThanItsName() throws IOException {
         DriverJar.write(work, folder.resolve("classes.jar"), null, "drivers.Good");
         DriverJar.write(work, folder.resolve("name.jar"), "drivers.Good");

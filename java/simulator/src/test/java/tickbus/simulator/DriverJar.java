@@ -67,6 +67,10 @@ public final class DriverJar {
                 }
             }
             """,
+            "drivers.Shy", "package drivers; import java.nio.file.Path; public class Shy extends Good {"
+                    + " public Shy(Path p) throws Exception { super(p); }"
+                    + " public static Good look(Path p) throws Exception { Good looked = new Good(p);"
+                    + " System.setProperty(\"tickbus.test.log\", \"look \"); return looked; } }",
             "drivers.Unrelated", "package drivers; public class Unrelated { public Unrelated(java.nio.file.Path p) {} }",
             "drivers.Shapeless", "package drivers; public abstract class Shapeless extends Good {"
                     + " public Shapeless(java.nio.file.Path p) throws Exception { super(p); } }",

@@ -12,9 +12,17 @@ use std::sync::Arc;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
-use tickbus::image::{Frame, triple_buffer};
+use tickbus::image::triple_buffer;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
+
+/// A frame such as the image hands over.
+#[derive(Clone)]
+struct Frame {
+    bytes: Box<[u8]>,
+    edges: Box<[u32]>,
+    sequence: u64,
+}
 
 /// Faults of the rig's first bits, and of the line, as sections of a driver.cfg; none of them stops the bus.
 const FAULTS: &str = "

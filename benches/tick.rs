@@ -18,6 +18,7 @@ use tickbus::time::{Monotonic, Nanos};
 
 /// A frame such as the image hands over.
 #[derive(Clone)]
+#[expect(dead_code, reason = "handed over, and not looked at")]
 struct Frame {
     bytes: Box<[u8]>,
     edges: Box<[u32]>,

@@ -227,7 +227,7 @@ impl Handle {
     }
 
     pub(crate) fn is_over(&self) -> Result<bool, Refusal> {
-        self.with_reason(|opened| opened.driver.is_over())
+        self.visit(|opened| opened.driver.is_over())
     }
 
     pub(crate) fn config(&self) -> Result<Arc<Config>, Refusal> {

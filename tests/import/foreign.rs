@@ -50,7 +50,7 @@ fn the_data_of_modules_are_signals_and_commented_bits_are_bits() {
     let array = "<ArrayMember Name=\"Value\" DataType=\"INT\" Dimensions=\"2\"><Element Index=\"[0]\" Value=\"0\"/>\
                  <Element Index=\"[1]\" Value=\"0\"/></ArrayMember><StructureMember Name=\"Ch0\" DataType=\"y\">\
                  <DataValueMember Name=\"Data\" DataType=\"REAL\"/></StructureMember>";
-    let modules = module(1, "Input", comments, DATA) + &module(2, "Output", "", array);
+    let modules = module(1, "Input", comments, DATA) + module(2, "Output", "", array).as_str();
     let imported = read("cell.L5X", &l5x(&modules, ""));
     assert_eq!(
         lines(&imported),
@@ -73,7 +73,7 @@ fn the_data_of_modules_are_signals_and_commented_bits_are_bits() {
 
 #[test]
 fn aliases_give_names_to_points_bits_and_whole_structures() {
-    let modules = module(1, "Input", "", DATA) + &module(2, "Input", "", DATA);
+    let modules = module(1, "Input", "", DATA) + module(2, "Input", "", DATA).as_str();
     let tags = "<Tag Name=\"Door\" TagType=\"Alias\" AliasFor=\"local:1:i.data.3\"/>\
                 <Tag Name=\"Faults\" TagType=\"Alias\" AliasFor=\"Local:1:I.Fault\"/>\
                 <Tag Name=\"Rack\" TagType=\"Alias\" AliasFor=\"Local:2:I\"/>";

@@ -65,8 +65,8 @@ impl Driver {
         self.counters.ticks = tick;
         let image = &mut self.image;
         match station.encode.word(slots) {
-            Some(word) if image.is_published(0, word) => image.ticks(now),
-            _ => write(
+            Some(word) => image.write_word(now, word),
+            None => write(
                 image,
                 std::slice::from_ref(station),
                 now,
@@ -75,11 +75,11 @@ impl Driver {
             ),
         }
         image.update();
-        let arrival = station.receive(image, (now, self.max_age), slots, &self.slots);
+        let age = station.receive(image, (now, self.max_age), slots, &self.slots);
         let found = Exchange {
             code: station.status,
             sequence: image.cycles(),
-            age: arrival.age,
+            age,
             granted: self.given.unwrap_or_else(|| now - self.first_now),
         };
         self.last = found;
@@ -289,28 +289,35 @@ impl Driver {
         if let Some(extras) = &mut self.extras {
             extras.sending(now, slots);
         }
-        let stations = self.stations.iter().enumerate();
-        let is_published = stations.rev().all(|(index, station)| {
-            let word = station.encode.word(slots);
-            word.is_some_and(|word| self.image.is_published(index, word))
-        });
-        if is_published {
-            self.image.ticks(now);
-        } else {
-            write(
-                &mut self.image,
-                &self.stations,
-                now,
-                slots,
-                &mut self.counters,
-            );
-        }
+        self.write(now, slots);
         if let Some(extras) = &mut self.extras {
             extras.sent(slots);
         }
         match &mut self.line {
             BusHandle::Free(_) => Ok(()),
             BusHandle::Stepped { bus, port, .. } => bus.as_stepped().send(now, port),
+        }
+    }
+
+    /// Hands what is sent to the bus: the values of all stations at once.
+    #[inline]
+    fn write(&mut self, now: Nanos, slots: &[Slot]) {
+        let (image, stations) = (&mut self.image, &self.stations);
+        if let [station] = &stations[..]
+            && let Some(word) = station.encode.word(slots)
+        {
+            image.write_word(now, word);
+            return;
+        }
+        let mut all = stations.iter().enumerate();
+        let is_published = all.all(|(index, station)| {
+            let word = station.encode.word(slots);
+            word.is_some_and(|word| image.is_published(index, word))
+        });
+        if is_published {
+            image.ticks(now);
+        } else {
+            write(image, stations, now, slots, &mut self.counters);
         }
     }
 
@@ -328,8 +335,7 @@ impl Driver {
         let image = &mut self.image;
         image.update();
         for station in &mut self.stations {
-            let arrival = station.receive(image, (now, self.max_age), slots, &self.slots);
-            age = age.max(arrival.age);
+            age = age.max(station.receive(image, (now, self.max_age), slots, &self.slots));
             code = code.worse(station.status);
         }
         if let BusHandle::Stepped {

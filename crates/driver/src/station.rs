@@ -3,7 +3,7 @@
 use super::{Code, SlotMap};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
-use tickbus_image::{Arrival, TickEnd};
+use tickbus_image::{Arrival, TickEnd, is_stale};
 
 /// One station of an open driver, as the tick sees it.
 #[derive(Debug)]
@@ -38,7 +38,7 @@ impl Station {
         image.overridden(self.index);
     }
 
-    /// Receives from the frame taken over last into the slots, and sets the status.
+    /// Receives from the frame taken over last into the slots, and sets the status. Returns the age of the data.
     #[inline]
     pub(super) fn receive(
         &mut self,
@@ -46,7 +46,25 @@ impl Station {
         (now, max_age): (Nanos, Nanos),
         slots: &mut [Slot],
         map: &SlotMap,
-    ) -> Arrival {
+    ) -> Nanos {
+        match image.unchanged(self.index, now) {
+            Some((age, is_valid)) if !is_stale(age, max_age, is_valid) => {
+                self.stale = false;
+                self.status = Code::Unchanged;
+                age
+            }
+            _ => self.receive_news(image, (now, max_age), slots, map),
+        }
+    }
+
+    #[inline(never)]
+    fn receive_news(
+        &mut self,
+        image: &mut TickEnd,
+        (now, max_age): (Nanos, Nanos),
+        slots: &mut [Slot],
+        map: &SlotMap,
+    ) -> Nanos {
         let mut receiver = Receiver {
             decode: &self.decode,
             slots,
@@ -63,7 +81,7 @@ impl Station {
             Arrival { fresh: true, .. } => Code::Fresh,
             Arrival { .. } => Code::Unchanged,
         };
-        arrival
+        arrival.age
     }
 }
 

@@ -158,6 +158,35 @@ impl TickEnd {
         self.sent[station].word == word
     }
 
+    /// As [`write`](Self::write), for an image of one station of up to eight bytes that are at hand as a number, the least
+    /// significant byte first: a tick that changes nothing then touches no frame.
+    ///
+    /// # Panics
+    ///
+    /// When the image has no station.
+    #[inline]
+    pub fn write_word(&mut self, now: Nanos, word: u64) {
+        if self.sent[0].word != word {
+            self.publish_word(word);
+        }
+        self.ticks(now);
+    }
+
+    #[inline(never)]
+    fn publish_word(&mut self, word: u64) {
+        let Sent {
+            edges, word: last, ..
+        } = &mut self.sent[0];
+        *last = word;
+        self.tx.with_buffer(|frame| {
+            for (to, from) in frame.bytes.iter_mut().zip(word.to_le_bytes()) {
+                *to = from;
+            }
+            edges.count(&frame.bytes, &mut frame.edges);
+        });
+        self.tx.publish();
+    }
+
     /// The simulation has ticked. What it wrote in this tick was handed over before.
     #[inline]
     pub fn ticks(&self, now: Nanos) {
@@ -182,6 +211,21 @@ impl TickEnd {
                 station.head = *head;
             }
         });
+    }
+
+    /// The age of a station's data, and whether they are valid, if [`read`](Self::read) would find nothing to show.
+    #[inline]
+    pub fn unchanged(&self, station: usize, now: Nanos) -> Option<(Nanos, bool)> {
+        let shown = &self.shown[station];
+        let Head {
+            heard,
+            sequence,
+            is_valid,
+        } = shown.head;
+        if sequence != shown.sequence || shown.forced || shown.shaper.is_busy() {
+            return None;
+        }
+        Some((age(now, heard), is_valid))
     }
 
     /// Shows the data of a station in the frame that was [taken over](Self::update) last, if they count at `now` and

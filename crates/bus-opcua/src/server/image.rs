@@ -238,7 +238,7 @@ impl Image {
 
     fn show_what_is_sent(&mut self, port: &Port, now: Nanos) {
         for station in 0..self.frames.len() {
-            let status = quality(port, station, now);
+            let status = quality(port, now);
             for at in 0..self.sends.signals(station).len() {
                 let index = self.sends.signals(station)[at];
                 self.put(now, index, self.sends.bits(index), status);
@@ -284,7 +284,7 @@ impl Image {
 }
 
 /// The quality of the simulation's values.
-fn quality(port: &Port, station: usize, now: Nanos) -> StatusCode {
+fn quality(port: &Port, now: Nanos) -> StatusCode {
     let age = port.tick_age(now);
     match port.watchdog() {
         _ if age == Nanos::MAX => StatusCode::BadWaitingForInitialData,

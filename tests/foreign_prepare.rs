@@ -15,6 +15,7 @@ mod stepped;
 use std::path::Path;
 use std::process::{Command, ExitCode};
 
+use actions::D;
 use foreign::Absent;
 use foreign::iec2c::Compiler;
 use stepped::{Random, Stepped};

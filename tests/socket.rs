@@ -79,7 +79,7 @@ fn records_that_come_together_are_handed_in_one_by_one() {
 fn stations_follow_one_another_in_a_record() {
     let mut device = Alone::open(
         "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
-         send = \"reply\"\nmax_age = \"999999h\"\n[[station]]\nname = \"a\"\n[[station]]\nname = \"b\"\n\
+         send = \"reply\"\nmax_age = \"24h\"\n[[station]]\nname = \"a\"\n[[station]]\nname = \"b\"\n\
          [[signal]]\nname = \"from a\"\nstation = \"a\"\naddress = \"%IB0\"\n\
          [[signal]]\nname = \"to b\"\nstation = \"b\"\naddress = \"%QW0\"\n\
          [[signal]]\nname = \"to a\"\nstation = \"a\"\naddress = \"%QB0\"\n\

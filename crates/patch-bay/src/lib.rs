@@ -183,7 +183,7 @@ mod tests {
             (Verb::Put, "/patch/LO%47O:I1", "PUMP:Q1", 400),
             (Verb::Put, "/patch/LOGO:I1", "PUMP", 400),
             (Verb::Put, "/force/LOGO:I1", "on", 400),
-            (Verb::Put, "/force/LOGO:I1", "1e3", 400),
+            (Verb::Put, "/force/LOGO:I1", "1e", 400),
             (Verb::Delete, "/force/LOGO:I1/x", "", 400),
         ] {
             assert_eq!(read(verb, path, body), Err(status), "{path} {body}");

@@ -249,7 +249,9 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
     let who = end.statistic("identity");
     end.end.driver.close();
 
-    let mut end = open(&fieldbus(&format!("write_to = \"{who}\"")));
+    let mut end = open(&fieldbus(&format!(
+        "write_to = \"{who}\"\nat_close = \"hold\""
+    )));
     for value in [70.0, 71.0] {
         end.set("position", value);
         end.set("pressure", 1.5);

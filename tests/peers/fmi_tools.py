@@ -300,14 +300,17 @@ def rig_in_c(library, config, record):
     class Signal(ctypes.Structure):
         _fields_ = [(name, ctypes.c_char_p) for name in ("name", "address", "data_type", "unit", "station")]
         _fields_ += [(name, ctypes.c_int32) for name in ("slot", "edges", "is_written", "kind")]
+        _fields_ += [("fail_safe", ctypes.c_uint64)]
 
     signals = [Signal() for _ in range(native.tb_signal_count(driver))]
     for at, signal in enumerate(signals):
         assert native.tb_signal_at(driver, at, ctypes.byref(signal)) == 0, native.tb_last_error()
     written = [signal for signal in signals if signal.is_written]
-    bits = [8 + signal.slot for signal in written if signal.data_type == b"BOOL"]
-    reals = [8 + signal.slot for signal in written if signal.data_type != b"BOOL"]
+    # The head of a tb_buffer of version 2 has 11 words.
+    bits = [11 + signal.slot for signal in written if signal.data_type == b"BOOL"]
+    reals = [11 + signal.slot for signal in written if signal.data_type != b"BOOL"]
     words = native.tb_buffer_of(driver)
+    assert words[0] == 2, f"a buffer of version {words[0]}"
     numbers = ctypes.cast(words, ctypes.POINTER(ctypes.c_double))
     random = 1
     for tick in range(2000):

@@ -52,9 +52,17 @@ int DDI_DevOpenNode(char *name, int16_t perm, int *handle) {
 }
 
 int DDI_DevCloseNode(int handle) {
+    struct end *end = end_of(handle), *other = &ends[end == &ends[0]];
+    int turns = 0;
     CALLED("%d", handle);
     pthread_mutex_lock(&lock);
-    end_of(handle)->is_started = 0;
+    /* The bus has a cycle after the last write: what was written reaches an end that reads. */
+    while (end->is_started && other->is_started && end->read < end->written && turns++ < 200) {
+        pthread_mutex_unlock(&lock);
+        nanosleep(&(struct timespec){0, 1000000}, NULL);
+        pthread_mutex_lock(&lock);
+    }
+    end->is_started = 0;
     pthread_mutex_unlock(&lock);
     return 0;
 }

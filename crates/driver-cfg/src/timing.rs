@@ -114,7 +114,7 @@ impl<'a> TimingKeys<'a> {
             match &self.watchdog {
                 Some(value) if value.as_text() == Some(OFF) => Some(Some(None)),
                 Some(value) => value
-                    .duration_from(LEAST_WATCHDOG, no_stop)
+                    .duration_between(LEAST_WATCHDOG, no_stop, LONGEST)
                     .map(|span| Some(Some(span))),
                 None => Some(None),
             },

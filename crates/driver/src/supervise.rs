@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::thread::JoinHandle;
 
+use log::Level;
 use tickbus_base::os::wake_on_time;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
@@ -90,7 +91,11 @@ impl BusThread {
         self.stop.wake();
         let limit = self.status.max_age().min(LONGEST_FAREWELL);
         if !farewell.wait(limit.to_duration()) {
-            log::warn!(
+            // The log has told of a line that does not run, or tells it now.
+            let is_news =
+                link.state == LinkState::Running && self.status.state() == LinkState::Running;
+            log::log!(
+                if is_news { Level::Warn } else { Level::Info },
                 "driver \"{}\": closes, and the peer has not confirmed the fail-safe values within {limit}; it may keep \
                  the last ones ({})",
                 self.name,

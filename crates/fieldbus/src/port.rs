@@ -348,6 +348,7 @@ impl Port {
     /// The peer was lost because of `error`, and the bus continues without a pause, as `next` says.
     pub fn lost(&mut self, error: &BusError, next: &str) {
         self.image.last_cycle = None;
+        self.line_ended();
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
     }

@@ -17,6 +17,9 @@ use super::manager::Nodes;
 use super::space;
 use super::watched::{Variable, Watched};
 
+/// How long a notification that is due may take to leave.
+const TO_LEAVE: Nanos = Nanos::from_millis(100);
+
 /// All signals, with their values in the image and in their nodes.
 pub(super) struct Image {
     table: Arc<SignalTable>,
@@ -195,6 +198,9 @@ impl Image {
                     port.sent(&receipt.bits(signal.station, signal.address().bits()));
                 }
             }
+            if port.is_ending() {
+                self.tell_who_has_the_last(port, now);
+            }
         }
         for index in 0..self.places.len() {
             let signal = &self.table.signals[index];
@@ -210,6 +216,28 @@ impl Image {
             }
         }
         self.show.tell_due(&self.places);
+    }
+
+    /// Tells the port which stations' subscribers have had time to see the last values.
+    fn tell_who_has_the_last(&self, port: &mut Port, now: Nanos) {
+        for station in 0..self.frames.len() {
+            let mut spans = (self.table.signals.iter().enumerate())
+                .filter(|(_, signal)| {
+                    signal.station == station && signal.area == self.role.areas().0
+                })
+                .filter_map(|(index, _)| {
+                    // No subscriber confirms a value: it has twice its time, and a notification some to leave.
+                    let span = self.show.watched.span(index)?;
+                    Some(now - self.places[index].since >= span + span + TO_LEAVE)
+                });
+            // Nobody watches a station without spans.
+            if spans
+                .next()
+                .is_some_and(|first| first && spans.all(|seen| seen))
+            {
+                port.has_last(station);
+            }
+        }
     }
 
     /// Updates the nodes of these signals for a client that is reading them: their pulses count as sent.

@@ -283,6 +283,9 @@ impl Service<'_> {
                     return Ok(Served::Worn);
                 }
                 self.image.show(port, now);
+                if port.is_ending() && started.is_alone(reactor) {
+                    port.line_ended();
+                }
             }
             port.observe(now);
             reactor.wait(&*clock, pace.due().min(port.due()));

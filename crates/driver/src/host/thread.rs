@@ -162,11 +162,10 @@ impl HostThread {
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        let scan_counters = Arc::clone(&cpu.scan_counters);
         let fault = Arc::new(Mutex::new(None));
         let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
         let counters = HostCounters {
-            scan_counters,
+            scan_counters: Arc::clone(&cpu.scan_counters),
             fault: Arc::clone(&fault),
             scanning: Arc::clone(&scanning),
             report,

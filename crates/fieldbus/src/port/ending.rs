@@ -34,7 +34,7 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
-    /// Something was sent since the line was opened.
+    /// The peer has got something since the line was opened.
     is_used: AtomicBool,
 }
 
@@ -89,11 +89,6 @@ impl Ending {
         self.is_begun
     }
 
-    /// A frame is about to be sent.
-    pub(super) fn is_used(&self) {
-        self.shared.is_used.store(true, Ordering::Relaxed);
-    }
-
     /// A peer has whole frames.
     fn sent(&mut self, stations: Range<usize>) {
         for cycles in &mut self.missing[stations] {
@@ -116,7 +111,12 @@ impl Port {
     /// Lets another thread end the exchange with the fail-safe values, which the peer of each station has after this many
     /// `cycles`.
     pub fn farewell(&mut self, cycles: u32) -> Farewell {
-        let (ending, farewell) = Ending::new(self.stations(), cycles);
+        let (mut ending, farewell) = Ending::new(self.stations(), cycles);
+        for (station, missing) in ending.missing.iter_mut().enumerate() {
+            if self.sizes(station).0 == 0 {
+                *missing = 0;
+            }
+        }
         self.image.ending = Some(ending);
         farewell
     }
@@ -126,13 +126,21 @@ impl Port {
         self.image.ending.as_ref().is_some_and(Ending::is_begun)
     }
 
-    /// The line has failed, and its peer is out of reach: nobody waits for it.
+    /// The line has failed, or the last peer has left: nobody waits for it.
     pub fn line_ended(&mut self) {
         if let Some(ending) = &self.image.ending {
             ending.shared.is_used.store(false, Ordering::Relaxed);
             if ending.shared.begun.load(Ordering::Relaxed) {
                 let _ = ending.done.send(());
             }
+        }
+    }
+
+    /// The peer of a station has the last values of all signals that it takes. For buses that send each signal alone: no
+    /// receipt of theirs is of a whole frame.
+    pub fn has_last(&mut self, station: usize) {
+        if let Some(ending) = &mut self.image.ending {
+            ending.sent(station..station + 1);
         }
     }
 
@@ -159,6 +167,9 @@ impl Port {
     /// The peer has the frames of this receipt.
     #[inline]
     pub(super) fn had(&mut self, receipt: &Receipt) {
+        if let Some(ending) = &self.image.ending {
+            ending.shared.is_used.store(true, Ordering::Relaxed);
+        }
         if receipt.is_last {
             self.had_last(receipt);
         }

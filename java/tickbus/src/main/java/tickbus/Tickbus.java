@@ -13,7 +13,6 @@ import java.util.Map;
 import java.util.Objects;
 import java.util.Optional;
 import java.util.function.LongToIntFunction;
-import java.util.function.Supplier;
 import java.util.stream.Stream;
 
 /**
@@ -450,7 +449,7 @@ public final class Tickbus implements AutoCloseable {
         Objects.requireNonNull(fault, "fault");
         int id = injectNative(handle, fault);
         // The fault is injected: to throw BUSY now would say that it is not.
-        return untilIdle(this::faults).stream().filter(one -> one.id() == id).findFirst().orElseThrow();
+        return Patience.untilIdle(this::faults).stream().filter(one -> one.id() == id).findFirst().orElseThrow();
     }
 
     /**
@@ -528,14 +527,14 @@ public final class Tickbus implements AutoCloseable {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];
         }
-        // As untilIdle, which would allocate.
+        // As Patience.untilIdle, which would allocate.
         while (true) {
             try {
                 endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
                 nextEvent = 0;
                 return endOfEvents > 0;
             } catch (FieldbusException e) {
-                waitAfter(e);
+                Patience.waitAfter(e);
             }
         }
     }
@@ -609,25 +608,6 @@ public final class Tickbus implements AutoCloseable {
             throw new FieldbusException(Status.BUSY, "'" + name + "' is ticked by " + (free ? "another thread" : former)
                 + "; tick it from that thread, end that thread, or call releaseThread() there first");
         }
-    }
-
-    /** Makes a call again and again until no other thread is in its way. */
-    static <T> T untilIdle(Supplier<T> call) {
-        while (true) {
-            try {
-                return call.get();
-            } catch (FieldbusException e) {
-                waitAfter(e);
-            }
-        }
-    }
-
-    /** Lets a call that met another thread's be tried again; throws what is no such meeting. */
-    private static void waitAfter(FieldbusException e) {
-        if (e.status() != Status.BUSY) {
-            throw e;
-        }
-        Thread.onSpinWait();
     }
 
     /** The exception for a negative code, with the driver's own reason if it has one. */

@@ -268,13 +268,13 @@ class MisuseTest {
     @Test
     void aCallThatMustNotBeRefusedIsMadeUntilItGetsThrough() {
         AtomicInteger calls = new AtomicInteger();
-        assertEquals(100_000, Tickbus.untilIdle(() -> {
+        assertEquals(100_000, Patience.untilIdle(() -> {
             if (calls.incrementAndGet() < 100_000) {
                 throw new FieldbusException(Status.BUSY, "in the way");
             }
             return calls.get();
         }));
-        assertStatus(Status.CLOSED, () -> Tickbus.untilIdle(() -> {
+        assertStatus(Status.CLOSED, () -> Patience.untilIdle(() -> {
             throw new FieldbusException(Status.CLOSED, "closed");
         }));
     }

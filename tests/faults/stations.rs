@@ -1,5 +1,6 @@
 //! Faults of one station among several.
 
+use std::fmt::Write as _;
 use std::sync::Arc;
 use tickbus::driver::Code;
 use tickbus::time::{Manual, Nanos};
@@ -75,12 +76,14 @@ fn the_other_end_of_a_loopback_sees_that_one_station_is_down() {
             link.0
         );
         for station in ["one", "two"] {
-            text += &format!("[[station]]\nname = \"{station}\"\n");
+            writeln!(text, "[[station]]\nname = \"{station}\"").expect("a String takes all");
         }
         for station in ["one", "two"] {
-            text += &format!(
-                "[[signal]]\nname = \"{station}\"\nstation = \"{station}\"\naddress = \"%IB0\"\n"
-            );
+            writeln!(
+                text,
+                "[[signal]]\nname = \"{station}\"\nstation = \"{station}\"\naddress = \"%IB0\""
+            )
+            .expect("a String takes all");
         }
         End::open(&text, clock)
     };

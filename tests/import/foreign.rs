@@ -1,5 +1,7 @@
 //! Files in the shapes in which the editors of PLCs write them.
 
+use std::fmt::Write as _;
+
 use tickbus::import::{Client, ImportOptions, Imported, condensed, import};
 use tickbus_image::signal::Addressing;
 
@@ -342,7 +344,7 @@ fn timers_and_counters_are_left_out_of_an_s7_client() {
 fn messages_of_one_kind_are_told_three_times_with_their_number() {
     let mut text = "Name;Address;Data type\n".to_owned();
     for number in 0..10 {
-        text += &format!("Tag {number};<No Value>;Int\n");
+        writeln!(text, "Tag {number};<No Value>;Int").expect("a String takes all");
     }
     let mistakes =
         import("hmi.csv", text.as_bytes(), ImportOptions::default()).expect_err("no addresses");

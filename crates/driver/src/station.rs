@@ -107,7 +107,6 @@ impl tickbus_image::Receiver for Receiver<'_> {
 }
 
 #[cfg(all(test, not(loom)))]
-#[expect(clippy::float_cmp, reason = "small whole numbers")]
 mod tests {
     use super::*;
     use crate::SlotMap;

@@ -122,6 +122,7 @@ impl Random {
     }
 }
 
+const FAIL_SAFE: [u8; 2] = [0x81, 0x02];
 const STATIONS: usize = 3;
 const STEPS: usize = if cfg!(miri) { 200 } else { 20_000 };
 const MAX_AGE: i64 = 40;
@@ -196,25 +197,24 @@ fn what_the_tick_sees_is_what_the_model_says() {
 }
 
 fn received(mut random: Random) {
-    let fail_safe = [0x81, 0x02];
     let bits: Vec<_> = (0..STATIONS).map(|_| latched(&mut random)).collect();
     let streams = bits.iter().map(|bits| StationStreams {
         tx_fail_safe: Box::new([]),
         tx_latched: Box::new([]),
-        rx_fail_safe: Box::new(fail_safe),
+        rx_fail_safe: Box::new(FAIL_SAFE),
         rx_latched: bits.clone().into(),
     });
     let (mut tick, mut bus) = image(streams.collect());
-    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, fail_safe)).collect();
+    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, FAIL_SAFE)).collect();
     let first = Peer {
-        bytes: fail_safe,
+        bytes: FAIL_SAFE,
         heard: None,
         is_valid: true,
     };
     // What is staged, what was handed over, and what the tick has.
     let (mut staged, mut handed) = ([first; STATIONS], [first; STATIONS]);
     let mut shown = [(); STATIONS].map(|()| Shown {
-        bytes: fail_safe,
+        bytes: FAIL_SAFE,
         edges: [0; 4],
     });
     let (mut now, mut codes) = (0, [0_usize; 3]);
@@ -308,17 +308,16 @@ fn what_the_peer_gets_is_what_the_model_says() {
 }
 
 fn sent(mut random: Random) {
-    let fail_safe = [0x81, 0x02];
     let bits: Vec<_> = (0..STATIONS).map(|_| latched(&mut random)).collect();
     let streams = bits.iter().map(|bits| StationStreams {
-        tx_fail_safe: Box::new(fail_safe),
+        tx_fail_safe: Box::new(FAIL_SAFE),
         tx_latched: bits.clone().into(),
         rx_fail_safe: Box::new([]),
         rx_latched: Box::new([]),
     });
     let (mut tick, mut bus) = image(streams.collect());
-    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, fail_safe)).collect();
-    let (mut written, mut taken) = ([fail_safe; STATIONS], [fail_safe; STATIONS]);
+    let mut models: Vec<_> = bits.iter().map(|bits| models(bits, FAIL_SAFE)).collect();
+    let (mut written, mut taken) = ([FAIL_SAFE; STATIONS], [FAIL_SAFE; STATIONS]);
     let (mut now, mut ticked, mut is_dead) = (0, None, false);
     let mut given = [0; 3];
     for step in 0..STEPS {
@@ -341,7 +340,7 @@ fn sent(mut random: Random) {
                     tick.ticks(Nanos(now));
                 } else {
                     tick.write(Nanos(now), |index, bytes| {
-                        bytes.copy_from_slice(&drawn[index])
+                        bytes.copy_from_slice(&drawn[index]);
                     });
                 }
                 (written, ticked) = (drawn, Some(now));
@@ -361,9 +360,9 @@ fn sent(mut random: Random) {
                 let models = &mut models[station];
                 let bytes = if is_dead {
                     for (model, bit) in models.iter_mut().zip(&bits[station]) {
-                        model.pass_instead(is_on(fail_safe, bit));
+                        model.pass_instead(is_on(FAIL_SAFE, bit));
                     }
-                    fail_safe
+                    FAIL_SAFE
                 } else {
                     let levels: Vec<bool> =
                         models.iter_mut().map(|model| model.read(now).0).collect();

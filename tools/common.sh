@@ -30,7 +30,7 @@ at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
-# What the zip has beyond a plain build; with the rest it would be larger than 15 MB.
+# What the zip has beyond a plain build; with the rest it would be larger than 15.5 MB.
 # shellcheck disable=SC2034 # for the scripts that source this
 PRODUCT_FEATURES=opcua,page
 

@@ -35,6 +35,7 @@ impl WriteGuard {
     pub fn meet(&mut self, port: &Port, identity: &str) -> bool {
         let identity = &*one_line(identity);
         self.may_write = self.write_to.as_deref() == Some(identity);
+        port.set_may_write(self.may_write);
         port.tell("identity", identity);
         port.tell("writes", if self.may_write { "allowed" } else { "blocked" });
         if !self.may_write && self.told.as_deref() != Some(identity) {

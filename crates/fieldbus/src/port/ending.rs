@@ -34,14 +34,17 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
-    /// The peer has got something since the line was opened.
+    /// Something was sent since the line was opened.
     is_used: AtomicBool,
+    /// The peer is one that nothing may be written to.
+    is_blocked: AtomicBool,
 }
 
 impl Farewell {
     /// Whether a peer may have got anything by this line.
     pub fn is_due(&self) -> bool {
         self.shared.is_used.load(Ordering::Relaxed)
+            && !self.shared.is_blocked.load(Ordering::Relaxed)
     }
 
     /// From now on every station sends its fail-safe values.
@@ -87,6 +90,11 @@ impl Ending {
 
     pub(super) fn is_begun(&self) -> bool {
         self.is_begun
+    }
+
+    /// A frame is about to be sent.
+    pub(super) fn is_used(&self) {
+        self.shared.is_used.store(true, Ordering::Relaxed);
     }
 
     /// A peer has whole frames.
@@ -136,6 +144,14 @@ impl Port {
         }
     }
 
+    /// Whether the peer may be written to at all.
+    pub(crate) fn set_may_write(&self, may_write: bool) {
+        if let Some(ending) = &self.image.ending {
+            let blocked = &ending.shared.is_blocked;
+            blocked.store(!may_write, Ordering::Relaxed);
+        }
+    }
+
     /// The peer of a station has the last values of all signals that it takes. For buses that send each signal alone: no
     /// receipt of theirs is of a whole frame.
     pub fn has_last(&mut self, station: usize) {
@@ -167,9 +183,6 @@ impl Port {
     /// The peer has the frames of this receipt.
     #[inline]
     pub(super) fn had(&mut self, receipt: &Receipt) {
-        if let Some(ending) = &self.image.ending {
-            ending.shared.is_used.store(true, Ordering::Relaxed);
-        }
         if receipt.is_last {
             self.had_last(receipt);
         }

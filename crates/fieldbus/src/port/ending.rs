@@ -28,6 +28,8 @@ impl Outputs {
 #[derive(Debug)]
 pub struct Farewell {
     shared: Arc<Shared>,
+    /// Whether any station sends anything.
+    sends: bool,
     done: Receiver<()>,
 }
 
@@ -43,7 +45,8 @@ struct Shared {
 impl Farewell {
     /// Whether a peer may have got anything by this line.
     pub fn is_due(&self) -> bool {
-        self.shared.is_used.load(Ordering::Relaxed)
+        self.sends
+            && self.shared.is_used.load(Ordering::Relaxed)
             && !self.shared.is_blocked.load(Ordering::Relaxed)
     }
 
@@ -71,16 +74,22 @@ pub(super) struct Ending {
 }
 
 impl Ending {
-    fn new(stations: usize, cycles: u32) -> (Self, Farewell) {
+    fn new(missing: Box<[u32]>) -> (Self, Farewell) {
         let (sender, done) = mpsc::channel();
+        let sends = missing.iter().any(|cycles| *cycles > 0);
         let shared = Arc::<Shared>::default();
         let ending = Self {
             shared: Arc::clone(&shared),
             is_begun: false,
-            missing: vec![cycles; stations].into(),
+            missing,
             done: sender,
         };
-        (ending, Farewell { shared, done })
+        let farewell = Farewell {
+            shared,
+            sends,
+            done,
+        };
+        (ending, farewell)
     }
 
     /// A cycle begins.
@@ -119,12 +128,11 @@ impl Port {
     /// Lets another thread end the exchange with the fail-safe values, which the peer of each station has after this many
     /// `cycles`.
     pub fn farewell(&mut self, cycles: u32) -> Farewell {
-        let (mut ending, farewell) = Ending::new(self.stations(), cycles);
-        for (station, missing) in ending.missing.iter_mut().enumerate() {
-            if self.sizes(station).0 == 0 {
-                *missing = 0;
-            }
-        }
+        let missing = (0..self.stations()).map(|station| match self.sizes(station).0 {
+            0 => 0,
+            _ => cycles,
+        });
+        let (ending, farewell) = Ending::new(missing.collect());
         self.image.ending = Some(ending);
         farewell
     }

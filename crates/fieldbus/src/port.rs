@@ -348,10 +348,6 @@ impl Port {
     /// The peer was lost because of `error`, and the bus continues without a pause, as `next` says.
     pub fn lost(&mut self, error: &BusError, next: &str) {
         self.image.last_cycle = None;
-        // Who refuses to be read may still take what is written.
-        if matches!(error, BusError::Link(_) | BusError::Left(_)) {
-            self.line_ended();
-        }
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
     }

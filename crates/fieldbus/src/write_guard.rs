@@ -1,5 +1,7 @@
 //! The guard in front of a PLC's memory: only a PLC that was named is written to.
 
+use std::ops::Range;
+
 use super::Port;
 use tickbus_base::os::one_line;
 
@@ -30,12 +32,12 @@ impl WriteGuard {
         self.may_write
     }
 
-    /// The PLC reports `identity`, or the bus identifies it by that. Returns whether it may be written to; if
+    /// The PLC of these stations reports `identity`, or the bus identifies it by that. Returns whether it may be written to; if
     /// not, statistics and log say so, and what would permit it.
-    pub fn meet(&mut self, port: &Port, identity: &str) -> bool {
+    pub fn meet(&mut self, port: &mut Port, stations: Range<usize>, identity: &str) -> bool {
         let identity = &*one_line(identity);
         self.may_write = self.write_to.as_deref() == Some(identity);
-        port.set_may_write(self.may_write);
+        port.set_may_write(stations, self.may_write);
         port.tell("identity", identity);
         port.tell("writes", if self.may_write { "allowed" } else { "blocked" });
         if !self.may_write && self.told.as_deref() != Some(identity) {
@@ -96,21 +98,21 @@ mod tests {
     #[test]
     fn only_the_plc_that_was_named_is_written_to() {
         logged::expect("nothing is written into the PLC \"ACME ");
-        let (port, status, _logged) = port();
+        let (mut port, status, _logged) = port();
         let mut guard = WriteGuard::new(Some("ACME 7"));
         assert!(!guard.may_write(), "nobody was met");
-        assert!(!guard.meet(&port, "ACME 8"));
+        assert!(!guard.meet(&mut port, 0..0, "ACME 8"));
         let text = statistics(&status);
         assert!(
             text.contains("\nidentity=ACME 8\nwrites=blocked\n"),
             "{text}"
         );
-        assert!(guard.meet(&port, "ACME 7") && guard.may_write());
+        assert!(guard.meet(&mut port, 0..0, "ACME 7") && guard.may_write());
         assert!(statistics(&status).contains("\nidentity=ACME 7\nwrites=allowed\n"));
         guard.part();
         assert!(!guard.may_write(), "it is gone");
         assert!(
-            !WriteGuard::new(None).meet(&port, "ACME 7"),
+            !WriteGuard::new(None).meet(&mut port, 0..0, "ACME 7"),
             "none was named"
         );
     }

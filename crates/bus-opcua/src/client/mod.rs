@@ -165,9 +165,11 @@ impl Free for Client {
             Driven::Late => return Err(self.late("opened a session")),
             Driven::Stopped => return Ok(()),
         };
-        let writes = self
-            .guard
-            .meet(port, &connect::identity(&endpoint, &server.product));
+        let writes = self.guard.meet(
+            port,
+            0..port.stations(),
+            &connect::identity(&endpoint, &server.product),
+        );
         let publishing = self.options.publishing_interval.unwrap_or(self.cycle);
         let rhythm = Rhythm {
             publishing: publishing.max(Nanos::from_millis(1)),

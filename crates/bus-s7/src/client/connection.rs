@@ -96,7 +96,8 @@ impl<'a> Connection<'a> {
         } else {
             line
         };
-        let may_write = self.bus.guard.meet(port, &line);
+        let all = 0..port.stations();
+        let may_write = self.bus.guard.meet(port, all, &line);
         self.session.allow(may_write);
         self.has_identity = true;
         port.tell("pdu", &length.to_string());

@@ -28,8 +28,6 @@ impl Outputs {
 #[derive(Debug)]
 pub struct Farewell {
     shared: Arc<Shared>,
-    /// Whether any station sends anything.
-    sends: bool,
     done: Receiver<()>,
 }
 
@@ -38,16 +36,12 @@ struct Shared {
     begun: AtomicBool,
     /// Something was sent since the line was opened.
     is_used: AtomicBool,
-    /// The peer is one that nothing may be written to.
-    is_blocked: AtomicBool,
 }
 
 impl Farewell {
     /// Whether a peer may have got anything by this line.
     pub fn is_due(&self) -> bool {
-        self.sends
-            && self.shared.is_used.load(Ordering::Relaxed)
-            && !self.shared.is_blocked.load(Ordering::Relaxed)
+        self.shared.is_used.load(Ordering::Relaxed)
     }
 
     /// From now on every station sends its fail-safe values.
@@ -68,28 +62,41 @@ pub(super) struct Ending {
     shared: Arc<Shared>,
     /// As the last cycle found it: all frames of a cycle are of one kind.
     is_begun: bool,
-    /// Per station, the cycles after which its peer has the last values.
-    missing: Box<[u32]>,
+    stations: Box<[Taker]>,
     done: Sender<()>,
 }
 
+/// The peer of a station, as far as it takes values.
+#[derive(Clone, Copy, Debug)]
+struct Taker {
+    /// The cycles after which it has the last values; 0 for a station without outputs.
+    missing: u32,
+    /// Whether its write guard lets anything through.
+    may_write: bool,
+}
+
+impl Taker {
+    fn is_owed(self) -> bool {
+        self.may_write && self.missing > 0
+    }
+}
+
 impl Ending {
-    fn new(missing: Box<[u32]>) -> (Self, Farewell) {
+    fn new(missing: impl Iterator<Item = u32>) -> (Self, Farewell) {
         let (sender, done) = mpsc::channel();
-        let sends = missing.iter().any(|cycles| *cycles > 0);
         let shared = Arc::<Shared>::default();
         let ending = Self {
             shared: Arc::clone(&shared),
             is_begun: false,
-            missing,
+            stations: missing
+                .map(|missing| Taker {
+                    missing,
+                    may_write: true,
+                })
+                .collect(),
             done: sender,
         };
-        let farewell = Farewell {
-            shared,
-            sends,
-            done,
-        };
-        (ending, farewell)
+        (ending, Farewell { shared, done })
     }
 
     /// A cycle begins.
@@ -101,17 +108,36 @@ impl Ending {
         self.is_begun
     }
 
-    /// A frame is about to be sent.
-    pub(super) fn is_used(&self) {
-        self.shared.is_used.store(true, Ordering::Relaxed);
+    /// A frame of this station is about to be sent.
+    pub(super) fn is_used(&self, station: usize) {
+        if self.stations[station].is_owed() {
+            self.shared.is_used.store(true, Ordering::Relaxed);
+        }
     }
 
     /// A peer has whole frames.
     fn sent(&mut self, stations: Range<usize>) {
-        for cycles in &mut self.missing[stations] {
-            *cycles = cycles.saturating_sub(1);
+        for taker in &mut self.stations[stations] {
+            taker.missing = taker.missing.saturating_sub(1);
         }
-        if self.missing.iter().all(|cycles| *cycles == 0) {
+        self.end_if_none_is_owed();
+    }
+
+    fn set_may_write(&mut self, stations: Range<usize>, may_write: bool) {
+        for taker in &mut self.stations[stations] {
+            taker.may_write = may_write;
+        }
+        // The stations that may be written to are used again in the next cycle.
+        if !may_write {
+            self.shared.is_used.store(false, Ordering::Relaxed);
+        }
+        if self.is_begun {
+            self.end_if_none_is_owed();
+        }
+    }
+
+    fn end_if_none_is_owed(&self) {
+        if !self.stations.iter().any(|taker| taker.is_owed()) {
             // A closer that waits no longer needs no news.
             let _ = self.done.send(());
         }
@@ -132,7 +158,7 @@ impl Port {
             0 => 0,
             _ => cycles,
         });
-        let (ending, farewell) = Ending::new(missing.collect());
+        let (ending, farewell) = Ending::new(missing);
         self.image.ending = Some(ending);
         farewell
     }
@@ -152,11 +178,10 @@ impl Port {
         }
     }
 
-    /// Whether the peer may be written to at all.
-    pub(crate) fn set_may_write(&self, may_write: bool) {
-        if let Some(ending) = &self.image.ending {
-            let blocked = &ending.shared.is_blocked;
-            blocked.store(!may_write, Ordering::Relaxed);
+    /// A write guard permits or forbids writes to these stations: closing waits for none that nothing is written to.
+    pub(crate) fn set_may_write(&mut self, stations: Range<usize>, may_write: bool) {
+        if let Some(ending) = &mut self.image.ending {
+            ending.set_may_write(stations, may_write);
         }
     }
 
@@ -194,5 +219,67 @@ impl Port {
         if receipt.is_last {
             self.had_last(receipt);
         }
+    }
+}
+
+#[cfg(all(test, not(loom)))]
+mod tests {
+    use tickbus_base::time::{Manual, Nanos};
+    use tickbus_image::{StationStreams, image};
+
+    use super::*;
+    use crate::{LinkStatus, Role};
+
+    /// A port with a station for each of these numbers of outgoing bytes.
+    fn port(sizes: &[usize]) -> Port {
+        let streams = sizes.iter().map(|size| StationStreams {
+            tx_fail_safe: vec![0; *size].into(),
+            tx_latched: Box::new([]),
+            rx_fail_safe: Box::new([]),
+            rx_latched: Box::new([]),
+        });
+        let (_, end) = image(streams.collect());
+        let clock: Arc<Manual> = Manual::new();
+        let status = LinkStatus::new("test", Nanos::from_millis(100));
+        Port::new(end, clock, Role::Controller, None, status)
+    }
+
+    fn send(port: &mut Port, station: usize) {
+        let frames = port.take(station..station + 1, Nanos::ZERO);
+        let mut frames = frames.expect("the line is up");
+        frames.frame(station);
+        let receipt = frames.receipt();
+        port.sent(&receipt);
+    }
+
+    #[test]
+    fn a_station_that_nothing_is_written_to_keeps_no_other_one_from_its_last_values() {
+        let mut port = port(&[1, 1]);
+        let farewell = port.farewell(1);
+        port.set_may_write(0..1, false);
+        send(&mut port, 1);
+        assert!(farewell.is_due(), "the second one takes values");
+        farewell.begin();
+        assert!(
+            !farewell.wait(Duration::ZERO),
+            "it has not got the last ones"
+        );
+        send(&mut port, 1);
+        assert!(farewell.wait(Duration::ZERO));
+    }
+
+    #[test]
+    fn nobody_waits_where_nothing_is_sent() {
+        let mut port = port(&[1, 0]);
+        let farewell = port.farewell(1);
+        send(&mut port, 0);
+        assert!(farewell.is_due());
+        port.set_may_write(0..1, false);
+        for station in 0..2 {
+            port.take(station..station + 1, Nanos::ZERO)
+                .expect("the line is up")
+                .frame(station);
+        }
+        assert!(!farewell.is_due(), "one is guarded, and one has no outputs");
     }
 }

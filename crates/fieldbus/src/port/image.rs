@@ -46,7 +46,7 @@ impl ImagePort {
     /// Whether the fail-safe values are to be sent, although the simulation ticks.
     fn is_untrusted(&mut self, station: usize, now: Nanos) -> bool {
         let is_ending = self.ending.as_ref().is_some_and(|ending| {
-            ending.is_used();
+            ending.is_used(station);
             ending.is_begun()
         });
         let Some(blind) = &mut self.blind else {

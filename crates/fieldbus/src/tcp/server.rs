@@ -477,6 +477,7 @@ impl<S: Service> Server<'_, S> {
             && !(is_left && self.gone.is_some())
         {
             self.gone = None;
+            port.line_ended();
             port.lost(error, &self.waiting);
         } else {
             port.log(

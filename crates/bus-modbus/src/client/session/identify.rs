@@ -144,7 +144,7 @@ impl ClientSession<'_> {
             let unit = self.stations[station].unit;
             identity = format!("modbus device at {}, unit {unit}", self.peer);
         }
-        self.guards[station].meet(port, &identity);
+        self.guards[station].meet(port, station..station + 1, &identity);
         self.stations[station].identity = Identity::Known;
     }
 

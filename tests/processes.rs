@@ -2,12 +2,13 @@
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
-use std::io::{BufRead as _, BufReader, Lines};
-use std::net::TcpListener;
+use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
 use std::process::{Child, ChildStdout, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
+use rustix::process::{Pid, WaitOptions, waitpid};
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
@@ -167,6 +168,50 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
     assert!(is_served, "each PLC is served: {running:?}");
     assert_eq!(statistic(&driver, "link.failed"), Some("0".to_owned()));
     driver.close();
+}
+
+/// A simulation is suspended, as by a virtual machine that pauses, and its PLC says one more thing meanwhile and then
+/// hangs. When the simulation goes on, that is older than `max_age` and never counts.
+#[test]
+fn what_waited_while_the_simulation_was_suspended_is_old() {
+    const MAX_AGE: Duration = Duration::from_millis(100);
+    let file = save(&config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\""));
+    let path = file.path().to_str().expect("a plain name");
+    let mut mirror = Process::start(&["mirror", path, "--tick", "200us"]);
+    let listening = mirror.until("listening on");
+    let address = listening.rsplit(' ').next().expect("an address");
+    let mut plc = TcpStream::connect(address).expect("it listens");
+    let mut hears = plc_hears(&plc);
+    let mut say = |level: u8| plc.write_all(&[0, level]).expect("it takes a record");
+    await_that("the simulation answers", || {
+        say(1);
+        hears() == 1
+    });
+    mirror.signal("STOP");
+    let pid = Pid::from_child(&mirror.child);
+    waitpid(Some(pid), WaitOptions::UNTRACED).expect("it is our child");
+    say(77);
+    // Its time passes.
+    std::thread::sleep(3 * MAX_AGE);
+    mirror.signal("CONT");
+    // Those that it sent before it was suspended come first.
+    await_that("its data are stale", || hears() == 255);
+    let heard: Vec<u8> = (0..200).map(|_| hears()).collect();
+    assert!(!heard.contains(&77), "{heard:?}");
+    await_that("the simulation answers again", || {
+        say(78);
+        hears() == 78
+    });
+}
+
+/// What the simulation sends to `plc` next: the level.
+fn plc_hears(plc: &TcpStream) -> impl FnMut() -> u8 + use<> {
+    let mut plc = plc.try_clone().expect("a second handle");
+    move || {
+        let mut record = [0; 2];
+        plc.read_exact(&mut record).expect("records go on");
+        record[1]
+    }
 }
 
 /// The two commands against each other: `mirror` as the machine, `plc reaction` as the PLC.

@@ -66,6 +66,7 @@ pub(super) fn listen(
         lines.opening(server.line, &server.waiting, port);
     }
     let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    port.begin_to_look(port.clock().now());
     while !stop.is_stopped() {
         turn(&mut servers, &mut lines, &mut set, port)?;
     }
@@ -81,7 +82,7 @@ fn turn(
 ) -> Result<(), BusError> {
     let now = port.clock().now();
     // Held-back frames must be handed in on time, even without a client.
-    let mut deadline = port.due();
+    let mut deadline = port.due().min(port.next_look());
     for server in &mut *servers {
         server.watch(now, set).map_err(|error| no_wait(&error))?;
         if let Some((_, served)) = &server.served {
@@ -93,6 +94,7 @@ fn turn(
     }
     set.wait(&**port.clock(), deadline)
         .map_err(|error| no_wait(&error))?;
+    port.look_at_line(port.clock().now());
     for server in servers {
         let ready = |key| set.ready().iter().find(|ready| ready.key == key);
         let readable = ready(server.key()).is_some_and(|ready| ready.is_readable);

@@ -9,6 +9,7 @@ mod ending;
 mod faults;
 mod frames;
 mod image;
+mod looks;
 
 pub use calls::CallWatch;
 pub use ending::{Farewell, Outputs};
@@ -26,11 +27,13 @@ use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role
 use crate::faults::{Diagnosis, FaultBoard};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
+use looks::Looks;
 
 /// A bus's access to the image, the clock and the state of its driver.
 #[derive(Debug)]
 pub struct Port {
     image: ImagePort,
+    looks: Looks,
     faults: FaultLayer,
     clock: Arc<dyn Clock>,
     role: Role,
@@ -48,6 +51,7 @@ impl Port {
         status: LinkStatus,
     ) -> Self {
         Self {
+            looks: Looks::new(status.max_age()),
             image: ImagePort {
                 validity: Validity::new(image.stations()),
                 image,
@@ -202,6 +206,34 @@ impl Port {
         }
     }
 
+    /// The bus begins to read from a line that is new at `now`, by a loop that promises to [look](Self::look_at_line) at it
+    /// until [`next_look`](Self::next_look) even if nothing comes.
+    ///
+    /// On a clock that does not [advance by itself](Clock::is_steady) nothing is promised: there, time does not pass while
+    /// the process stands still.
+    pub fn begin_to_look(&mut self, now: Nanos) {
+        if self.clock.is_steady() {
+            self.looks.begin(now);
+        }
+    }
+
+    /// The bus looks at `now`, and then hands in what it has found. If the look comes long after it was promised, since the
+    /// process was suspended or the processors were busy, that may have waited all the time: it counts as having come
+    /// right after the look before.
+    pub fn look_at_line(&mut self, now: Nanos) {
+        self.looks.look(now);
+    }
+
+    /// This look leaves some of what waits to the next one.
+    pub fn look_leaves_some(&mut self) {
+        self.looks.leaves_some();
+    }
+
+    /// When the bus has to look at its line even if nothing comes; [`Nanos::MAX`] for never.
+    pub fn next_look(&self) -> Nanos {
+        self.looks.next()
+    }
+
     /// Hands in what belongs together: the frames of all stations that one message of the peer carries, its signs of
     /// life. A tick sees all that `hand_in` hands in, or nothing of it.
     pub fn together<R>(&mut self, hand_in: impl FnOnce(&mut Self) -> R) -> R {
@@ -221,7 +253,9 @@ impl Port {
     #[inline]
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
         self.faults.attend(now, &mut self.image);
-        self.faults.received(station, now, bytes, &mut self.image);
+        let arrival = self.looks.arrival(now);
+        self.faults
+            .received(station, arrival, bytes, &mut self.image);
     }
 
     /// As [`received`](Self::received), of a frame of which the peer wrote only these ranges of bits (bit n of byte k is
@@ -247,7 +281,8 @@ impl Port {
     /// from then on; if the station is read, hand in its first frame before this call.
     #[inline]
     pub fn touch(&mut self, station: usize, now: Nanos) {
-        self.faults.touch(station, now, &mut self.image);
+        let arrival = self.looks.arrival(now);
+        self.faults.touch(station, arrival, &mut self.image);
     }
 
     /// The PLC of `station` reports that it runs its program, or that it does not: then the station is stale

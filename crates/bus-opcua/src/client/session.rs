@@ -44,11 +44,17 @@ impl ClientSession<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), self.cycle);
         let mut news = Vec::new();
+        port.begin_to_look(clock.now());
         // The trouble with values as last reported; `None` for none.
         let mut said = None;
         while !stop.is_stopped() {
             let now = clock.now();
+            port.look_at_line(now);
             self.inbox.take(&mut news);
+            if !news.is_empty() {
+                // The tasks may have read a part only.
+                port.look_leaves_some();
+            }
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
@@ -68,7 +74,8 @@ impl ClientSession<'_> {
                 self.write(port, now);
             }
             port.observe(now);
-            self.reactor.wait(&*clock, pace.due().min(port.due()));
+            self.reactor
+                .wait(&*clock, pace.due().min(port.due()).min(port.next_look()));
         }
         Ok(())
     }

@@ -271,9 +271,15 @@ impl Service<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), cycle);
         let mut news = Vec::new();
+        port.begin_to_look(clock.now());
         while !stop.is_stopped() {
             let now = clock.now();
+            port.look_at_line(now);
             started.inbox.take(&mut news);
+            if !news.is_empty() {
+                // The tasks may have read a part only.
+                port.look_leaves_some();
+            }
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
@@ -288,7 +294,7 @@ impl Service<'_> {
                 }
             }
             port.observe(now);
-            reactor.wait(&*clock, pace.due().min(port.due()));
+            reactor.wait(&*clock, pace.due().min(port.due()).min(port.next_look()));
         }
         Ok(Served::Stopped)
     }

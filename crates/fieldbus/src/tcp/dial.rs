@@ -148,9 +148,11 @@ impl<S: Stream> Call<S> {
         let added = set.add(0, &self.stream, interest);
         added.map_err(|error| no_wait(&error))?;
         let mut readable = false;
+        port.begin_to_look(port.clock().now());
         while !stop.is_stopped() {
+            port.look_at_line(port.clock().now());
             self.turn(readable, caller, port)?;
-            let deadline = caller.deadline(port).min(port.due());
+            let deadline = caller.deadline(port).min(port.due()).min(port.next_look());
             if interest != self.interest() {
                 interest = self.interest();
                 let changed = set.change(0, &self.stream, interest);
@@ -177,7 +179,8 @@ impl<S: Stream> Call<S> {
         }
     }
 
-    /// One turn of `caller`, for an owner that waits for several streams; see [`run`](Self::run).
+    /// One turn of `caller`, for an owner that waits for several streams and has [looked](Port::look_at_line) at them; see
+    /// [`run`](Self::run).
     ///
     /// # Errors
     ///
@@ -223,7 +226,12 @@ impl<S: Stream> Call<S> {
     ) -> Result<bool, BusError> {
         match self.stream.read(&mut self.buffer) {
             Ok(0) => Err(caller.left()),
-            Ok(count) => caller.hear(now, &self.buffer[..count], port).map(|()| true),
+            Ok(count) => {
+                if count == self.buffer.len() {
+                    port.look_leaves_some();
+                }
+                caller.hear(now, &self.buffer[..count], port).map(|()| true)
+            }
             Err(error) if is_for_later(&error) => Ok(false),
             Err(error) => Err(caller.broke(&error)),
         }

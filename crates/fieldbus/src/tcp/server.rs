@@ -100,6 +100,7 @@ pub fn serve<S: Service>(
     assert!(limit <= BUFFER, "a telegram fits into one read");
     port.opening(&server.waiting);
     server.listen(true).map_err(|error| no_wait(&error))?;
+    port.begin_to_look(port.clock().now());
     while !stop.is_stopped() {
         server.turn(port)?;
     }
@@ -214,6 +215,7 @@ impl<S: Service> Server<'_, S> {
         let waited = self.set.wait(&**port.clock(), deadline);
         waited.map_err(|error| no_wait(&error))?;
         let now = port.clock().now();
+        port.look_at_line(now);
         self.ready.clear();
         self.ready.extend_from_slice(self.set.ready());
         for index in 0..self.ready.len() {
@@ -242,6 +244,7 @@ impl<S: Service> Server<'_, S> {
     fn deadline(&self, port: &Port) -> Nanos {
         let mut deadline = port
             .due()
+            .min(port.next_look())
             .min(self.accept_paused_until.unwrap_or(Nanos::MAX));
         if self.clients.speakers > 0 {
             deadline = deadline.min(port.stale_at(port.clock().now()));
@@ -286,6 +289,9 @@ impl<S: Service> Server<'_, S> {
             Err(error) if is_for_later(&error) => return Ok(()),
             Err(error) => return Err(client.broke(&error)),
         };
+        if count == self.buffer.len() {
+            port.look_leaves_some();
+        }
         if !port.is_up(now) {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();

@@ -91,6 +91,7 @@ fn read(arguments: &Arguments) -> Result<(Program, Client), Mistakes> {
         name: arguments.name.clone(),
         counts,
         cables,
+        alive: None,
     };
     let client = Client::new(profile, KEEP_ALIVE);
     let client = client.map_err(|mistake| Mistakes::of("--name", mistake))?;

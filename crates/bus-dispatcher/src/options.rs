@@ -6,7 +6,8 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_dispatcher::client::Profile;
 use tickbus_dispatcher::{
-    Cable, Channel, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role as Part, is_name,
+    Cable, Channel, Kind, LEAST_PROMISE, LONGEST_NAME, LONGEST_PROMISE, MOST_CHANNELS, PORT,
+    Role as Part, is_name,
 };
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, BusSetup, Role};
@@ -141,6 +142,8 @@ impl Options {
             name,
             counts: self.channels(setup.table).counts,
             cables: self.cables.iter().map(|(_, cable)| cable.clone()).collect(),
+            // Whoever has its outputs as inputs learns within this driver's own `max_age` that it is gone.
+            alive: Some(setup.max_age.clamp(LEAST_PROMISE, LONGEST_PROMISE)),
         };
         profile.check().map(|()| profile)
     }

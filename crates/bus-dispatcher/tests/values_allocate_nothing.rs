@@ -60,7 +60,7 @@ fn values_go_both_ways() {
         reader.read_line(line).expect("it is there");
     };
     hear(&mut line);
-    assert_eq!(line, "VP x Q01 I01 AQ01 AI01 V=3\r\n");
+    assert_eq!(line, "VP x Q01 I01 AQ01 AI01 V=3 ALIVE=60000ms\r\n");
     stream.write_all(b"OK VP\r\nEND 0\r\n").expect("it reads");
     while line != "PING\r\n" {
         hear(&mut line);

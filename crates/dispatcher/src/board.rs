@@ -2,6 +2,7 @@
 
 mod forces;
 mod remote;
+mod silence;
 mod snapshot;
 
 use std::collections::{BTreeMap, HashMap};
@@ -73,6 +74,8 @@ struct Plugged {
     outputs: Box<[Output]>,
     /// Whether an input whose source is lost gets a sign for that, and not 0.
     hears_losses: bool,
+    /// It has not kept its promise to speak: its outputs have no values.
+    is_silent: bool,
 }
 
 /// What the board keeps for a connection.
@@ -276,6 +279,7 @@ impl Board {
             host,
             outputs,
             hears_losses: false,
+            is_silent: false,
         }));
     }
 
@@ -363,7 +367,7 @@ impl Board {
         let (Some(to), Some(from)) = (self.place(sink), self.place(source)) else {
             return;
         };
-        if self.host(to.seat).is_some() {
+        if self.host(to.seat).is_some() || self.is_silent(from.seat) {
             return;
         }
         if let Some(output) = self.output(from) {

@@ -67,6 +67,8 @@ pub struct Dispatcher {
     saving: usize,
     /// When the times of all clients are looked at next.
     next_look: Nanos,
+    /// The shortest time within which a client has promised a line, or a longer one.
+    promise: Nanos,
     /// The other dispatchers of the laboratory, if there can be any.
     federation: Option<Box<Federation>>,
     /// Who waits for answers of other dispatchers.
@@ -83,6 +85,10 @@ struct Session {
     /// The rest of the current line is too long, and is ignored.
     is_skipping: bool,
     is_version_2: bool,
+    /// It has promised a line at least this often.
+    alive: Option<Nanos>,
+    /// It has broken that promise, and was not heard since.
+    is_silent: bool,
     progress: Progress,
 }
 
@@ -142,6 +148,7 @@ impl Dispatcher {
             promised: Vec::new(),
             saving: 0,
             next_look: Nanos::MAX,
+            promise: Nanos::MAX,
             federation: None,
             waiting: Vec::new(),
         }
@@ -182,6 +189,8 @@ impl Dispatcher {
             begun: Vec::new(),
             is_skipping: false,
             is_version_2: false,
+            alive: None,
+            is_silent: false,
             progress: Progress::Going,
         });
         self.next_look = self.next_look.min(now + self.settings.idle);
@@ -265,6 +274,12 @@ impl Dispatcher {
     /// Goes on with clients that had to wait, and disconnects those that have been silent for too long.
     pub fn tick(&mut self, now: Nanos) {
         for seat in std::mem::take(&mut self.resumable) {
+            if let Some(session) = &mut self.sessions[seat] {
+                // It was not read from.
+                session.heard = now;
+                let due = session.alive.map_or(Nanos::MAX, |alive| now + alive);
+                self.next_look = self.next_look.min(due);
+            }
             self.arrived(now, seat, &[]);
         }
         self.beat(now);
@@ -272,7 +287,9 @@ impl Dispatcher {
             return;
         }
         let idle = self.settings.idle;
-        let mut first = Nanos::MAX;
+        // If this process was held up, lines of clients may wait that were not read yet.
+        let is_late = now - self.next_look > Nanos(self.promise.0 / 2);
+        let (mut first, mut promise) = (Nanos::MAX, Nanos::MAX);
         for seat in 0..self.sessions.len() {
             let Some(session) = self.sessions[seat]
                 .as_mut()
@@ -286,12 +303,27 @@ impl Dispatcher {
                     "nothing was heard for {idle}; send PING when there is nothing else to send"
                 ));
                 self.refuse(seat, &refusal);
+                continue;
+            }
+            first = first.min(session.heard + idle);
+            let Some(alive) = session.alive else {
+                continue;
+            };
+            promise = promise.min(alive);
+            if session.is_silent || session.progress == Progress::Stuck {
+                continue;
+            }
+            let due = session.heard + alive;
+            if now < due || is_late {
+                first = first.min(due);
             } else {
-                first = first.min(session.heard + idle);
+                session.is_silent = true;
+                self.board.fall_silent(seat);
             }
         }
+        self.promise = promise;
         // With many clients there is always one whose time comes next; they are looked at together.
-        let soonest = now + Nanos(idle.0 / 600);
+        let soonest = now + Nanos((idle.0 / 600).min(promise.0 / 10));
         self.next_look = first.max(soonest);
         if first == Nanos::MAX {
             self.next_look = Nanos::MAX;
@@ -339,7 +371,7 @@ impl Dispatcher {
                 break;
             };
             if quick > 0 {
-                session.heard = now;
+                self.heard(now, seat);
                 at += quick;
                 continue;
             }
@@ -366,9 +398,10 @@ impl Dispatcher {
                 break;
             }
             at += end + 1;
-            session.heard = now;
+            let was_skipping = std::mem::take(&mut session.is_skipping);
+            self.heard(now, seat);
             self.board.traffic.lines += 1;
-            if std::mem::take(&mut session.is_skipping) {
+            if was_skipping {
                 continue;
             }
             if begins_like_http(rest) {
@@ -386,6 +419,21 @@ impl Dispatcher {
             counts = self.board.device(seat).map(|device| device.counts);
         }
         at
+    }
+
+    /// A line of a client has come. If it was silent, its outputs have values again.
+    #[inline]
+    fn heard(&mut self, now: Nanos, seat: usize) {
+        let Some(session) = &mut self.sessions[seat] else {
+            return;
+        };
+        session.heard = now;
+        if std::mem::take(&mut session.is_silent) {
+            self.next_look = self
+                .next_look
+                .min(now + session.alive.unwrap_or(Nanos::MAX));
+            self.board.speak_again(seat);
+        }
     }
 
     /// Works on the lines of values in their usual form at the beginning of `bytes`; returns how many bytes those were.
@@ -460,6 +508,7 @@ impl Dispatcher {
             counts,
             is_version_2,
             hears_losses,
+            alive,
         } = identification;
         if let Some(device) = self.board.device(seat) {
             let text = format!(
@@ -479,6 +528,11 @@ impl Dispatcher {
             return Ok(());
         };
         session.is_version_2 = is_version_2;
+        session.alive = alive;
+        if let Some(alive) = alive {
+            self.promise = self.promise.min(alive);
+            self.next_look = self.next_look.min(now + alive);
+        }
         let device = Device {
             role,
             name: name.to_owned(),

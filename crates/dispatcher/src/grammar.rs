@@ -2,12 +2,13 @@
 //!
 //! ```text
 //! line       = [ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
-//! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) ["V=2" | "V=3"]
+//! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) *("V=2" | "V=3" | "ALIVE=" time)
 //! values     = "P" *(channel "=" number)
 //! connect    = "CONNECT" 1*(channel ":" name ":" channel)
 //! disconnect = "DISCONNECT" 1*channel
 //! channel    = ("Q" | "I" | "AQ" | "AI") 1*DIGIT
 //! number     = ["-" | "+"] (1*DIGIT ["." *DIGIT] | "." 1*DIGIT) ["E" ["-" | "+"] 1*DIGIT]
+//! time       = 1*DIGIT ["." 1*DIGIT] ("ms" | "s")
 //! name       = 1*63(ALPHA | DIGIT | "_" | "-" | ".")
 //! ```
 //!
@@ -19,9 +20,16 @@ use crate::device::Role;
 use crate::name::{LONGEST_NAME, is_name, is_shown_name};
 use crate::number::Number;
 use crate::refusal::{Code, Refusal};
+use tickbus_base::time::Nanos;
 
 /// The longest line, in bytes, with its end.
 pub const LONGEST_LINE: usize = 4096;
+
+/// The shortest time that a client can promise between two lines: threads and networks are late by some milliseconds.
+pub const LEAST_PROMISE: Nanos = Nanos::from_millis(10);
+
+/// The longest one: 60 s.
+pub const LONGEST_PROMISE: Nanos = Nanos::from_secs(60);
 
 /// A line, read as far as its keyword says what it is.
 #[derive(Clone, Debug)]
@@ -57,6 +65,8 @@ pub struct Identification<'a> {
     pub is_version_2: bool,
     /// Whether it wants to hear of an input that its source is lost: version 3.
     pub hears_losses: bool,
+    /// It promises a line at least this often.
+    pub alive: Option<Nanos>,
 }
 
 /// Reads a line, without its end.
@@ -114,15 +124,31 @@ fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>
         )));
     };
     let mut counts = [None; 4];
-    let mut version = 1;
+    let (mut version, mut alive) = (None, None);
     while let Some(word) = words.word() {
-        if word.eq_ignore_ascii_case(b"V") && words.take(b'=') {
-            version = match words.word() {
-                Some(b"2") => 2,
-                Some(b"3") => 3,
-                _ => return Err(Code::Syntax.because("the version is 2 or 3, as V=2")),
-            };
-            break;
+        if words.take(b'=') {
+            let value = words.word();
+            if word.eq_ignore_ascii_case(b"V") && version.is_none() {
+                version = match value {
+                    Some(b"2") => Some(2),
+                    Some(b"3") => Some(3),
+                    _ => return Err(Code::Syntax.because("the version is 2 or 3, as V=2")),
+                };
+            } else if word.eq_ignore_ascii_case(b"ALIVE") && alive.is_none() {
+                alive = Some(promise(value.unwrap_or_default())?);
+            } else {
+                return Err(Code::Syntax.because(format_args!(
+                    "\"{}=\" stands where V=2 or ALIVE=500ms was expected, each at most once",
+                    shown(word)
+                )));
+            }
+            continue;
+        }
+        if version.is_some() || alive.is_some() {
+            return Err(Code::Syntax.because(format_args!(
+                "\"{}\" stands where the end of the line was expected",
+                shown(word)
+            )));
         }
         let Some((kind, count)) = Kind::with_number(word) else {
             return Err(Code::Syntax.because(format_args!(
@@ -150,9 +176,23 @@ fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>
         role,
         name,
         counts: Counts::new(q, i, aq, ai),
-        is_version_2: version >= 2,
-        hears_losses: version >= 3,
+        is_version_2: version.is_some(),
+        hears_losses: version == Some(3),
+        alive,
     })
+}
+
+/// How often a client promises a line.
+fn promise(text: &[u8]) -> Result<Nanos, Refusal> {
+    let time = std::str::from_utf8(text).ok();
+    let time = time.and_then(|text| text.parse::<Nanos>().ok());
+    time.filter(|time| (LEAST_PROMISE..=LONGEST_PROMISE).contains(time))
+        .ok_or_else(|| {
+            Code::Syntax.because(format_args!(
+                "\"{}\" is no time for ALIVE; write one of {LEAST_PROMISE} to {LONGEST_PROMISE}, as ALIVE=500ms",
+                shown(text)
+            ))
+        })
 }
 
 /// The values of a line, each checked when it is reached.

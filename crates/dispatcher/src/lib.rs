@@ -38,6 +38,7 @@ pub use device::{Device, Role};
 pub use dispatcher::{Dispatcher, Order, Reply, Settings};
 pub use door::Door;
 pub use federation::Identity;
+pub use grammar::{LEAST_PROMISE, LONGEST_PROMISE};
 pub use host::HostId;
 pub use name::{LONGEST_NAME, is_name};
 pub use number::{LONGEST_NUMBER, Number};

@@ -25,6 +25,7 @@ impl Seated {
                 .iter()
                 .map(|text| Cable::parse(text).expect(text))
                 .collect(),
+            alive: None,
         };
         let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
         client.connected(lab.now);

@@ -95,6 +95,102 @@ fn version_3_hears_that_a_source_is_lost_and_is_back() {
 }
 
 #[test]
+fn a_client_that_breaks_its_promise_to_speak_is_lost_until_it_speaks() {
+    for (on_loss, lost, zero) in [
+        (OnLoss::FailSafe, &["P I1=? I2=?"][..], &["P I1=0"][..]),
+        (OnLoss::Hold, &[], &[]),
+    ] {
+        let settings = Settings {
+            on_loss,
+            ..Settings::default()
+        };
+        let mut lab = Lab::with(settings, Patch::new());
+        let logo = lab.join("VR LOGO I02 V=3");
+        let old = lab.join("VR OLD I01");
+        let pump = lab.join("VP PUMP Q02 I01 V=2 ALIVE=500ms");
+        lab.say(logo, "CONNECT I1:PUMP:Q1 I2:PUMP:Q2");
+        lab.say(old, "CONNECT I1:PUMP:Q1");
+        lab.say(pump, "P Q1=24 Q2=1");
+        assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24 I2=1"]);
+        assert_eq!(lab.hear(old), ["P I1=24"]);
+        for _ in 0..4 {
+            lab.wait(Nanos::from_millis(400));
+            lab.say(pump, "PING");
+        }
+        assert_eq!(lab.hear(logo), NOTHING, "it keeps its promise");
+        lab.wait(Nanos::from_millis(499));
+        assert_eq!(lab.hear(logo), NOTHING);
+        lab.wait(Nanos::from_millis(51));
+        assert_eq!(lab.hear(logo), lost);
+        assert_eq!(lab.hear(old), zero);
+        lab.say(pump, "");
+        let back = match on_loss {
+            OnLoss::FailSafe => (&["P I1=24 I2=1"][..], &["P I1=24"][..]),
+            OnLoss::Hold => (&[][..], &[][..]),
+        };
+        assert_eq!(
+            (&lab.hear(logo)[..], &lab.hear(old)[..]),
+            (&to_strings(back.0)[..], &to_strings(back.1)[..])
+        );
+        lab.wait(Nanos::from_millis(600));
+        assert_eq!(lab.hear(logo), lost);
+        lab.say(logo, "DISCONNECT I1");
+        lab.say(logo, "CONNECT I1:PUMP:Q1");
+        assert_eq!(
+            lab.hear(logo),
+            ["OK DISCONNECT", "OK CONNECT"],
+            "it has no value"
+        );
+        lab.say(pump, "P Q2=2");
+        let back = match on_loss {
+            OnLoss::FailSafe => "P I1=24 I2=2",
+            OnLoss::Hold => "P I2=2",
+        };
+        assert_eq!(lab.hear(logo), [back]);
+    }
+}
+
+fn to_strings(lines: &[&str]) -> Vec<String> {
+    lines.iter().map(|line| (*line).to_owned()).collect()
+}
+
+#[test]
+fn the_dispatcher_does_not_blame_clients_for_its_own_pause() {
+    let mut lab = Lab::new();
+    let logo = lab.join("VR LOGO I01 V=3");
+    let pump = lab.join("VP PUMP Q01 ALIVE=100ms");
+    lab.say(logo, "CONNECT I1:PUMP:Q1");
+    lab.say(pump, "P Q1=24");
+    assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24"]);
+    lab.now += Nanos::from_secs(5);
+    lab.dispatcher.tick(lab.now);
+    assert_eq!(lab.hear(logo), NOTHING, "its lines may wait in the system");
+    lab.wait(Nanos::from_millis(30));
+    assert_eq!(lab.hear(logo), ["P I1=?"], "they did not");
+}
+
+#[test]
+fn promises_that_cannot_be_kept_or_read_are_refused() {
+    let mut lab = Lab::new();
+    let logo = lab.connect();
+    for line in [
+        "VR LOGO Q1 ALIVE=9ms",
+        "VR LOGO Q1 ALIVE=61s",
+        "VR LOGO Q1 ALIVE=500",
+        "VR LOGO Q1 ALIVE=",
+        "VR LOGO Q1 ALIVE",
+        "VR LOGO Q1 ALIVE=1s ALIVE=1s",
+        "VR LOGO Q1 V=2 V=2",
+        "VR LOGO Q1 ALIVE=1s I1",
+        "VR LOGO Q1 AGE=1s",
+    ] {
+        refused(&lab.ask(logo, line), 400);
+    }
+    let answer = lab.ask(logo, "vr LOGO Q1 alive = 0.5s v=3");
+    assert_eq!(answer[0], "OK VR");
+}
+
+#[test]
 fn version_1_gets_lists_values_and_refusals_only() {
     let mut lab = Lab::new();
     let logo = lab.connect();

@@ -136,6 +136,7 @@ fn client(map: &Map) -> Result<Client, Mistake> {
         name: map.name.clone(),
         counts: map.counts(),
         cables: Vec::new(),
+        alive: None,
     };
     Client::new(profile, KEEP_ALIVE)
 }

@@ -74,7 +74,7 @@ impl Board {
             let from = self.place(pin).filter(|_| pin.channel.kind.is_output());
             for (to, from) in self.supplied(from) {
                 self.resume(to, from);
-                if self.said(pin).is_none() {
+                if self.said(pin).is_none() && !self.is_silent(from.seat) {
                     self.deliver(to, Number::ZERO, false);
                 }
             }
@@ -108,6 +108,9 @@ impl Board {
     fn said(&self, source: &Pin) -> Option<Number> {
         let place = self.place(source)?;
         let plugged = self.seats[place.seat].plugged.as_ref()?;
+        if plugged.is_silent {
+            return None;
+        }
         let value = plugged.outputs.get(place.channel)?.value;
         value.is_known().then_some(value)
     }

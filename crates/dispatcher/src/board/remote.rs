@@ -99,6 +99,7 @@ impl Board {
     /// Sends another dispatcher the values of an output that it wants: unless that is forced, those to come, too.
     pub(super) fn resume(&mut self, to: Place, from: Place) {
         if self.forced_at(from).is_none()
+            && !self.is_silent(from.seat)
             && let Some(output) = self.output(from)
         {
             output.sinks.push(to);
@@ -107,7 +108,7 @@ impl Board {
     }
 
     /// What an output is forced to.
-    fn forced_at(&self, from: Place) -> Option<Number> {
+    pub(super) fn forced_at(&self, from: Place) -> Option<Number> {
         let device = self.device(from.seat).filter(|_| self.has_forces())?;
         let channel = device.counts.channels(true).nth(from.channel)?;
         self.forced(&Pin::new(&device.name, channel))
@@ -117,6 +118,7 @@ impl Board {
     pub(crate) fn supply_again(&mut self, to: Place, from: Place) {
         let said = self.output(from).map(|output| output.value);
         let said = said.filter(|value| value.is_known());
+        let said = self.silence_of(from).or(said);
         if let Some(value) = self.forced_at(from).or(said) {
             self.deliver(to, value, true);
         }

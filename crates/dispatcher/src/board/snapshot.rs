@@ -34,8 +34,8 @@ pub struct ClientState {
 pub struct ChannelState {
     /// Which one.
     pub channel: Channel,
-    /// What the client has said of its output, or has been sent for its input. `None` if it was never said, or if the
-    /// input's client has been sent that its source is lost.
+    /// What the client has said of its output, or has been sent for its input. `None` if it was never said, if the client
+    /// has broken its promise to speak, or if the input's client has been sent that its source is lost.
     pub value: Option<Number>,
     /// What an operator holds it at.
     pub forced: Option<Number>,
@@ -60,7 +60,15 @@ impl Board {
         let clients = plugged.map(|(plugged, inputs)| {
             let Device { counts, name, .. } = &plugged.device;
             let outputs = counts.channels(true).zip(&plugged.outputs);
-            let outputs = outputs.map(|(channel, output)| (channel, output.value));
+            let outputs = outputs.map(|(channel, output)| {
+                let is_silent = plugged.is_silent;
+                let value = if is_silent {
+                    Number::LOST
+                } else {
+                    output.value
+                };
+                (channel, value)
+            });
             let values = inputs.iter().map(|input| input.value);
             let values = values.chain(std::iter::repeat(Number::UNKNOWN));
             let inputs = counts.channels(false).zip(values);

@@ -37,6 +37,9 @@ pub struct Profile {
     pub counts: Counts,
     /// The connections that it asks for.
     pub cables: Vec<Cable>,
+    /// It promises a line at least this often, of 10 ms to 60 s: if it breaks that, its outputs have no values. `None` for no
+    /// promise.
+    pub alive: Option<Nanos>,
 }
 
 impl Profile {
@@ -385,12 +388,18 @@ impl Client {
             Progress::Apart | Progress::Asking(Request::Identify) => return,
             Progress::Connected => {
                 let Profile {
-                    role, name, counts, ..
+                    role,
+                    name,
+                    counts,
+                    alive,
+                    ..
                 } = &self.profile;
                 let [q, i, aq, ai] = Kind::ALL.map(|kind| counts.of(kind));
+                let alive = alive.map(|alive| format!(" ALIVE={}ms", alive.0 / 1_000_000));
                 let line = format!(
-                    "{} {name} Q{q:02} I{i:02} AQ{aq:02} AI{ai:02} V=3",
-                    role.keyword()
+                    "{} {name} Q{q:02} I{i:02} AQ{aq:02} AI{ai:02} V=3{}",
+                    role.keyword(),
+                    alive.unwrap_or_default()
                 );
                 self.ask(now, Request::Identify, &line);
                 return;

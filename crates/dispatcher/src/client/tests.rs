@@ -16,6 +16,7 @@ impl Bench {
                 .iter()
                 .map(|text| Cable::parse(text).expect(text))
                 .collect(),
+            alive: Some(Nanos::from_millis(250)),
         };
         let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
         client.connected(Nanos::ZERO);
@@ -26,7 +27,10 @@ impl Bench {
     /// A client that was taken.
     fn taken(cables: &[&str]) -> Self {
         let mut bench = Self::new(cables);
-        assert_eq!(bench.says(), "VP PUMP Q02 I01 AQ02 AI01 V=3\r\n");
+        assert_eq!(
+            bench.says(),
+            "VP PUMP Q02 I01 AQ02 AI01 V=3 ALIVE=250ms\r\n"
+        );
         let heard = bench.hears("OK VP\r\nVP:PUMP:Q02:I01:AQ02:AI01:127.0.0.1:3330\r\nEND 1\r\n");
         assert_eq!(heard.expect("right"), ["identified", "PUMP is here", "end"]);
         if cables.is_empty() {
@@ -131,6 +135,7 @@ fn many_values_make_several_lines() {
         name: "BIG".to_owned(),
         counts: Counts::new(256, 0, 256, 0),
         cables: Vec::new(),
+        alive: None,
     };
     let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
     let capacity = client.out.capacity();
@@ -378,6 +383,7 @@ fn a_profile_that_no_dispatcher_takes_is_a_mistake() {
             .iter()
             .map(|text| Cable::parse(text).expect(text))
             .collect(),
+        alive: None,
     };
     let some = Counts::new(1, 0, 0, 0);
     for (profile, part) in [

@@ -539,10 +539,19 @@ impl Dispatcher {
             for word in line.split(' ').skip(1) {
                 let item = word.split_once('=').and_then(|(number, value)| {
                     let output = host.wanted.get(&number.parse().ok()?)?;
-                    Some((output, Number::parse(value.as_bytes())?))
+                    let value = match value {
+                        "?" => None,
+                        value => Some(Number::parse(value.as_bytes())?),
+                    };
+                    Some((*output, value))
                 });
-                if let Some((output, value)) = item {
-                    self.board.set(output.seat, output.channel, value);
+                match item {
+                    Some((output, Some(value))) => {
+                        self.board.set(output.seat, output.channel, value);
+                    }
+                    // The client over there has broken its promise to speak.
+                    Some((output, None)) => self.board.lose_output(output),
+                    None => {}
                 }
             }
         }

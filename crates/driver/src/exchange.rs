@@ -520,11 +520,12 @@ mod tests {
             let draw =
                 |shift: u32, below: u64| usize::try_from((random >> shift) % below).expect("small");
             let (bit, level) = (draw(20, 16), [0.0, 1.0, 1.0, f64::NAN][draw(24, 4)]);
-            let time = (draw(28, 4) != 0).then_some(Nanos::from_millis(step));
+            // None before the first one that is given, and in some ticks after it.
+            let time = (step >= 200 && draw(28, 4) != 0).then_some(Nanos::from_millis(step));
             // Also longer than data count for.
             let pause = Nanos::from_millis([0, 0, 1, 1, 1, 30][draw(30, 6)]);
             let sent = (draw(34, 2) == 0).then_some(draw(36, 256).to_le_bytes()[0]);
-            let is_halved = draw(44, 8) == 0;
+            let (is_halved, is_answered) = (draw(44, 8) == 0, draw(47, 3) != 0);
             let seen = [0, 1].map(|index| {
                 let rig = &mut rigs[index];
                 rig.pass(pause, sent);
@@ -533,14 +534,26 @@ mod tests {
                 driver.is_simple = index == 0;
                 slots[bit] = Slot::from_real(level);
                 let found = if is_halved {
-                    driver.receive(time, slots);
-                    driver.send(slots)
+                    let found = driver.receive(time, slots);
+                    if is_answered {
+                        driver.send(slots)
+                    } else {
+                        found
+                    }
                 } else {
                     driver.exchange(time, slots)
                 };
                 (found, slots.iter().map(|slot| slot.0).collect::<Vec<_>>())
             });
             assert_eq!(seen[0], seen[1], "step {step}");
+            let [one, other] = [0, 1].map(|index: usize| rigs[index].driver.counters);
+            assert_eq!(one, other, "step {step}");
+            let open = u64::from(is_halved && !is_answered);
+            assert_eq!(
+                one.fresh + one.unchanged + one.stale + open,
+                one.ticks,
+                "each tick is counted when it ends"
+            );
             codes[usize::try_from(seen[0].0.code.code()).expect("no error")] += 1;
         }
         assert!(

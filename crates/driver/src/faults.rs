@@ -83,7 +83,7 @@ impl Driver {
 mod tests {
     use super::*;
     use crate::Watch;
-    use tickbus_base::time::Monotonic;
+    use tickbus_base::time::{Manual, Monotonic, Nanos};
     use tickbus_driver_cfg::Config;
     use tickbus_image::signal::Slot;
 
@@ -116,6 +116,65 @@ mod tests {
             assert!(driver.end_fault(fault));
             assert!((0..3).any(|_| tick(&mut driver, &mut watch)), "it is over");
         }
+        driver.close();
+    }
+
+    /// A driver on a stepped bus that stands still when nobody ticks.
+    fn stepped(more: &str) -> Driver {
+        let text = format!(
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
+             program = \"mirror\"\nscan = \"1ms\"\n{more}[[signal]]\nname = \"life\"\naddress = \"%IB0\"\n\
+             [[signal]]\nname = \"a\"\naddress = \"%IB1\"\n"
+        );
+        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        Driver::open(config, Manual::new()).expect("opens")
+    }
+
+    #[test]
+    fn a_heartbeat_goes_on_when_a_forcing_ends() {
+        let mut driver = stepped("heartbeat = { signal = \"life\", every = \"1ms\" }\n");
+        let (mut watch, mut slots) = (driver.watch(), driver.initial_slots());
+        let mut force = None;
+        for step in 1..=60_u32 {
+            watch.ask(false);
+            match step % 20 {
+                5 => force = Some(watch.force(1, Slot::from_real(5.0)).expect("room")),
+                10 => watch
+                    .end_fault(force.take().expect("it is forced"))
+                    .expect("room"),
+                _ => {}
+            }
+            driver.exchange(Nanos::from_millis(step.into()), &mut slots);
+            assert_eq!(
+                slots[0],
+                Slot::from_real(step.into()),
+                "each tick is a beat"
+            );
+        }
+        driver.close();
+    }
+
+    #[test]
+    fn a_fault_is_felt_in_the_next_tick_though_nobody_looks_at_the_driver() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                    scan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n\
+                    [[signal]]\nname = \"b\"\naddress = \"%QB0\"\n";
+        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+        let mut slots = driver.initial_slots();
+        // The first ticks have more to do than to exchange.
+        for _ in 0..3 {
+            driver.exchange(None, &mut slots);
+        }
+        assert!(driver.is_simple);
+        let fault = driver
+            .inject_text("kind = \"stuck\"\nsignal = \"b\"\nvalue = 9\n")
+            .unwrap_or_else(|why| panic!("{why}"));
+        driver.exchange(None, &mut slots);
+        assert_eq!(slots[1], Slot::from_real(9.0));
+        assert!(driver.end_fault(fault));
+        driver.exchange(None, &mut slots);
+        assert_eq!(slots[1], Slot::from_real(0.0));
         driver.close();
     }
 }

@@ -143,4 +143,79 @@ mod tests {
         assert_eq!(shown((20, 9), true, &[0, 3]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown((21, 20), true, &[0, 4]), (false, 0.0, 4.0, 1.0));
     }
+
+    /// A byte that is 7 when it does not count.
+    fn one_byte() -> Config {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                    [[signal]]\nname = \"speed\"\naddress = \"%QB0\"\nfail_safe = 7\n";
+        Config::parse("driver.cfg", text).expect("right")
+    }
+
+    #[test]
+    fn a_station_shows_the_last_value_while_it_counts_and_else_the_fail_safe_one() {
+        const MAX_AGE: i64 = 20;
+        let (config, role) = (one_byte(), Role::Device);
+        let table = &config.table;
+        let (mut tick, mut bus) = image(directions(table, role));
+        let mut station = Station::new(table, 0, role.areas());
+        let map = SlotMap::new(table, role);
+        let mut slots = vec![Slot::from_real(7.0); map.count];
+        // The model: what came last and when, and whether a tick has seen it.
+        let (mut value, mut heard, mut is_valid, mut is_new) = (7, None, true, false);
+        let (mut now, mut random, mut codes) = (0, 1_u64, [0; 3]);
+        for step in 0..20_000 {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            let draw = |shift: u32, below: u64| (random >> shift) % below;
+            now += i64::try_from(draw(20, 5) * draw(24, 5)).expect("small");
+            match draw(28, 8) {
+                0 => {
+                    value = draw(34, 256).to_le_bytes()[0];
+                    (heard, is_valid, is_new) = (Some(now), draw(44, 4) != 0, true);
+                    bus.received(0, Nanos(now), &[value], is_valid);
+                }
+                1 => {
+                    heard = Some(now);
+                    bus.touch(0, Nanos(now));
+                }
+                2 => {
+                    // A PLC goes into STOP, or into RUN, without a frame.
+                    is_valid = draw(34, 2) == 0;
+                    bus.set_valid(0, is_valid);
+                }
+                3 => {
+                    // A recording is shown instead.
+                    let code = [Code::Fresh, Code::Unchanged, Code::Stale]
+                        [usize::from(step % 3 > 0) + usize::from(step % 3 > 1)];
+                    let bent = if code == Code::Stale { 7.0 } else { 300.0 };
+                    slots[0] = Slot::from_real(bent);
+                    station.shown_instead(&mut tick, code);
+                }
+                _ => {
+                    bus.hand_over();
+                    tick.update();
+                    let age =
+                        station.receive(&mut tick, (Nanos(now), Nanos(MAX_AGE)), &mut slots, &map);
+                    let expected_age = heard.map_or(Nanos::MAX, |heard| Nanos(now - heard));
+                    let counts = is_valid && expected_age.0 <= MAX_AGE;
+                    let (code, shown) = match (counts, is_new) {
+                        (true, true) => (Code::Fresh, value),
+                        (true, false) => (Code::Unchanged, value),
+                        (false, _) => (Code::Stale, 7),
+                    };
+                    is_new &= !counts;
+                    let found = (age, station.status, station.stale, slots[0]);
+                    let expected = Slot::from_real(f64::from(shown));
+                    assert_eq!(
+                        found,
+                        (expected_age, code, !counts, expected),
+                        "step {step}"
+                    );
+                    codes[usize::try_from(code.code()).expect("no error")] += 1;
+                }
+            }
+        }
+        assert!(codes.iter().all(|count| *count > 500), "{codes:?}");
+    }
 }

@@ -423,3 +423,6 @@ impl Port {
         self.image.status.log(level, kind, message);
     }
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests;

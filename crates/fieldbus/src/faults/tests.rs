@@ -181,6 +181,85 @@ fn edges_are_counted_as_they_are_seen() {
     assert_eq!((end.slots[2].real(), end.slots[SIGNALS].real()), (1.0, 1.0));
 }
 
+/// The numbers of a generator of Knuth's.
+fn random(state: &mut u64, below: u64) -> u64 {
+    *state = state
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    (*state >> 33) % below
+}
+
+#[test]
+fn the_edges_of_a_bent_signal_are_those_of_the_levels_that_are_shown() {
+    for latch in [Latch::Rising, Latch::Falling, Latch::Both] {
+        let mut end = End::new();
+        end.table.signals[2].latch = Some(latch);
+        let (mut state, mut counted) = (1, 0.0);
+        let (mut shown, mut truth) = (false, (false, 0.0));
+        // How the level is bent, and the number of the fault.
+        let mut fault: Option<(Option<bool>, u32)> = None;
+        for step in 0..5_000 {
+            match (&fault, random(&mut state, 6)) {
+                (Some((_, id)), 0) => {
+                    assert!(end.faults.end(*id));
+                    fault = None;
+                }
+                (None, 0) => {
+                    let (stuck, text) = match random(&mut state, 3) {
+                        0 => (None, "kind = \"invert\""),
+                        1 => (Some(false), "kind = \"stuck\"\nvalue = false"),
+                        _ => (Some(true), "kind = \"stuck\"\nvalue = true"),
+                    };
+                    let id = end.inject(&format!("{text}\nsignal = \"a = b > c\""));
+                    fault = Some((stuck, id));
+                }
+                _ => {}
+            }
+            if random(&mut state, 2) == 0 {
+                let count = u8::try_from(random(&mut state, 4)).expect("small");
+                truth = (random(&mut state, 2) == 0, f64::from(count));
+            }
+            end.tick(|slots| {
+                slots[2] = Slot::from_real(f64::from(u8::from(truth.0)));
+                slots[SIGNALS] = Slot::from_real(truth.1);
+            });
+            let (level, edges) = match &fault {
+                None => truth,
+                Some((stuck, _)) => {
+                    let level = stuck.unwrap_or(!truth.0);
+                    let is_edge = level != shown
+                        && match latch {
+                            Latch::Rising => level,
+                            Latch::Falling => !level,
+                            Latch::Both => true,
+                        };
+                    (level, f64::from(u8::from(is_edge)))
+                }
+            };
+            let found = (end.slots[2].real() != 0.0, end.slots[SIGNALS].real());
+            assert_eq!(found, (level, edges), "{latch:?} step {step}");
+            shown = level;
+            counted += f64::from(u8::from(fault.is_some())) * edges;
+        }
+        assert!(counted > 200.0, "{latch:?}: {counted}");
+    }
+}
+
+#[test]
+fn the_time_of_faults_does_not_go_back_with_the_simulations() {
+    let mut end = End::new();
+    end.set(1, 100.0);
+    end.tick = 20;
+    assert_eq!(end.tick(nothing)[1], 100.0, "200 ms");
+    end.inject("kind = \"stuck\"\nsignal = \"level\"\nvalue = 7.5\nat = \"100ms\"\nfor = \"50ms\"");
+    // The simulation begins anew. The moment of the fault is past, and it lasts until 50 ms have gone by that are new.
+    end.tick = 0;
+    for millis in (0..250).step_by(10) {
+        assert_eq!(end.tick(nothing)[1], 7.5, "{millis} ms");
+    }
+    assert_eq!(end.tick(nothing)[1], 100.0);
+}
+
 #[test]
 fn faults_of_one_signal_follow_each_other() {
     let mut end = End::new();

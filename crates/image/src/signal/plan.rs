@@ -275,3 +275,6 @@ fn gaps(members: &[Member], frame_bytes: usize) -> Vec<Range<usize>> {
 fn index(number: usize) -> u32 {
     u32::try_from(number).expect("signal tables and frames have fewer than 2^32 slots and bytes")
 }
+
+#[cfg(all(test, not(loom)))]
+mod tests;

@@ -32,11 +32,6 @@ impl Extras {
         })
     }
 
-    /// Whether it has nothing else than faults.
-    pub(super) fn is_for_faults_alone(&self) -> bool {
-        self.reflexes.is_none() && self.beats.is_empty()
-    }
-
     /// The simulation hands its values over: the first thing in the half that sends.
     #[cold]
     pub(super) fn handed_over(&mut self, slots: &mut [Slot]) {

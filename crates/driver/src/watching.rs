@@ -139,8 +139,9 @@ impl Driver {
     fn put_away(&mut self, watched: &mut Watched) {
         let is_idle = |extras: &Extras| {
             let faults = extras.faults.as_ref();
-            extras.is_for_faults_alone() && faults.is_some_and(Faults::is_idle)
+            faults.is_some_and(Faults::is_idle)
         };
+        // Extras that were the spare ones have nothing else than faults.
         if watched.spare.is_none() && self.extras.as_deref().is_some_and(is_idle) {
             watched.spare = self.extras.take();
         }

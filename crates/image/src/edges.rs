@@ -285,12 +285,6 @@ impl PulseShaper {
         &self.bits
     }
 
-    /// Whether a level is forced or held, or an edge waits, so that the same frame needs shaping again.
-    #[inline]
-    pub fn is_busy(&self) -> bool {
-        self.busy
-    }
-
     /// Whether the levels of a frame with the counters `edges` need shaping; if not, they
     /// [`pass`](Self::pass).
     #[inline]

@@ -46,7 +46,8 @@ struct Shown {
     sequence: u64,
     shaper: PulseShaper,
     shaped: Box<[u8]>,
-    /// Whether the simulation sees anything else than the frame: shaped levels, or fail-safe values.
+    /// Whether the simulation sees anything else than the frame: shaped levels, or fail-safe values. While the shaper has
+    /// an edge to show, it does.
     forced: bool,
 }
 
@@ -222,7 +223,7 @@ impl TickEnd {
             sequence,
             is_valid,
         } = shown.head;
-        if sequence != shown.sequence || shown.forced || shown.shaper.is_busy() {
+        if sequence != shown.sequence || shown.forced {
             return None;
         }
         Some((age(now, heard), is_valid))
@@ -253,7 +254,7 @@ impl TickEnd {
             sequence,
         };
         // The most common tick finds nothing: the simulation ticks faster than the bus.
-        if !arrival.stale && (arrival.fresh || shown.forced || shown.shaper.is_busy()) {
+        if !arrival.stale && (arrival.fresh || shown.forced) {
             self.show(station, now, receiver);
         }
         arrival

@@ -175,8 +175,7 @@ impl LineFaults {
     /// Looks up which faults are active.
     pub fn look(&mut self) {
         let mut sum = Sum::default();
-        // Decided anew: a fault that is over must not leave anything behind.
-        (self.fate, self.repeats) = (Fate::Passes(1), false);
+        // The fates of frames are drawn anew: a fault that is over must not leave anything behind.
         for wire in &mut self.stations {
             (wire.dead, wire.came, wire.went) = (false, true, true);
         }

@@ -30,7 +30,9 @@ pub struct Slots<'a> {
 pub struct Faults {
     entries: Vec<Entry>,
     board: Arc<FaultBoard>,
+    /// How long the simulation has run, and its time at the last tick.
     time: Nanos,
+    given: Nanos,
 }
 
 /// A fault that is on the board and that no tick knows yet: made by any thread, so that the tick which
@@ -124,6 +126,7 @@ impl Faults {
             // Those that are forgotten may leave a little later than others come.
             entries: Vec::with_capacity(2 * LIMIT),
             board,
+            given: Nanos::ZERO,
             time: Nanos::ZERO,
         }
     }
@@ -170,8 +173,9 @@ impl Faults {
     /// Conditions are judged on true values: what this end writes as of this tick (or the previous one, if
     /// the tick receives first), what it reads as of the previous tick.
     pub fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
-        // If time jumped back, no fault would begin or end until it has caught up.
-        self.time = self.time.max(moment.time);
+        // If time jumps back, faults go on from where they were: what was to last for a second lasts for a second.
+        let passed = moment.time - std::mem::replace(&mut self.given, moment.time);
+        self.time += passed.max(Nanos::ZERO);
         let moment = TickTime {
             time: self.time,
             ..moment

@@ -4,12 +4,11 @@
 mod common;
 
 use std::collections::BTreeMap;
-use std::sync::mpsc::channel;
 
-use common::hosts::{Hosts, NAMES, id};
+use common::hosts::{Hosts, NAMES, id, number, order, pin};
 use proptest::prelude::*;
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::{Device, Number, OnLoss, Order, Pin, Reply, Settings};
+use tickbus_dispatcher::{Device, OnLoss, Order, Pin, Settings};
 
 const NOTHING: [&str; 0] = [];
 
@@ -336,26 +335,6 @@ fn hosts_of_one_name_are_told_apart() {
     }
 }
 
-fn pin(text: &str) -> Pin {
-    Pin::parse(text).expect(text)
-}
-
-fn number(text: &str) -> Number {
-    Number::parse(text.as_bytes()).expect(text)
-}
-
-/// Has an operator's order carried out at a host; returns the answer when all letters are carried.
-fn order(hosts: &mut Hosts, host: usize, order: Order) -> Result<(), String> {
-    let (sender, answer) = channel();
-    let reply = Reply::new(move |outcome| sender.send(outcome).expect("it is waited for"));
-    let lab = &mut hosts.labs[host];
-    lab.dispatcher.operate(order, reply);
-    lab.settle();
-    hosts.settle();
-    let answer = answer.try_recv().expect("an answer");
-    answer.map_err(|refusal| refusal.to_string())
-}
-
 #[test]
 fn an_operator_patches_clients_of_all_hosts_and_forces_those_of_one() {
     let mut hosts = hosts();
@@ -659,50 +638,4 @@ proptest! {
             while hosts.labs[0].dispatcher.next_letter().is_some() {}
         }
     }
-}
-
-#[test]
-fn a_client_that_breaks_its_promise_is_lost_on_other_hosts_too() {
-    let mut hosts = hosts();
-    let pump = hosts.join(0, "VP PUMP Q01 ALIVE=2s");
-    hosts.ask(0, pump, "P Q1=24");
-    let logo = hosts.join(1, "VR LOGO I01 V=3");
-    let old = hosts.join(1, "VR OLD I01");
-    assert_eq!(
-        hosts.ask(1, logo, "CONNECT I1:PUMP:Q1"),
-        ["OK CONNECT", "P I1=24"]
-    );
-    assert_eq!(hosts.ask(1, old, "CONNECT I1:PUMP:Q1"), ["P I1=24"]);
-    hosts.wait(3);
-    assert_eq!(hosts.hear(1, logo), ["P I1=?"]);
-    assert_eq!(hosts.hear(1, old), ["P I1=0"]);
-    // Who is connected meanwhile gets nothing.
-    let late = hosts.join(2, "VR LATE I01 V=3");
-    assert_eq!(hosts.ask(2, late, "CONNECT I1:PUMP:Q1"), ["OK CONNECT"]);
-    hosts.ask(0, pump, "PING");
-    assert_eq!(hosts.hear(1, logo), ["P I1=24"]);
-    assert_eq!(hosts.hear(1, old), ["P I1=24"]);
-    assert_eq!(hosts.hear(2, late), ["P I1=24"]);
-    // An operator's value is no client's promise.
-    hosts.wait(3);
-    let heard = (hosts.hear(1, logo), hosts.hear(2, late));
-    assert_eq!(
-        heard,
-        (vec!["P I1=?".to_owned()], vec!["P I1=?".to_owned()])
-    );
-    let (q1, forced) = (pin("PUMP:Q1"), number("5"));
-    assert_eq!(
-        order(&mut hosts, 0, Order::Force(q1.clone(), forced)),
-        Ok(())
-    );
-    hosts.settle();
-    assert_eq!(hosts.hear(1, logo), ["P I1=5"]);
-    hosts.ask(0, pump, "PING");
-    hosts.wait(3);
-    assert_eq!(hosts.hear(1, logo), NOTHING);
-    assert_eq!(order(&mut hosts, 0, Order::Release(q1)), Ok(()));
-    hosts.settle();
-    assert_eq!(hosts.hear(1, logo), ["P I1=?"]);
-    hosts.ask(0, pump, "PING");
-    assert_eq!(hosts.hear(1, logo), ["P I1=24"]);
 }

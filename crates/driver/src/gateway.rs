@@ -445,7 +445,7 @@ mod tests {
     use tickbus_base::time::Monotonic;
 
     const LINE: &str = "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"loopback\"\ncycle = \"100us\"\n\
-        max_age = \"20ms\"\nlink = \"starved\"\n";
+        max_age = \"80ms\"\nlink = \"starved\"\n";
 
     const SIGNALS: [(&str, &str); 5] = [
         ("sync.go", "%ID0"),
@@ -500,10 +500,12 @@ mod tests {
                 gateway.run(step, &[], &mut []).expect("the PLC answers");
                 gateway.close();
             });
-            while tick((385.0, 385.0)) != (386.0, 386.0) {}
+            while tick((385.0, 385.0)) != (386.0, 386.0) {
+                assert!(!step.is_finished(), "the step was not waited for");
+            }
             {
                 let _starved = desk.lock();
-                let end = clock.now() + Nanos::from_millis(100);
+                let end = clock.now() + Nanos::from_millis(200);
                 while clock.now() < end {
                     assert_eq!(tick((385.0, 385.0)), (386.0, 386.0));
                 }

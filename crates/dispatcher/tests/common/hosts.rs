@@ -1,9 +1,10 @@
 //! Several dispatchers, and a network between them that loses letters and is cut.
 
 use std::collections::{BTreeSet, VecDeque};
+use std::sync::mpsc::channel;
 
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::{HostId, Identity, Patch, Settings};
+use tickbus_dispatcher::{HostId, Identity, Number, Order, Patch, Pin, Reply, Settings};
 
 use super::Lab;
 
@@ -150,4 +151,24 @@ impl Hosts {
         let dispatcher = &mut self.labs[host].dispatcher;
         std::iter::from_fn(|| dispatcher.next_news()).collect()
     }
+}
+
+pub(crate) fn pin(text: &str) -> Pin {
+    Pin::parse(text).expect(text)
+}
+
+pub(crate) fn number(text: &str) -> Number {
+    Number::parse(text.as_bytes()).expect(text)
+}
+
+/// Has an operator's order carried out at a host; returns the answer when all letters are carried.
+pub(crate) fn order(hosts: &mut Hosts, host: usize, order: Order) -> Result<(), String> {
+    let (sender, answer) = channel();
+    let reply = Reply::new(move |outcome| sender.send(outcome).expect("it is waited for"));
+    let lab = &mut hosts.labs[host];
+    lab.dispatcher.operate(order, reply);
+    lab.settle();
+    hosts.settle();
+    let answer = answer.try_recv().expect("an answer");
+    answer.map_err(|refusal| refusal.to_string())
 }

@@ -30,6 +30,10 @@ fn main() -> std::process::ExitCode {
             reads_and_writes,
         ),
         ("the_client_comes_back_when_the_server_does", comes_back),
+        (
+            "a_client_that_closes_leaves_its_fail_safe_values_behind",
+            closes,
+        ),
         ("bad_quality_is_told_and_is_not_fresh", bad_quality),
         ("types_that_differ_are_told_with_the_signal", wrong_types),
         (
@@ -112,6 +116,27 @@ fn reads_and_writes() -> Result<(), Absent> {
     for level in [0.0, 1.0, 0.0] {
         device.end.set("sensor", level);
         device.end.tick();
+    }
+    Ok(())
+}
+
+fn closes() -> Result<(), Absent> {
+    for (at_close, position, sensor) in [("fail_safe", 0, false), ("hold", 13_824, true)] {
+        let address = free_address();
+        let mut plc = plc(address, &json!({}))?;
+        let keys =
+            format!("security = \"None\"\nwrite_to = \"{IDENTITY}\"\nat_close = \"{at_close}\"");
+        let mut device = Device::client(address, &keys);
+        device.end.set("position", 138.24);
+        device.end.set("sensor", 1.0);
+        device.until("the PLC has it", |_| {
+            let has = |plc: &mut Peer, name: &str| plc.ask(&json!({"get": name}))["value"].clone();
+            has(&mut plc, "position") == 13_824 && has(&mut plc, "sensor") == true
+        });
+        device.end.driver.close();
+        let left =
+            ["position", "sensor"].map(|name| plc.ask(&json!({"get": name}))["value"].clone());
+        assert_eq!(left, [json!(position), json!(sensor)], "{at_close}");
     }
     Ok(())
 }

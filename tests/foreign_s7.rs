@@ -36,6 +36,10 @@ fn main() -> ExitCode {
             our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop,
         ),
         (
+            "closing_leaves_the_fail_safe_values_in_snap7_in_c",
+            closing_leaves_the_fail_safe_values_in_snap7_in_c,
+        ),
+        (
             "rust7_reads_and_writes_the_server",
             rust7_reads_and_writes_the_server,
         ),
@@ -269,6 +273,32 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
     end.end.driver.close();
     // A WORD, a bit that was 0 in 0xEE, and a REAL of 1.5.
     assert_eq!(cpu.end(), "changed 2 3 20 40 41 42 43\n");
+    Ok(())
+}
+
+fn closing_leaves_the_fail_safe_values_in_snap7_in_c() -> Result<(), Absent> {
+    let cpu = Cpu::start(snap7_in_c()?, "snap7c_server.py");
+    let fieldbus = |further: &str| {
+        format!(
+            "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
+             input = \"DB2\"\noutput = \"DB1\"\n{further}\n[fieldbus.at]\n\"sensor\" = \"%DB2.DBX20.4\"\n\
+             \"pressure\" = \"DB2,REAL40\"\n",
+            cpu.port
+        )
+    };
+    logged::expect("nothing is written into the PLC");
+    let mut end = open(&fieldbus(""));
+    end.until("it reads", |end| end.get("speed") == 28_399.0);
+    let who = end.statistic("identity");
+    end.end.driver.close();
+
+    let mut end = open(&fieldbus(&format!("write_to = \"{who}\"")));
+    end.set("position", 70.0);
+    end.set("sensor", 1.0);
+    end.until("it comes back", |end| end.get("speed") == 71.0);
+    end.end.driver.close();
+    // The bit is 0 again, as it was in 0xEE; position and pressure are 0.
+    assert_eq!(cpu.end(), "changed 2 3 40 41 42 43\n");
     Ok(())
 }
 

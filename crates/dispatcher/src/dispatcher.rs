@@ -546,6 +546,8 @@ impl Dispatcher {
         self.confirm(seat, Role::keyword(role));
         self.board.list(seat);
         self.board.refresh_all(seat);
+        // As far as there is room: what comes in this turn has not waited for a client that does not read.
+        self.board.refill(seat, is_version_2);
         self.settle();
         Ok(())
     }

@@ -95,6 +95,23 @@ fn version_3_hears_that_a_source_is_lost_and_is_back() {
 }
 
 #[test]
+fn values_that_come_while_a_client_joins_have_not_waited_for_it() {
+    let mut lab = Lab::new();
+    let pump = lab.join("VP PUMP Q01");
+    let logo = lab.join("VR LOGO I01 V=3");
+    lab.say(logo, "CONNECT I1:PUMP:Q1");
+    lab.say(pump, "P Q1=1");
+    lab.dispatcher.gone(logo);
+    let logo = lab.connect();
+    // All of it before anything is written.
+    lab.say(logo, "VR LOGO I01 V=3");
+    lab.say(pump, "P Q1=2");
+    let heard = lab.hear(logo);
+    assert_eq!(heard[heard.len() - 2..], ["P I1=1", "P I1=2"]);
+    assert_eq!(lab.dispatcher.traffic().overtaken, 0);
+}
+
+#[test]
 fn version_1_gets_lists_values_and_refusals_only() {
     let mut lab = Lab::new();
     let logo = lab.connect();

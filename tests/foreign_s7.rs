@@ -238,14 +238,7 @@ fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
 fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result<(), Absent> {
     expect_warnings();
     let mut cpu = Cpu::start(snap7_in_c()?, "snap7c_server.py");
-    let fieldbus = |further: &str| {
-        format!(
-            "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
-             input = \"DB2\"\noutput = \"DB1\"\n{further}\n[fieldbus.at]\n\"sensor\" = \"%DB2.DBX20.4\"\n\
-             \"pressure\" = \"DB2,REAL40\"\n",
-            cpu.port
-        )
-    };
+    let fieldbus = |further: &str| snap7_keys(&cpu, further);
     logged::expect("nothing is written into the PLC");
     let mut end = open(&fieldbus(""));
     // What its data block holds before anybody has written, plus 1.
@@ -276,16 +269,19 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
     Ok(())
 }
 
+/// The `[fieldbus]` of a client of Snap7 in C.
+fn snap7_keys(cpu: &Cpu, further: &str) -> String {
+    format!(
+        "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
+         input = \"DB2\"\noutput = \"DB1\"\n{further}\n[fieldbus.at]\n\"sensor\" = \"%DB2.DBX20.4\"\n\
+         \"pressure\" = \"DB2,REAL40\"\n",
+        cpu.port
+    )
+}
+
 fn closing_leaves_the_fail_safe_values_in_snap7_in_c() -> Result<(), Absent> {
     let cpu = Cpu::start(snap7_in_c()?, "snap7c_server.py");
-    let fieldbus = |further: &str| {
-        format!(
-            "kind = \"s7-client\"\naddress = \"127.0.0.1:{}\"\ncycle = \"2ms\"\nslot = 2\n\
-             input = \"DB2\"\noutput = \"DB1\"\n{further}\n[fieldbus.at]\n\"sensor\" = \"%DB2.DBX20.4\"\n\
-             \"pressure\" = \"DB2,REAL40\"\n",
-            cpu.port
-        )
-    };
+    let fieldbus = |further: &str| snap7_keys(&cpu, further);
     logged::expect("nothing is written into the PLC");
     let mut end = open(&fieldbus(""));
     end.until("it reads", |end| end.get("speed") == 28_399.0);

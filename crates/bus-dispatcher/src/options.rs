@@ -142,7 +142,7 @@ impl Options {
             name,
             counts: self.channels(setup.table).counts,
             cables: self.cables.iter().map(|(_, cable)| cable.clone()).collect(),
-            // Whoever has its outputs as inputs learns within this driver's own `max_age` that it is gone.
+            // Clients that this driver feeds lose their source if the driver falls silent for longer than its `max_age`.
             alive: Some(setup.max_age.clamp(LEAST_PROMISE, LONGEST_PROMISE)),
         };
         profile.check().map(|()| profile)

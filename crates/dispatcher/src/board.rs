@@ -74,7 +74,7 @@ struct Plugged {
     outputs: Box<[Output]>,
     /// Whether an input whose source is lost gets a sign for that, and not 0.
     hears_losses: bool,
-    /// It has not kept its promise to speak: its outputs have no values.
+    /// Whether the client has been silent for longer than its `ALIVE` time; its outputs are then cut off from the patch.
     is_silent: bool,
 }
 

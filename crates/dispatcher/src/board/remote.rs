@@ -116,9 +116,12 @@ impl Board {
 
     /// Sends another dispatcher the value of an output once more.
     pub(crate) fn supply_again(&mut self, to: Place, from: Place) {
-        let said = self.output(from).map(|output| output.value);
-        let said = said.filter(|value| value.is_known());
-        let said = self.silence_of(from).or(said);
+        let said = if self.is_silent(from.seat) {
+            Some(Number::LOST)
+        } else {
+            let said = self.output(from).map(|output| output.value);
+            said.filter(|value| value.is_known())
+        };
         if let Some(value) = self.forced_at(from).or(said) {
             self.deliver(to, value, true);
         }

@@ -1,18 +1,17 @@
-//! Clients that have promised to speak and do not: as with forced channels, their outputs are taken out of the routes, and
-//! put back when they speak again. So a value on its way costs nothing more because of promises.
+//! Clients that are silent for longer than their `ALIVE` time. As with forced channels, the board takes their outputs out of
+//! the routes, and puts them back with the next line, so that routing a value costs no more than without such clients.
 
 use super::{Board, Place};
-use crate::number::Number;
 use crate::patch::Pin;
 
 impl Board {
-    /// Whether the client on a seat has broken its promise to speak.
+    /// Whether the client on a seat has exceeded its `ALIVE` time.
     pub(super) fn is_silent(&self, seat: usize) -> bool {
         let plugged = self.seats[seat].plugged.as_ref();
         plugged.is_some_and(|plugged| plugged.is_silent)
     }
 
-    /// A client has not kept its promise: its outputs have no values, and their inputs have lost their sources.
+    /// The client on a seat has exceeded its `ALIVE` time: every input that it feeds loses its source.
     pub(crate) fn fall_silent(&mut self, seat: usize) {
         self.begin_line();
         let sinks = self.set_silent(seat, true);
@@ -30,7 +29,7 @@ impl Board {
         }
     }
 
-    /// It speaks again: its outputs have the values that it said last.
+    /// The client on a seat sends lines again: every input that it feeds gets the last value of its source.
     pub(crate) fn speak_again(&mut self, seat: usize) {
         self.begin_line();
         let sinks = self.set_silent(seat, false);
@@ -43,7 +42,7 @@ impl Board {
         }
     }
 
-    /// The source of an output of a client elsewhere is lost.
+    /// Another dispatcher reports that a client there has exceeded its `ALIVE` time: the inputs of this output lose their source.
     pub(crate) fn lose_output(&mut self, output: Place) {
         self.forget(output);
         let Some(pin) = self.pin(output).filter(|pin| self.forced(pin).is_none()) else {
@@ -55,7 +54,7 @@ impl Board {
         }
     }
 
-    /// Marks a client; returns the connections of its outputs that no operator has forced.
+    /// Sets the mark of a client, and returns the connections from its outputs, except outputs that an operator has forced.
     fn set_silent(&mut self, seat: usize, is_silent: bool) -> Vec<(Pin, Pin)> {
         let Some(plugged) = &mut self.seats[seat].plugged else {
             return Vec::new();
@@ -68,7 +67,7 @@ impl Board {
             .collect()
     }
 
-    /// What other dispatchers want of a client: the places on their seats, and its outputs that no operator has forced.
+    /// Which outputs of a client go to other dispatchers, each with its place on the other's seat, except forced outputs.
     fn all_supplied(&self, seat: usize) -> Vec<(Place, Place)> {
         let of_client = self.supplies.range(
             Place { seat, channel: 0 }..=Place {
@@ -87,10 +86,5 @@ impl Board {
         let device = self.device(output.seat)?;
         let channel = device.counts.channels(true).nth(output.channel)?;
         Some(Pin::new(&device.name, channel))
-    }
-
-    /// What a silent client says to other dispatchers.
-    pub(super) fn silence_of(&self, output: Place) -> Option<Number> {
-        self.is_silent(output.seat).then_some(Number::LOST)
     }
 }

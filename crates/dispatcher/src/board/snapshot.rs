@@ -34,8 +34,8 @@ pub struct ClientState {
 pub struct ChannelState {
     /// Which one.
     pub channel: Channel,
-    /// What the client has said of its output, or has been sent for its input. `None` if it was never said, if the client
-    /// has broken its promise to speak, or if the input's client has been sent that its source is lost.
+    /// The last value that the client sent for its output, or was sent for its input. `None` if there was no value yet, if the
+    /// client has exceeded its `ALIVE` time, or if the input has lost its source.
     pub value: Option<Number>,
     /// What an operator holds it at.
     pub forced: Option<Number>,

@@ -37,8 +37,8 @@ pub struct Profile {
     pub counts: Counts,
     /// The connections that it asks for.
     pub cables: Vec<Cable>,
-    /// It promises a line at least this often, of 10 ms to 60 s: if it breaks that, its outputs have no values. `None` for no
-    /// promise.
+    /// The client sends a line at least this often, 10 ms to 60 s; the dispatcher cuts its outputs off while it does not. `None`:
+    /// the dispatcher does not supervise it.
     pub alive: Option<Nanos>,
 }
 

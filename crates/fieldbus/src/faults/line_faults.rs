@@ -85,6 +85,8 @@ struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     waiting: Option<Ring>,
+    /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
+    overtaken: usize,
     /// The origin of the bytes that the bus was given: decides who is told that they were sent.
     given: Given,
 }
@@ -126,6 +128,7 @@ impl LineFaults {
                 reads: false,
                 held_up: None,
                 waiting: None,
+                overtaken: 0,
                 given: Given::Image,
             },
             waiting: None,
@@ -503,10 +506,8 @@ impl Outgoing {
         }
         if slow == Nanos::ZERO {
             // The fault is over: values are current at once, edges are shown one at a time.
-            let bytes = self.current.iter_mut().zip(&self.newest);
-            for ((current, newest), latched) in bytes.zip(&self.latched) {
-                *current = (*current & latched) | (newest & !latched);
-            }
+            take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
+            self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
         }
         hurried
     }
@@ -516,10 +517,23 @@ impl Outgoing {
         if let Some(ring) = &mut self.waiting
             && let Some((_, next)) = ring.front()
         {
-            self.current.copy_from_slice(next);
+            // Values do not go back, though the next fault has begun before all edges were shown.
+            let is_overtaken = self.overtaken > 0;
+            self.overtaken = self.overtaken.saturating_sub(1);
+            take_bits(&mut self.current, next, |byte| {
+                if is_overtaken { self.latched[byte] } else { u8::MAX }
+            });
             ring.pop();
             (self.reads, self.held_up) = (false, None);
         }
+    }
+}
+
+/// Takes over from `next` those bits that `mask` gives for each byte.
+fn take_bits(current: &mut [u8], next: &[u8], mask: impl Fn(usize) -> u8) {
+    for (byte, (current, next)) in current.iter_mut().zip(next).enumerate() {
+        let mask = mask(byte);
+        *current = *current & !mask | next & mask;
     }
 }
 

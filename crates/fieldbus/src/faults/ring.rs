@@ -39,6 +39,10 @@ impl Ring {
         self.count == 0
     }
 
+    pub(super) fn len(&self) -> usize {
+        self.count
+    }
+
     pub(super) fn is_full(&self) -> bool {
         self.count == self.taken.len()
     }

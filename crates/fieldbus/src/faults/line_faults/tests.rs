@@ -177,6 +177,24 @@ fn a_pulse_that_waits_is_sent_though_its_fault_ends_and_values_are_true_at_once(
 }
 
 #[test]
+fn values_do_not_go_back_when_the_next_fault_begins_before_all_edges_were_shown() {
+    let mut rig = Rig::new();
+    let slow = rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    for now in 0..6_u8 {
+        rig.send(now.into(), [now & 1, 1 + now], true);
+    }
+    rig.end(slow);
+    assert_eq!(rig.send(6, [0, 7], true).0, [1, 7]);
+    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    let sent = (7..60).map(|now: u8| rig.send(now.into(), [0, 1 + now], true).0);
+    let sent: Vec<[u8; 2]> = sent.collect();
+    assert!(sent.is_sorted_by_key(|bytes| bytes[1]), "{sent:?}");
+    let edges = sent.windows(2).filter(|pair| pair[0][0] < pair[1][0]);
+    assert_eq!(edges.count(), 2, "no edge is lost: {sent:?}");
+    assert_eq!(sent.last(), Some(&[0, 40]));
+}
+
+#[test]
 fn a_frame_that_the_peer_has_not_taken_keeps_its_pulse() {
     let mut rig = Rig::new();
     rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);

@@ -43,7 +43,7 @@ impl FaultBoard {
         make: impl FnOnce(u32) -> (Arc<Cell>, Option<LineFault>),
     ) -> Result<(Arc<Cell>, Option<u32>), Mistake> {
         let mut cells = self.cells();
-        let forgotten = if cells.len() < LIMIT {
+        let over = if cells.len() < LIMIT {
             None
         } else {
             let over = cells.iter().position(|cell| cell.phase() == Phase::Over);
@@ -55,14 +55,18 @@ impl FaultBoard {
             })?;
             let over = cells.remove(over);
             self.forgotten.fetch_add(over.begun(), Ordering::Relaxed);
-            Some(over.id())
+            Some(over)
         };
         let (cell, line) = make(self.last.fetch_add(1, Ordering::Relaxed) + 1);
+        let mut earlier = over.iter().chain(&*cells).rev();
+        if let Some(earlier) = earlier.find(|earlier| cell.is_namesake(earlier)) {
+            cell.follow(earlier);
+        }
         cells.push(Arc::clone(&cell));
         drop(cells);
         self.mailbox().extend(line);
         self.news.fetch_add(1, Ordering::Release);
-        Ok((cell, forgotten))
+        Ok((cell, over.map(|over| over.id())))
     }
 
     pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: TickTime) {
@@ -129,5 +133,37 @@ impl FaultBoard {
 
     fn mailbox(&self) -> MutexGuard<'_, Vec<LineFault>> {
         self.mailbox.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tickbus_base::time::Nanos;
+    use tickbus_test_log as logged;
+
+    #[test]
+    fn a_fault_that_is_injected_again_and_again_does_not_fill_the_log() {
+        let _logged = logged::Watch::over("tickbus_fieldbus");
+        logged::expect("injected fault \"again\"");
+        let board = FaultBoard::default();
+        for round in 1..=5_000 {
+            let make = |id| {
+                let (name, what) = ("again".to_owned(), String::new());
+                (Arc::new(Cell::new(id, name, "stuck", what)), None)
+            };
+            let (cell, _) = board.enlist(make).expect("the others are over");
+            for phase in [Phase::Active, Phase::Over] {
+                let moment = TickTime {
+                    time: Nanos(round),
+                    tick: 1,
+                };
+                board.enter(&cell, phase, moment);
+                board.tell("d");
+            }
+            assert_eq!(cell.begun(), 1, "each counts for itself");
+        }
+        let told = logged::times("injected fault \"again\"");
+        assert_eq!(told, 20 + 9, "twenty, and the powers of two up to 8192");
     }
 }

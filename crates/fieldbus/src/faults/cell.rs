@@ -63,7 +63,7 @@ pub(super) struct Cell {
     begun: AtomicU64,
     since: AtomicI64,
     tick: AtomicU64,
-    /// Beginnings and ends so far, and how many of them were logged.
+    /// Beginnings and ends so far, also of earlier faults of this name and kind; and how many of them were logged.
     changes: AtomicU64,
     told: AtomicU64,
 }
@@ -82,6 +82,19 @@ impl Cell {
             changes: AtomicU64::new(0),
             told: AtomicU64::new(0),
         }
+    }
+
+    /// Whether this is another fault under the same name.
+    pub(super) fn is_namesake(&self, other: &Self) -> bool {
+        self.name == other.name && self.kind == other.kind
+    }
+
+    /// Goes on counting for the log where an earlier fault of its name has got to: who injects one again and again
+    /// does not fill the log.
+    pub(super) fn follow(&self, earlier: &Self) {
+        let changes = earlier.changes.load(Ordering::Acquire);
+        self.changes.store(changes, Ordering::Relaxed);
+        self.told.store(changes, Ordering::Relaxed);
     }
 
     pub(super) fn phase(&self) -> Phase {

@@ -1,16 +1,15 @@
 //! Frames that are lost, repeated or held back on the line.
 
+mod outgoing;
+
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
+use self::outgoing::{Given, Outgoing};
 use super::ring::Ring;
 use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase};
 use tickbus_base::time::Nanos;
-
-/// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
-/// often than that.
-const PATIENCE: Nanos = Nanos::from_secs(1);
 
 /// The combined effect of the active faults.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -66,41 +65,6 @@ struct Wire {
     rx_len: usize,
 }
 
-/// Outgoing frames.
-#[derive(Debug)]
-struct Outgoing {
-    /// The mask of latched bits: the peer has to see each of their changes.
-    latched: Box<[u8]>,
-    /// The newest bytes of the image.
-    newest: Box<[u8]>,
-    /// The bytes that the bus sends.
-    current: Box<[u8]>,
-    /// The bytes that the peer received last.
-    sent: Box<[u8]>,
-    /// The mask of bits that the peer reads: all, until it has not read one for [`PATIENCE`].
-    read: Box<[u8]>,
-    /// Whether the peer has read anything since `current` was set, and since when a pulse in it has held up
-    /// the frames behind it nevertheless.
-    reads: bool,
-    held_up: Option<Nanos>,
-    /// Changes that are held back.
-    waiting: Option<Ring>,
-    /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
-    overtaken: usize,
-    /// The origin of the bytes that the bus was given: decides who is told that they were sent.
-    given: Given,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Given {
-    /// The image: it keeps its pulses until they were sent.
-    Image,
-    /// The ring: the image has released these bytes long ago.
-    Held,
-    /// Neither: old bytes, so that the bus has something to send.
-    Nothing,
-}
-
 /// The shape of one station's frames.
 #[derive(Clone, Debug)]
 pub struct Shape {
@@ -119,18 +83,7 @@ impl LineFaults {
             dead: false,
             came: true,
             went: true,
-            out: Outgoing {
-                latched: shape.latched,
-                newest: shape.last_sent.clone(),
-                current: shape.last_sent.clone(),
-                read: vec![0xFF; shape.last_sent.len()].into(),
-                sent: shape.last_sent,
-                reads: false,
-                held_up: None,
-                waiting: None,
-                overtaken: 0,
-                given: Given::Image,
-            },
+            out: Outgoing::new(shape.last_sent, shape.latched),
             waiting: None,
             rx_len: shape.rx_len,
         };
@@ -429,111 +382,6 @@ impl LineFaults {
     /// The active faults, as text: `"cable" (link-down)`.
     pub fn active(&self) -> &str {
         &self.active
-    }
-}
-
-impl Outgoing {
-    /// Whether the image's bytes go to the bus directly.
-    fn is_through(&self, slow: Nanos) -> bool {
-        slow == Nanos::ZERO
-            && self.waiting.as_ref().is_none_or(Ring::is_empty)
-            && !(self.given == Given::Held && self.has_unseen(&self.current))
-    }
-
-    /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
-    fn loses(&self, next: &[u8]) -> bool {
-        let bytes = self.current.iter().zip(&self.sent).zip(next);
-        let mut bits = bytes.zip(self.watched());
-        bits.any(|(((current, sent), next), watched)| {
-            (current ^ sent) & (current ^ next) & watched != 0
-        })
-    }
-
-    /// The latched bits that the peer reads.
-    fn watched(&self) -> impl Iterator<Item = u8> {
-        let bytes = self.latched.iter().zip(&self.read);
-        bytes.map(|(latched, read)| latched & read)
-    }
-
-    /// Whether the peer has polled for [`PATIENCE`] without reading the pulse in `current`: it does not read
-    /// that bit, and the bits that it does read must not wait forever.
-    fn is_left_out(&mut self, now: Nanos) -> bool {
-        if !self.reads {
-            return false;
-        }
-        if now < *self.held_up.get_or_insert(now) + PATIENCE {
-            return false;
-        }
-        let bytes = self.current.iter().zip(&self.sent);
-        for (read, (current, sent)) in self.read.iter_mut().zip(bytes) {
-            *read &= !(current ^ sent);
-        }
-        true
-    }
-
-    /// Whether a latched bit of `bytes` differs from what the peer has seen.
-    fn has_unseen(&self, bytes: &[u8]) -> bool {
-        let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
-        bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
-    }
-
-    /// Holds the image's bytes back and finds what is due by `now`; true if something was sent early.
-    fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
-        let mut hurried = false;
-        self.given = Given::Held;
-        if *image != *self.newest {
-            self.newest.copy_from_slice(image);
-            if self.waiting.as_ref().is_some_and(Ring::is_full) {
-                hurried = true;
-                self.advance();
-            }
-            if let Some(ring) = &mut self.waiting {
-                ring.push(now, image);
-            }
-        }
-        while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {
-            let due = slow == Nanos::ZERO || taken + slow <= now;
-            if !due {
-                break;
-            }
-            if self.loses(next) {
-                if !self.is_left_out(now) {
-                    break;
-                }
-                hurried = true;
-            }
-            self.advance();
-        }
-        if slow == Nanos::ZERO {
-            // The fault is over: values are current at once, edges are shown one at a time.
-            take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
-            self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
-        }
-        hurried
-    }
-
-    /// Makes the oldest held change the bytes that the bus sends.
-    fn advance(&mut self) {
-        if let Some(ring) = &mut self.waiting
-            && let Some((_, next)) = ring.front()
-        {
-            // Values do not go back, though the next fault has begun before all edges were shown.
-            let is_overtaken = self.overtaken > 0;
-            self.overtaken = self.overtaken.saturating_sub(1);
-            take_bits(&mut self.current, next, |byte| {
-                if is_overtaken { self.latched[byte] } else { u8::MAX }
-            });
-            ring.pop();
-            (self.reads, self.held_up) = (false, None);
-        }
-    }
-}
-
-/// Takes over from `next` those bits that `mask` gives for each byte.
-fn take_bits(current: &mut [u8], next: &[u8], mask: impl Fn(usize) -> u8) {
-    for (byte, (current, next)) in current.iter_mut().zip(next).enumerate() {
-        let mask = mask(byte);
-        *current = *current & !mask | next & mask;
     }
 }
 

@@ -1,5 +1,6 @@
 use proptest::prelude::*;
 
+use super::outgoing::PATIENCE;
 use super::*;
 use crate::faults::TickTime;
 use crate::faults::{Begin, Direction, Effect, Fault, Faults, Lasts, Slots};

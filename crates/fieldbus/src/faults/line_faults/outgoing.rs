@@ -1,0 +1,169 @@
+//! What a station sends while answers are slow.
+
+use tickbus_base::time::Nanos;
+
+use super::super::ring::Ring;
+
+/// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
+/// often than that.
+pub(super) const PATIENCE: Nanos = Nanos::from_secs(1);
+
+/// Outgoing frames.
+#[derive(Debug)]
+pub(super) struct Outgoing {
+    /// The mask of latched bits: the peer has to see each of their changes.
+    latched: Box<[u8]>,
+    /// The newest bytes of the image.
+    pub(super) newest: Box<[u8]>,
+    /// The bytes that the bus sends.
+    pub(super) current: Box<[u8]>,
+    /// The bytes that the peer received last.
+    pub(super) sent: Box<[u8]>,
+    /// The mask of bits that the peer reads: all, until it has not read one for [`PATIENCE`].
+    pub(super) read: Box<[u8]>,
+    /// Whether the peer has read anything since `current` was set, and since when a pulse in it has held up
+    /// the frames behind it nevertheless.
+    pub(super) reads: bool,
+    held_up: Option<Nanos>,
+    /// Changes that are held back.
+    pub(super) waiting: Option<Ring>,
+    /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
+    overtaken: usize,
+    /// The origin of the bytes that the bus was given: decides who is told that they were sent.
+    pub(super) given: Given,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Given {
+    /// The image: it keeps its pulses until they were sent.
+    Image,
+    /// The ring: the image has released these bytes long ago.
+    Held,
+    /// Neither: old bytes, so that the bus has something to send.
+    Nothing,
+}
+
+impl Outgoing {
+    /// Of a station that sent `last_sent` last.
+    pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>) -> Self {
+        Self {
+            latched,
+            newest: last_sent.clone(),
+            current: last_sent.clone(),
+            read: vec![0xFF; last_sent.len()].into(),
+            sent: last_sent,
+            reads: false,
+            held_up: None,
+            waiting: None,
+            overtaken: 0,
+            given: Given::Image,
+        }
+    }
+
+    /// Whether the image's bytes go to the bus directly.
+    pub(super) fn is_through(&self, slow: Nanos) -> bool {
+        slow == Nanos::ZERO
+            && self.waiting.as_ref().is_none_or(Ring::is_empty)
+            && !(self.given == Given::Held && self.has_unseen(&self.current))
+    }
+
+    /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
+    fn loses(&self, next: &[u8]) -> bool {
+        let bytes = self.current.iter().zip(&self.sent).zip(next);
+        let mut bits = bytes.zip(self.watched());
+        bits.any(|(((current, sent), next), watched)| {
+            (current ^ sent) & (current ^ next) & watched != 0
+        })
+    }
+
+    /// The latched bits that the peer reads.
+    fn watched(&self) -> impl Iterator<Item = u8> {
+        let bytes = self.latched.iter().zip(&self.read);
+        bytes.map(|(latched, read)| latched & read)
+    }
+
+    /// Whether the peer has polled for [`PATIENCE`] without reading the pulse in `current`: it does not read
+    /// that bit, and the bits that it does read must not wait forever.
+    fn is_left_out(&mut self, now: Nanos) -> bool {
+        if !self.reads {
+            return false;
+        }
+        if now < *self.held_up.get_or_insert(now) + PATIENCE {
+            return false;
+        }
+        let bytes = self.current.iter().zip(&self.sent);
+        for (read, (current, sent)) in self.read.iter_mut().zip(bytes) {
+            *read &= !(current ^ sent);
+        }
+        true
+    }
+
+    /// Whether a latched bit of `bytes` differs from what the peer has seen.
+    fn has_unseen(&self, bytes: &[u8]) -> bool {
+        let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
+        bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
+    }
+
+    /// Holds the image's bytes back and finds what is due by `now`; true if something was sent early.
+    pub(super) fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
+        let mut hurried = false;
+        self.given = Given::Held;
+        if *image != *self.newest {
+            self.newest.copy_from_slice(image);
+            if self.waiting.as_ref().is_some_and(Ring::is_full) {
+                hurried = true;
+                self.advance();
+            }
+            if let Some(ring) = &mut self.waiting {
+                ring.push(now, image);
+            }
+        }
+        while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {
+            let due = slow == Nanos::ZERO || taken + slow <= now;
+            if !due {
+                break;
+            }
+            if self.loses(next) {
+                if !self.is_left_out(now) {
+                    break;
+                }
+                hurried = true;
+            }
+            self.advance();
+        }
+        if slow == Nanos::ZERO {
+            // The fault is over: values are current at once, edges are shown one at a time.
+            take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
+            self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
+        }
+        hurried
+    }
+
+    /// Makes the oldest held change the bytes that the bus sends.
+    fn advance(&mut self) {
+        if let Some(ring) = &mut self.waiting
+            && let Some((_, next)) = ring.front()
+        {
+            // Values do not go back, though the next fault has begun before all edges were shown.
+            let is_overtaken = self.overtaken > 0;
+            self.overtaken = self.overtaken.saturating_sub(1);
+            take_bits(&mut self.current, next, |byte| {
+                if is_overtaken {
+                    self.latched[byte]
+                } else {
+                    u8::MAX
+                }
+            });
+            ring.pop();
+            (self.reads, self.held_up) = (false, None);
+        }
+    }
+}
+
+/// Takes over from `next` those bits that `mask` gives for each byte.
+fn take_bits(current: &mut [u8], next: &[u8], mask: impl Fn(usize) -> u8) {
+    for (byte, (current, next)) in current.iter_mut().zip(next).enumerate() {
+        let mask = mask(byte);
+        *current = *current & !mask | next & mask;
+    }
+}

@@ -133,13 +133,17 @@ impl Differences {
         if differences == 0 {
             log::info!("{recording}: replayed, {compared} ticks compared, no difference");
         } else {
-            let listed = match &self.file {
-                Some(_) => format!("listed in {}", self.path.display()),
-                None => format!("the first {MOST_LOGGED} are in the log"),
-            };
+            let listed = self.listed_where();
             log::warn!(
                 "{recording}: replayed, {compared} ticks compared, {differences} differences, {listed}"
             );
+        }
+    }
+
+    fn listed_where(&self) -> String {
+        match &self.file {
+            Some(_) => format!("listed in {}", self.path.display()),
+            None => format!("the first {MOST_LOGGED} are in the log"),
         }
     }
 }
@@ -149,5 +153,28 @@ fn shown(kind: ValueKind, slot: Slot) -> String {
         ValueKind::Signed => slot.signed().to_string(),
         ValueKind::Unsigned => slot.unsigned().to_string(),
         ValueKind::Bit | ValueKind::Real | ValueKind::Count => slot.real().to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_that_cannot_be_written_is_not_said_to_be_there() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let listed_where = |name: &str| {
+            let mut differences = Differences::new(&folder.path().join(name));
+            differences.compared();
+            differences.listed_where()
+        };
+        let place = folder.path().join("run.csv.diff");
+        assert_eq!(
+            listed_where("run.csv"),
+            format!("listed in {}", place.display())
+        );
+        // Nobody can write into this, whatever the user may.
+        std::fs::create_dir(folder.path().join("other.csv.diff")).expect("a folder");
+        assert_eq!(listed_where("other.csv"), "the first 10 are in the log");
     }
 }

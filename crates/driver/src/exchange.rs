@@ -510,6 +510,22 @@ mod tests {
     }
 
     #[test]
+    fn a_time_that_is_refused_is_not_the_one_before_which_no_other_counts() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
+                    program = \"mirror\"\nscan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n";
+        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let mut driver = Driver::open(config, Manual::new()).expect("opens");
+        let mut slots = driver.initial_slots();
+        let mut codes = [3, 1_000_000_000_000, 4, 5].map(|millis| {
+            let time = Nanos::from_millis(millis);
+            driver.exchange(time, &mut slots).code
+        });
+        assert_eq!(codes[1], Code::BusFailed);
+        codes[1] = Code::Fresh;
+        assert_eq!(codes, [Code::Fresh; 4]);
+    }
+
+    #[test]
     fn an_exchange_with_nothing_else_to_do_comes_to_the_same_as_any_other() {
         let mut rigs = ["exchanges simply", "exchanges otherwise"].map(Rig::new);
         let (mut codes, mut random) = ([0; 3], 1_u64);

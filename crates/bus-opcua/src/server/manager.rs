@@ -28,6 +28,7 @@ use tickbus_image::signal::{Area, SignalTable};
 use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
 use super::watched::{Rhythm, Variable, Watched};
+use super::writers::Writers;
 
 /// A sampling interval that holds no change back, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
@@ -43,6 +44,11 @@ pub(super) struct Visitor {
 }
 
 impl Visitor {
+    /// Whether its session lasts.
+    pub(super) fn is_there(&self) -> bool {
+        (self.deadline)().is_some()
+    }
+
     fn of(context: &RequestContext) -> Self {
         let session = Arc::clone(&context.session);
         let read = session.read();
@@ -74,6 +80,8 @@ pub(super) enum Visit {
     Written(Visitor, Vec<Vec<(usize, u64)>>),
     /// These signals are about to be read: their nodes must be updated first.
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
+    /// The first client writes what the second one wrote within `max_age`.
+    SecondWriter(String, String),
     /// A client was refused because its certificate is another application's; the text says so.
     Impostor(String),
     /// Certificates were rejected: the new files, and their total number.
@@ -99,6 +107,7 @@ pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
     pub(super) watched: Watched,
+    pub(super) writers: Writers,
     pub(super) inbox: Inbox<Visit>,
     pub(super) wall: WallClock,
     /// Whether a client's certificate must belong to its application.
@@ -326,6 +335,9 @@ impl InMemoryNodeManagerImpl for Signals {
     ) -> Result<(), StatusCode> {
         // If a service fails, every node gets its status.
         self.admits(context)?;
+        let (writers, session) = (&self.own.writers, context.session_id);
+        writers.begin(session, || Visitor::of(context));
+        let mut second = None;
         let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
         let mut space = address_space.write();
         let now = date((self.own.wall)());
@@ -337,6 +349,13 @@ impl InMemoryNodeManagerImpl for Signals {
                     continue;
                 }
             };
+            if let Some(other) = writers.write(session, index) {
+                second.get_or_insert(other);
+                if writers.is_single {
+                    node.set_status(StatusCode::BadUserAccessDenied);
+                    continue;
+                }
+            }
             node.set_status(StatusCode::Good);
             let written = &node.value().value;
             let value = DataValue {
@@ -360,8 +379,11 @@ impl InMemoryNodeManagerImpl for Signals {
                 last.push((index, bits));
             }
         }
+        let inbox = &self.own.inbox;
+        if let Some(other) = second {
+            inbox.push(Visit::SecondWriter(Visitor::of(context).name, other));
+        }
         if !lists[0].is_empty() {
-            let inbox = &self.own.inbox;
             inbox.push(Visit::Written(Visitor::of(context), lists));
         }
         Ok(())

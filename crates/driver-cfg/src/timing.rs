@@ -79,9 +79,16 @@ pub struct Timing {
 /// What the file states of keys whose defaults depend on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stated {
-    watchdog: Option<Option<Nanos>>,
+    watchdog: Watchdog,
     at_close: Option<Outputs>,
     while_stale: Option<Outputs>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Watchdog {
+    Usual,
+    Off,
+    After(Nanos),
 }
 
 impl Timing {
@@ -96,7 +103,11 @@ impl Timing {
         } else {
             Outputs::Hold
         };
-        self.watchdog = self.stated.watchdog.unwrap_or(usual_watchdog);
+        self.watchdog = match self.stated.watchdog {
+            Watchdog::Usual => usual_watchdog,
+            Watchdog::Off => None,
+            Watchdog::After(limit) => Some(limit),
+        };
         self.at_close = self.stated.at_close.unwrap_or(usual_end);
         // A machine does not depend on its PLC: sensors go on.
         self.while_stale = if is_controller {
@@ -144,11 +155,11 @@ impl<'a> TimingKeys<'a> {
             span(&self.cycle, LEAST_CYCLE, no_rhythm),
             span(&self.max_age, Nanos(1), ""),
             match &self.watchdog {
-                Some(value) if value.as_text() == Some(OFF) => Some(Some(None)),
+                Some(value) if value.as_text() == Some(OFF) => Some(Watchdog::Off),
                 Some(value) => value
                     .duration_between(LEAST_WATCHDOG, no_stop, LONGEST)
-                    .map(|span| Some(Some(span))),
-                None => Some(None),
+                    .map(Watchdog::After),
+                None => Some(Watchdog::Usual),
             },
         );
         let outputs = |value: &Option<Value<'_>>| match value {

@@ -148,12 +148,7 @@ impl HostThread {
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
         // looks at its own end.
         let is_own = role == config.role;
-        // A CPU whose program has died must not keep its last outputs on the bus.
-        let watchdog = match config.timing.watchdog.filter(|_| is_own) {
-            Some(stated) => Some(stated.max(interval + interval)),
-            None if is_own && role == Role::Controller => None,
-            None => Some((interval + interval).max(max_age)),
-        };
+        let watchdog = watchdog(config, (is_own, role), interval);
         let watchdog = watchdog.filter(|_| hosted.has_watchdog);
         let virtual_time = Manual::new();
         let (clock, limit) = match &scanned {
@@ -246,6 +241,16 @@ impl HostThread {
             thread: Some(thread),
             bus,
         })
+    }
+}
+
+/// How long a program may pause between two scans: a CPU whose program has died must not keep its last outputs on the bus.
+fn watchdog(config: &Config, (is_own_end, role): (bool, Role), interval: Nanos) -> Option<Nanos> {
+    let two_scans = interval + interval;
+    match config.timing.watchdog.filter(|_| is_own_end) {
+        Some(stated) => Some(stated.max(two_scans)),
+        None if is_own_end && role == Role::Controller => None,
+        None => Some(two_scans.max(config.timing.max_age)),
     }
 }
 

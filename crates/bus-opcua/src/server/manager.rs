@@ -4,7 +4,6 @@ use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
@@ -27,52 +26,12 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
+use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
 use super::writers::Writers;
 
 /// A sampling interval that holds no change back, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
-
-/// A client's session. It is reached through closures because the crate does not export its type.
-pub(super) struct Visitor {
-    /// The session's number.
-    pub(super) id: u32,
-    /// The client's name, or else the session's.
-    pub(super) name: String,
-    /// When the session will expire, which every request postpones; `None` if it is over.
-    pub(super) deadline: Box<dyn Fn() -> Option<Instant> + Send>,
-}
-
-impl Visitor {
-    /// Whether its session lasts.
-    pub(super) fn is_there(&self) -> bool {
-        (self.deadline)().is_some()
-    }
-
-    fn of(context: &RequestContext) -> Self {
-        let session = Arc::clone(&context.session);
-        let read = session.read();
-        let application = read
-            .application_description()
-            .application_name
-            .text
-            .to_string();
-        let name = if application.is_empty() {
-            read.session_name().to_owned()
-        } else {
-            application
-        };
-        drop(read);
-        Self {
-            id: context.session_id,
-            name,
-            deadline: Box::new(move || {
-                let session = session.read();
-                session.is_activated().then(|| session.deadline())
-            }),
-        }
-    }
-}
 
 /// What clients have done.
 pub(super) enum Visit {

@@ -7,6 +7,7 @@ mod setup;
 mod space;
 mod status;
 mod units;
+mod visitor;
 mod watched;
 mod writers;
 
@@ -28,8 +29,9 @@ use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
 use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
-use manager::{Own, Visit, Visitor};
+use manager::{Own, Visit};
 use peers::{Peers, Seen};
+use visitor::Visitor;
 use watched::Watched;
 use writers::Writers;
 

@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use tickbus_base::time::{Clock, Nanos};
 
-use super::manager::Visitor;
+use super::visitor::Visitor;
 
 /// The last writers of all signals.
 pub(super) struct Writers {

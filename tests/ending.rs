@@ -18,14 +18,17 @@ mod peers;
 
 use std::io::Read as _;
 use std::net::TcpListener;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 
 use commands::Running;
 use modbus_plc::{Habit, Plc};
 use peers::Alone;
 use rustix::process::Signal;
-use tickbus::time::{Clock, Monotonic};
+use tickbus::driver::Host;
+use tickbus::driver_cfg::Config;
+use tickbus::plc::{Program, Scan};
+use tickbus::time::{Clock, Monotonic, Nanos};
 use tickbus_conformance as conformance;
 
 use conformance::rig::{End, eventually, logged, statistic};
@@ -140,7 +143,7 @@ fn a_controller_that_stops_has_a_watchdog_unless_it_is_switched_off() {
         let stopped = cell.now();
         eventually("the watchdog would have bitten", || {
             conformance::rig::pass(&cell.clock, 1);
-            (cell.now() - stopped > tickbus::time::Nanos::from_millis(400)).then_some(())
+            (cell.now() - stopped > Nanos::from_millis(400)).then_some(())
         });
         let asked = || plc.with(|memory| memory.asked.len());
         let before = asked();
@@ -150,6 +153,63 @@ fn a_controller_that_stops_has_a_watchdog_unless_it_is_switched_off() {
         });
         assert_eq!(motor(&plc), left, "{further}");
         cell.end.driver.close();
+    }
+}
+
+/// A program that starts the motor, and hangs in its second scan until it is let go.
+#[derive(Debug)]
+struct Hangs(mpsc::Receiver<()>);
+
+impl Program for Hangs {
+    fn name(&self) -> &'static str {
+        "hangs"
+    }
+
+    fn input_bytes(&self) -> usize {
+        2
+    }
+
+    fn output_bytes(&self) -> usize {
+        2
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        if scan.outputs[1] == 1 {
+            // The test has ended, or lets it go.
+            let _ = self.0.recv();
+        }
+        scan.outputs.copy_from_slice(&[0, 1]);
+    }
+}
+
+#[test]
+fn a_program_that_hangs_has_the_watchdog_of_its_file() {
+    for (further, left) in [
+        ("", 7),
+        ("watchdog = \"off\"", 1),
+        ("watchdog = \"20s\"", 1),
+    ] {
+        let plc = Plc::start(|_, _| Habit::Answers);
+        let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
+        let config = Config::parse("driver.cfg", &text).expect("a right file");
+        let (release, released) = mpsc::channel();
+        let (clock, program) = (Monotonic::shared(), Box::new(Hangs(released)));
+        let host = Host::open(
+            &config,
+            program,
+            Nanos::from_millis(1),
+            Arc::clone(&clock) as _,
+        );
+        let host = host.expect("it opens");
+        eventually("the motor runs", || (motor(&plc) == 1).then_some(()));
+        let limit = clock.now() + Nanos::from_millis(900);
+        let bitten = eventually("the watchdog bites, or has time to", || {
+            let value = motor(&plc);
+            (value == 7 || clock.now() > limit).then_some(value)
+        });
+        assert_eq!(bitten, left, "{further}");
+        drop(release);
+        host.close();
     }
 }
 

@@ -630,6 +630,28 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
 }
 
 #[test]
+fn a_writer_of_any_number_of_single_places_is_the_only_one_at_each_of_them() {
+    const COILS: u16 = 200;
+    let text = "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-server\"\n\
+        address = \"127.0.0.1:0\"\nmax_age = \"20s\"\nwriters = 1\noutput_bytes = 25\n\
+        [[signal]]\nname = \"run\"\naddress = \"%QX0.0\"\n";
+    let device = Alone::open(text);
+    let (mut first, mut second) = (client(device.address()), client(device.address()));
+    let coil = |at: u16, value| {
+        let [high, low] = at.to_be_bytes();
+        [5, high, low, value, 0]
+    };
+    for at in 0..COILS {
+        let on = coil(at, 0xFF);
+        assert_eq!(ask(&mut first, at, &on), on, "coil {at}");
+    }
+    logged::expect("each undoes what the other one does");
+    for at in 0..COILS {
+        assert_eq!(ask(&mut second, at, &coil(at, 0)), [0x85, 6], "coil {at}");
+    }
+}
+
+#[test]
 fn function_3_reads_the_inputs_behind_the_outputs() {
     let (mut device, mut stream) = device("");
     device.end.set("position", 5.0);

@@ -17,7 +17,7 @@ use std::thread::JoinHandle;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
-use conformance::rig::{Bus, End, Liar, await_that, pass};
+use conformance::rig::{Bus, End, Liar, await_that, logged, pass, statistic};
 use peers::{leave, own_address};
 use tickbus::time::Manual;
 
@@ -186,6 +186,49 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
         device.tick();
         stale(&device) == [true, true]
     });
+}
+
+#[test]
+fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
+    for (further, is_single) in [("", false), ("writers = 1", true)] {
+        let (bus, clock) = (OpcUa::new("device"), Manual::new());
+        let open =
+            |role, further| End::open(&conformance::rig::config(&bus, role, further), &clock);
+        let (mut device, mut first) = (open("device", further), open("controller", ""));
+        // The first one counts up below 100, the second one from 100 on.
+        let mut count = 0.0;
+        let mut turn = |device: &mut End, controllers: &mut [(&mut End, f64)]| {
+            count = (count + 1.0) % 100.0;
+            for (end, base) in controllers {
+                end.set("speed", *base + count);
+                end.tick();
+            }
+            pass(&clock, 3);
+            device.tick();
+        };
+        let has_speed =
+            |device: &End, base: f64| (base..base + 100.0).contains(&device.get("speed"));
+        await_that("the first one writes", || {
+            turn(&mut device, &mut [(&mut first, 0.0)]);
+            has_speed(&device, 0.0)
+        });
+        logged::expect("each undoes what the other one does");
+        if is_single {
+            logged::expect("BadUserAccessDenied");
+        }
+        let mut second = open("controller", "");
+        await_that("the second one is told", || {
+            turn(&mut device, &mut [(&mut first, 0.0), (&mut second, 100.0)]);
+            assert!(!is_single || device.get("speed") < 100.0, "it is refused");
+            statistic(&device.driver, "opcua.second_writer").is_some()
+                && (is_single || has_speed(&device, 100.0))
+        });
+        first.driver.close();
+        await_that("the second one is the only one", || {
+            turn(&mut device, &mut [(&mut second, 100.0)]);
+            has_speed(&device, 100.0)
+        });
+    }
 }
 
 /// Says what is no OPC UA, and leaves in good order.

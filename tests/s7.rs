@@ -199,6 +199,27 @@ fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
 }
 
 #[test]
+fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
+    for (further, code, speed) in [("", 0xFF, 8), ("writers = 1", 3, 7)] {
+        let (mut device, at) = server(further);
+        let (mut first, mut second) = (Client::new(at), Client::new(at));
+        first.write(OUTPUTS, 2, &[0, 7]);
+        device.until_speed(7);
+        second.write(OUTPUTS, 4, &[0, 9]);
+        logged::expect("each undoes what the other one does");
+        let answer = second.ask(&command(OUTPUTS, 2, &[0, 8]));
+        assert_eq!(answer.last(), Some(&code), "{further}");
+        device.until_speed(speed);
+        assert_eq!(device.end.statistic("s7.second_writer"), "1");
+        drop(first);
+        device.until("the first one is gone", |_| {
+            second.ask(&command(OUTPUTS, 2, &[0, 6])).last() == Some(&0xFF)
+        });
+        device.until_speed(6);
+    }
+}
+
+#[test]
 fn every_station_has_a_slot_and_blocks_of_its_own() {
     let text = "[driver]\nid = 1\nname = \"two\"\n[fieldbus]\nkind = \"s7-server\"\n\
         address = \"127.0.0.1:0\"\ndb = [{ number = 1, area = \"%Q\", station = \"lathe\" }]\n\

@@ -1,15 +1,17 @@
 """An open driver."""
 
 import atexit
+import contextlib
 import itertools
 import os
 import re
+import signal
 import time
 import warnings
 import weakref
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from types import TracebackType
+from types import FrameType, TracebackType
 from typing import Any, Literal, NamedTuple, Self
 
 from . import _durations, _native, _toml
@@ -80,6 +82,7 @@ class Driver(_native.Driver):
 
     def __init__(self, path: str, overlay: str = "") -> None:
         _open.add(self)
+        _close_when_terminated()
 
     def every(self, period: str) -> Iterator[Turn]:
         """Pace a loop by the computer's clock: a turn in each period, such as ``"10ms"``, until the driver is closed::
@@ -224,6 +227,26 @@ def _close_all() -> None:
             # Another thread is in a tick, and the process ends.
             if error.status is not Status.BUSY:
                 raise
+
+
+def _terminated(number: int, _frame: FrameType | None) -> None:
+    """Closes the drivers that are open, and then ends the process as the signal does where nobody handles it."""
+    signal.signal(number, signal.SIG_DFL)
+    try:
+        _close_all()
+    finally:
+        os.kill(os.getpid(), number)
+
+
+def _close_when_terminated() -> None:
+    """Lets a termination signal that the program does not handle close the drivers before it ends the process."""
+    if os.name != "posix":
+        return
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is signal.SIG_DFL:
+            # Only the main thread may; a program that opens its drivers elsewhere handles signals itself.
+            with contextlib.suppress(ValueError):
+                signal.signal(number, _terminated)
 
 
 if hasattr(os, "register_at_fork"):

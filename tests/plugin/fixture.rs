@@ -85,8 +85,15 @@ pub(crate) struct Udp {
 
 impl Udp {
     pub(crate) fn new(isolated: bool) -> Self {
-        let address = address();
-        Self { address, isolated }
+        Self::at(isolated, &address())
+    }
+
+    /// The one whose machine is at this address.
+    pub(crate) fn at(isolated: bool, address: &str) -> Self {
+        Self {
+            address: address.to_owned(),
+            isolated,
+        }
     }
 }
 

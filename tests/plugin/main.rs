@@ -11,18 +11,19 @@ mod fixture;
 mod isolation;
 
 use std::fs;
+use std::net::UdpSocket;
 use std::path::Path;
 use std::process::Command;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
-use conformance::rig::{CYCLE, await_that, logged};
+use conformance::rig::{CYCLE, End, await_that, eventually, logged};
 use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, until_it_echoes};
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::driver_cfg::Options;
 use tickbus::fieldbus::{Events, plugin};
-use tickbus::time::{Manual, Nanos};
+use tickbus::time::{Manual, Monotonic, Nanos};
 
 conformance!(plain, crate::Udp::new(false));
 conformance!(isolated, crate::Udp::new(true));
@@ -81,6 +82,50 @@ fn a_line_that_failed_once_comes_back() {
             until(&end, &clock, "failed", "link");
             until_it_echoes(&mut end, &clock, 7.0);
             assert_eq!(end.statistic("state"), "running");
+        }
+    }
+}
+
+/// A machine by hand at the other end of the UDP example, until the controller says good-bye: the last image that it got.
+fn last_image(socket: &UdpSocket) -> Vec<u8> {
+    const HEADER: usize = 20;
+    let (mut datagram, mut last) = ([0; 100], Vec::new());
+    loop {
+        let (size, controller) = socket.recv_from(&mut datagram).expect("a datagram");
+        match datagram[7] {
+            1 => {
+                last = datagram[HEADER..size].to_vec();
+                // The answer has the session and the sequence of the request.
+                datagram[7] = 2;
+                datagram[HEADER + 2..HEADER + 4].copy_from_slice(&last[2..4]);
+                socket
+                    .send_to(&datagram[..size], controller)
+                    .expect("it is there");
+            }
+            _ => return last,
+        }
+    }
+}
+
+#[test]
+fn a_controller_that_closes_leaves_its_fail_safe_values_behind() {
+    for isolated in BOTH {
+        for (further, speed) in [("", -1_i16), ("at_close = \"hold\"", 10)] {
+            let socket = UdpSocket::bind("127.0.0.1:0").expect("a free port");
+            let address = socket.local_addr().expect("bound");
+            let machine = std::thread::spawn(move || last_image(&socket));
+            let bus = Udp::at(isolated, &address.to_string());
+            let text =
+                conformance::rig::config(&bus, "controller", further).replace("300ms", "20s");
+            let mut end = End::open(&text, &Monotonic::shared());
+            end.set("speed", 10.0);
+            eventually("the machine runs", || {
+                end.tick();
+                (end.get("position") == 10.0).then_some(())
+            });
+            end.driver.close();
+            let last = machine.join().expect("no panic");
+            assert_eq!(last[2..4], speed.to_be_bytes(), "{isolated} {further}");
         }
     }
 }

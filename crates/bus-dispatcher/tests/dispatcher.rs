@@ -15,7 +15,7 @@ use std::sync::Arc;
 use std::thread;
 
 use laboratory::Laboratory;
-use tickbus_base::time::{Clock as _, Manual, Nanos};
+use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos};
 use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{self, End, await_that, pass};
 use tickbus_driver::Code;
@@ -177,6 +177,34 @@ fn an_input_without_its_source_has_its_fail_safe_value_and_without_all_it_is_sta
         (1.0, -1.0)
     );
     assert_eq!(machine.end.link().state, LinkState::Running);
+}
+
+#[test]
+fn the_last_line_of_a_controller_has_the_fail_safe_values() {
+    // An input whose source has left is 0.
+    let both = ["P AI1=-1", "P AI1=0"];
+    for (further, heard) in [("", &both[..]), ("at_close = \"hold\"", &both[1..])] {
+        let laboratory = Laboratory::patched();
+        laboratory.serve();
+        let mut machine = Hand::join(&laboratory, "VR device Q01 I01 AQ02 AI02");
+        machine.say("P Q1=24 AQ1=7 AQ2=7");
+        let text = laboratory
+            .config("controller", further)
+            .replace("300ms", "20s");
+        let mut controller = End::open(&text, &Monotonic::shared());
+        thread::scope(|scope| {
+            let hearing = scope.spawn(|| while !machine.until("P").contains("AI1=10") {});
+            while !hearing.is_finished() {
+                controller.set("speed", 10.0);
+                controller.tick();
+                thread::yield_now();
+            }
+        });
+        controller.driver.close();
+        for line in heard {
+            assert_eq!(machine.until("P"), *line, "{further}");
+        }
+    }
 }
 
 #[test]

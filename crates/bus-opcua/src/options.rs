@@ -6,7 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::At;
-use tickbus_fieldbus::tcp::{Address, Host};
+use tickbus_fieldbus::tcp::{Address, Host, Writers};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 
 use super::security::{Credentials, Keys, Mode, Policy};
@@ -66,6 +66,8 @@ pub struct ServerOptions {
     pub credentials: Credentials,
     /// Whether anonymous logins are permitted.
     pub anonymous: bool,
+    /// Whether a client is refused that writes what another one has written lately.
+    pub is_single_writer: bool,
 }
 
 impl ClientOptions {
@@ -274,6 +276,7 @@ impl ServerOptions {
         let host = table.take("host");
         let keys = Keys::take(table);
         let anonymous = table.take("anonymous");
+        let is_single_writer = Writers::read(table);
         if !keys.has_user() && anonymous.is_none() {
             table.require_one_of(
                 &["user", "anonymous"],
@@ -306,6 +309,7 @@ impl ServerOptions {
             security: security?,
             credentials: credentials?,
             anonymous: allowed?,
+            is_single_writer: is_single_writer?,
         })
     }
 }

@@ -201,6 +201,32 @@ pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
     });
 }
 
+/// A controller whose machine shows no sign of life switches off what it has switched on, until there is one again.
+pub fn sends_fail_safe_values_while_it_is_blind(bus: &impl Bus) {
+    let alive = "alive = { signal = \"position\", within = \"100ms\" }";
+    let clock = Manual::new();
+    let mut rig = Rig {
+        device: End::open(&config(bus, "device", ""), &clock),
+        controller: End::open(&config(bus, "controller", alive), &clock),
+        clock,
+    };
+    rig.controller.set("speed", 10.0);
+    let mut position = 0.0;
+    let mut gets = |rig: &mut Rig, moves: bool, speed: f64| {
+        if moves {
+            position = (position + 1.0) % 100.0;
+        }
+        rig.device.set("position", position);
+        rig.controller.tick();
+        rig.device.tick().code != Code::Stale && rig.device.get("speed") == speed
+    };
+    rig.until("the machine runs", |rig| gets(rig, true, 10.0));
+    rig.until("the machine stops, since its sign of life does", |rig| {
+        gets(rig, false, -1.0)
+    });
+    rig.until("it runs again", |rig| gets(rig, true, 10.0));
+}
+
 pub fn keeps_events_in_order(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "events = true");
     rig.connect();
@@ -491,7 +517,7 @@ macro_rules! conformance {
                 opens_and_exchanges_both_ways exchanges_whole_images_only keeps_edges_both_ways
                 answers_within_the_tick keeps_events_in_order is_stale_without_its_peer_and_recovers
                 the_watchdog_bites_when_the_simulation_stops sees_through_a_peer_that_lies
-                leaves_the_fail_safe_values_behind opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
+                leaves_the_fail_safe_values_behind sends_fail_safe_values_while_it_is_blind opens_closes_and_opens_again closes_while_its_peer_is_silent closes_while_busy
                 refuses_bad_configuration is_stale_while_a_signal_that_has_to_change_does_not
             );
 

@@ -1,6 +1,7 @@
 //! Tables that replace those of a driver.cfg: the same device on another line.
 
 use super::Config;
+use super::timing::Line;
 use crate::{Options, PageOptions, loopback};
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, did_you_mean, read_text, shown};
 use tickbus_fieldbus::{At, Role};
@@ -12,7 +13,8 @@ impl Config {
     /// example, a test uses the plant's own signal table, but in simulation time.
     ///
     /// A `[fieldbus]` with a `kind` replaces the file's own, except for what belongs to the device and not to
-    /// the bus: sizes, cycle times, time-outs and life signs stay. `[[station]]` tables give what that bus
+    /// the bus: sizes, cycle times, time-outs and life signs stay. What the file leaves open about the end is that of the new
+    /// line: a controller has a watchdog and leaves its fail-safe values behind. `[[station]]` tables give what that bus
     /// needs to know about the file's stations, by name. A `[fieldbus]` without a `kind` changes only the
     /// `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
     /// recording removes the file's own, which belongs to the plant. So does the file's `[page]`, if the bus is replaced.
@@ -81,6 +83,8 @@ fn read_fieldbus(
             config.record = None;
         }
         config.page = None;
+        // What this end leaves behind depends on the line that it is put on.
+        config.timing.fit(Line::of(role, Some(&bus)));
         config.bus = bus;
         config.events = events;
         config.role = role;
@@ -198,6 +202,21 @@ mod tests {
         let recorded = plant.overlaid("test", "[record]\nfile = \"test.vcd\"\n");
         let record = recorded.expect("right").record.expect("it is recorded");
         assert_eq!(record.file, std::path::Path::new("test.vcd"));
+    }
+
+    #[test]
+    fn a_controller_on_another_bus_ends_as_one_that_its_file_puts_there() {
+        let end = "kind = \"socket\"\nrole = \"controller\"\naddress = \"10.0.0.1:2000\"\n";
+        for stated in [
+            "",
+            "watchdog = \"off\"",
+            "at_close = \"hold\"\nwhile_stale = \"hold\"",
+        ] {
+            let machine = plant(&format!("kind = \"loopback\"\nlink = \"cell\"\n{stated}"));
+            let overlaid = machine.overlaid("other tables", &format!("[fieldbus]\n{end}"));
+            let right = plant(&format!("{end}{stated}"));
+            assert_eq!(overlaid.expect("right").timing, right.timing, "{stated}");
+        }
     }
 
     #[test]

@@ -73,6 +73,49 @@ pub struct Timing {
     pub while_stale: Outputs,
     /// Pauses between attempts to reach the peer; the last one repeats. Never empty, all positive.
     pub reconnect: Vec<Nanos>,
+    stated: Stated,
+}
+
+/// What the file states of keys whose defaults depend on the line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Stated {
+    watchdog: Watchdog,
+    at_close: Option<Outputs>,
+    while_stale: Option<Outputs>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Watchdog {
+    Usual,
+    Off,
+    After(Nanos),
+}
+
+impl Timing {
+    /// Decides what the file leaves open about the end of `line`.
+    pub(super) fn fit(&mut self, line: Line) {
+        let is_controller = line.role == Role::Controller;
+        let ten_cycles = self.cycle.or(line.cycle).unwrap_or_default().times(10);
+        // A controller that stops must not leave its outputs on. It may scan as slowly as the other end may answer.
+        let usual_watchdog = is_controller.then(|| self.max_age.max(ten_cycles).max(LEAST_MAX_AGE));
+        let usual_end = if is_controller || line.is_client {
+            Outputs::FailSafe
+        } else {
+            Outputs::Hold
+        };
+        self.watchdog = match self.stated.watchdog {
+            Watchdog::Usual => usual_watchdog,
+            Watchdog::Off => None,
+            Watchdog::After(limit) => Some(limit),
+        };
+        self.at_close = self.stated.at_close.unwrap_or(usual_end);
+        // A machine does not depend on its PLC: sensors go on.
+        self.while_stale = if is_controller {
+            self.stated.while_stale.unwrap_or(Outputs::FailSafe)
+        } else {
+            Outputs::Hold
+        };
+    }
 }
 
 /// Cycle times and time-outs as written in the file.
@@ -112,11 +155,11 @@ impl<'a> TimingKeys<'a> {
             span(&self.cycle, LEAST_CYCLE, no_rhythm),
             span(&self.max_age, Nanos(1), ""),
             match &self.watchdog {
-                Some(value) if value.as_text() == Some(OFF) => Some(Some(None)),
+                Some(value) if value.as_text() == Some(OFF) => Some(Watchdog::Off),
                 Some(value) => value
                     .duration_between(LEAST_WATCHDOG, no_stop, LONGEST)
-                    .map(|span| Some(Some(span))),
-                None => Some(None),
+                    .map(Watchdog::After),
+                None => Some(Watchdog::Usual),
             },
         );
         let outputs = |value: &Option<Value<'_>>| match value {
@@ -146,34 +189,21 @@ impl<'a> TimingKeys<'a> {
             );
         }
         let ten_cycles = stated_cycle.or(of_bus).unwrap_or_default().times(10);
-        let max_age = stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE));
-        // A controller that stops must not leave its outputs on. It may scan as slowly as the other end may answer.
-        let usual_watchdog = match line.role {
-            Role::Controller => Some(max_age.max(ten_cycles).max(LEAST_MAX_AGE)),
-            Role::Device => None,
-        };
-        let usually = |applies| {
-            if applies {
-                Outputs::FailSafe
-            } else {
-                Outputs::Hold
-            }
-        };
-        let is_controller = line.role == Role::Controller;
-        let while_stale = ends.1?.unwrap_or(Outputs::FailSafe);
-        Some(Timing {
+        let mut timing = Timing {
             cycle: stated_cycle,
-            max_age,
-            watchdog: watchdog.unwrap_or(usual_watchdog),
-            at_close: ends.0?.unwrap_or(usually(is_controller || line.is_client)),
-            // A machine does not depend on its PLC: sensors go on.
-            while_stale: if is_controller {
-                while_stale
-            } else {
-                Outputs::Hold
-            },
+            max_age: stated.unwrap_or(ten_cycles.max(LEAST_MAX_AGE)),
+            watchdog: None,
+            at_close: Outputs::Hold,
+            while_stale: Outputs::Hold,
             reconnect: reconnect?,
-        })
+            stated: Stated {
+                watchdog,
+                at_close: ends.0?,
+                while_stale: ends.1?,
+            },
+        };
+        timing.fit(line);
+        Some(timing)
     }
 }
 

@@ -4,7 +4,6 @@ use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
@@ -27,46 +26,12 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
 use super::space::{self, NAMESPACE, NAMESPACE_URI};
+use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
+use super::writers::Writers;
 
 /// A sampling interval that holds no change back, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
-
-/// A client's session. It is reached through closures because the crate does not export its type.
-pub(super) struct Visitor {
-    /// The session's number.
-    pub(super) id: u32,
-    /// The client's name, or else the session's.
-    pub(super) name: String,
-    /// When the session will expire, which every request postpones; `None` if it is over.
-    pub(super) deadline: Box<dyn Fn() -> Option<Instant> + Send>,
-}
-
-impl Visitor {
-    fn of(context: &RequestContext) -> Self {
-        let session = Arc::clone(&context.session);
-        let read = session.read();
-        let application = read
-            .application_description()
-            .application_name
-            .text
-            .to_string();
-        let name = if application.is_empty() {
-            read.session_name().to_owned()
-        } else {
-            application
-        };
-        drop(read);
-        Self {
-            id: context.session_id,
-            name,
-            deadline: Box::new(move || {
-                let session = session.read();
-                session.is_activated().then(|| session.deadline())
-            }),
-        }
-    }
-}
 
 /// What clients have done.
 pub(super) enum Visit {
@@ -74,6 +39,8 @@ pub(super) enum Visit {
     Written(Visitor, Vec<Vec<(usize, u64)>>),
     /// These signals are about to be read: their nodes must be updated first.
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
+    /// The first client writes what the second one wrote within `max_age`.
+    SecondWriter(String, String),
     /// A client was refused because its certificate is another application's; the text says so.
     Impostor(String),
     /// Certificates were rejected: the new files, and their total number.
@@ -99,6 +66,7 @@ pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
     pub(super) watched: Watched,
+    pub(super) writers: Writers,
     pub(super) inbox: Inbox<Visit>,
     pub(super) wall: WallClock,
     /// Whether a client's certificate must belong to its application.
@@ -326,6 +294,9 @@ impl InMemoryNodeManagerImpl for Signals {
     ) -> Result<(), StatusCode> {
         // If a service fails, every node gets its status.
         self.admits(context)?;
+        let (writers, session) = (&self.own.writers, context.session_id);
+        writers.begin(session, || Visitor::of(context));
+        let mut second = None;
         let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
         let mut space = address_space.write();
         let now = date((self.own.wall)());
@@ -337,6 +308,13 @@ impl InMemoryNodeManagerImpl for Signals {
                     continue;
                 }
             };
+            if let Some(other) = writers.write(session, index) {
+                second.get_or_insert(other);
+                if writers.is_single {
+                    node.set_status(StatusCode::BadUserAccessDenied);
+                    continue;
+                }
+            }
             node.set_status(StatusCode::Good);
             let written = &node.value().value;
             let value = DataValue {
@@ -360,8 +338,11 @@ impl InMemoryNodeManagerImpl for Signals {
                 last.push((index, bits));
             }
         }
+        let inbox = &self.own.inbox;
+        if let Some(other) = second {
+            inbox.push(Visit::SecondWriter(Visitor::of(context).name, other));
+        }
         if !lists[0].is_empty() {
-            let inbox = &self.own.inbox;
             inbox.push(Visit::Written(Visitor::of(context), lists));
         }
         Ok(())

@@ -7,7 +7,9 @@ mod setup;
 mod space;
 mod status;
 mod units;
+mod visitor;
 mod watched;
+mod writers;
 
 use std::net::TcpListener;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -27,9 +29,11 @@ use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
 use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
-use manager::{Own, Visit, Visitor};
+use manager::{Own, Visit};
 use peers::{Peers, Seen};
+use visitor::Visitor;
 use watched::Watched;
+use writers::Writers;
 
 /// How long clients have to learn of the end, in real time.
 const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
@@ -86,7 +90,7 @@ impl Server {
     fn start(
         &self,
         reactor: &Reactor,
-        max_age: Nanos,
+        port: &Port,
         listener: TcpListener,
         rejects: &Arc<Mutex<Rejects>>,
     ) -> Result<Started, BusError> {
@@ -96,9 +100,15 @@ impl Server {
         let inbox: Inbox<Visit> = reactor.inbox();
         let (watched, tasks_alone) = (Watched::default(), Arc::default());
         let wall = self.pki.wall;
+        let max_age = port.max_age();
         let own = Own {
             reads: self.role.areas().1,
             watched: watched.clone(),
+            writers: Writers::new(
+                self.options.is_single_writer,
+                self.table.signals.len(),
+                (Arc::clone(port.clock()), max_age),
+            ),
             inbox: inbox.clone(),
             wall,
             checks_applications: self.pki.trust == Trust::Listed,
@@ -206,7 +216,7 @@ impl Free for Server {
         loop {
             let reactor = Reactor::new(stop)?;
             let listener = listener.try_clone().map_err(refused)?;
-            let mut started = self.start(&reactor, port.max_age(), listener, &rejects)?;
+            let mut started = self.start(&reactor, port, listener, &rejects)?;
             let show = started.show.clone();
             let service = match &mut service {
                 Some(service) => {
@@ -225,6 +235,7 @@ impl Free for Server {
                     table: &self.table,
                     waiting: waiting.clone(),
                     pki: &self.pki,
+                    is_single_writer: self.options.is_single_writer,
                     turned_away: Rarely::default(),
                 }),
             };
@@ -255,6 +266,7 @@ struct Service<'a> {
     table: &'a SignalTable,
     waiting: String,
     pki: &'a Pki,
+    is_single_writer: bool,
     /// Clients rejected because their certificate is unknown or not their own.
     turned_away: Rarely,
 }
@@ -322,6 +334,10 @@ impl Service<'_> {
                 }
                 // The reader may be gone.
                 let _ = done.send(());
+            }
+            Visit::SecondWriter(writer, other) => {
+                let clients = (&writer as _, &other as _);
+                tcp::report_second(port, "opcua.second_writer", clients, self.is_single_writer);
             }
             Visit::Impostor(why) => {
                 port.count("opcua.refused_applications");

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use super::manager::Visitor;
+use super::visitor::Visitor;
 
 /// The sessions of clients that have written or, for stations without writable signals, have read. Each
 /// counts only for the stations that it has accessed.

@@ -145,18 +145,17 @@ impl HostThread {
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);
         let status = LinkStatus::new(&name, max_age);
-        // A CPU whose program has died must not keep its last outputs on the bus.
-        let watchdog = (interval + interval).max(max_age);
-        let watchdog = hosted.has_watchdog.then_some(watchdog);
+        // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
+        // looks at its own end.
+        let is_own = role == config.role;
+        let watchdog = watchdog(config, (is_own, role), interval);
+        let watchdog = watchdog.filter(|_| hosted.has_watchdog);
         let virtual_time = Manual::new();
         let (clock, limit) = match &scanned {
             Scanned::Freely { clock, .. } => (Arc::clone(clock), watchdog),
             Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
-        // looks at its own end.
-        let is_own = role == config.role;
         let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
         let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
@@ -242,6 +241,16 @@ impl HostThread {
             thread: Some(thread),
             bus,
         })
+    }
+}
+
+/// How long a program may pause between two scans: a CPU whose program has died must not keep its last outputs on the bus.
+fn watchdog(config: &Config, (is_own_end, role): (bool, Role), interval: Nanos) -> Option<Nanos> {
+    let two_scans = interval + interval;
+    match config.timing.watchdog.filter(|_| is_own_end) {
+        Some(stated) => Some(stated.max(two_scans)),
+        None if is_own_end && role == Role::Controller => None,
+        None => Some(two_scans.max(config.timing.max_age)),
     }
 }
 

@@ -284,6 +284,12 @@ impl LineFaults {
         out.given == Given::Image
     }
 
+    /// Whether the bus was given the image's newest bytes: no fault holds them back or repeats others.
+    pub fn gives_newest(&self, station: usize) -> bool {
+        let out = &self.stations[station].out;
+        !self.repeats && out.given != Given::Nothing && out.current == out.newest
+    }
+
     /// Decides what happens to a frame that arrived at `now`, and stores it if it has to wait.
     pub fn arrives(&mut self, station: usize, now: Nanos, bytes: &[u8]) -> Fate {
         if !self.sum.down && std::mem::replace(&mut self.stations[station].came, true) {

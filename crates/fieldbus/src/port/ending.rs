@@ -115,11 +115,10 @@ impl Ending {
         }
     }
 
-    /// A peer has whole frames.
-    fn sent(&mut self, stations: Range<usize>) {
-        for taker in &mut self.stations[stations] {
-            taker.missing = taker.missing.saturating_sub(1);
-        }
+    /// The peer of a station has a whole frame.
+    fn sent(&mut self, station: usize) {
+        let taker = &mut self.stations[station];
+        taker.missing = taker.missing.saturating_sub(1);
         self.end_if_none_is_owed();
     }
 
@@ -188,8 +187,11 @@ impl Port {
     /// The peer of a station has the last values of all signals that it takes. For buses that send each signal alone: no
     /// receipt of theirs is of a whole frame.
     pub fn has_last(&mut self, station: usize) {
-        if let Some(ending) = &mut self.image.ending {
-            ending.sent(station..station + 1);
+        // Injected faults may have given the bus older values.
+        if let Some(ending) = &mut self.image.ending
+            && self.faults.gives_newest(station)
+        {
+            ending.sent(station);
         }
     }
 
@@ -208,8 +210,8 @@ impl Port {
             let size = self.sizes(stations.start).0;
             bits.start == 0 && bits.end >= 8 * size
         });
-        if let (true, Some(ending)) = (is_whole, &mut self.image.ending) {
-            ending.sent(stations);
+        if is_whole {
+            stations.for_each(|station| self.has_last(station));
         }
     }
 

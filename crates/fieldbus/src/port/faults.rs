@@ -150,6 +150,12 @@ impl FaultLayer {
         }
     }
 
+    /// Whether [`outgoing`](Self::outgoing) has returned the image's newest bytes.
+    pub(super) fn gives_newest(&self, station: usize) -> bool {
+        let line = self.line.as_ref();
+        line.is_none_or(|line| line.gives_newest(station))
+    }
+
     /// A whole frame arrived.
     #[inline]
     pub(super) fn received(

@@ -1,6 +1,7 @@
 //! A port whose line has faults, against a model of the line.
 
 use std::collections::VecDeque;
+use std::time::Duration;
 
 use tickbus_base::time::Manual;
 use tickbus_image::signal::{Area, Latch, SignalTable};
@@ -239,4 +240,31 @@ fn a_pulse_is_sent_until_the_peer_has_it_or_the_line_has_lost_it() {
         }
     }
     assert!(lost > 200 && shown > 200, "{lost} {shown}");
+}
+
+#[test]
+fn a_peer_has_the_last_values_when_no_fault_keeps_them_from_it() {
+    let send = |rig: &mut Rig, now| {
+        let mut frames = rig.port.take_all(Nanos(now)).expect("the line is up");
+        let bytes = [0, 1].map(|station| frames.frame(station)[0]);
+        let receipt = frames.receipt();
+        rig.port.sent(&receipt);
+        bytes
+    };
+    for effect in [
+        LineEffect::SlowAnswers(Nanos(20)),
+        LineEffect::Duplicate(1.0, Direction::Out),
+    ] {
+        let mut rig = Rig::new();
+        let farewell = rig.port.farewell(1);
+        rig.tick.write(Nanos(0), |_, bytes| bytes[0] = 2);
+        assert_eq!(send(&mut rig, 0), [2, 2]);
+        let fault = rig.inject(effect);
+        farewell.begin();
+        assert_eq!(send(&mut rig, 1), [2, 2], "{effect:?}");
+        assert!(!farewell.wait(Duration::ZERO), "{effect:?}");
+        rig.end(fault);
+        assert_eq!(send(&mut rig, 30), [0, 0], "{effect:?}");
+        assert!(farewell.wait(Duration::ZERO), "{effect:?}");
+    }
 }

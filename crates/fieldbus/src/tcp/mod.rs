@@ -23,7 +23,7 @@ pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
 pub use stream::{close_gracefully, is_for_later, prepare, watch_peer};
-pub use writers::{Writer, Writers};
+pub use writers::{Writer, Writers, report_second};
 
 /// The system cannot wait on this thread, or for this socket.
 pub fn no_wait(error: &std::io::Error) -> BusError {

@@ -17,7 +17,7 @@ use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, server};
 const LISTENER: usize = usize::MAX - 1;
 
 /// The most connections at a time; further ones are closed at once.
-const MOST: usize = 1100;
+const MOST: usize = if cfg!(test) { 3 } else { 1100 };
 
 /// At most this many clients are accepted per turn.
 const ACCEPTS: usize = 32;
@@ -331,3 +331,51 @@ impl Host<'_, '_, '_> {
 
 /// What is longer than a turn may take would keep the server from its other clients.
 const _: () = assert!(BLOCKED.0 <= 2 * ROUND.0);
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+    use std::net::TcpStream;
+    use std::sync::Mutex;
+
+    use super::*;
+    use crate::server::Control;
+    use crate::{Controls, StartCondition};
+    use tickbus_base::time::Monotonic;
+
+    #[test]
+    fn a_client_that_finds_the_server_full_is_turned_away_and_the_operator_told_once() {
+        let settings = Settings::new(Nanos::from_millis(1), StartCondition::Count(1));
+        let listener = Listener::bind(&Address::local(0)).expect("a free port");
+        let address = listener.address();
+        let controls = Controls::default();
+        let news = Mutex::new(Vec::new());
+        std::thread::scope(|scope| {
+            let serving = scope.spawn(|| {
+                let hosting = Hosting {
+                    clock: &*Monotonic::shared(),
+                    controls: &controls,
+                    news: &mut |line| news.lock().expect("no panic").push(line.to_owned()),
+                };
+                listener.run(settings, Logic::new(), hosting)
+            });
+            let connect = || TcpStream::connect(address).expect("it listens");
+            let idle: Vec<_> = (0..MOST).map(|_| connect()).collect();
+            for _ in 0..2 {
+                // Closed, or reset.
+                assert!(matches!(connect().read(&mut [0]), Ok(0) | Err(_)));
+            }
+            controls.send(Control::Stop);
+            serving
+                .join()
+                .expect("no panic")
+                .expect_err("nobody has joined");
+            drop(idle);
+        });
+        let news = news.into_inner().expect("no panic");
+        let told = news
+            .iter()
+            .filter(|line| line.contains("further ones are turned away"));
+        assert_eq!(told.count(), 1, "{news:?}");
+    }
+}

@@ -67,6 +67,8 @@ pub(crate) struct HostCounters {
     pub(crate) scan_counters: Arc<ScanCounters>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
+    /// Whether a scan that takes too long is a fault.
+    can_hang: bool,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::RecorderCounters>>,
     /// The clock of the line.
@@ -141,6 +143,7 @@ impl HostThread {
         let max_age = config.timing.max_age;
         let interval = hosted.interval;
         let report = hosted.program.report();
+        let can_hang = hosted.program.can_hang();
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);
@@ -168,6 +171,7 @@ impl HostThread {
             scan_counters: Arc::clone(&cpu.scan_counters),
             fault: Arc::clone(&fault),
             scanning: Arc::clone(&scanning),
+            can_hang,
             report,
             record,
             clock: Arc::clone(&clock),
@@ -343,7 +347,8 @@ impl HostCounters {
     }
 
     pub(crate) fn fault(&self) -> Option<String> {
-        if let Some(span) = self.scanning.too_long(self.wall.now()) {
+        let too_long = self.scanning.too_long(self.wall.now());
+        if let Some(span) = too_long.filter(|_| self.can_hang) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
         }
@@ -437,3 +442,6 @@ fn scan_in_steps(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

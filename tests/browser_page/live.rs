@@ -286,6 +286,11 @@ fn values_arrive_and_a_force_reaches_the_modbus_plc_until_it_is_released() {
     browser.keys(&format!("much{ENTER}"));
     browser.wait("document.getElementById('status').classList.contains('bad')");
     assert_eq!(machine.read("3", "1"), 6940);
+    // It is about that signal alone.
+    choose(&browser, "Level low");
+    browser.wait("document.getElementById('status').textContent === ''");
+    browser.wait("!document.getElementById('status').classList.contains('bad')");
+    choose(&browser, "Level");
     // Released one by one, and all at once.
     browser.run("document.getElementById('list').focus()");
     browser.keys(DELETE);
@@ -526,6 +531,17 @@ fn the_page_says_when_it_is_old_and_comes_back_after_a_restart() {
     machine.kill();
     browser.wait("/What is shown is \\d+ s old/.test(document.getElementById('age').textContent)");
     browser.wait("document.body.classList.contains('is-old') && document.getElementById('link').textContent === 'no connection'");
+}
+
+#[test]
+fn an_open_page_can_force_after_a_restart_that_keeps_its_token() {
+    let mut machine = Machine::new("modbus-server", "token_file = \"page.token\"", TANK);
+    let browser = open(&machine, 1280, 800);
+    machine.restart();
+    force(&browser, "Level low", "TRUE");
+    browser.wait("document.getElementById('access').textContent === 'may force'");
+    wait_marked(&browser, "Level low", "forced");
+    machine.kill();
 }
 
 /// So many signals, half of them `%I` words and half `%Q` bits.

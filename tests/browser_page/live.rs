@@ -497,6 +497,29 @@ fn what_came_before_the_page_is_marked_and_a_constant_has_no_edge() {
 }
 
 #[test]
+fn an_outage_draws_no_edge_of_a_bool() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1280, 800);
+    // Both ways of drawing: each value, and each pixel.
+    let edges = browser.run(
+        "const Real = window.Path2D; \
+         let edges = 0; \
+         window.Path2D = class { rect() {} moveTo(x) { this.x = x; } lineTo(x) { if (x === this.x) edges += 1; } }; \
+         const ctx = { fill() {}, stroke() {} }; \
+         run.end = 100; \
+         const counts = [[1, NaN, 1], [NaN, 1, 0, NaN, 0, 1]].flatMap((values) => [400, 8].map((width) => { \
+           edges = 0; \
+           const times = values.map((_, i) => i * 100 / values.length); \
+           paintBool({ ctx, colours: {}, left: 0, width, from: 0, to: 100 }, { times, values }, 0, 10); \
+           return edges; \
+         })); \
+         window.Path2D = Real; \
+         return counts;",
+    );
+    assert_eq!(edges, json!([0, 0, 2, 2]));
+}
+
+#[test]
 fn a_plc_that_is_gone_is_not_shown_as_one_that_is_there() {
     let mut machine = Machine::rig();
     let browser = open(&machine, 1280, 900);

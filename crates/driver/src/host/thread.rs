@@ -140,10 +140,8 @@ impl HostThread {
         scanned: Scanned,
         wall: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
-        let max_age = config.timing.max_age;
-        let interval = hosted.interval;
-        let report = hosted.program.report();
-        let can_hang = hosted.program.can_hang();
+        let (max_age, interval) = (config.timing.max_age, hosted.interval);
+        let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);

@@ -54,7 +54,7 @@ fn the_variables_of_a_client_that_is_late_do_not_count_as_live() {
     let members = members();
     let mut now = Nanos::ZERO;
     let mut after = |sequence, waited| {
-        now = now + Nanos::from_millis(10);
+        now += Nanos::from_millis(10);
         run.view = Some(view(&members, sequence, waited));
         run.update(now, now.0.unsigned_abs(), true);
         let json: serde_json::Value = serde_json::from_str(&run.json()).expect("right");

@@ -47,14 +47,23 @@ fn a_record_that_comes_byte_by_byte_is_one_record() {
 }
 
 #[test]
-fn an_http_request_is_no_record() {
+fn what_a_browser_sends_is_no_record() {
     let (mut device, address) = device("");
-    let mut browser = client(address);
     let body = "a".repeat(20 * RECORD);
-    let request = format!("POST / HTTP/1.1\r\nContent-Type: text/plain\r\n\r\n{body}");
-    browser.write_all(request.as_bytes()).expect("it is taken");
-    device.until_reason("is an HTTP request");
-    assert_eq!(device.end.statistic("bus_cycles"), "0");
+    for head in [
+        b"POST / HTTP/1.1\r\nContent-Type: text/plain\r\n\r\n".as_slice(),
+        // With https:, and to a relay of WebRTC.
+        b"\x16\x03\x01\x07\x6b\x01\x00\x07\x67\x03\x03",
+        b"\x00\x03\x00\x08\x21\x12\xa4\x42",
+    ] {
+        let mut browser = client(address);
+        browser
+            .write_all(&[head, body.as_bytes()].concat())
+            .expect("it is taken");
+        let at = browser.local_addr().expect("it is connected");
+        device.until_reason(&format!("refused {at}: this is an HTTP request"));
+        assert_eq!(device.end.statistic("bus_cycles"), "0");
+    }
     let mut plc = client(address);
     plc.write_all(&record(1)).expect("the device reads");
     device.until_speed(1);

@@ -286,6 +286,11 @@ fn values_arrive_and_a_force_reaches_the_modbus_plc_until_it_is_released() {
     browser.keys(&format!("much{ENTER}"));
     browser.wait("document.getElementById('status').classList.contains('bad')");
     assert_eq!(machine.read("3", "1"), 6940);
+    // It is about that signal alone.
+    choose(&browser, "Level low");
+    browser.wait("document.getElementById('status').textContent === ''");
+    browser.wait("!document.getElementById('status').classList.contains('bad')");
+    choose(&browser, "Level");
     // Released one by one, and all at once.
     browser.run("document.getElementById('list').focus()");
     browser.keys(DELETE);
@@ -492,6 +497,29 @@ fn what_came_before_the_page_is_marked_and_a_constant_has_no_edge() {
 }
 
 #[test]
+fn an_outage_draws_no_edge_of_a_bool() {
+    let machine = Machine::tank();
+    let browser = open(&machine, 1280, 800);
+    // Both ways of drawing: each value, and each pixel.
+    let edges = browser.run(
+        "const Real = window.Path2D; \
+         let edges = 0; \
+         window.Path2D = class { rect() {} moveTo(x) { this.x = x; } lineTo(x) { if (x === this.x) edges += 1; } }; \
+         const ctx = { fill() {}, stroke() {} }; \
+         run.end = 100; \
+         const counts = [[1, NaN, 1], [NaN, 1, 0, NaN, 0, 1]].flatMap((values) => [400, 8].map((width) => { \
+           edges = 0; \
+           const times = values.map((_, i) => i * 100 / values.length); \
+           paintBool({ ctx, colours: {}, left: 0, width, from: 0, to: 100 }, { times, values }, 0, 10); \
+           return edges; \
+         })); \
+         window.Path2D = Real; \
+         return counts;",
+    );
+    assert_eq!(edges, json!([0, 0, 2, 2]));
+}
+
+#[test]
 fn a_plc_that_is_gone_is_not_shown_as_one_that_is_there() {
     let mut machine = Machine::rig();
     let browser = open(&machine, 1280, 900);
@@ -526,6 +554,17 @@ fn the_page_says_when_it_is_old_and_comes_back_after_a_restart() {
     machine.kill();
     browser.wait("/What is shown is \\d+ s old/.test(document.getElementById('age').textContent)");
     browser.wait("document.body.classList.contains('is-old') && document.getElementById('link').textContent === 'no connection'");
+}
+
+#[test]
+fn an_open_page_can_force_after_a_restart_that_keeps_its_token() {
+    let mut machine = Machine::new("modbus-server", "token_file = \"page.token\"", TANK);
+    let browser = open(&machine, 1280, 800);
+    machine.restart();
+    force(&browser, "Level low", "TRUE");
+    browser.wait("document.getElementById('access').textContent === 'may force'");
+    wait_marked(&browser, "Level low", "forced");
+    machine.kill();
 }
 
 /// So many signals, half of them `%I` words and half `%Q` bits.

@@ -4,7 +4,7 @@ use std::io;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{Caller, begins_like_http};
+use tickbus_fieldbus::tcp::{Caller, begins_like_browser};
 use tickbus_fieldbus::{BusError, Port, Receipt};
 
 use super::connection_states::ConnectionStates;
@@ -123,8 +123,8 @@ impl Caller for Transfer<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         let Connection { peer, session, .. } = &mut *self.connection;
         // A browser sends the beginning of its request at once.
-        if !session.has_heard() && session.partial().is_none() && begins_like_http(bytes) {
-            return Err(EndReason::Http.of(*peer));
+        if !session.has_heard() && session.partial().is_none() && begins_like_browser(bytes) {
+            return Err(EndReason::Browser.of(*peer));
         }
         let mut bytes = bytes;
         while !bytes.is_empty() {

@@ -4,7 +4,7 @@ use std::fmt;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::tcp::IS_HTTP;
+use tickbus_fieldbus::tcp::IS_BROWSER;
 
 use super::Partial;
 
@@ -26,7 +26,7 @@ pub enum EndReason {
     /// Bytes arrived, although nothing is to be received.
     Unasked,
     /// The peer is a web browser, or sends what one would.
-    Http,
+    Browser,
 }
 
 impl EndReason {
@@ -57,7 +57,7 @@ impl EndReason {
             Self::Unasked => BusError::Protocol(format!(
                 "{peer} sends, but this end has nothing to receive; give both ends the same signals"
             )),
-            Self::Http => BusError::Protocol(format!("refused {peer}: {IS_HTTP}")),
+            Self::Browser => BusError::Protocol(format!("refused {peer}: {IS_BROWSER}")),
         }
     }
 }
@@ -105,7 +105,7 @@ mod tests {
             ),
             (EndReason::Silent(limit), &["silent for 300ms", "max_age"]),
             (EndReason::Unasked, &["nothing to receive", "same signals"]),
-            (EndReason::Http, &["HTTP request", "web page"]),
+            (EndReason::Browser, &["HTTP request", "web page"]),
         ] {
             let text = fault.of("10.0.0.7:4000").to_string();
             for part in parts {

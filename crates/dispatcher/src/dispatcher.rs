@@ -8,7 +8,7 @@ mod saving;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{IS_HTTP, begins_like_http};
+use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser};
 
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::{Channel, Counts};
@@ -379,8 +379,8 @@ impl Dispatcher {
                 if session.is_skipping {
                     return bytes.len();
                 }
-                if rest.len() >= LONGEST_LINE && begins_like_http(rest) {
-                    self.refuse_http(seat);
+                if rest.len() >= LONGEST_LINE && begins_like_browser(rest) {
+                    self.refuse_browser(seat);
                     return bytes.len();
                 }
                 if rest.len() >= LONGEST_LINE {
@@ -404,8 +404,8 @@ impl Dispatcher {
             if was_skipping {
                 continue;
             }
-            if begins_like_http(rest) {
-                self.refuse_http(seat);
+            if begins_like_browser(rest) {
+                self.refuse_browser(seat);
                 return bytes.len();
             }
             if end >= LONGEST_LINE {
@@ -668,11 +668,11 @@ impl Dispatcher {
     }
 
     /// Closes the connection of a web browser: what follows the head of its request is the text of a web site.
-    fn refuse_http(&mut self, seat: usize) {
+    fn refuse_browser(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Closing;
         }
-        self.refuse(seat, &Code::Syntax.because(IS_HTTP));
+        self.refuse(seat, &Code::Syntax.because(IS_BROWSER));
     }
 
     fn refuse_length(&mut self, seat: usize) {

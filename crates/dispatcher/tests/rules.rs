@@ -23,6 +23,11 @@ fn what_a_web_site_has_a_browser_send_is_refused_with_its_body() {
     for head in [
         "POST / HTTP/1.1\r\nHost: 127.0.0.1:20070\r\n\r\n".to_owned(),
         format!("GET /{} HTTP/1.1\r\n\r\n", "a".repeat(5000)),
+        // The hello of TLS, with a ticket that another server has given, as behind a name that suddenly means this computer.
+        format!(
+            "\x16\x03\x01\x01\x7c\x01\0\x01\x78\x03\x03{}\r\n",
+            "a".repeat(200)
+        ),
     ] {
         let mut lab = Lab::new();
         let pump = lab.join("VP PUMP Q01 I01");

@@ -9,9 +9,9 @@ use tickbus_image::signal::{Area, DataType, Signal, Slot};
 use tickbus_virtual_time::{Controls, Members, Pacing, RunView, State, Step};
 use tickbus_web::Refused;
 
-use crate::exhibit::Exhibit;
+use crate::exhibit::{Exhibit, Freshness};
 use crate::line::{self, Line, Station};
-use crate::sheet::{DriverJson, Row, Sheet, SignalJson};
+use crate::sheet::{DriverJson, Row, STALE, Sheet, SignalJson, UNKNOWN};
 
 /// A step that takes longer than this, and longer than a tenth of what it may take, is told to be late.
 const LATE: Nanos = Nanos::from_secs(1);
@@ -48,6 +48,8 @@ struct Told {
     state: LinkState,
     cause: Cause,
     reason: String,
+    /// Whether nothing is known of the server.
+    is_hung: bool,
 }
 
 /// How fast the run went between the last two lines.
@@ -158,18 +160,26 @@ impl ShownRun {
         self.sheet = Sheet::new(now, &values);
     }
 
-    fn take_values(&mut self, number: u64) -> bool {
+    fn take_values(&mut self, now: Nanos, number: u64) -> bool {
         let Some(view) = &self.view else {
             return false;
         };
+        let is_hung = self.sheet.missing_for(now) > LATE;
         let mut is_new = false;
         let values = self.signals.iter().zip(&view.values).enumerate();
         for (index, (signal, value)) in values {
+            let flags = if !has_begun(view) {
+                STALE | UNKNOWN
+            } else if is_hung || is_late(view) && owes(view, signal.station) {
+                STALE
+            } else {
+                0
+            };
             let seen = Row {
                 slot: slot_of(signal, *value),
                 bits: value & (u64::MAX >> (64 - signal.data_type.width().bits())),
                 edges: 0,
-                flags: 0,
+                flags,
                 number,
             };
             is_new |= self.sheet.put(index, seen);
@@ -227,7 +237,7 @@ impl ShownRun {
             reason: &self.state.reason,
             since_ms: (now - self.since).0.max(0) / 1_000_000,
             facts: vec![("Clients", self.members.clients.len().to_string())],
-            stations: self.stations(),
+            stations: self.clients(),
             ..Line::new(
                 self.id,
                 &self.name,
@@ -257,12 +267,11 @@ impl ShownRun {
         line.text()
     }
 
-    fn stations(&self) -> Vec<Station<'_>> {
+    fn clients(&self) -> Vec<Station<'_>> {
         let clients = self.members.clients.iter().enumerate();
         let stations = clients.map(|(at, client)| {
             let view = self.view.as_ref();
-            let owes = view.is_some_and(|view| view.owes.get(at) == Some(&true));
-            let late = view.filter(|view| owes && is_late(view));
+            let late = view.filter(|view| owes(view, at) && is_late(view));
             let state = match (view.map(|view| view.state), client.multiple.get()) {
                 (None | Some(State::Start), _) => "joined".to_owned(),
                 _ if late.is_some() => "late".to_owned(),
@@ -286,6 +295,16 @@ impl ShownRun {
         let last = self.signals.last();
         last.is_some_and(|signal| signal.station == self.members.clients.len())
     }
+}
+
+/// Whether all initial values are there.
+fn has_begun(view: &RunView) -> bool {
+    view.step.is_some_and(|step| step.sequence > 0)
+}
+
+/// Whether a client has not answered yet; the logic of the server always has.
+fn owes(view: &RunView, client: usize) -> bool {
+    view.owes.get(client) == Some(&true)
 }
 
 /// Whether those who have not answered yet are late.
@@ -312,6 +331,7 @@ fn hung(silent: Nanos) -> Told {
             "the server has shown nothing for {}; it waits for whoever reads its output, or hangs",
             silent.rounded()
         ),
+        is_hung: true,
     }
 }
 
@@ -321,6 +341,7 @@ fn told(view: Option<&RunView>) -> Told {
         state,
         cause,
         reason,
+        is_hung: false,
     };
     let Some(view) = view else {
         let reason = "the server begins".to_owned();
@@ -388,7 +409,7 @@ impl Exhibit for ShownRun {
         self.take_members(now);
         let step = self.view.as_ref().and_then(|view| view.step);
         self.pace.go_on(now, step);
-        let is_new = self.take_values(number);
+        let is_new = self.take_values(now, number);
         self.sheet.go_on(now, number, &self.signals);
         self.update_line(now, number, with_line) || is_new
     }
@@ -415,7 +436,7 @@ impl Exhibit for ShownRun {
             edges: None,
             age_ms: None,
             failsafe: false,
-            stale: false,
+            stale: row.flags & STALE != 0,
             forced: None,
         });
         let run = DriverJson {
@@ -428,6 +449,22 @@ impl Exhibit for ShownRun {
             signals: signals.collect(),
         };
         serde_json::to_string(&run).expect("texts and numbers")
+    }
+
+    fn stations(&self) -> Vec<Freshness<'_>> {
+        let is_hung = self.state.is_hung;
+        let clients = self.members.clients.iter().enumerate();
+        let freshness = clients.map(|(at, client)| {
+            let view = self.view.as_ref();
+            let is_late = view.is_some_and(|view| is_late(view) && owes(view, at));
+            Freshness {
+                name: &client.name,
+                // Data of virtual time have the age of the step.
+                age_ms: None,
+                stale: is_late || is_hung || view.is_none_or(|view| !has_begun(view)),
+            }
+        });
+        freshness.collect()
     }
 
     fn state(&self) -> LinkState {
@@ -454,3 +491,6 @@ impl Exhibit for ShownRun {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

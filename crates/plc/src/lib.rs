@@ -75,6 +75,12 @@ pub trait Program: Send {
     /// inputs read as 0 and missing outputs are dropped.
     fn scan(&mut self, scan: &mut Scan<'_>);
 
+    /// Whether a scan that takes seconds is a fault of the program. A scan that always ends at once was merely not let run by a
+    /// busy computer, and goes on when that lets it.
+    fn can_hang(&self) -> bool {
+        true
+    }
+
     /// The program's report in addition to its outputs, which can be read at any time while it runs.
     fn report(&self) -> Option<Arc<dyn Report>> {
         None

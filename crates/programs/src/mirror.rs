@@ -48,6 +48,10 @@ impl Program for Mirror {
         Some(Box::new(*self))
     }
 
+    fn can_hang(&self) -> bool {
+        false
+    }
+
     fn scan(&mut self, scan: &mut Scan<'_>) {
         let bytes = scan.inputs.len().min(scan.outputs.len());
         copy_frame(&mut scan.outputs[..bytes], &scan.inputs[..bytes]);

@@ -70,6 +70,8 @@ function paintBool(painting, data, top, bottom) {
   const busy = new Path2D();
   const lines = new Path2D();
   const level = (value) => (value > 0.5 ? top : bottom);
+  // Beside a time without a value nothing is known to have changed.
+  const isEdge = (i) => i >= 0 && !Number.isNaN(valueOf(data, i)) && !Number.isNaN(valueOf(data, i + 1));
   function segment(value, x, end) {
     if (Number.isNaN(value)) return;
     const y = level(value);
@@ -83,7 +85,7 @@ function paintBool(painting, data, top, bottom) {
     for (let i = first; i <= last; i++) {
       const end = i < last ? place(painting, times[i + 1]) : edge;
       segment(valueOf(data, i), x, end);
-      if (i < last && i >= 0) {
+      if (i < last && isEdge(i)) {
         lines.moveTo(end, top);
         lines.lineTo(end, bottom);
       }
@@ -97,7 +99,7 @@ function paintBool(painting, data, top, bottom) {
     for (let x = 0; x < width; x++) {
       const next = indexAt(times, from + (x + 1) * step, Math.max(index, 0), last + 1);
       const now = next > index + 1 ? "busy" : valueOf(data, next);
-      if (next === index + 1) {
+      if (next === index + 1 && isEdge(index)) {
         lines.moveTo(left + x + 0.5, top);
         lines.lineTo(left + x + 0.5, bottom);
       }

@@ -11,6 +11,7 @@ mod feed;
 mod guard;
 mod patient;
 mod room;
+mod seats;
 mod serve;
 mod site;
 mod token;

@@ -15,11 +15,12 @@ use hyper_util::rt::{TokioIo, TokioTimer};
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::tcp::{Address, bind, prepare};
 use tokio::net::TcpStream;
-use tokio::sync::{Semaphore, oneshot};
+use tokio::sync::oneshot;
 
 use crate::feed::Feed;
 use crate::guard::Guard;
 use crate::patient::Patient;
+use crate::seats::Seats;
 use crate::serve::{Hall, answer};
 use crate::site::Site;
 use crate::token;
@@ -35,15 +36,18 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub struct Limits {
     /// Connections at a time; further ones are closed at once.
     pub connections: usize,
+    /// Of these, those of one computer.
+    pub per_computer: usize,
     /// How long a request may take to arrive, and how long a viewer may read nothing.
     pub patience: Duration,
 }
 
 impl Default for Limits {
-    /// 512 connections, 20 s.
+    /// 512 connections, 256 of one computer, 20 s.
     fn default() -> Self {
         Self {
             connections: 512,
+            per_computer: 256,
             patience: Duration::from_secs(20),
         }
     }
@@ -181,13 +185,13 @@ async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else {
         return;
     };
-    let seats = Arc::new(Semaphore::new(limits.connections));
+    let mut seats = Seats::new(limits.connections, limits.per_computer);
     loop {
-        let Ok((stream, _)) = listener.accept().await else {
+        let Ok((stream, peer)) = listener.accept().await else {
             tokio::time::sleep(PAUSE).await;
             continue;
         };
-        let Ok(seat) = Arc::clone(&seats).try_acquire_owned() else {
+        let Some(seat) = seats.take(peer.ip()) else {
             continue;
         };
         // A viewer whose computer has gone without a word is not to be taken for one that is there.

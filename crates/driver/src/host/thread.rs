@@ -67,6 +67,8 @@ pub(crate) struct HostCounters {
     pub(crate) scan_counters: Arc<ScanCounters>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
+    /// Whether a scan that takes too long is a fault.
+    can_hang: bool,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::RecorderCounters>>,
     /// The clock of the line.
@@ -138,9 +140,8 @@ impl HostThread {
         scanned: Scanned,
         wall: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
-        let max_age = config.timing.max_age;
-        let interval = hosted.interval;
-        let report = hosted.program.report();
+        let (max_age, interval) = (config.timing.max_age, hosted.interval);
+        let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);
@@ -167,6 +168,7 @@ impl HostThread {
             scan_counters: Arc::clone(&cpu.scan_counters),
             fault: Arc::clone(&fault),
             scanning: Arc::clone(&scanning),
+            can_hang,
             report,
             record,
             clock: Arc::clone(&clock),
@@ -352,7 +354,8 @@ impl HostCounters {
     }
 
     pub(crate) fn fault(&self) -> Option<String> {
-        if let Some(span) = self.scanning.too_long(self.wall.now()) {
+        let too_long = self.scanning.too_long(self.wall.now());
+        if let Some(span) = too_long.filter(|_| self.can_hang) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
         }
@@ -446,3 +449,6 @@ fn scan_in_steps(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

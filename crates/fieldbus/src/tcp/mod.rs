@@ -2,10 +2,10 @@
 //! for many clients.
 
 mod address;
+mod browser;
 mod connect;
 mod dial;
 mod dialler;
-mod http;
 mod listen;
 mod resolve;
 mod server;
@@ -15,10 +15,10 @@ mod writers;
 use super::BusError;
 
 pub use address::{Address, Host};
+pub use browser::{IS_BROWSER, begins_like_browser};
 pub use connect::{connect, reach};
 pub use dial::{Call, Caller, Stream, dial};
 pub use dialler::Dialler;
-pub use http::{IS_HTTP, begins_like_http};
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};

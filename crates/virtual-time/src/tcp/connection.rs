@@ -4,7 +4,7 @@ use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{IS_HTTP, begins_like_http, close_gracefully, prepare};
+use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser, close_gracefully, prepare};
 
 use super::is_later;
 use crate::server::ToClient;
@@ -82,8 +82,8 @@ impl Connection {
     pub(super) fn frame(&mut self) -> Result<Option<&[u8]>, String> {
         let arrived = &self.buffer[self.start..self.end];
         let frame = wire::frame(arrived).map_err(|why| {
-            if begins_like_http(arrived) {
-                IS_HTTP.to_owned()
+            if begins_like_browser(arrived) {
+                IS_BROWSER.to_owned()
             } else {
                 why
             }

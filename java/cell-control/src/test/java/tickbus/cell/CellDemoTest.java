@@ -207,6 +207,31 @@ class CellDemoTest {
         }
     }
 
+    /** A machine that stands still begins again; one whose nets were killed meanwhile has failed. */
+    @Test
+    @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be suspended")
+    void aKilledProcessOfTheNetsIsNoStall() throws Exception {
+        Process demo = start();
+        try (BufferedReader out = demo.inputReader()) {
+            ProcessHandle nets = netsAfterACylinder(demo, out).get(0);
+            signal("STOP", demo);
+            nets.destroyForcibly();
+            // Longer than what counts as a stall.
+            Thread.sleep(1500);
+            signal("CONT", demo);
+            List<String> rest = out.lines().toList();
+            assertTrue(rest.get(rest.size() - 1).matches("demo-cell: failed reason=\"process \\d+ of the nets ended by itself with exit "
+                + "code 137.*"), rest.toString());
+            assertTrue(rest.stream().noneMatch(line -> line.contains("does not count")), rest.toString());
+        } finally {
+            demo.destroyForcibly();
+        }
+    }
+
+    private static void signal(String name, Process process) throws Exception {
+        assertEquals(0, new ProcessBuilder("kill", "-" + name, String.valueOf(process.pid())).start().waitFor());
+    }
+
     /** One cylinder a round, so that no round has a mishap. */
     @Test
     @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")

@@ -202,9 +202,17 @@ public final class NetBuilder {
             mistakes.add(kind + " number " + (others.size() + 1) + ": no name; expected one");
         } else if (!given.equals(given.strip()) || given.chars().anyMatch(Character::isISOControl)) {
             mistakes.add(kind + " '" + given + "': a blank at an end or a control character; expected a name without");
+        } else if (given.chars().anyMatch(NetBuilder::turnsText)) {
+            mistakes.add(kind + " number " + (others.size() + 1) + ": its name turns the direction of the text, so that another name is "
+                + "shown; expected one without such characters");
         } else if (others.containsKey(given)) {
             mistakes.add(kind + " " + given + ": given twice; expected a name of its own");
         }
+    }
+
+    /** Whether a character has no look of its own but turns what stands around it, as U+202E does. */
+    private static boolean turnsText(int c) {
+        return c == 0x61C || c == 0x200E || c == 0x200F || c >= 0x202A && c <= 0x202E || c >= 0x2066 && c <= 0x2069;
     }
 
     /** The net; a {@link NetException} with all mistakes if there are any. */

@@ -77,10 +77,11 @@ class PetriNetTest {
     void allMistakesOfABuilderAreReportedAtOnce() {
         NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("w").capacity(3).place("a", -1).place("a")
             .place("b", 5).capacity(2).input("a").transition("t").input("nowhere").input("a", 0).output("b").output("b")
-            .transition(" ").place("a\u0007").build());
+            .transition(" ").place("a\u0007").place("\u202egnp.exe").build());
         for (String one : new String[] {"call place(...) before capacity", "place a: -1 tokens", "place a: given twice",
             "place b: 5 tokens; expected at most its capacity of 2", "there is no transition yet",
-            "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name", "a control character"}) {
+            "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name", "a control character",
+            "place number 4: its name turns the direction of the text"}) {
             assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
         }
     }

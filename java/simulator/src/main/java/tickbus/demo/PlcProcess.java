@@ -31,6 +31,9 @@ public final class PlcProcess implements Plc {
     private static final long SECONDS_TO_DIE = 5;
     private static final int LAST_WORDS = 5;
 
+    /** A process that a signal ended has an exit code above this. */
+    private static final int SIGNALS = 128;
+
     /** How lines for people begin: with the name of the command. */
     private static final Pattern WORDS = Pattern.compile("[a-z]+: ");
 
@@ -218,6 +221,12 @@ public final class PlcProcess implements Plc {
         now.await("hangs at its end");
         throw new DemoFailure(name() + " of " + what + " ended by itself with exit code " + now.process.exitValue()
                 + lastWords());
+    }
+
+    /** Whether a signal of somebody else has ended its current life: a machine that stands still does not do that. */
+    public boolean endedBySignal() {
+        Life now = life;
+        return now != null && !now.killed && !now.process.isAlive() && now.process.exitValue() > SIGNALS;
     }
 
     private String lastWords() {

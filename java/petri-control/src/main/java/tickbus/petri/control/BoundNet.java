@@ -133,7 +133,10 @@ public final class BoundNet {
         return term(new Term(Term.Kind.CODE, "", null, 0, condition));
     }
 
-    /** What follows happens while the place is marked: its outputs are 0 otherwise. */
+    /**
+     * What follows happens while the place is marked: its outputs are 0 otherwise. If several marked places set one output, the
+     * one bound last gives its value.
+     */
     public BoundNet during(String place) {
         return at(Step.Moment.DURING, place);
     }

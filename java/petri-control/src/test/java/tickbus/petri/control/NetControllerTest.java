@@ -86,6 +86,17 @@ class NetControllerTest {
     }
 
     @Test
+    void ofTwoMarkedPlacesTheOneBoundLastGivesTheValue() {
+        PetriNet net = PetriNet.named("both").place("a", 1).place("b", 1).place("c").transition("t").input("a").output("c").build();
+        bind(BoundNet.of(net).when("t").on("Piece at stop").during("b").set("Pieces", 5).during("a").set("Pieces", 3));
+        scan();
+        assertEquals(3, machine.signal("Pieces").get());
+        machine.signal("Piece at stop").setBoolean(true);
+        scan();
+        assertEquals(5, machine.signal("Pieces").get());
+    }
+
+    @Test
     void aNetReadsSensorsAndSetsOutputsInOneExchange() {
         bind(bound());
         scan();

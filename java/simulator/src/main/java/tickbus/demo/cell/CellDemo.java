@@ -56,6 +56,8 @@ public final class CellDemo {
     private long roundNanos;
     /** What the last whole round came to; null in the first one. */
     private String lastRound;
+    /** Whether somebody has killed the nets, which no stall excuses. */
+    private boolean netsKilled;
 
     private CellDemo(CellOptions options, PrintStream out, List<String> notes) {
         this.options = options;
@@ -104,7 +106,7 @@ public final class CellDemo {
                 CellDemo demo = new CellDemo(options, out, List.copyOf(notes));
                 verdict = demo.play(guard, err);
                 long stall = demo.stalls.longestNanos();
-                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0 || notes.size() == ATTEMPTS - 1) {
+                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0 || demo.netsKilled || notes.size() == ATTEMPTS - 1) {
                     break;
                 }
                 notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
@@ -147,7 +149,11 @@ public final class CellDemo {
                 plc.start();
                 timeline.add(0, "nets", plc.name());
                 timeline.add(0, "reader", "on " + port);
-                operate(plc, guard);
+                try {
+                    operate(plc, guard);
+                } finally {
+                    netsKilled = plc.endedBySignal();
+                }
             }
             return lastRound == null ? check() : lastRound;
         } catch (IOException e) {

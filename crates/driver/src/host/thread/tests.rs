@@ -1,0 +1,75 @@
+//! A scan that takes too long.
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+
+use tickbus_base::time::Manual;
+use tickbus_plc::Scan;
+
+use crate::Host;
+
+use super::*;
+
+/// A program whose scan tells that it has begun, and ends when the test says so.
+struct Slow {
+    can_hang: bool,
+    begun: Sender<()>,
+    end: Receiver<()>,
+}
+
+impl Program for Slow {
+    fn name(&self) -> &'static str {
+        "slow"
+    }
+
+    fn input_bytes(&self) -> usize {
+        0
+    }
+
+    fn output_bytes(&self) -> usize {
+        0
+    }
+
+    fn can_hang(&self) -> bool {
+        self.can_hang
+    }
+
+    fn scan(&mut self, _scan: &mut Scan<'_>) {
+        // The test may have ended.
+        let _ = self.begun.send(());
+        let _ = self.end.recv();
+    }
+}
+
+/// What is told of a scan that takes 4 s.
+fn fault_of(can_hang: bool) -> Option<String> {
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
+                [[signal]]\nname = \"run\"\naddress = \"%QB0\"\n";
+    let config = Config::parse("driver.cfg", text).expect("right");
+    let clock = Arc::new(Manual::default());
+    let (begun, has_begun) = channel();
+    let (let_end, end) = channel();
+    let program = Box::new(Slow {
+        can_hang,
+        begun,
+        end,
+    });
+    let wall = Arc::clone(&clock) as Arc<dyn Clock>;
+    let host = Host::open(&config, program, Nanos::from_millis(1), wall).expect("a free port");
+    has_begun.recv().expect("the first scan");
+    clock.advance(Nanos::from_secs(4));
+    let fault = host.fault();
+    drop(let_end);
+    assert_eq!(host.close(), None);
+    fault
+}
+
+#[test]
+fn a_scan_of_seconds_is_a_fault_of_a_program_that_can_hang() {
+    let fault = fault_of(true).expect("it hangs");
+    assert!(fault.contains("has been in one scan for 4s"), "{fault}");
+}
+
+#[test]
+fn a_program_that_cannot_hang_was_merely_not_let_run() {
+    assert_eq!(fault_of(false), None);
+}

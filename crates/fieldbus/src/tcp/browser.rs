@@ -1,0 +1,89 @@
+//! Telling a web browser from a peer.
+
+/// Request lines of browsers begin so. The published grammar of dispatchers has a `CONNECT` of its own, and browsers send
+/// that to proxies only.
+const REQUESTS: [&[u8]; 9] = [
+    b"GET /",
+    b"POST /",
+    b"HEAD /",
+    b"OPTIONS /",
+    b"OPTIONS *",
+    b"PUT /",
+    b"DELETE /",
+    b"PATCH /",
+    b"TRACE /",
+];
+
+/// What every STUN message has behind its type and length.
+const STUN_COOKIE: [u8; 4] = [0x21, 0x12, 0xA4, 0x42];
+
+/// Why such a connection is closed, for a log or as an answer.
+pub const IS_BROWSER: &str = "this is an HTTP request or another message of a web browser, as a web page may send it without the user's knowledge; no web server is here";
+
+/// Whether the first bytes of a connection are those of a web browser: an HTTP request, the hello of TLS behind `https:` and
+/// `wss:`, or a message to a relay of WebRTC.
+///
+/// Any web site can have a browser open connections to ports of the same computer and its network, and chooses parts of what is
+/// sent: the body of a request, and the ticket in a hello. Ports without a password therefore close such a connection before
+/// they look further.
+pub fn begins_like_browser(bytes: &[u8]) -> bool {
+    REQUESTS.iter().any(|it| bytes.starts_with(it)) || is_tls_hello(bytes) || is_stun(bytes)
+}
+
+/// A handshake record that holds one `ClientHello` and nothing else.
+fn is_tls_hello(bytes: &[u8]) -> bool {
+    let &[0x16, 3, _, high, low, 1, 0, hello_high, hello_low, 3, ..] = bytes else {
+        return false;
+    };
+    let record = u16::from_be_bytes([high, low]);
+    record.checked_sub(4) == Some(u16::from_be_bytes([hello_high, hello_low]))
+}
+
+fn is_stun(bytes: &[u8]) -> bool {
+    bytes.first().is_some_and(|first| *first < 0x40) && bytes.get(4..8) == Some(&STUN_COOKIE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::begins_like_browser;
+
+    #[test]
+    fn requests_of_browsers_are_told_from_lines_and_records() {
+        for request in [
+            "GET / HTTP/1.1\r\n",
+            "POST /any?thing HTTP/1.1",
+            "OPTIONS * HTTP/1.1",
+            "PUT /",
+        ] {
+            assert!(begins_like_browser(request.as_bytes()), "{request}");
+        }
+        for line in [
+            "P Q1=24",
+            "CONNECT I1:P1:Q2",
+            "VR POST Q1",
+            "GET",
+            "",
+            "\0\0",
+        ] {
+            assert!(!begins_like_browser(line.as_bytes()), "{line}");
+        }
+    }
+
+    #[test]
+    fn what_browsers_send_with_https_and_webrtc_is_told_from_records() {
+        // As Chromium sends it to https://127.0.0.1:20070/, and with turn:127.0.0.1:20070?transport=tcp.
+        let hello = b"\x16\x03\x01\x07\x6b\x01\x00\x07\x67\x03\x03\x2a\xbd";
+        let allocate = b"\x00\x03\x00\x08\x21\x12\xa4\x42\x32\x4d\x58\x4d";
+        assert!(begins_like_browser(hello));
+        assert!(begins_like_browser(allocate));
+        for record in [
+            b"\x16\x03\x01\x07\x6b\x01\x00\x07\x68\x03\x03".as_slice(),
+            b"\x16\x03\x01\x00\x03\x01\x00\xff\xff\x03\x03",
+            b"\x16\x03\x01\x07",
+            b"\x00\x03\x00\x08\x21\x12\xa4\x43",
+            b"\x40\x03\x00\x08\x21\x12\xa4\x42",
+        ] {
+            assert!(!begins_like_browser(record), "{record:02x?}");
+        }
+    }
+}

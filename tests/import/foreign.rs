@@ -187,7 +187,11 @@ fn a_program_without_its_modules_gives_the_points_whose_type_its_tags_tell() {
             "Card.DATA.7 %IX8.2 BOOL",
         ]
     );
-    assert!(imported.text.contains("CH01.DATA level"), "{}", imported.text);
+    assert!(
+        imported.text.contains("CH01.DATA level"),
+        "{}",
+        imported.text
+    );
     let skipped: Vec<&str> = imported
         .skipped
         .iter()

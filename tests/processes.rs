@@ -376,6 +376,19 @@ fn what_is_wrong_is_told_before_anything_starts() {
         "{text}"
     );
     assert_eq!(code, Some(1));
+    // The file has no "role" that could be removed.
+    let hosting = save(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+         [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n",
+    );
+    let hosting = hosting.path().to_str().expect("a plain name");
+    let (text, code) = refused(&["plc", "mirror", "--config", hosting]);
+    assert!(
+        text.contains(":5:8: both ends of the bus \"loopback\" live in one process")
+            && text.contains("plc: failed mistakes=1"),
+        "{text}"
+    );
+    assert_eq!(code, Some(1));
 
     let both = save(&config(""));
     let both = both.path().to_str().expect("a plain name");

@@ -163,6 +163,82 @@ fn the_tag_table_of_studio_5000_gives_aliases_and_commented_points() {
     );
 }
 
+/// An alias of the whole input structure of a module that is not in the file.
+const CARD: &str = "<Tag Name=\"Card\" TagType=\"Alias\" AliasFor=\"Rack:1:I\"><Comments>\
+                    <Comment Operand=\".PT00\">lid</Comment><Comment Operand=\".CH01\">level</Comment>\
+                    <Comment Operand=\".PT00.DATA\">lid</Comment><Comment Operand=\".DATA.7\">door</Comment>\
+                    <Comment Operand=\".STATUS\">unknown</Comment></Comments></Tag>";
+
+#[test]
+fn a_program_without_its_modules_gives_the_points_whose_type_its_tags_tell() {
+    let tags = "<Tag Name=\"Valve\" TagType=\"Alias\" Radix=\"Float\" AliasFor=\"Rack:2:O.Ch03.Out\"/>\
+                <Tag Name=\"Level\" TagType=\"Alias\" AliasFor=\"Rack:3:I.Ch00.Data\"/>\
+                <Tag Name=\"Lid\" TagType=\"Alias\" AliasFor=\"rack:3:i.pt04.data\"/>\
+                <Tag Name=\"Count\" TagType=\"Alias\" Radix=\"Decimal\" AliasFor=\"Rack:4:I.Ctr00.Value\"/>";
+    let imported = read("Main_Program.L5X", &l5x("", &format!("{tags}{CARD}")));
+    assert_eq!(
+        lines(&imported),
+        [
+            "Valve %QD0 REAL",
+            "Level %ID0 REAL",
+            "Lid %IX8.0 BOOL",
+            "Card.PT00.DATA %IX8.1 BOOL",
+            "Card.CH01.DATA %ID4 REAL",
+            "Card.DATA.7 %IX8.2 BOOL",
+        ]
+    );
+    assert!(
+        imported.text.contains("CH01.DATA level"),
+        "{}",
+        imported.text
+    );
+    let skipped: Vec<&str> = imported
+        .skipped
+        .iter()
+        .map(|skipped| skipped.mistake.what.as_str())
+        .collect();
+    assert_eq!(
+        skipped,
+        [
+            "the type of \"Rack:4:I.Ctr00.Value\" stands nowhere in the file: skipped",
+            "of \"Rack:1:I\" only the points with a comment stand in the file: the others are skipped",
+        ]
+    );
+}
+
+#[test]
+fn the_table_of_studio_5000_tells_types_by_radix_and_by_comments_on_members_of_aliases() {
+    let text = "TYPE,SCOPE,NAME,DESCRIPTION,DATATYPE,SPECIFIER,ATTRIBUTES\n\
+                ALIAS,,Valve,\"\",\"\",\"Rack:2:O.Ch03.Out\",\"(RADIX := Float, ExternalAccess := Read/Write)\"\n\
+                ALIAS,,Card,\"\",\"\",\"Rack:1:I\",\"\"\n\
+                COMMENT,,Card,\"lid\",\"\",\"CARD.PT00\",\"\"\n\
+                COMMENT,,Card,\"level\",\"\",\"Card.CH01\",\"\"\n\
+                COMMENT,,Other,\"no module's\",\"\",\"Other.CH01\",\"\"\n\
+                ALIAS,Main,Drive,\"\",\"\",\"Drive:I\",\"(RADIX := Decimal)\"\n";
+    let imported = read("tags.csv", text);
+    assert_eq!(
+        lines(&imported),
+        [
+            "Valve %QD0 REAL",
+            "Card.PT00.DATA %IX4.0 BOOL",
+            "Card.CH01.DATA %ID0 REAL"
+        ]
+    );
+    assert!(imported.text.contains("PT00.DATA lid"), "{}", imported.text);
+    let skipped: Vec<&str> = imported
+        .skipped
+        .iter()
+        .map(|skipped| skipped.mistake.what.as_str())
+        .collect();
+    assert_eq!(
+        skipped,
+        [
+            "of \"Rack:1:I\" only the points with a comment stand in the table: the others are skipped",
+            "the type of \"Drive:I\" stands nowhere in the table: skipped",
+        ]
+    );
+}
+
 #[test]
 fn variables_of_twincat_without_a_place_get_one_in_order_behind_the_others() {
     let text = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\r\n<TcPlcObject Version=\"1.1.0.1\">\r\n  <GVL Name=\"IO\">\r\n    \
@@ -290,6 +366,19 @@ fn the_tag_tables_of_tia_portal_as_xml_are_read() {
     let imported = read("tags.xml", openness);
     assert_eq!(lines(&imported), ["Lamp %QX0.1 BOOL"]);
     assert!(imported.text.contains("# green"), "{}", imported.text);
+}
+
+#[test]
+fn a_tag_table_of_openness_with_constants_alone_has_no_inputs_and_outputs() {
+    let text = "<?xml version=\"1.0\"?><Document><Engineering version=\"V17\"/><SW.Tags.PlcTagTable ID=\"0\">\
+                <AttributeList><Name>Numbers</Name></AttributeList><ObjectList><SW.Tags.PlcUserConstant ID=\"1\">\
+                <AttributeList><DataTypeName>Int</DataTypeName><Name>Most</Name><Value>5</Value></AttributeList>\
+                </SW.Tags.PlcUserConstant></ObjectList></SW.Tags.PlcTagTable></Document>";
+    let told = told("Numbers.xml", text);
+    assert!(
+        told.contains("no variable in this file is an input or output"),
+        "{told}"
+    );
 }
 
 #[test]

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use super::layout;
 use super::timing::{Line, Timing, TimingKeys};
+use crate::loopback;
 use crate::{Options, PageOptions};
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
 use tickbus_fieldbus::faults::{self, Fault};
-use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
+use tickbus_fieldbus::{At, BusKind, Events, LifeSigns, Role, Written};
 use tickbus_image::signal::{Addressing, SignalTable, Station};
 use tickbus_record as record;
 
@@ -383,7 +384,13 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
     let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
     let read = if let Some(kind) = kind {
         let moved = asked.is_some_and(|asked| asked.moved);
-        let read = Options::read(&kind, role, moved, table);
+        // A loopback is no command's line, which is said below: of a role that only the command gave, nothing is.
+        let is_loopback = kind.as_text() == Some(<loopback::Options as BusKind>::NAME);
+        let as_written = match stated {
+            None if is_loopback => Role::default(),
+            _ => role,
+        };
+        let read = Options::read(&kind, as_written, moved, table);
         if let (Some((bus, _)), Some(_)) = (&read, asked)
             && bus.is_in_process()
         {

@@ -4,7 +4,10 @@
 //! them as they are, with comments on members and bits.
 
 use std::collections::{HashMap, HashSet};
-use std::fmt::Write as _;
+
+mod table;
+
+pub(crate) use table::table;
 
 use roxmltree::Node;
 
@@ -281,18 +284,33 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
                 points.list[index].bits.insert(bit.to_owned());
             }
             "BOOL".clone_into(&mut kind);
-        } else if kind.is_empty() && is_point(target) {
-            "BOOL".clone_into(&mut kind);
+        } else if kind.is_empty() {
+            let is_float = tag.attribute("Radix") == Some("Float");
+            kind_by_name(target, is_float)
+                .unwrap_or_default()
+                .clone_into(&mut kind);
         }
         if kind.is_empty() {
-            skipped.report(
-                at,
-                format!(
-                    "the type of \"{}\" stands nowhere in the file: skipped",
-                    shown(target)
-                ),
-                "export the whole controller, with its modules, or add a [[signal]] by hand",
-            );
+            let name = names.give(tag, name, &["Program"], "Name");
+            let comments = child(tag, "Comments");
+            let comments = comments
+                .into_iter()
+                .flat_map(|comments| named(comments, "Comment"));
+            let before = records.len();
+            let mut members = HashSet::new();
+            records.extend(comments.filter_map(|comment| {
+                let operand = comment.attribute("Operand").unwrap_or_default();
+                let (member, kind) = commented_point(operand)?;
+                let is_new = members.insert(member.to_ascii_uppercase());
+                is_new.then(|| {
+                    let texts = [&name, target].map(|whole| format!("{whole}{member}"));
+                    cells(
+                        [&texts[0], &texts[1], kind, &words(Some(comment))],
+                        [place(comment, "Operand"), at, at, at],
+                    )
+                })
+            }));
+            unknown(skipped, at, target, records.len() > before, "file");
             continue;
         }
         let name = &names.give(tag, name, &["Program"], "Name");
@@ -321,10 +339,51 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
     records
 }
 
-/// The data of one point of a module with a point in its path: `Local:1:I.Pt00.Data`.
-fn is_point(target: &str) -> bool {
-    let mut parts = target.rsplit('.');
-    parts.next() == Some("Data") && parts.next().is_some_and(|part| part.starts_with("Pt"))
+/// The type of a point whose module is not in the file, by its radix, or by the names in modules that have a structure
+/// for each point: `Local:1:I.Pt00.Data`, `Local:2:I.Ch03.Data`.
+fn kind_by_name(path: &str, is_float: bool) -> Option<&'static str> {
+    if bit(path).is_some() {
+        return Some("BOOL");
+    }
+    if is_float {
+        return Some("REAL");
+    }
+    let (point, member) = path.rsplit_once('.')?;
+    let (letters, number) = point.rsplit_once('.')?.1.split_at_checked(2)?;
+    if !member.eq_ignore_ascii_case("Data") || number.parse::<u8>().is_err() {
+        None
+    } else if letters.eq_ignore_ascii_case("Pt") {
+        Some("BOOL")
+    } else {
+        letters.eq_ignore_ascii_case("Ch").then_some("REAL")
+    }
+}
+
+/// The point at which a comment stands, and its type: `.PT00` and `.PT00.DATA` are one point.
+fn commented_point(operand: &str) -> Option<(String, &'static str)> {
+    let kind = |member: &str| kind_by_name(&format!("I{member}"), false);
+    if let Some(kind) = kind(operand) {
+        return Some((operand.to_owned(), kind));
+    }
+    let data = format!("{operand}.DATA");
+    kind(&data).map(|kind| (data, kind))
+}
+
+/// Reports an alias of a structure that is not in the `file`, of which the points with a comment may be known.
+fn unknown(skipped: &Collector<'_>, at: usize, target: &str, has_points: bool, file: &str) {
+    let target = shown(target);
+    let what = if has_points {
+        format!(
+            "of \"{target}\" only the points with a comment stand in the {file}: the others are skipped"
+        )
+    } else {
+        format!("the type of \"{target}\" stands nowhere in the {file}: skipped")
+    };
+    skipped.report(
+        at,
+        what,
+        "export the whole controller as L5X, with its modules, or add a [[signal]] by hand",
+    );
 }
 
 fn cells(texts: [&str; 4], at: [usize; 4]) -> Record {
@@ -334,108 +393,4 @@ fn cells(texts: [&str; 4], at: [usize; 4]) -> Record {
         at,
     });
     cells.collect()
-}
-
-/// The headings of Studio 5000's table of tags.
-const HEADINGS: [&str; 6] = [
-    "TYPE",
-    "SCOPE",
-    "NAME",
-    "DESCRIPTION",
-    "DATATYPE",
-    "SPECIFIER",
-];
-
-/// The points in a table of tags that Studio 5000 exported as CSV: aliases of points, and points with a comment. `None`
-/// for another table.
-pub(super) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
-    let is_heading = |record: &Record| {
-        let cells = record.iter().map(|cell| cell.text.as_str());
-        record.len() >= HEADINGS.len() && cells.zip(HEADINGS).all(|(cell, heading)| cell == heading)
-    };
-    let first = 1 + records.iter().take(50).position(is_heading)?;
-    let mut points = Vec::new();
-    let mut seen = HashSet::new();
-    // An alias gives a better name than the comment of the point.
-    for wanted in ["ALIAS", "COMMENT"] {
-        for record in &records[first..] {
-            let [of, scope, name, comment, kind, path] = HEADINGS_AT.map(|index| record.get(index));
-            let (Some(of), Some(scope), Some(name), Some(path)) = (of, scope, name, path) else {
-                continue;
-            };
-            if of.text != wanted || device::module_side(&path.text).is_none() {
-                continue;
-            }
-            let kind = kind.map_or("", |kind| kind.text.as_str());
-            let kind = match kind {
-                "" if bit(&path.text).is_some() || is_point(&path.text) => "BOOL",
-                kind => kind,
-            };
-            if kind.is_empty() {
-                skipped.report(
-                    path.at,
-                    format!(
-                        "the type of \"{}\" stands nowhere in the table: skipped",
-                        shown(&path.text)
-                    ),
-                    "export the controller as L5X, which has the structures of its modules",
-                );
-                continue;
-            }
-            if !seen.insert(path.text.to_ascii_uppercase()) && wanted == "COMMENT" {
-                continue;
-            }
-            let called = match (wanted, scope.text.as_str()) {
-                ("COMMENT", _) => path.text.clone(),
-                (_, "") => name.text.clone(),
-                (_, program) => format!("{program}.{}", name.text),
-            };
-            let comment = unescaped(comment.map_or("", |comment| comment.text.as_str()));
-            points.push(cells(
-                [&called, &path.text, kind, &comment],
-                [name.at, path.at, path.at, path.at],
-            ));
-        }
-    }
-    Some(points)
-}
-
-const HEADINGS_AT: [usize; HEADINGS.len()] = [0, 1, 2, 3, 4, 5];
-
-/// A description without Studio 5000's escapes: `$N` is a line end, `$Q` a quotation mark, `$00E9` a character.
-fn unescaped(text: &str) -> String {
-    let mut plain = String::new();
-    let mut rest = text;
-    while let Some((before, after)) = rest.split_once('$') {
-        plain.push_str(before);
-        let code = after
-            .get(..4)
-            .and_then(|code| u32::from_str_radix(code, 16).ok());
-        if let Some(c) = code.and_then(char::from_u32) {
-            plain.push(c);
-            rest = &after[4..];
-            continue;
-        }
-        let letter = after.chars().next();
-        match letter {
-            Some('N' | 'n' | 'R' | 'r' | 'L' | 'l' | 'T' | 't') => plain.push(' '),
-            Some('Q' | 'q') => plain.push('"'),
-            Some(c) => plain.push(c),
-            None => {}
-        }
-        rest = &after[letter.map_or(0, char::len_utf8)..];
-    }
-    write!(plain, "{rest}").expect("a String takes all");
-    plain.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn escapes_of_descriptions_are_read() {
-        assert_eq!(unescaped("a$Nb $Qc$Q 5$$ $00E9$'"), "a b \"c\" 5$ é'");
-        assert_eq!(unescaped("$"), "");
-    }
 }

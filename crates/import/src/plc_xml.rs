@@ -55,7 +55,9 @@ pub(super) fn read(file: &str, text: &str, skipped: &Collector<'_>) -> Result<Pr
         "RSLogix5000Content" => (logix::l5x(root, skipped), Origin::Logix),
         "TcPlcObject" => (twincat(root, text), Origin::Project),
         "Tagtable" | "Tagtables" => (tag_table(root), Origin::Project),
-        _ if named(root, "SW.Tags.PlcTag").next().is_some() => (openness(root), Origin::Project),
+        "Document" if named(root, "SW.Tags.PlcTagTable").next().is_some() => {
+            (openness(root), Origin::Project)
+        }
         other => {
             return Err(Mistakes::of_file(
                 file,

@@ -3,14 +3,18 @@
 //! | room | what lives there |
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
+//! | [`net`] | TCP sockets, of the operating system or simulated |
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
+//! | [`simulation`] | what a whole simulated run puts in the operating system's place |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 
 mod mistake;
+pub mod net;
 pub mod os;
 mod percent;
 mod quick_clock;
+pub mod simulation;
 pub mod statistics;
 pub mod time;
 pub mod toml_text;

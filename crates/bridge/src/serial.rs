@@ -71,7 +71,7 @@ pub fn run(
 ) -> Result<(), String> {
     let port = device.open()?;
     let no_wait = |error: io::Error| format!("the system cannot wait for the port: {error}");
-    let mut set = PollSet::new(hosting.stop).map_err(no_wait)?;
+    let mut set = PollSet::new(hosting.stop);
     let mut host = Host {
         bridge,
         port: Some(Watched::new(&mut set, PORT, port).map_err(no_wait)?),

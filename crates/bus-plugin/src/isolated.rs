@@ -160,7 +160,7 @@ impl Helper {
         let (memory, file) = SharedMemory::create(memory_bytes(&bus.setup)).map_err(cannot)?;
         let (line, theirs) = UnixStream::pair().map_err(cannot)?;
         line.set_nonblocking(true).map_err(cannot)?;
-        let mut set = PollSet::new(stop).map_err(cannot)?;
+        let mut set = PollSet::new(stop);
         let interest = Interest::Read;
         set.add(0, &line, interest).map_err(cannot)?;
         let clock = Monotonic::shared();

@@ -1,8 +1,9 @@
 //! The end that listens: at each address it serves one peer at a time.
 
 use std::io;
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::SocketAddr;
 
+use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{
@@ -65,7 +66,7 @@ pub(super) fn listen(
     for server in &servers {
         lines.opening(server.line, &server.waiting, port);
     }
-    let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    let mut set = PollSet::new(stop);
     port.begin_to_look(port.clock().now());
     while !stop.is_stopped() {
         turn(&mut servers, &mut lines, &mut set, port)?;
@@ -213,7 +214,7 @@ impl Server<'_> {
         if let Some((_, served)) = &self.served {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();
-                if stream.set_nonblocking(true).is_ok() {
+                if stream.set_nonblocking().is_ok() {
                     close_gracefully(&stream);
                 }
                 turn_away(peer, served, port);
@@ -229,10 +230,12 @@ impl Server<'_> {
         }
         let patience = Session::patience(self.terms.max_age);
         // If it cannot be prepared, it is gone already.
-        if let Err(error) = prepare(&stream, patience) {
+        if let Err(error) = prepare(stream.os(), patience) {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
         }
+        // What it has sent waits for the next look, and may have waited as long as its connection.
+        port.look_leaves_some();
         let connection = Connection::new(peer, self.terms, port);
         let reason = format!("{peer} has connected; waiting for its first record");
         lines.opening(self.line, &reason, port);

@@ -103,7 +103,7 @@ impl Listener {
     ///
     /// The system cannot wait for sockets.
     pub fn run(self, dispatcher: &mut Dispatcher, hosting: Hosting<'_>) -> io::Result<()> {
-        let mut set = PollSet::new(hosting.stop)?;
+        let mut set = PollSet::new(hosting.stop);
         set.add(LISTENER, &self.socket, Interest::Read)?;
         let mut host = Host {
             dispatcher,

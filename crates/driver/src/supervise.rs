@@ -3,11 +3,10 @@
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
-use std::thread::JoinHandle;
 
 use log::Level;
 use tickbus_base::os::wake_on_time;
+use tickbus_base::simulation::Thread;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
 use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};
@@ -27,9 +26,8 @@ pub(super) struct BusThread {
     close_timeout: Nanos,
     /// How the fail-safe values are sent at the end; `None` if the peer keeps what it has.
     farewell: Option<Farewell>,
-    /// Disconnected when the thread ends.
-    ended: Receiver<()>,
-    thread: Option<JoinHandle<()>>,
+    clock: Arc<dyn Clock>,
+    thread: Option<Thread>,
 }
 
 impl BusThread {
@@ -47,33 +45,28 @@ impl BusThread {
             port.set_while_stale(timing.while_stale);
         }
         // A clock that stands still between two calls brings no further cycle.
-        let is_due = timing.at_close == Outputs::FailSafe && port.clock().is_steady();
+        let is_due = timing.at_close == Outputs::FailSafe && port.clock().passes_alone();
         let farewell = (is_due && cycles > 0).then(|| port.farewell(cycles));
         let reconnect = timing.reconnect.clone();
         let stop = Stop::new();
         let close_timeout = bus.close_timeout();
-        let (end, ended) = mpsc::channel();
-        let thread = std::thread::Builder::new()
-            .name(format!("bus {name}"))
-            .spawn({
-                let (stop, status) = (stop.clone(), status.clone());
-                move || {
-                    let _end: Sender<()> = end;
-                    // Dropped before `_end`: freeing what a bus holds, such as unloading a library, may take
-                    // time, and closing waits for `_end` with a limit.
-                    let (mut bus, mut port) = (bus, port);
-                    let clock = Arc::clone(port.clock());
-                    wake_on_time();
-                    serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
-                }
-            })?;
+        let clock = Arc::clone(port.clock());
+        let thread = Thread::spawn(&*clock, &format!("bus {name}"), {
+            let (stop, status, clock) = (stop.clone(), status.clone(), Arc::clone(&clock));
+            move || {
+                // Freeing what a bus holds, such as unloading a library, may take time: the thread ends after that.
+                let (mut bus, mut port) = (bus, port);
+                wake_on_time();
+                serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
+            }
+        })?;
         Ok(Self {
             stop,
             name: name.to_owned(),
             status,
             close_timeout,
             farewell,
-            ended,
+            clock,
             thread: Some(thread),
         })
     }
@@ -90,7 +83,7 @@ impl BusThread {
         farewell.begin();
         self.stop.wake();
         let limit = self.status.max_age().min(LONGEST_FAREWELL);
-        if !farewell.wait(limit.to_duration()) {
+        if !farewell.wait(&*self.clock, limit) {
             // The log has told of a line that does not run, or tells it now.
             let is_news =
                 link.state == LinkState::Running && self.status.state() == LinkState::Running;
@@ -109,18 +102,16 @@ impl Drop for BusThread {
     fn drop(&mut self) {
         self.take_leave();
         self.stop.stop();
-        if self.ended.recv_timeout(self.close_timeout.to_duration()) == Err(Timeout) {
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        if !thread.join_within(&*self.clock, self.close_timeout) {
             log::error!(
                 "driver \"{}\": the bus did not end within {}, and its thread is left behind ({})",
                 self.name,
                 self.close_timeout,
                 self.status.link().reason
             );
-            return;
-        }
-        if let Some(thread) = self.thread.take() {
-            // Its panics are caught and recorded on the thread itself.
-            let _ = thread.join();
         }
     }
 }

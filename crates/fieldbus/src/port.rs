@@ -209,10 +209,10 @@ impl Port {
     /// The bus begins to read from a line that is new at `now`, by a loop that promises to [look](Self::look_at_line) at it
     /// until [`next_look`](Self::next_look) even if nothing comes.
     ///
-    /// On a clock that does not [advance by itself](Clock::is_steady) nothing is promised: there, time does not pass while
+    /// On a clock that does not [advance by itself](Clock::passes_alone) nothing is promised: there, time does not pass while
     /// the process stands still.
     pub fn begin_to_look(&mut self, now: Nanos) {
-        if self.clock.is_steady() {
+        if self.clock.passes_alone() {
             self.looks.begin(now);
         }
     }
@@ -227,6 +227,11 @@ impl Port {
     /// This look leaves some of what waits to the next one.
     pub fn look_leaves_some(&mut self) {
         self.looks.leaves_some();
+    }
+
+    /// What the bus hands in next has come at `at`, for a bus that knows that and does not [look](Self::look_at_line).
+    pub fn came_at(&mut self, at: Nanos) {
+        self.looks.came(at);
     }
 
     /// When the bus has to look at its line even if nothing comes; [`Nanos::MAX`] for never.

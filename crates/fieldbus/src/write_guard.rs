@@ -27,6 +27,11 @@ impl WriteGuard {
         }
     }
 
+    /// Whether a PLC is named.
+    pub const fn names_one(&self) -> bool {
+        self.write_to.is_some()
+    }
+
     /// Whether the current PLC may be written to.
     pub const fn may_write(&self) -> bool {
         self.may_write

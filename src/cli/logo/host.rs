@@ -45,7 +45,7 @@ pub(super) fn run(
     let mut host = Host {
         terminal: Terminal::new(controller),
         client,
-        set: PollSet::new(hosting.stop)?,
+        set: PollSet::new(hosting.stop),
         dialler: Dialler::new(hosting.address, hosting.stop),
         stream: None,
         interest: Interest::Read,

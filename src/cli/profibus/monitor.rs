@@ -119,7 +119,7 @@ fn watch(
     let clock = Monotonic::shared();
     let begun = clock.now();
     let end = arguments.duration.map_or(Nanos::MAX, |span| begun + span);
-    let mut set = PollSet::new(stop).map_err(Ending::Port)?;
+    let mut set = PollSet::new(stop);
     set.add(0, port, Interest::Read).map_err(Ending::Port)?;
     let (mut marks, mut monitor) = (Marks::default(), Monitor::new(arguments.baud));
     let (mut next, mut told) = (begun + EVERY, String::new());

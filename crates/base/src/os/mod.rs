@@ -16,6 +16,7 @@ mod own_file;
 mod peer_silence;
 mod poll;
 mod poll_set;
+mod pollable;
 #[cfg(unix)]
 mod process_watch;
 #[cfg(unix)]
@@ -45,6 +46,7 @@ pub use own_file::own_file;
 pub use peer_silence::peer_silence;
 pub use poll::Interest;
 pub use poll_set::{PollSet, Ready};
+pub use pollable::{Pollable, Source};
 #[cfg(unix)]
 pub use process_watch::ProcessWatch;
 #[cfg(unix)]

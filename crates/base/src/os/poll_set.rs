@@ -8,6 +8,7 @@ use std::time::Duration;
 use rustix::fd::AsFd;
 
 use super::poll::{Interest, wake};
+use super::pollable::{Pollable, Source};
 use crate::time::{Clock, Nanos, Stop};
 
 /// Lets one thread wait for sockets, for a deadline, and for its [`Stop`], whichever is first.
@@ -16,9 +17,17 @@ use crate::time::{Clock, Nanos, Stop};
 /// token.
 pub struct PollSet {
     stop: Stop,
+    /// `None` until it is needed: a simulation has none.
+    system: Option<System>,
+    /// Sockets of a simulation: key, identity, and what to wait for.
+    simulated: Vec<(usize, u64, Interest)>,
+    ready: Vec<Ready>,
+}
+
+/// The operating system's side of a set.
+struct System {
     wake: wake::Receiver,
     watch: watch::Watch,
-    ready: Vec<Ready>,
 }
 
 impl fmt::Debug for PollSet {
@@ -41,24 +50,33 @@ pub struct Ready {
 /// The key of the socket by which other threads wake this one.
 const WAKE: usize = usize::MAX;
 
-impl PollSet {
-    /// An empty set that `stop` wakes.
-    ///
-    /// # Errors
-    ///
-    /// The system has no more sockets.
-    pub fn new(stop: &Stop) -> io::Result<Self> {
+impl System {
+    fn new(stop: &Stop) -> io::Result<Self> {
         let (sender, wake) = wake::pair()?;
         let mut watch = watch::Watch::new()?;
         watch.add(WAKE, &wake, Interest::Read)?;
         // If the buffer is full, a wake-up is already pending; nothing else can fail within one pair.
         stop.set_waker(Some(Arc::new(move || drop(sender.send()))));
-        Ok(Self {
+        Ok(Self { wake, watch })
+    }
+}
+
+impl PollSet {
+    /// An empty set that `stop` wakes.
+    pub fn new(stop: &Stop) -> Self {
+        Self {
             stop: stop.clone(),
-            wake,
-            watch,
+            system: None,
+            simulated: Vec::new(),
             ready: Vec::new(),
-        })
+        }
+    }
+
+    fn system(&mut self) -> io::Result<&mut System> {
+        if self.system.is_none() {
+            self.system = Some(System::new(&self.stop)?);
+        }
+        Ok(self.system.as_mut().expect("it was just made"))
     }
 
     /// Adds a socket. The caller keeps it, and must [remove](Self::remove) it before closing it.
@@ -70,9 +88,20 @@ impl PollSet {
     /// # Panics
     ///
     /// When `key` is `usize::MAX`, which the set uses itself.
-    pub fn add(&mut self, key: usize, socket: &impl AsFd, interest: Interest) -> io::Result<()> {
+    pub fn add(
+        &mut self,
+        key: usize,
+        socket: &impl Pollable,
+        interest: Interest,
+    ) -> io::Result<()> {
         assert_ne!(key, WAKE, "a key that is taken");
-        self.watch.add(key, socket, interest)
+        match socket.source() {
+            Source::Os(socket) => self.system()?.watch.add(key, &socket, interest),
+            Source::Simulated(identity) => {
+                self.simulated.push((key, identity, interest));
+                Ok(())
+            }
+        }
     }
 
     /// Changes what the set waits for on a socket.
@@ -80,13 +109,32 @@ impl PollSet {
     /// # Errors
     ///
     /// The system cannot wait for it.
-    pub fn change(&mut self, key: usize, socket: &impl AsFd, interest: Interest) -> io::Result<()> {
-        self.watch.change(key, socket, interest)
+    pub fn change(
+        &mut self,
+        key: usize,
+        socket: &impl Pollable,
+        interest: Interest,
+    ) -> io::Result<()> {
+        match socket.source() {
+            Source::Os(socket) => self.system()?.watch.change(key, &socket, interest),
+            Source::Simulated(_) => {
+                let places = self.simulated.iter_mut().filter(|place| place.0 == key);
+                places.for_each(|place| place.2 = interest);
+                Ok(())
+            }
+        }
     }
 
     /// Removes a socket.
-    pub fn remove(&mut self, key: usize, socket: &impl AsFd) {
-        self.watch.remove(key, socket);
+    pub fn remove(&mut self, key: usize, socket: &impl Pollable) {
+        match socket.source() {
+            Source::Os(socket) => {
+                if let Some(system) = &mut self.system {
+                    system.watch.remove(key, &socket);
+                }
+            }
+            Source::Simulated(_) => self.simulated.retain(|place| place.0 != key),
+        }
         self.ready.retain(|ready| ready.key != key);
     }
 
@@ -98,7 +146,13 @@ impl PollSet {
     /// The system cannot wait.
     pub fn wait(&mut self, clock: &dyn Clock, deadline: Nanos) -> io::Result<()> {
         self.ready.clear();
-        let (watch, ready, stop) = (&mut self.watch, &mut self.ready, &self.stop);
+        if let Some(simulation) = clock.simulation() {
+            simulation.poll(&self.simulated, deadline, &self.stop, &mut self.ready);
+            return Ok(());
+        }
+        self.system()?;
+        let (system, ready, stop) = (&mut self.system, &mut self.ready, &self.stop);
+        let System { wake, watch } = system.as_mut().expect("it was just made");
         let mut waited = Ok(());
         clock.wait_with(deadline, stop, &mut |patience| {
             // The token may have been woken before the waker was set; no wake-up would follow.
@@ -110,9 +164,9 @@ impl PollSet {
             waited = watch.wait(patience, ready);
         });
         waited?;
-        if let Some(woken) = self.ready.iter().position(|ready| ready.key == WAKE) {
-            self.ready.swap_remove(woken);
-            self.wake.drain();
+        if let Some(woken) = ready.iter().position(|ready| ready.key == WAKE) {
+            ready.swap_remove(woken);
+            wake.drain();
         }
         Ok(())
     }
@@ -125,7 +179,9 @@ impl PollSet {
 
 impl Drop for PollSet {
     fn drop(&mut self) {
-        self.stop.set_waker(None);
+        if self.system.is_some() {
+            self.stop.set_waker(None);
+        }
     }
 }
 
@@ -362,7 +418,7 @@ mod tests {
     fn those_that_are_ready_are_told_and_no_others() {
         let mut pairs = pairs(100);
         let (clock, stop) = (Manual::new(), Stop::new());
-        let mut set = PollSet::new(&stop).expect("sockets");
+        let mut set = PollSet::new(&stop);
         for (key, (_, server)) in pairs.iter().enumerate() {
             set.add(key, server, Interest::Read).expect("it is open");
         }
@@ -395,7 +451,7 @@ mod tests {
         let mut pairs = pairs(1);
         let (client, server) = &mut pairs[0];
         let (clock, stop) = (Manual::new(), Stop::new());
-        let mut set = PollSet::new(&stop).expect("sockets");
+        let mut set = PollSet::new(&stop);
         set.add(0, server, Interest::Read).expect("it is open");
         client.write_all(&[1]).expect("the server is there");
         set.wait(&*clock, Nanos::MAX).expect("it waits");
@@ -413,7 +469,7 @@ mod tests {
         let (clock, stop) = (Manual::new(), Stop::new());
         thread::scope(|scope| {
             let waiting = scope.spawn(|| {
-                let mut set = PollSet::new(&stop).expect("sockets");
+                let mut set = PollSet::new(&stop);
                 set.add(0, &pairs[0].1, Interest::Read).expect("it is open");
                 while clock.now() < Nanos(10) {
                     set.wait(&*clock, Nanos(10)).expect("it waits");
@@ -433,7 +489,7 @@ mod tests {
         let clock = Monotonic::shared();
         let stop = Stop::new();
         stop.wake();
-        let mut set = PollSet::new(&stop).expect("sockets");
+        let mut set = PollSet::new(&stop);
         set.wait(&*clock, Nanos::MAX).expect("woken before");
         drop(set);
         let waiting = thread::spawn({
@@ -441,7 +497,7 @@ mod tests {
             let stop = stop.clone();
             move || {
                 // A set cannot move to another thread.
-                let mut set = PollSet::new(&stop).expect("sockets");
+                let mut set = PollSet::new(&stop);
                 set.wait(&*clock, Nanos::MAX)
             }
         });
@@ -452,7 +508,7 @@ mod tests {
     #[test]
     fn a_deadline_ends_a_wait() {
         let clock = Monotonic::shared();
-        let mut set = PollSet::new(&Stop::new()).expect("sockets");
+        let mut set = PollSet::new(&Stop::new());
         // A short wait, and one that is long enough to end early.
         for span in [2, 102] {
             let deadline = clock.now() + Nanos::from_millis(span);

@@ -6,6 +6,7 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::stop::Shared;
+use crate::simulation::Simulation;
 use super::{Nanos, Stop};
 
 /// A source of time that can also be waited on.
@@ -27,6 +28,16 @@ pub trait Clock: Send + Sync + fmt::Debug {
     /// told by a counter.
     fn is_steady(&self) -> bool {
         false
+    }
+
+    /// Whether its time passes without being set, by whoever ticks, between two calls of the simulation.
+    fn passes_alone(&self) -> bool {
+        self.is_steady()
+    }
+
+    /// What replaces the operating system where a whole run is simulated.
+    fn simulation(&self) -> Option<&dyn Simulation> {
+        None
     }
 
     /// The date at which this clock read zero, as the time since 1 January 1970 UTC; `None` for a clock

@@ -59,7 +59,7 @@ enum Heard {
 ///
 /// The system cannot wait for sockets, or has no more threads.
 pub fn run(mapping: &mut Mapping, hosting: Hosting<'_>) -> io::Result<()> {
-    let set = PollSet::new(hosting.stop)?;
+    let set = PollSet::new(hosting.stop);
     let broker = Broker::call(mapping, &hosting)?;
     let mut host = Between {
         link: Link::new(&mapping.map().dispatcher, hosting.stop),

@@ -87,7 +87,8 @@ impl Client {
     fn stream(&self, port: &mut Port, stop: &Stop) -> Result<Option<TcpStream>, BusError> {
         let patience = port.max_age().times(SILENCE);
         let reached = tcp::connect(&self.options.url.address, patience, port, stop)?;
-        Ok(reached.map(|(stream, _)| stream))
+        let stream = reached.map(|(stream, _)| stream.into_os());
+        stream.transpose().map_err(|error| tcp::no_wait(&error))
     }
 
     /// The server's endpoint that matches the options.

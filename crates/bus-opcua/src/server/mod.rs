@@ -203,8 +203,9 @@ impl Free for Server {
         let Some((listener, bound)) = tcp::listen(&self.options.address, port, stop)? else {
             return Ok(());
         };
-        // All connections inherit this: an answer is sent at once, without waiting for more.
         let refused = |error: std::io::Error| tcp::no_wait(&error);
+        let listener = listener.into_os().map_err(refused)?;
+        // All connections inherit this: an answer is sent at once, without waiting for more.
         SockRef::from(&listener)
             .set_tcp_nodelay(true)
             .map_err(refused)?;

@@ -20,6 +20,10 @@ const UNTOLD: u8 = 5;
 /// When a station is tried again after the CPU refused something of it.
 const RETRY: Nanos = Nanos::from_secs(1);
 
+/// When a CPU that was not asked for its identity is asked after all, if nothing is written to it for that reason: the
+/// connections that broke at the question may have broken with the cable.
+const ASK_AGAIN: Nanos = Nanos::from_secs(5);
+
 /// One connection.
 pub(super) struct Connection<'a> {
     bus: &'a mut S7Client,
@@ -29,6 +33,8 @@ pub(super) struct Connection<'a> {
     has_identity: bool,
     /// When to ask the CPU for its operating state next; `None` if it does not report it.
     state: Option<Nanos>,
+    /// When to connect again, to ask for the identity that was not asked for.
+    ask_again: Option<Nanos>,
     /// A cycle became due while the question was pending.
     is_due: bool,
     /// For the frames of the cycle under way.
@@ -63,6 +69,7 @@ impl<'a> Connection<'a> {
             pace: Pace::new(now, bus.cycle),
             has_identity: false,
             state: None,
+            ask_again: None,
             is_due: false,
             receipt: None,
             stations: (0..port.stations()).map(station).collect(),
@@ -89,6 +96,7 @@ impl<'a> Connection<'a> {
         if self.state.is_none() {
             self.presume_run(now, port);
         }
+        let was_asked = identity.is_some();
         let line = identity.map(|identity| identity.line()).unwrap_or_default();
         let line = if line.is_empty() {
             let called = self.bus.options.called;
@@ -99,6 +107,8 @@ impl<'a> Connection<'a> {
         let all = 0..port.stations();
         let may_write = self.bus.guard.meet(port, all, &line);
         self.session.allow(may_write);
+        let is_missed = !was_asked && !may_write && self.bus.guard.names_one();
+        self.ask_again = is_missed.then(|| now + ASK_AGAIN);
         self.has_identity = true;
         port.tell("pdu", &length.to_string());
         port.running(&format!("connected with {}, {line}", self.peer));
@@ -305,12 +315,19 @@ impl Caller for Connection<'_> {
     }
 
     fn check(&mut self, now: Nanos, _port: &mut Port) -> Result<(), BusError> {
+        if self.ask_again.is_some_and(|due| due <= now) {
+            let peer = self.peer;
+            return Err(BusError::Link(format!(
+                "{peer} was not asked which CPU it is, because connections broke at that question; it is asked again"
+            )));
+        }
         let checked = self.session.check(now);
         checked.map_err(|end| end.into_error(self.peer))
     }
 
     fn deadline(&self, _port: &Port) -> Nanos {
-        let mut deadline = self.session.deadline();
+        let again = self.ask_again.unwrap_or(Nanos::MAX);
+        let mut deadline = self.session.deadline().min(again);
         if self.has_identity {
             deadline = deadline.min(self.pace.due());
         }

@@ -2,9 +2,7 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::thread::JoinHandle;
 
 use crate::recording::ScanRecorder;
 use crate::supervise::{BusThread, panic_text};
@@ -14,6 +12,7 @@ use crate::view::View;
 use crate::watch::{Figures, Watch};
 use crate::{DriverError, SlotMap};
 use tickbus_base::os::{dropped_log_lines, wake_on_time};
+use tickbus_base::simulation::Thread;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::{Config, Timing};
@@ -81,14 +80,12 @@ pub(crate) struct HostCounters {
 #[derive(Debug)]
 pub(crate) struct HostThread {
     pub(crate) counters: HostCounters,
-    /// Disconnected when the thread ends.
-    ended: Receiver<()>,
     pub(crate) status: LinkStatus,
     pub(crate) board: Arc<FaultBoard>,
     /// Looks at the program's image, until somebody takes it.
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
-    thread: Option<JoinHandle<()>>,
+    thread: Option<Thread>,
     #[expect(dead_code, reason = "kept for its drop")]
     bus: Option<BusThread>,
 }
@@ -214,9 +211,7 @@ impl HostThread {
                     (stop, None, Box::new(scans))
                 }
             };
-        let (end, ended) = mpsc::channel();
-        let spawned = std::thread::Builder::new().name(name).spawn(move || {
-            let _end: Sender<()> = end;
+        let spawned = Thread::spawn(&*counters.wall, &name, move || {
             let result = catch_unwind(AssertUnwindSafe(&mut scans));
             scanning.set(None);
             // What it holds may take its leave of the peer, which closing waits for.
@@ -235,7 +230,6 @@ impl HostThread {
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
             counters,
-            ended,
             status,
             board,
             watch: Mutex::new(watch),
@@ -374,20 +368,18 @@ impl HostThread {
 
     /// Whether the program is scanned no more, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
-        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+        !self.thread.as_ref().is_some_and(Thread::is_running)
     }
 
     /// Stops scanning. Returns why the program did not end, if so: its thread is then left behind.
     pub(crate) fn end(&mut self) -> Option<String> {
         let thread = self.thread.take()?;
         self.stop.stop();
-        if self.ended.recv_timeout(LONGEST_SCAN.to_duration()) == Err(Timeout) {
+        if !thread.join_within(&*self.counters.wall, LONGEST_SCAN) {
             let why = format!("the PLC program's scan did not end within {LONGEST_SCAN}");
             log::error!("{why}, and its thread is left behind");
             return Some(why);
         }
-        // Its panics are caught and recorded on the thread itself.
-        let _ = thread.join();
         None
     }
 }

@@ -25,6 +25,8 @@ struct Lane {
     frames: Vec<Vec<u8>>,
     /// Per station, whether the other end has yet to take its frame.
     waiting: Vec<bool>,
+    /// When the frames were offered.
+    offered_at: Nanos,
 }
 
 fn lane(role: Role) -> usize {
@@ -120,6 +122,7 @@ impl End {
             waiting: vec![false; frames.len()],
             sizes,
             frames,
+            offered_at: Nanos::ZERO,
         };
         drop(locked);
         Ok(Self {
@@ -144,6 +147,11 @@ impl End {
         }
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
+        // Time passes between the cycles of a free line, in which the process may stand still. On simulation time the other
+        // end's last values are those of now.
+        if port.clock().passes_alone() {
+            port.came_at(theirs.offered_at.min(now));
+        }
         port.together(|port| {
             let frames = theirs.frames.iter().zip(&mut theirs.waiting);
             for (station, (frame, waiting)) in frames.enumerate() {
@@ -172,6 +180,7 @@ impl End {
             port.sent(&receipt);
         }
         if let Some(mut frames) = port.take_all(now) {
+            mine.offered_at = now;
             let lanes = mine.frames.iter_mut().zip(&mut mine.waiting);
             for (station, (frame, waiting)) in lanes.enumerate() {
                 frame.copy_from_slice(frames.frame(station));

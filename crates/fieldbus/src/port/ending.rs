@@ -3,8 +3,10 @@
 use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
-use std::time::Duration;
+use std::sync::mpsc::{self, Receiver, Sender};
+
+use tickbus_base::simulation::wait_for;
+use tickbus_base::time::{Clock, Nanos};
 
 use super::{Port, Receipt};
 
@@ -51,8 +53,8 @@ impl Farewell {
 
     /// Waits until the peers of all stations have these values, or the line has ended; at most for `limit`. Returns
     /// whether that was in time.
-    pub fn wait(&self, limit: Duration) -> bool {
-        self.done.recv_timeout(limit) != Err(RecvTimeoutError::Timeout)
+    pub fn wait(&self, clock: &dyn Clock, limit: Nanos) -> bool {
+        wait_for(clock, &self.done, limit)
     }
 }
 
@@ -263,11 +265,11 @@ mod tests {
         assert!(farewell.is_due(), "the second one takes values");
         farewell.begin();
         assert!(
-            !farewell.wait(Duration::ZERO),
+            !farewell.wait(&*Manual::new(), Nanos::ZERO),
             "it has not got the last ones"
         );
         send(&mut port, 1);
-        assert!(farewell.wait(Duration::ZERO));
+        assert!(farewell.wait(&*Manual::new(), Nanos::ZERO));
     }
 
     #[test]

@@ -55,6 +55,11 @@ impl Looks {
         self.is_unfinished = true;
     }
 
+    /// What is handed in next has come at `at`.
+    pub(super) fn came(&mut self, at: Nanos) {
+        self.kept_since = Some(at);
+    }
+
     /// When the next look is to come at the latest; [`Nanos::MAX`] if the bus has not begun to look.
     pub(super) fn next(&self) -> Nanos {
         self.last.map_or(Nanos::MAX, |last| last + self.rest())
@@ -63,7 +68,8 @@ impl Looks {
     /// The time that counts for what is handed in at `now`.
     #[inline]
     pub(super) fn arrival(&self, now: Nanos) -> Nanos {
-        self.kept_since.map_or(now, |since| since.min(now))
+        let look = self.last.unwrap_or(now);
+        self.kept_since.unwrap_or(look).min(now)
     }
 
     /// The time between two looks at an idle line.

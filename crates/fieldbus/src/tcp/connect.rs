@@ -1,12 +1,13 @@
 //! Connecting.
 
 use std::io::{self, ErrorKind};
-use std::net::{SocketAddr, TcpStream, ToSocketAddrs as _};
+use std::net::{self, SocketAddr, ToSocketAddrs as _};
 
 use rustix::io::Errno;
 use socket2::{Domain, Protocol, Socket, Type};
 
 use crate::{BusError, Port};
+use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 
@@ -29,7 +30,7 @@ pub fn connect(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<(TcpStream, SocketAddr)>, BusError> {
-    let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    let mut set = PollSet::new(stop);
     port.opening(&format!("connecting to {address}"));
     let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
         return Ok(None);
@@ -39,7 +40,7 @@ pub fn connect(
     };
     let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
     port.tell("address", &peer.to_string());
-    prepare(&stream, patience).map_err(|error| {
+    prepare(stream.os(), patience).map_err(|error| {
         BusError::Link(format!("the connection with {peer} broke at once: {error}"))
     })?;
     Ok(Some((stream, peer)))
@@ -50,11 +51,13 @@ pub fn connect(
 /// # Errors
 ///
 /// The host is unknown, or does not answer.
-pub fn reach(address: &Address) -> io::Result<TcpStream> {
+pub fn reach(address: &Address) -> io::Result<net::TcpStream> {
     let mut failed = io::Error::other("the host has no address");
     let mut connect = |address: SocketAddr| {
-        let reached = TcpStream::connect_timeout(&address, PATIENCE.to_duration());
-        let reached = reached.and_then(|stream| not_itself(&stream).map(|()| stream));
+        let reached = net::TcpStream::connect_timeout(&address, PATIENCE.to_duration());
+        let reached = reached.and_then(|stream| {
+            not_itself(stream.local_addr()?, stream.peer_addr()?).map(|()| stream)
+        });
         reached.map_err(|error| failed = error).ok()
     };
     let reached = address
@@ -97,7 +100,10 @@ fn reach_one(
     port: &Port,
     stop: &Stop,
 ) -> io::Result<Option<TcpStream>> {
-    let stream = begin(address)?;
+    let stream = match port.clock().simulation() {
+        Some(simulation) => TcpStream::Simulated(simulation.connect(address)?),
+        None => begin(address)?.into(),
+    };
     set.add(0, &stream, Interest::Write)?;
     let connected = wait(&stream, set, port, stop);
     set.remove(0, &stream);
@@ -113,7 +119,7 @@ fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::
             if let Some(error) = stream.take_error()? {
                 return Err(error);
             }
-            not_itself(stream)?;
+            not_itself(stream.local_addr()?, stream.peer_addr()?)?;
             return Ok(true);
         }
         if port.clock().now() >= limit {
@@ -124,15 +130,15 @@ fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::
 }
 
 /// If the system happens to choose the destination port for this end, the socket connects to itself.
-fn not_itself(stream: &TcpStream) -> io::Result<()> {
-    if stream.local_addr()? == stream.peer_addr()? {
+fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
+    if own == peer {
         return Err(ErrorKind::ConnectionRefused.into());
     }
     Ok(())
 }
 
 /// Starts to connect, without waiting.
-fn begin(address: SocketAddr) -> io::Result<TcpStream> {
+fn begin(address: SocketAddr) -> io::Result<net::TcpStream> {
     let socket = Socket::new(
         Domain::for_address(address),
         Type::STREAM,

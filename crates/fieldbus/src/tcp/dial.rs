@@ -1,12 +1,11 @@
 //! A connection with one peer, for any protocol that implements [`Caller`].
 
 use std::io::{self, Read, Write};
-use std::net::{SocketAddr, TcpStream};
-
-use rustix::fd::AsFd;
+use std::net::{self, SocketAddr};
 
 use crate::{BusError, Port};
-use tickbus_base::os::{Interest, PollSet};
+use tickbus_base::net::TcpStream;
+use tickbus_base::os::{Interest, PollSet, Pollable};
 #[cfg(unix)]
 use tickbus_base::os::{LinkedTerminal, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
@@ -71,7 +70,7 @@ pub trait Caller {
 }
 
 /// A stream of bytes that never blocks.
-pub trait Stream: Read + Write + AsFd {
+pub trait Stream: Read + Write + Pollable {
     /// It is about to be dropped.
     fn close(&mut self) {}
 }
@@ -82,8 +81,12 @@ impl Stream for TcpStream {
     }
 }
 
-// A box of a trait object is no socket on Windows; it is needed for serial ports alone.
-#[cfg(unix)]
+impl Stream for net::TcpStream {
+    fn close(&mut self) {
+        close_gracefully(self);
+    }
+}
+
 impl<S: Stream + ?Sized> Stream for Box<S> {
     fn close(&mut self) {
         (**self).close();
@@ -108,8 +111,13 @@ pub fn dial(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<(Call<TcpStream>, SocketAddr)>, BusError> {
+    let since = port.clock().now();
     let reached = connect(address, patience, port, stop)?;
-    Ok(reached.map(|(stream, peer)| (Call::new(stream), peer)))
+    Ok(reached.map(|(stream, peer)| {
+        let mut call = Call::new(stream);
+        call.since = Some(since);
+        (call, peer)
+    }))
 }
 
 /// A connection with one peer: transfers bytes between a stream and a [`Caller`]. It is closed properly when
@@ -120,6 +128,8 @@ pub struct Call<S: Stream> {
     buffer: Box<[u8]>,
     /// Whether the system has not accepted all that was to be written.
     blocked: bool,
+    /// When connecting began, until the first look: what the peer has sent may wait since then.
+    since: Option<Nanos>,
 }
 
 impl<S: Stream> Call<S> {
@@ -129,6 +139,7 @@ impl<S: Stream> Call<S> {
             stream,
             buffer: vec![0; BUFFER].into(),
             blocked: false,
+            since: None,
         }
     }
 
@@ -143,12 +154,19 @@ impl<S: Stream> Call<S> {
         port: &mut Port,
         stop: &Stop,
     ) -> Result<(), BusError> {
-        let mut set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+        let mut set = PollSet::new(stop);
         let mut interest = self.interest();
         let added = set.add(0, &self.stream, interest);
         added.map_err(|error| no_wait(&error))?;
         let mut readable = false;
-        port.begin_to_look(port.clock().now());
+        match self.since.take() {
+            Some(since) => {
+                port.begin_to_look(since);
+                port.look_at_line(port.clock().now());
+                port.look_leaves_some();
+            }
+            None => port.begin_to_look(port.clock().now()),
+        }
         while !stop.is_stopped() {
             port.look_at_line(port.clock().now());
             self.turn(readable, caller, port)?;

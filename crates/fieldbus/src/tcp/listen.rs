@@ -1,9 +1,10 @@
 //! Listening for connections.
 
 use std::io::{self, ErrorKind};
-use std::net::{SocketAddr, TcpListener};
+use std::net::{self, SocketAddr};
 
 use crate::{BusError, Port};
+use tickbus_base::net::TcpListener;
 use tickbus_base::time::Stop;
 
 use super::Address;
@@ -37,8 +38,7 @@ pub fn listen(
         };
         BusError::Link(format!("cannot listen on {address} ({error}); {right}"))
     };
-    let listener = TcpListener::bind(&*addresses).map_err(cannot)?;
-    listener.set_nonblocking(true).map_err(cannot)?;
+    let listener = TcpListener::bind(&addresses, port.clock().simulation()).map_err(cannot)?;
     let bound = listener.local_addr().map_err(cannot)?;
     port.tell("address", &bound.to_string());
     if !bound.ip().is_loopback() {
@@ -53,8 +53,8 @@ pub fn listen(
 /// # Errors
 ///
 /// The host is unknown, or the address cannot be listened on.
-pub fn bind(address: &Address) -> io::Result<(TcpListener, SocketAddr)> {
-    let listener = TcpListener::bind(address.to_string())?;
+pub fn bind(address: &Address) -> io::Result<(net::TcpListener, SocketAddr)> {
+    let listener = net::TcpListener::bind(address.to_string())?;
     listener.set_nonblocking(true)?;
     let bound = listener.local_addr()?;
     Ok((listener, bound))

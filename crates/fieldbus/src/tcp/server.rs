@@ -1,9 +1,10 @@
 //! A server for many clients, for any protocol that implements [`Service`].
 
 use std::io::{self, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::SocketAddr;
 
 use crate::{BusError, Port};
+use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Nanos, Stop};
 
@@ -82,7 +83,7 @@ pub fn serve<S: Service>(
     let Some((listener, bound)) = listen(address, port, stop)? else {
         return Ok(());
     };
-    let set = PollSet::new(stop).map_err(|error| no_wait(&error))?;
+    let set = PollSet::new(stop);
     let mut server = Server {
         limits: service.limits(),
         service,
@@ -410,7 +411,7 @@ impl<S: Service> Server<'_, S> {
 
     fn welcome(&mut self, stream: TcpStream, peer: SocketAddr, now: Nanos, port: &mut Port) {
         // If it cannot be prepared, it is gone already.
-        if let Err(error) = prepare(&stream, self.limits.patience) {
+        if let Err(error) = prepare(stream.os(), self.limits.patience) {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
         }
@@ -437,6 +438,8 @@ impl<S: Service> Server<'_, S> {
             return;
         }
         port.count("clients.accepted");
+        // What it has sent waits for the next look, and may have waited as long as its connection.
+        port.look_leaves_some();
         self.tell(port);
         if self.clients.speakers == 0 && self.gone.is_none() {
             port.opening(&format!(

@@ -1,10 +1,11 @@
 //! System settings that every connection needs.
 
-use std::io::{self, ErrorKind, Read as _};
-use std::net::{Shutdown, TcpStream};
+use std::io::{self, ErrorKind, Read};
+use std::net::TcpStream;
 
 use socket2::SockRef;
 
+use tickbus_base::net::HalfClose;
 use tickbus_base::time::Nanos;
 
 /// How many times a socket is read at most while it is being closed.
@@ -15,9 +16,12 @@ const LONGEST: Nanos = Nanos::from_secs(3600);
 
 /// Closes the sending direction before a connection is closed: with unread bytes the system would reset the
 /// connection, and the peer would lose what it has not read yet.
-pub fn close_gracefully(mut stream: &TcpStream) {
+pub fn close_gracefully<'a, S: HalfClose>(mut stream: &'a S)
+where
+    &'a S: Read,
+{
     // If this fails, the connection has failed already.
-    let _ = stream.shutdown(Shutdown::Write);
+    let _ = stream.shutdown_write();
     let mut unread = [0; 4096];
     for _ in 0..READS {
         if !matches!(stream.read(&mut unread), Ok(count) if count > 0) {
@@ -31,12 +35,19 @@ pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// Makes the system send at once, never block, and give up after `patience` on a peer whose cable was pulled.
+/// Makes the system send at once, never block, and give up after `patience` on a peer whose cable was pulled; `None`, of a
+/// simulation, does so anyway.
 ///
 /// # Errors
 ///
 /// The system refuses one of these settings.
-pub fn prepare(stream: &TcpStream, patience: Nanos) -> io::Result<()> {
+pub fn prepare<'a>(
+    stream: impl Into<Option<&'a TcpStream>>,
+    patience: Nanos,
+) -> io::Result<()> {
+    let Some(stream) = stream.into() else {
+        return Ok(());
+    };
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
     let limit = patience.min(LONGEST).to_duration();

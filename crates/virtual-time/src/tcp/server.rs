@@ -93,7 +93,7 @@ impl Listener {
         let mut server = server::Server::new(settings, logic, now)
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
         let locals = Locals::join(&mut server, now, locals);
-        let mut set = PollSet::new(hosting.controls.stop()).map_err(cannot)?;
+        let mut set = PollSet::new(hosting.controls.stop());
         set.add(LISTENER, &self.listener, Interest::Read)
             .map_err(cannot)?;
         let mut host = Host {

@@ -1,4 +1,4 @@
-use std::net::TcpListener;
+use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::thread::{scope, yield_now};
 use std::time::Duration;
@@ -210,7 +210,7 @@ fn what_has_arrived_in_the_meantime_counts_before_the_time_is_checked() {
     peer.write_all(&[7]).expect("room");
     clock.advance(SECOND);
     let stop = Stop::new();
-    let mut set = PollSet::new(&stop).expect("a set");
+    let mut set = PollSet::new(&stop);
     let added = set.add(0, call.stream(), Interest::Read);
     added.expect("it is open");
     set.wait(&*clock, Nanos::MAX).expect("it can wait");

@@ -1,0 +1,224 @@
+//! Sockets of the operating system, or of a [simulation](crate::simulation).
+
+use std::io::{self, Read, Write};
+use std::net::{self, Shutdown, SocketAddr};
+
+use crate::simulation::{Simulation, SimulatedListener, SimulatedStream};
+
+/// A TCP connection.
+#[derive(Debug)]
+pub enum TcpStream {
+    /// Of the operating system.
+    Os(net::TcpStream),
+    /// Of a simulation.
+    Simulated(Box<dyn SimulatedStream>),
+}
+
+/// A listening TCP socket.
+#[derive(Debug)]
+pub enum TcpListener {
+    /// Of the operating system.
+    Os(net::TcpListener),
+    /// Of a simulation.
+    Simulated(Box<dyn SimulatedListener>),
+}
+
+impl From<net::TcpStream> for TcpStream {
+    fn from(stream: net::TcpStream) -> Self {
+        Self::Os(stream)
+    }
+}
+
+impl TcpStream {
+    /// The operating system's socket; `None` in a simulation.
+    pub fn os(&self) -> Option<&net::TcpStream> {
+        match self {
+            Self::Os(stream) => Some(stream),
+            Self::Simulated(_) => None,
+        }
+    }
+
+    /// The same, for a room that knows no simulation.
+    ///
+    /// # Errors
+    ///
+    /// It is simulated.
+    pub fn into_os(self) -> io::Result<net::TcpStream> {
+        match self {
+            Self::Os(stream) => Ok(stream),
+            Self::Simulated(_) => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+
+    /// As [`std::net::TcpStream::local_addr`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        match self {
+            Self::Os(stream) => stream.local_addr(),
+            Self::Simulated(stream) => stream.local_addr(),
+        }
+    }
+
+    /// As [`std::net::TcpStream::peer_addr`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn peer_addr(&self) -> io::Result<SocketAddr> {
+        match self {
+            Self::Os(stream) => stream.peer_addr(),
+            Self::Simulated(stream) => stream.peer_addr(),
+        }
+    }
+
+    /// As [`std::net::TcpStream::take_error`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn take_error(&self) -> io::Result<Option<io::Error>> {
+        match self {
+            Self::Os(stream) => stream.take_error(),
+            Self::Simulated(stream) => stream.take_error(),
+        }
+    }
+
+    /// Never to block; a simulated one never does.
+    ///
+    /// # Errors
+    ///
+    /// As of [`std::net::TcpStream::set_nonblocking`].
+    pub fn set_nonblocking(&self) -> io::Result<()> {
+        self.os().map_or(Ok(()), |stream| stream.set_nonblocking(true))
+    }
+
+}
+
+/// A connection whose directions can be closed one by one.
+pub trait HalfClose {
+    /// Closes the sending direction.
+    ///
+    /// # Errors
+    ///
+    /// As of [`std::net::TcpStream::shutdown`].
+    fn shutdown_write(&self) -> io::Result<()>;
+}
+
+impl HalfClose for net::TcpStream {
+    fn shutdown_write(&self) -> io::Result<()> {
+        self.shutdown(Shutdown::Write)
+    }
+}
+
+impl HalfClose for TcpStream {
+    fn shutdown_write(&self) -> io::Result<()> {
+        match self {
+            Self::Os(stream) => HalfClose::shutdown_write(stream),
+            Self::Simulated(stream) => stream.shutdown_write(),
+        }
+    }
+}
+
+impl Read for &TcpStream {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            TcpStream::Os(stream) => (&*stream).read(buffer),
+            TcpStream::Simulated(stream) => stream.read(buffer),
+        }
+    }
+}
+
+impl Write for &TcpStream {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            TcpStream::Os(stream) => (&*stream).write(bytes),
+            TcpStream::Simulated(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl Read for TcpStream {
+    #[inline]
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        (&*self).read(buffer)
+    }
+}
+
+impl Write for TcpStream {
+    #[inline]
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        (&*self).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl TcpListener {
+    /// Listens on the first of `addresses` that is free, without blocking.
+    ///
+    /// # Errors
+    ///
+    /// None of them can be listened on.
+    pub fn bind(
+        addresses: &[SocketAddr],
+        simulation: Option<&dyn Simulation>,
+    ) -> io::Result<Self> {
+        if let Some(simulation) = simulation {
+            return Ok(Self::Simulated(simulation.listen(addresses)?));
+        }
+        let listener = net::TcpListener::bind(addresses)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self::Os(listener))
+    }
+
+    /// As [`TcpStream::into_os`].
+    ///
+    /// # Errors
+    ///
+    /// It is simulated.
+    pub fn into_os(self) -> io::Result<net::TcpListener> {
+        match self {
+            Self::Os(listener) => Ok(listener),
+            Self::Simulated(_) => Err(io::ErrorKind::Unsupported.into()),
+        }
+    }
+
+    /// As [`std::net::TcpListener::local_addr`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn local_addr(&self) -> io::Result<SocketAddr> {
+        match self {
+            Self::Os(listener) => listener.local_addr(),
+            Self::Simulated(listener) => listener.local_addr(),
+        }
+    }
+
+    /// As [`std::net::TcpListener::accept`].
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn accept(&self) -> io::Result<(TcpStream, SocketAddr)> {
+        Ok(match self {
+            Self::Os(listener) => {
+                let (stream, peer) = listener.accept()?;
+                (TcpStream::Os(stream), peer)
+            }
+            Self::Simulated(listener) => {
+                let (stream, peer) = listener.accept()?;
+                (TcpStream::Simulated(stream), peer)
+            }
+        })
+    }
+}

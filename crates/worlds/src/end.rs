@@ -1,0 +1,149 @@
+//! One end of a world's line: its driver, and what ticks it.
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::{Code, Driver};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Slot;
+
+use crate::judge::{Shown, Stamp, level, real, whole};
+use crate::plan::Plan;
+use crate::scheduler::{SimulatedClock, now};
+
+/// The slots of a station in one direction.
+#[derive(Clone, Copy, Debug)]
+struct Places {
+    stamp: usize,
+    pulse: usize,
+    /// Where rising edges of `pulse` are counted, at the end that reads it.
+    edges: Option<usize>,
+    level: usize,
+    numbers: Option<(usize, usize)>,
+}
+
+/// An open driver.
+pub(crate) struct End {
+    driver: Driver,
+    slots: Vec<Slot>,
+    area: u64,
+    writes: Vec<Places>,
+    reads: Vec<Places>,
+    halves: bool,
+    next_pulse: i64,
+}
+
+/// What a tick found.
+#[derive(Clone, Debug)]
+pub(crate) struct Found {
+    pub(crate) code: Code,
+    pub(crate) age: i64,
+    pub(crate) sequence: u64,
+    pub(crate) stations: Vec<Shown>,
+}
+
+impl End {
+    pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Self {
+        let text = plan.driver_cfg(end, link);
+        let config = Config::parse("driver.cfg", &text)
+            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+        let driver = Driver::open(config, SimulatedClock::shared())
+            .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
+        let slots = driver.initial_slots();
+        let signals = &driver.config().table.signals;
+        let place = |name: String| signals.iter().position(|signal| signal.name == name);
+        let places = |area: char| {
+            let stations = 0..plan.stations;
+            let places = stations.map(|station| {
+                let at = |name: &str| place(format!("{name}{area}{station}"));
+                let pulse = at("pulse").expect("it is in the file");
+                Places {
+                    stamp: at("stamp").expect("it is in the file"),
+                    pulse,
+                    edges: driver.slots().edges[pulse],
+                    level: at("level").expect("it is in the file"),
+                    numbers: at("whole").zip(at("real")),
+                }
+            });
+            places.collect()
+        };
+        let (writes, reads) = if end == 0 {
+            (places('I'), places('Q'))
+        } else {
+            (places('Q'), places('I'))
+        };
+        Self {
+            writes,
+            reads,
+            driver,
+            slots,
+            area: 1 - end as u64,
+            halves: plan.ends[end].halves,
+            next_pulse: now().0 + plan.pulses.0,
+        }
+    }
+
+    /// One tick, the `tick`th of this `life`; returns what it found, and whether it wrote a pulse.
+    pub(crate) fn tick(&mut self, life: u64, tick: u64, pulses: Nanos) -> (Found, bool) {
+        let time = now().0;
+        let is_pulse = time >= self.next_pulse;
+        if is_pulse {
+            self.next_pulse = time + pulses.0;
+        }
+        let found = if self.halves {
+            let found = self.driver.receive(None, &mut self.slots);
+            let shown = self.shown();
+            self.write(life, tick, is_pulse);
+            let sent = self.driver.send(&mut self.slots);
+            debug_assert_eq!(sent.code, found.code);
+            (found, shown)
+        } else {
+            self.write(life, tick, is_pulse);
+            let found = self.driver.exchange(None, &mut self.slots);
+            (found, self.shown())
+        };
+        let (exchange, stations) = found;
+        let found = Found {
+            code: exchange.code,
+            age: exchange.age.0,
+            sequence: exchange.sequence,
+            stations,
+        };
+        (found, is_pulse)
+    }
+
+    fn write(&mut self, life: u64, tick: u64, is_pulse: bool) {
+        for (station, places) in self.writes.iter().enumerate() {
+            let stamp = Stamp {
+                life,
+                area: self.area,
+                station: station as u64,
+                tick,
+            }
+            .number();
+            self.slots[places.stamp] = Slot::from_unsigned(stamp);
+            self.slots[places.pulse] = Slot::from_real(f64::from(is_pulse));
+            self.slots[places.level] = Slot::from_real(f64::from(level(stamp)));
+            if let Some((whole_at, real_at)) = places.numbers {
+                self.slots[whole_at] = Slot::from_real(whole(stamp).into());
+                self.slots[real_at] = Slot::from_real(real(stamp));
+            }
+        }
+    }
+
+    fn shown(&self) -> Vec<Shown> {
+        let shown = self.reads.iter().map(|places| {
+            let real = |place: usize| self.slots[place].real();
+            Shown {
+                stamp: self.slots[places.stamp].unsigned(),
+                level: real(places.level) != 0.0,
+                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+                edges: places.edges.map_or(0, |place| real(place) as u64),
+                numbers: places.numbers.map(|(whole, half)| (real(whole), real(half))),
+            }
+        });
+        shown.collect()
+    }
+
+    pub(crate) fn close(self) {
+        self.driver.close();
+    }
+}

@@ -1,0 +1,18 @@
+//! Simulated worlds: two drivers at the ends of a line, with their threads, a network and a clock that one seed rules, judged
+//! by values that say themselves when they were written.
+//!
+//! [`Plan::draw`] draws a world from a seed: which bus, which keys of driver.cfg, which misfortunes exist at all, and when they
+//! happen. [`Plan::run`] lets it happen, within a fraction of a millisecond, and returns the first promise that was broken. The
+//! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
+
+mod end;
+mod judge;
+mod network;
+mod plan;
+mod random;
+mod scheduler;
+mod world;
+
+pub use judge::Broken;
+pub use plan::{Bus, Event, Misfortune, Plan};
+pub use random::Random;

@@ -1,0 +1,488 @@
+//! The network of a simulated world: TCP as its ends see it, with what may happen to bytes on their way.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::io::{self, ErrorKind};
+use std::net::{Ipv4Addr, SocketAddr};
+
+use tickbus_base::os::{Interest, Ready};
+use tickbus_base::simulation::{SimulatedListener, SimulatedSocket, SimulatedStream};
+
+use crate::random::Random;
+use crate::scheduler::{at_network, awake_since};
+
+/// How the network of a world behaves.
+#[derive(Clone, Copy, Debug)]
+pub struct Conditions {
+    /// The least and the greatest time that bytes take, in ns.
+    pub latency: (i64, i64),
+    /// A write arrives in pieces, at times of their own, once in so many; 0 for never.
+    pub splits: u64,
+    /// How many bytes a connection holds that were not read.
+    pub capacity: usize,
+}
+
+impl Default for Conditions {
+    fn default() -> Self {
+        Self {
+            latency: (1_000, 50_000),
+            splits: 0,
+            capacity: 64 * 1024,
+        }
+    }
+}
+
+/// Bytes on their way, or waiting to be read.
+#[derive(Debug)]
+struct Piece {
+    /// When they arrive.
+    at: i64,
+    /// Since when the sender had not waited when it sent them.
+    sent: i64,
+    bytes: Vec<u8>,
+    read: usize,
+}
+
+/// Bytes that a process has read.
+#[derive(Clone, Copy, Debug)]
+pub struct Delivery {
+    /// When they arrived at its computer.
+    pub at: i64,
+    /// When they were sent, or earlier.
+    pub sent: i64,
+}
+
+#[derive(Debug)]
+struct End {
+    process: usize,
+    own: SocketAddr,
+    peer: SocketAddr,
+    other: u64,
+    /// When connecting is decided, and what it comes to.
+    connected: i64,
+    error: Option<ErrorKind>,
+    incoming: VecDeque<Piece>,
+    /// Nothing arrives before that.
+    held_until: i64,
+    /// When the end of what the peer sends arrives.
+    fin: Option<i64>,
+    /// When the connection breaks for this end.
+    reset: Option<i64>,
+    has_shut_down: bool,
+    /// Since when the sender had not waited when it began to write what the connection has not taken yet.
+    owed_since: Option<i64>,
+}
+
+#[derive(Debug)]
+struct Listening {
+    address: SocketAddr,
+    process: usize,
+    waiting: VecDeque<u64>,
+}
+
+/// All sockets of a world.
+#[derive(Debug, Default)]
+pub struct Network {
+    pub(crate) conditions: Conditions,
+    ends: BTreeMap<u64, End>,
+    listeners: BTreeMap<u64, Listening>,
+    next: u64,
+    ports: u16,
+    /// Until when the cable is pulled.
+    cut_until: i64,
+    /// What each process has read.
+    pub(crate) deliveries: BTreeMap<usize, Vec<Delivery>>,
+}
+
+impl End {
+    fn room(&self, capacity: usize) -> usize {
+        let held: usize = self
+            .incoming
+            .iter()
+            .map(|piece| piece.bytes.len() - piece.read)
+            .sum();
+        capacity.saturating_sub(held)
+    }
+
+    fn readable_at(&self) -> i64 {
+        let piece = self.incoming.front().map_or(i64::MAX, |piece| piece.at);
+        let fin = self.fin.unwrap_or(i64::MAX);
+        piece.min(fin).min(self.reset.unwrap_or(i64::MAX))
+    }
+}
+
+impl Network {
+    fn identity(&mut self) -> u64 {
+        self.next += 1;
+        self.next
+    }
+
+    /// The next time at which one of these sockets is ready.
+    pub(crate) fn due(&self, sockets: &[(u64, Interest)]) -> i64 {
+        let due = sockets.iter().map(|(id, interest)| {
+            let (read, write) = self.ready_at(*id);
+            match interest {
+                Interest::Read => read,
+                Interest::Write => write,
+                Interest::ReadWrite => read.min(write),
+            }
+        });
+        due.min().unwrap_or(i64::MAX)
+    }
+
+    /// When a socket can be read and written.
+    fn ready_at(&self, id: u64) -> (i64, i64) {
+        if let Some(listening) = self.listeners.get(&id) {
+            let first = listening.waiting.front();
+            let end = first.and_then(|end| self.ends.get(end));
+            return (end.map_or(i64::MAX, |end| end.connected), i64::MAX);
+        }
+        let Some(end) = self.ends.get(&id) else {
+            return (i64::MIN, i64::MIN);
+        };
+        let reset = end.reset.unwrap_or(i64::MAX);
+        let other = self.ends.get(&end.other);
+        let has_room = other.is_none_or(|other| other.room(self.conditions.capacity) > 0);
+        let write = if has_room { end.connected } else { i64::MAX };
+        (end.readable_at().max(end.connected), write.min(reset))
+    }
+
+    pub(crate) fn look(
+        &self,
+        sockets: &[(usize, u64, Interest)],
+        now: i64,
+        ready: &mut Vec<Ready>,
+    ) {
+        for (key, id, interest) in sockets {
+            let (read, write) = self.ready_at(*id);
+            let found = Ready {
+                key: *key,
+                is_readable: read <= now && *interest != Interest::Write,
+                is_writable: write <= now && *interest != Interest::Read,
+            };
+            if found.is_readable || found.is_writable {
+                ready.push(found);
+            }
+        }
+    }
+
+    pub(crate) fn listen(
+        &mut self,
+        process: usize,
+        addresses: &[SocketAddr],
+    ) -> io::Result<Box<dyn SimulatedListener>> {
+        let address = *addresses.first().ok_or(ErrorKind::InvalidInput)?;
+        let mut taken = self.listeners.values();
+        if taken.any(|listening| listening.address.port() == address.port()) {
+            return Err(ErrorKind::AddrInUse.into());
+        }
+        let id = self.identity();
+        self.listeners.insert(
+            id,
+            Listening {
+                address,
+                process,
+                waiting: VecDeque::new(),
+            },
+        );
+        Ok(Box::new(Listener(id)))
+    }
+
+    pub(crate) fn connect(
+        &mut self,
+        address: SocketAddr,
+        process: usize,
+        now: i64,
+        random: &mut Random,
+    ) -> io::Result<Box<dyn SimulatedStream>> {
+        self.ports += 1;
+        let own = SocketAddr::from((Ipv4Addr::LOCALHOST, 40_000 + self.ports));
+        let (one, other) = (self.identity(), self.identity());
+        let (least, most) = self.conditions.latency;
+        let end = |process, own, peer, other, connected, error| End {
+            process,
+            own,
+            peer,
+            other,
+            connected,
+            error,
+            incoming: VecDeque::new(),
+            held_until: 0,
+            fin: None,
+            reset: None,
+            has_shut_down: false,
+            owed_since: None,
+        };
+        if now < self.cut_until {
+            // Nobody answers; the caller's patience ends it, unless the cable is back before.
+            let connected = i64::MAX;
+            self.ends
+                .insert(one, end(process, own, address, other, connected, None));
+            return Ok(Box::new(Stream(one)));
+        }
+        let there = now + random.within(least, most);
+        let back = there + random.within(least, most);
+        let listener = self
+            .listeners
+            .values_mut()
+            .find(|listening| listening.address.port() == address.port());
+        let Some(listening) = listener else {
+            let refused = Some(ErrorKind::ConnectionRefused);
+            self.ends
+                .insert(one, end(process, own, address, other, back, refused));
+            return Ok(Box::new(Stream(one)));
+        };
+        listening.waiting.push_back(other);
+        let theirs = listening.process;
+        self.ends
+            .insert(one, end(process, own, address, other, back, None));
+        self.ends
+            .insert(other, end(theirs, address, own, one, there, None));
+        Ok(Box::new(Stream(one)))
+    }
+
+    /// Breaks every connection, as a device in the middle that restarts does.
+    pub fn reset_all(&mut self, now: i64) {
+        for end in self.ends.values_mut() {
+            end.reset.get_or_insert(now);
+            end.incoming.clear();
+        }
+    }
+
+    /// Nothing arrives for `span`, and then everything.
+    pub fn hold_all(&mut self, now: i64, span: i64) {
+        for end in self.ends.values_mut() {
+            end.held_until = end.held_until.max(now + span);
+            for piece in &mut end.incoming {
+                if piece.at > now {
+                    piece.at = piece.at.max(end.held_until);
+                }
+            }
+        }
+        self.cut_until = self.cut_until.max(now + span);
+    }
+
+    /// The system closes what a process that was killed has left.
+    pub fn kill(&mut self, process: usize, now: i64) {
+        self.listeners.retain(|_, listening| listening.process != process);
+        let ids: Vec<u64> = self.ends.iter().filter(|(_, end)| end.process == process).map(|(id, _)| *id).collect();
+        for id in ids {
+            self.close(id, now);
+        }
+    }
+
+    fn close(&mut self, id: u64, now: i64) {
+        let latency = self.conditions.latency.1;
+        let Some(end) = self.ends.remove(&id) else {
+            return;
+        };
+        if let Some(other) = self.ends.get_mut(&end.other) {
+            let last = other.incoming.back().map_or(now, |piece| piece.at);
+            let at = last.max(now + latency).max(other.held_until);
+            if end.incoming.iter().any(|piece| piece.at <= now) {
+                other.reset.get_or_insert(at);
+            } else if !end.has_shut_down {
+                other.fin.get_or_insert(at);
+            }
+        }
+    }
+
+    fn read(&mut self, id: u64, buffer: &mut [u8], now: i64) -> io::Result<usize> {
+        let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
+        if end.connected > now {
+            return Err(ErrorKind::WouldBlock.into());
+        }
+        if end.reset.is_some_and(|at| at <= now) {
+            return Err(ErrorKind::ConnectionReset.into());
+        }
+        let mut count = 0;
+        let log = self.deliveries.entry(end.process).or_default();
+        while let Some(piece) = end.incoming.front_mut()
+            && piece.at <= now
+            && count < buffer.len()
+        {
+            let rest = &piece.bytes[piece.read..];
+            let taken = rest.len().min(buffer.len() - count);
+            buffer[count..count + taken].copy_from_slice(&rest[..taken]);
+            count += taken;
+            piece.read += taken;
+            if piece.read == piece.bytes.len() {
+                log.push(Delivery {
+                    at: piece.at,
+                    sent: piece.sent,
+                });
+                end.incoming.pop_front();
+            }
+        }
+        if count > 0 || buffer.is_empty() {
+            return Ok(count);
+        }
+        if end.fin.is_some_and(|at| at <= now) {
+            return Ok(0);
+        }
+        Err(ErrorKind::WouldBlock.into())
+    }
+
+    fn write(
+        &mut self,
+        id: u64,
+        bytes: &[u8],
+        (now, sent): (i64, i64),
+        random: &mut Random,
+    ) -> io::Result<usize> {
+        let end = self.ends.get(&id).ok_or(ErrorKind::NotConnected)?;
+        if end.reset.is_some_and(|at| at <= now) {
+            return Err(ErrorKind::ConnectionReset.into());
+        }
+        if end.has_shut_down {
+            return Err(ErrorKind::BrokenPipe.into());
+        }
+        if end.connected > now {
+            return Err(ErrorKind::WouldBlock.into());
+        }
+        let (conditions, own, other) = (self.conditions, id, end.other);
+        let (least, most) = conditions.latency;
+        let Some(room) = self.ends.get(&other).map(|other| other.room(conditions.capacity)) else {
+            // The other end is closed: its computer says so.
+            let end = self.ends.get_mut(&own).expect("it was just there");
+            end.reset.get_or_insert(now + most);
+            return Ok(bytes.len());
+        };
+        let count = bytes.len().min(room);
+        // What the connection does not take at once is old when it does.
+        let end = self.ends.get_mut(&own).expect("it was just there");
+        let sent = end.owed_since.unwrap_or(sent);
+        end.owed_since = (count < bytes.len()).then_some(sent);
+        if count == 0 {
+            return Err(ErrorKind::WouldBlock.into());
+        }
+        let other = self.ends.get_mut(&other).expect("it was just there");
+        let mut rest = &bytes[..count];
+        let splits = conditions.splits > 0 && random.once_in(conditions.splits);
+        while !rest.is_empty() {
+            let length = if splits {
+                1 + usize::try_from(random.below(rest.len() as u64)).expect("a length")
+            } else {
+                rest.len()
+            };
+            let last = other.incoming.back().map_or(0, |piece| piece.at);
+            let at = (now + random.within(least, most)).max(last).max(other.held_until);
+            let (piece, further) = rest.split_at(length);
+            other.incoming.push_back(Piece {
+                at,
+                sent,
+                bytes: piece.to_vec(),
+                read: 0,
+            });
+            rest = further;
+        }
+        Ok(count)
+    }
+}
+
+#[derive(Debug)]
+struct Listener(u64);
+
+impl SimulatedSocket for Listener {
+    fn identity(&self) -> u64 {
+        self.0
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        at_network(|network, _, _| Ok(network.listeners[&self.0].address))
+    }
+}
+
+impl SimulatedListener for Listener {
+    fn accept(&self) -> io::Result<(Box<dyn SimulatedStream>, SocketAddr)> {
+        at_network(|network, _, now| {
+            let Some(listening) = network.listeners.get_mut(&self.0) else {
+                return Err(ErrorKind::InvalidInput.into());
+            };
+            let first = listening.waiting.front().copied();
+            let id = first.ok_or(ErrorKind::WouldBlock)?;
+            let Some(end) = network.ends.get(&id) else {
+                listening.waiting.pop_front();
+                return Err(ErrorKind::ConnectionAborted.into());
+            };
+            if end.connected > now {
+                return Err(ErrorKind::WouldBlock.into());
+            }
+            let peer = end.peer;
+            listening.waiting.pop_front();
+            Ok((Box::new(Stream(id)) as _, peer))
+        })
+    }
+}
+
+impl Drop for Listener {
+    fn drop(&mut self) {
+        at_network(|network, _, now| {
+            if let Some(listening) = network.listeners.remove(&self.0) {
+                for id in listening.waiting {
+                    network.close(id, now);
+                }
+            }
+        });
+    }
+}
+
+#[derive(Debug)]
+struct Stream(u64);
+
+impl SimulatedSocket for Stream {
+    fn identity(&self) -> u64 {
+        self.0
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        at_network(|network, _, _| {
+            let end = network.ends.get(&self.0).ok_or(ErrorKind::NotConnected)?;
+            Ok(end.own)
+        })
+    }
+}
+
+impl SimulatedStream for Stream {
+    fn read(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        at_network(|network, _, now| network.read(self.0, buffer, now))
+    }
+
+    fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+        let times = awake_since();
+        at_network(|network, random, _| network.write(self.0, bytes, times, random))
+    }
+
+    fn shutdown_write(&self) -> io::Result<()> {
+        at_network(|network, _, now| {
+            let latency = network.conditions.latency.1;
+            let end = network.ends.get_mut(&self.0).ok_or(ErrorKind::NotConnected)?;
+            end.has_shut_down = true;
+            let other = end.other;
+            if let Some(other) = network.ends.get_mut(&other) {
+                let last = other.incoming.back().map_or(now, |piece| piece.at);
+                other.fin.get_or_insert(last.max(now + latency).max(other.held_until));
+            }
+            Ok(())
+        })
+    }
+
+    fn peer_addr(&self) -> io::Result<SocketAddr> {
+        at_network(|network, _, _| {
+            let end = network.ends.get(&self.0).ok_or(ErrorKind::NotConnected)?;
+            Ok(end.peer)
+        })
+    }
+
+    fn take_error(&self) -> io::Result<Option<io::Error>> {
+        at_network(|network, _, _| {
+            let end = network.ends.get_mut(&self.0).ok_or(ErrorKind::NotConnected)?;
+            Ok(end.error.take().map(io::Error::from))
+        })
+    }
+}
+
+impl Drop for Stream {
+    fn drop(&mut self) {
+        at_network(|network, _, now| network.close(self.0, now));
+    }
+}

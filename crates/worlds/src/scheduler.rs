@@ -1,0 +1,507 @@
+//! Threads of a simulated world, as coroutines on one thread: which of them runs next, and when time passes, only the seed
+//! decides.
+//!
+//! A thread runs until it waits. In a world with [`Habits::preempts`] it may also lose the processor where it looks at the
+//! clock, so that others run, and time passes, between what it has read and what it does with that.
+#![allow(
+    unsafe_code,
+    reason = "a coroutine gives its thread a reference that the clock, which knows no coroutines, has to find again"
+)]
+
+use std::cell::RefCell;
+use std::fmt;
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use corosensei::stack::DefaultStack;
+use corosensei::{Coroutine, CoroutineResult, Yielder};
+use tickbus_base::os::{Interest, Ready};
+use tickbus_base::simulation::{Simulation, SimulatedListener, SimulatedStream};
+use tickbus_base::time::{Clock, Nanos, Stop};
+
+use crate::network::Network;
+use crate::random::Random;
+
+/// How much of a stack a thread of a driver has.
+const STACK: usize = 512 * 1024;
+
+/// A world in which nothing ends does so after that many turns.
+const MOST_TURNS: u64 = 2_000_000;
+
+/// What the scheduler may do to threads.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Habits {
+    /// A thread that looks at the clock loses the processor once in so many looks; 0 for never.
+    pub preempts: u64,
+    /// A thread that is woken may get the processor late by up to this.
+    pub late: i64,
+}
+
+type Thread = Coroutine<(), (), (), DefaultStack>;
+
+/// What a thread waits for.
+enum Wait {
+    /// The processor alone.
+    Nothing,
+    /// A time, a token, or a socket.
+    Event {
+        deadline: i64,
+        stop: Option<Stop>,
+        sockets: Vec<(u64, Interest)>,
+    },
+    /// Whatever another thread does, or a time.
+    Anything { deadline: i64, seen: u64 },
+}
+
+struct Task {
+    thread: Option<Thread>,
+    yielder: *const Yielder<(), ()>,
+    wait: Wait,
+    /// The process that it belongs to.
+    process: usize,
+    /// Since when it runs without having waited.
+    awake_since: i64,
+    /// Not to be run before that.
+    not_before: i64,
+}
+
+#[derive(Default)]
+struct Process {
+    /// Its threads do not run before that.
+    suspended_until: i64,
+}
+
+/// All that is simulated on this thread.
+struct World {
+    now: i64,
+    random: Random,
+    habits: Habits,
+    tasks: Vec<Task>,
+    processes: Vec<Process>,
+    current: Option<usize>,
+    /// Threads run so far.
+    turns: u64,
+    network: Network,
+    /// What was spawned since the last look.
+    spawned: Vec<(usize, Box<dyn FnOnce()>)>,
+    /// The world is to end now.
+    is_over: bool,
+}
+
+thread_local! {
+    static WORLD: RefCell<Option<World>> = const { RefCell::new(None) };
+    /// Stacks of threads that have ended.
+    static STACKS: RefCell<Vec<DefaultStack>> = const { RefCell::new(Vec::new()) };
+}
+
+fn with<R>(act: impl FnOnce(&mut World) -> R) -> R {
+    WORLD.with(|world| act(world.borrow_mut().as_mut().expect("a world runs on this thread")))
+}
+
+/// Why a world has come to no end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stuck {
+    /// Every thread waits for another one.
+    Deadlock,
+    /// Threads go on and on.
+    Endless,
+}
+
+/// Runs `main` and all that it spawns, in a world of its own on this thread, until none is left.
+///
+/// # Errors
+///
+/// It comes to no end.
+///
+/// # Panics
+///
+/// A thread panicked, or a world runs on this thread already.
+pub fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> Result<(), Stuck> {
+    WORLD.with(|world| {
+        let before = world.borrow_mut().replace(World {
+            // Some time after the computer was switched on.
+            now: 1_000_000_000,
+            random: Random::new(seed),
+            habits,
+            tasks: Vec::new(),
+            processes: vec![Process::default()],
+            current: None,
+            turns: 0,
+            network: Network::default(),
+            spawned: vec![(0, Box::new(main))],
+            is_over: false,
+        });
+        assert!(before.is_none(), "one world at a time");
+    });
+    let end = Ending;
+    let result = run_all();
+    drop(end);
+    result
+}
+
+/// Ends the world, whatever has happened.
+struct Ending;
+
+impl Drop for Ending {
+    fn drop(&mut self) {
+        let tasks = with(|world| std::mem::take(&mut world.tasks));
+        for task in tasks {
+            if let Some(mut thread) = task.thread
+                && !thread.done()
+            {
+                // What it holds is leaked: its drops would wait in a world that has ended.
+                // SAFETY: nothing on its stack is reachable from elsewhere but by reference counts that never fall.
+                unsafe { thread.force_reset() };
+            }
+        }
+        WORLD.with(|world| world.borrow_mut().take());
+    }
+}
+
+fn run_all() -> Result<(), Stuck> {
+    loop {
+        if with(|world| world.is_over) {
+            return Ok(());
+        }
+        begin_spawned();
+        let Some(next) = with(World::next)? else {
+            return Ok(());
+        };
+        let mut thread = with(|world| {
+            world.current = Some(next);
+            world.turns += 1;
+            world.tasks[next].thread.take().expect("it does not run")
+        });
+        let result = thread.resume(());
+        with(|world| {
+            world.current = None;
+            world.now += world.random.within(0, 2_000);
+        });
+        match result {
+            CoroutineResult::Yield(()) => with(|world| world.tasks[next].thread = Some(thread)),
+            CoroutineResult::Return(()) => {
+                with(|world| {
+                    world.tasks[next].wait = Wait::Event {
+                        deadline: i64::MAX,
+                        stop: None,
+                        sockets: Vec::new(),
+                    };
+                });
+                STACKS.with(|stacks| stacks.borrow_mut().push(thread.into_stack()));
+            }
+        }
+    }
+}
+
+fn begin_spawned() {
+    let spawned = with(|world| std::mem::take(&mut world.spawned));
+    for (process, body) in spawned {
+        let stack = STACKS.with(|stacks| stacks.borrow_mut().pop());
+        let stack = stack.unwrap_or_else(|| DefaultStack::new(STACK).expect("memory"));
+        let index = with(|world| world.tasks.len());
+        let thread = Coroutine::with_stack(stack, move |yielder: &Yielder<(), ()>, ()| {
+            with(|world| world.tasks[index].yielder = std::ptr::from_ref(yielder));
+            body();
+        });
+        with(|world| {
+            let now = world.now;
+            world.tasks.push(Task {
+                thread: Some(thread),
+                yielder: std::ptr::null(),
+                wait: Wait::Nothing,
+                process,
+                awake_since: now,
+                not_before: now,
+            });
+        });
+    }
+}
+
+impl World {
+    /// The thread to run next; `None` if all have ended.
+    fn next(&mut self) -> Result<Option<usize>, Stuck> {
+        if self.turns > MOST_TURNS {
+            return Err(Stuck::Endless);
+        }
+        loop {
+            let mut ready = Vec::new();
+            let mut soonest = i64::MAX;
+            let mut is_any = false;
+            for index in 0..self.tasks.len() {
+                let task = &mut self.tasks[index];
+                if task.thread.is_none() {
+                    continue;
+                }
+                is_any = true;
+                // A wake counts once: it is not to be asked for again.
+                if let Wait::Event { stop: Some(stop), .. } = &task.wait
+                    && stop.is_woken()
+                {
+                    (task.wait, task.awake_since) = (Wait::Nothing, self.now);
+                }
+                let resumed = self.processes[task.process]
+                    .suspended_until
+                    .max(task.not_before);
+                if resumed > self.now {
+                    soonest = soonest.min(resumed);
+                    continue;
+                }
+                let due = match &task.wait {
+                    Wait::Nothing => self.now,
+                    Wait::Event {
+                        deadline, sockets, ..
+                    } => self.network.due(sockets).min(*deadline),
+                    Wait::Anything { deadline, seen } => {
+                        if self.turns > seen + 1 {
+                            self.now
+                        } else {
+                            *deadline
+                        }
+                    }
+                };
+                if due <= self.now {
+                    ready.push(index);
+                } else {
+                    soonest = soonest.min(due);
+                }
+            }
+            if !is_any {
+                return Ok(None);
+            }
+            if ready.is_empty() {
+                if soonest == i64::MAX {
+                    return Err(Stuck::Deadlock);
+                }
+                self.now = soonest;
+                continue;
+            }
+            let chosen = self.random.of(&ready);
+            let task = &mut self.tasks[chosen];
+            if !matches!(task.wait, Wait::Nothing) {
+                task.wait = Wait::Nothing;
+                let late = self.habits.late;
+                if late > 0 && self.random.once_in(4) {
+                    task.not_before = self.now + self.random.within(0, late);
+                    if task.not_before > self.now {
+                        continue;
+                    }
+                }
+                task.awake_since = self.now;
+            }
+            return Ok(Some(chosen));
+        }
+    }
+}
+
+/// Lets the running thread wait.
+fn suspend(wait: Wait) {
+    let yielder = with(|world| {
+        let current = world.current.expect("a thread of this world runs");
+        world.tasks[current].wait = wait;
+        world.tasks[current].yielder
+    });
+    // SAFETY: the thread that runs is the one whose yielder this is, and its coroutine lives until it has returned.
+    unsafe { (*yielder).suspend(()) };
+    with(|world| {
+        let current = world.current.expect("it was resumed");
+        let now = world.now;
+        if world.tasks[current].not_before > 0 && world.tasks[current].awake_since < now {
+            // It was woken late, or waited for nothing but the processor.
+            world.tasks[current].not_before = 0;
+        }
+    });
+}
+
+/// The time in this world.
+pub fn now() -> Nanos {
+    with(|world| Nanos(world.now))
+}
+
+/// Ends the world, whatever its threads do.
+pub fn stop() {
+    with(|world| world.is_over = true);
+}
+
+/// Lets the running thread sleep.
+pub fn sleep(span: Nanos) {
+    let deadline = with(|world| world.now + span.0.max(0));
+    suspend(Wait::Event {
+        deadline,
+        stop: None,
+        sockets: Vec::new(),
+    });
+}
+
+/// Lets the running thread sleep until `done`.
+pub fn sleep_until(done: impl Fn() -> bool) {
+    while !done() {
+        let seen = with(|world| world.turns);
+        let deadline = with(|world| world.now + 1_000_000);
+        suspend(Wait::Anything { deadline, seen });
+    }
+}
+
+/// Starts a thread of a process.
+pub fn spawn(process: usize, body: impl FnOnce() + 'static) {
+    with(|world| world.spawned.push((process, Box::new(body))));
+}
+
+/// A new process.
+pub fn new_process() -> usize {
+    with(|world| {
+        world.processes.push(Process::default());
+        world.processes.len() - 1
+    })
+}
+
+/// Stops all threads of a process for a time.
+pub fn suspend_process(process: usize, span: Nanos) {
+    with(|world| {
+        let until = world.now + span.0;
+        let process = &mut world.processes[process];
+        process.suspended_until = process.suspended_until.max(until);
+    });
+}
+
+/// Acts on the network.
+pub fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
+    with(|world| act(&mut world.network, &mut world.random, world.now))
+}
+
+/// The clock of the world that runs on this thread.
+#[derive(Clone, Copy, Debug)]
+pub struct SimulatedClock;
+
+impl SimulatedClock {
+    /// The clock, to be handed in.
+    pub fn shared() -> Arc<dyn Clock> {
+        Arc::new(Self)
+    }
+}
+
+impl Clock for SimulatedClock {
+    fn now(&self) -> Nanos {
+        let (now, is_preempted) = with(|world| {
+            let preempts = world.habits.preempts;
+            let is_preempted = preempts > 0
+                && world.current.is_some()
+                && world.random.once_in(preempts);
+            (world.now, is_preempted)
+        });
+        if is_preempted {
+            suspend(Wait::Nothing);
+        }
+        Nanos(now)
+    }
+
+    fn wait_until(&self, deadline: Nanos, stop: &Stop) {
+        if stop.is_woken() {
+            return;
+        }
+        suspend(Wait::Event {
+            deadline: deadline.0,
+            stop: Some(stop.clone()),
+            sockets: Vec::new(),
+        });
+    }
+
+    fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
+        self.wait_until(deadline, stop);
+        sleep(Some(Duration::ZERO));
+    }
+
+    fn passes_alone(&self) -> bool {
+        true
+    }
+
+    fn simulation(&self) -> Option<&dyn Simulation> {
+        Some(self)
+    }
+}
+
+impl Simulation for SimulatedClock {
+    fn spawn(&self, _name: &str, body: Box<dyn FnOnce() + Send>) {
+        with(|world| {
+            let process = world.current.map_or(0, |current| world.tasks[current].process);
+            world.spawned.push((process, body));
+        });
+    }
+
+    fn wait_for(&self, limit: Nanos, done: &mut dyn FnMut() -> bool) -> bool {
+        let deadline = with(|world| world.now.saturating_add(limit.0));
+        loop {
+            if done() {
+                return true;
+            }
+            let (now, seen) = with(|world| (world.now, world.turns));
+            if now >= deadline {
+                return false;
+            }
+            suspend(Wait::Anything { deadline, seen });
+        }
+    }
+
+    fn poll(
+        &self,
+        sockets: &[(usize, u64, Interest)],
+        deadline: Nanos,
+        stop: &Stop,
+        ready: &mut Vec<Ready>,
+    ) {
+        let is_woken = stop.is_woken();
+        let look = |ready: &mut Vec<Ready>| {
+            with(|world| world.network.look(sockets, world.now, ready));
+        };
+        look(ready);
+        if is_woken || !ready.is_empty() {
+            return;
+        }
+        suspend(Wait::Event {
+            deadline: deadline.0,
+            stop: Some(stop.clone()),
+            sockets: sockets.iter().map(|(_, id, interest)| (*id, *interest)).collect(),
+        });
+        look(ready);
+    }
+
+    fn listen(&self, addresses: &[SocketAddr]) -> io::Result<Box<dyn SimulatedListener>> {
+        with(|world| {
+            let current = world.current.expect("a thread of this world runs");
+            let process = world.tasks[current].process;
+            world.network.listen(process, addresses)
+        })
+    }
+
+    fn connect(&self, address: SocketAddr) -> io::Result<Box<dyn SimulatedStream>> {
+        with(|world| {
+            let current = world.current.expect("a thread of this world runs");
+            let process = world.tasks[current].process;
+            world
+                .network
+                .connect(address, process, world.now, &mut world.random)
+        })
+    }
+}
+
+/// Since when the running thread has not waited.
+pub(crate) fn awake_since() -> (i64, i64) {
+    with(|world| {
+        let since = world
+            .current
+            .map_or(world.now, |current| world.tasks[current].awake_since);
+        (world.now, since)
+    })
+}
+
+/// The network, and chance, of the world that runs on this thread.
+pub(crate) fn at_network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
+    network(act)
+}
+
+impl fmt::Debug for World {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("World").field("now", &self.now).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,301 @@
+//! A world as it happens.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::Code;
+
+use crate::end::End;
+use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
+use crate::plan::{Bus, Misfortune, Plan};
+use crate::random::{Random, scramble};
+use crate::scheduler::{self, Stuck};
+
+/// After its last misfortune a world is whole again within this: an attempt to connect that was begun while the cable was
+/// pulled may take 5 s to fail.
+const PATIENCE: Nanos = Nanos::from_secs(16);
+
+/// Closing takes no longer than the last values may take, and a bus that does not end.
+const LONGEST_CLOSE: Nanos = Nanos::from_secs(5);
+
+/// What an end is to do at its next tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Order {
+    Pause(Nanos),
+    Close(Nanos),
+    Kill(Nanos),
+    Finish,
+}
+
+#[derive(Default)]
+struct EndState {
+    orders: RefCell<VecDeque<Order>>,
+    process: Cell<usize>,
+    is_open: Cell<bool>,
+    is_finished: Cell<bool>,
+    writer: RefCell<Writer>,
+    reader: RefCell<Reader>,
+}
+
+struct Shared {
+    plan: Plan,
+    link: String,
+    ends: [EndState; 2],
+    broken: RefCell<Option<Broken>>,
+}
+
+impl Shared {
+    fn fail(&self, broken: Broken) {
+        self.broken.borrow_mut().get_or_insert(broken);
+        scheduler::stop();
+    }
+
+    fn check(&self, judged: Result<(), Broken>) {
+        if let Err(broken) = judged {
+            self.fail(broken);
+        }
+    }
+}
+
+impl Plan {
+    /// Lets it happen.
+    ///
+    /// # Errors
+    ///
+    /// The first promise that was broken.
+    pub fn run(&self) -> Result<(), Broken> {
+        thread_local! {
+            static WORLDS: Cell<u64> = const { Cell::new(0) };
+        }
+        // Links are shared by all worlds of the process.
+        let number = WORLDS.replace(WORLDS.get() + 1);
+        let thread = std::thread::current().id();
+        let shared = Rc::new(Shared {
+            plan: self.clone(),
+            link: format!("world {number} of {thread:?}"),
+            ends: Default::default(),
+            broken: RefCell::default(),
+        });
+        let main = {
+            let shared = Rc::clone(&shared);
+            move || fate(&shared)
+        };
+        let result = scheduler::run(scramble(self.seed ^ 1), self.habits, main);
+        if let Some(broken) = shared.broken.borrow_mut().take() {
+            return Err(broken);
+        }
+        result.map_err(|stuck| Broken {
+            promise: "end",
+            what: match stuck {
+                Stuck::Deadlock => "every thread waits for another one".to_owned(),
+                Stuck::Endless => "threads go on and on".to_owned(),
+            },
+        })
+    }
+}
+
+/// Starts both ends, lets the misfortunes happen, and looks whether the world recovers.
+fn fate(shared: &Rc<Shared>) {
+    let plan = &shared.plan;
+    scheduler::network(|network, _, _| network.conditions = plan.conditions);
+    let began = scheduler::now();
+    for end in 0..2 {
+        begin(shared, end, 1);
+    }
+    for event in &plan.events {
+        let at = began + event.at;
+        scheduler::sleep(at - scheduler::now());
+        befall(shared, event.what);
+    }
+    scheduler::sleep(began + plan.span - scheduler::now());
+    recover(shared);
+    for end in [1, 0] {
+        shared.ends[end].orders.borrow_mut().push_back(Order::Finish);
+        let asked = scheduler::now();
+        scheduler::sleep_until(|| shared.ends[end].is_finished.get());
+        let took = scheduler::now() - asked;
+        if took > LONGEST_CLOSE + plan.ends[end].period {
+            shared.fail(Broken {
+                promise: "close",
+                what: format!("end {end} took {took}"),
+            });
+        }
+    }
+    judge_pulses(shared);
+}
+
+fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
+    let process = scheduler::new_process();
+    shared.ends[end].process.set(process);
+    let shared = Rc::clone(shared);
+    scheduler::spawn(process, move || live(&shared, end, life, process));
+}
+
+fn befall(shared: &Rc<Shared>, what: Misfortune) {
+    let order = |end: usize, order| shared.ends[end].orders.borrow_mut().push_back(order);
+    match what {
+        Misfortune::Suspend { end, span } => {
+            // Both ends of a loopback are one process.
+            let both = shared.plan.bus == Bus::Loopback;
+            for (which, state) in shared.ends.iter().enumerate() {
+                if which == end || both {
+                    scheduler::suspend_process(state.process.get(), span);
+                }
+            }
+        }
+        Misfortune::Pause { end, span } => order(end, Order::Pause(span)),
+        Misfortune::Hold { span } => scheduler::network(|network, _, now| network.hold_all(now, span.0)),
+        Misfortune::Reset => scheduler::network(|network, _, now| network.reset_all(now)),
+        Misfortune::Close { end, span } => order(end, Order::Close(span)),
+        Misfortune::Kill { end, span } => {
+            // What the process does from now on reaches nobody.
+            let process = shared.ends[end].process.get();
+            scheduler::network(|network, _, now| network.kill(process, now));
+            order(end, Order::Kill(span));
+        }
+    }
+}
+
+/// Without further misfortunes both ends have each other's newest values soon.
+fn recover(shared: &Shared) {
+    let limit = scheduler::now() + PATIENCE;
+    loop {
+        scheduler::sleep(shared.plan.max_age);
+        let now = scheduler::now();
+        let judged = [0, 1].map(|end| {
+            let (mine, theirs) = (&shared.ends[end], &shared.ends[1 - end]);
+            mine.reader.borrow().judge_liveness(&shared.plan, &theirs.writer.borrow(), now.0)
+        });
+        let [one, other] = judged;
+        let judged = one.and(other);
+        let is_whole = judged.is_ok() && shared.ends.iter().all(|end| end.is_open.get());
+        if is_whole {
+            return;
+        }
+        if now >= limit {
+            shared.check(judged);
+            return;
+        }
+    }
+}
+
+/// One end, from life to life.
+fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
+    let plan = &shared.plan;
+    let state = &shared.ends[end];
+    let mut random = Random::new(scramble(plan.seed ^ scramble(life << 8 | end as u64)));
+    let mut driver = End::open(plan, end, &shared.link);
+    state.reader.borrow_mut().begin(plan.stations);
+    state.is_open.set(true);
+    let mut tick = 0;
+    loop {
+        let order = state.orders.borrow_mut().pop_front();
+        match order {
+            None => {}
+            Some(Order::Pause(span)) => scheduler::sleep(span),
+            Some(Order::Finish) => {
+                driver.close();
+                state.is_finished.set(true);
+                return;
+            }
+            Some(Order::Close(span) | Order::Kill(span)) => {
+                state.is_open.set(false);
+                let asked = scheduler::now();
+                driver.close();
+                let took = scheduler::now() - asked;
+                if took > LONGEST_CLOSE {
+                    shared.fail(Broken {
+                        promise: "close",
+                        what: format!("end {end} took {took}"),
+                    });
+                }
+                scheduler::sleep(span);
+                begin(shared, end, life + 1);
+                return;
+            }
+        }
+        tick += 1;
+        one_tick(shared, (end, process), &mut driver, (life, tick));
+        let period = plan.ends[end].period.0;
+        scheduler::sleep(Nanos(random.within(period / 2, period + period / 2)));
+    }
+}
+
+fn one_tick(shared: &Shared, (end, process): (usize, usize), driver: &mut End, (life, tick): (u64, u64)) {
+    let plan = &shared.plan;
+    let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
+    let began = scheduler::now().0;
+    state.writer.borrow_mut().begin(life, tick, began);
+    let (found, is_pulse) = driver.tick(life, tick, plan.pulses);
+    let ended = scheduler::now().0;
+    {
+        let mut writer = state.writer.borrow_mut();
+        writer.end(ended);
+        if is_pulse {
+            writer.pulses.push(began);
+        }
+    }
+    if found.code.code() < 0 {
+        shared.fail(Broken {
+            promise: "code",
+            what: format!("a tick returned {}", found.code),
+        });
+        return;
+    }
+    log::trace!("{began} end {end} life {life} tick {tick}{} {} age {} sequence {} {:?}", if is_pulse { " PULSE" } else { "" }, found.code.name(), found.age, found.sequence, found.stations.iter().map(|shown| (Stamp::of(shown.stamp).tick, shown.edges)).collect::<Vec<_>>());
+    let writer = peer.writer.borrow();
+    let judged = scheduler::network(|network, _, _| {
+        let deliveries = network.deliveries.entry(process).or_default();
+        let seen = Seen {
+            began,
+            is_stale: found.code == Code::Stale,
+            is_fresh: found.code == Code::Fresh,
+            age: found.age,
+            sequence: found.sequence,
+            stations: &found.stations,
+            deliveries,
+        };
+        let judged = state.reader.borrow_mut().judge(plan, end as u64, &writer, &seen);
+        judged.and_then(|()| match watchdog(plan, 1 - end) {
+            Some(limit) => Reader::judge_watchdog(plan, limit.0, &writer, &seen),
+            None => Ok(()),
+        })
+    });
+    shared.check(judged);
+}
+
+/// The watchdog of an end, as docs/driver-cfg.md has it.
+fn watchdog(plan: &Plan, end: usize) -> Option<Nanos> {
+    match plan.ends[end].watchdog {
+        Some(watchdog) => watchdog,
+        None if end == 1 => {
+            let least = plan.max_age.max(plan.cycle.times(10));
+            Some(least.max(Nanos::from_millis(250)))
+        }
+        None => None,
+    }
+}
+
+/// In a world without misfortunes each pulse was seen, once; in no other one more were seen than written.
+fn judge_pulses(shared: &Shared) {
+    let plan = &shared.plan;
+    for end in 0..2 {
+        let (reader, writer) = (shared.ends[end].reader.borrow(), shared.ends[1 - end].writer.borrow());
+        for station in 0..plan.stations {
+            let seen: u64 = reader.edges.get(station).map_or(0, |edges| edges.iter().map(|edge| edge.1).sum());
+            let written = writer.pulses.len() as u64;
+            // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
+            let interrupts = watchdog(plan, 1 - end).is_some()
+                || end == 0 && !plan.ends[1].holds_while_stale;
+            let repeats = matches!(plan.bus, Bus::Modbus | Bus::S7);
+            if seen > written && !repeats && !interrupts {
+                shared.fail(Broken {
+                    promise: "edges",
+                    what: format!("end {end} saw {seen} rising edges of station {station}, and {written} were written"),
+                });
+            }
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use std::io::{self, Read, Write};
 use std::net::{self, Shutdown, SocketAddr};
 
-use crate::simulation::{Simulation, SimulatedListener, SimulatedStream};
+use crate::simulation::{SimulatedListener, SimulatedStream, Simulation};
 
 /// A TCP connection.
 #[derive(Debug)]
@@ -92,9 +92,9 @@ impl TcpStream {
     ///
     /// As of [`std::net::TcpStream::set_nonblocking`].
     pub fn set_nonblocking(&self) -> io::Result<()> {
-        self.os().map_or(Ok(()), |stream| stream.set_nonblocking(true))
+        self.os()
+            .map_or(Ok(()), |stream| stream.set_nonblocking(true))
     }
-
 }
 
 /// A connection whose directions can be closed one by one.
@@ -168,10 +168,7 @@ impl TcpListener {
     /// # Errors
     ///
     /// None of them can be listened on.
-    pub fn bind(
-        addresses: &[SocketAddr],
-        simulation: Option<&dyn Simulation>,
-    ) -> io::Result<Self> {
+    pub fn bind(addresses: &[SocketAddr], simulation: Option<&dyn Simulation>) -> io::Result<Self> {
         if let Some(simulation) = simulation {
             return Ok(Self::Simulated(simulation.listen(addresses)?));
         }

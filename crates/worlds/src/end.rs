@@ -135,9 +135,15 @@ impl End {
             Shown {
                 stamp: self.slots[places.stamp].unsigned(),
                 level: real(places.level) != 0.0,
-                #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a small count"
+                )]
                 edges: places.edges.map_or(0, |place| real(place) as u64),
-                numbers: places.numbers.map(|(whole, half)| (real(whole), real(half))),
+                numbers: places
+                    .numbers
+                    .map(|(whole, half)| (real(whole), real(half))),
             }
         });
         shown.collect()

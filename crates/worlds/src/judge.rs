@@ -99,7 +99,9 @@ impl Writer {
 
     /// The newest that was whole at a time.
     fn newest_at(&self, time: i64) -> Option<(u64, u64)> {
-        let after = self.written.partition_point(|written| written.ended <= time);
+        let after = self
+            .written
+            .partition_point(|written| written.ended <= time);
         let written = self.written.get(after.checked_sub(1)?)?;
         Some((written.life, written.tick))
     }
@@ -117,7 +119,9 @@ impl Writer {
 
     /// When the tick after the one that was written ended.
     fn is_ticking(&self) -> bool {
-        self.written.last().is_some_and(|written| written.ended == i64::MAX)
+        self.written
+            .last()
+            .is_some_and(|written| written.ended == i64::MAX)
     }
 }
 
@@ -162,13 +166,22 @@ fn broken(promise: &'static str, what: String) -> Result<(), Broken> {
 /// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
 fn slack(plan: &Plan) -> i64 {
     let cycles = plan.cycle.0 * 4;
-    let late = plan.habits.late * 6 + if plan.habits.preempts > 0 { 3_000_000 } else { 0 };
+    let late = plan.habits.late * 6
+        + if plan.habits.preempts > 0 {
+            3_000_000
+        } else {
+            0
+        };
     // A request is asked and answered before the next one, in as many pieces as the connection takes.
     let ways = match plan.bus {
         Bus::Modbus | Bus::S7 => 12,
         Bus::Loopback | Bus::Socket | Bus::SocketOnChange => 4,
     };
-    let pieces = if plan.conditions.capacity < 1_000 { 4 } else { 1 };
+    let pieces = if plan.conditions.capacity < 1_000 {
+        4
+    } else {
+        1
+    };
     cycles + late + plan.conditions.latency.1 * ways * pieces + 1_000_000
 }
 
@@ -233,7 +246,8 @@ impl Reader {
                 Some(_) => {}
             }
             if shown.edges > 0 {
-                self.edges.resize(self.edges.len().max(station + 1), Vec::new());
+                self.edges
+                    .resize(self.edges.len().max(station + 1), Vec::new());
                 self.edges[station].push((now, shown.edges));
             }
         }
@@ -253,12 +267,16 @@ impl Reader {
     ) -> Result<(), Broken> {
         let now = seen.began;
         if shown.stamp == FAIL_SAFE {
-            let is_right = !shown.level && shown.numbers.is_none_or(|numbers| numbers == (-7.0, 2.5));
+            let is_right =
+                !shown.level && shown.numbers.is_none_or(|numbers| numbers == (-7.0, 2.5));
             if !is_right {
                 broken("fail-safe", format!("station {station} shows {shown:?}"))?;
             }
             if seen.is_stale && shown.edges > 0 {
-                broken("stale edges", format!("station {station} has {}", shown.edges))?;
+                broken(
+                    "stale edges",
+                    format!("station {station} has {}", shown.edges),
+                )?;
             }
             return Ok(());
         }
@@ -268,16 +286,27 @@ impl Reader {
         let stamp = Stamp::of(shown.stamp);
         let Stamp { life, tick, .. } = stamp;
         if stamp.area != area || stamp.station != station as u64 || !writer.has_begun(life, tick) {
-            broken("invented", format!("station {station} shows {stamp:?}, which nobody wrote"))?;
+            broken(
+                "invented",
+                format!("station {station} shows {stamp:?}, which nobody wrote"),
+            )?;
         }
         let is_right = shown.level == level(shown.stamp)
-            && shown.numbers.is_none_or(|numbers| numbers == (whole(shown.stamp).into(), real(shown.stamp)));
+            && shown
+                .numbers
+                .is_none_or(|numbers| numbers == (whole(shown.stamp).into(), real(shown.stamp)));
         if !is_right {
-            broken("torn", format!("station {station} shows {shown:?} in the tick of {stamp:?}"))?;
+            broken(
+                "torn",
+                format!("station {station} shows {shown:?} in the tick of {stamp:?}"),
+            )?;
         }
         let newest = &mut self.newest[station];
         if (life, tick) < *newest {
-            broken("order", format!("station {station} shows {stamp:?} after {newest:?}"))?;
+            broken(
+                "order",
+                format!("station {station} shows {stamp:?} after {newest:?}"),
+            )?;
         }
         *newest = (life, tick);
         // Old data as young: the peer had written something newer before it sent what made the age so small.
@@ -286,8 +315,12 @@ impl Reader {
         let sent = if plan.bus == Bus::Loopback {
             Some(heard)
         } else {
-            let before = seen.deliveries.partition_point(|delivery| delivery.at <= heard - 1_000_000);
-            before.checked_sub(1).map(|index| seen.deliveries[index].sent)
+            let before = seen
+                .deliveries
+                .partition_point(|delivery| delivery.at <= heard - 1_000_000);
+            before
+                .checked_sub(1)
+                .map(|index| seen.deliveries[index].sent)
         };
         if let Some(sent) = sent
             && let Some(least) = writer.newest_at(sent - slack)
@@ -295,7 +328,10 @@ impl Reader {
         {
             broken(
                 "old as young",
-                format!("at {now} station {station} shows {stamp:?} with age {}; {least:?} was there when its peer sent", seen.age),
+                format!(
+                    "at {now} station {station} shows {stamp:?} with age {}; {least:?} was there when its peer sent",
+                    seen.age
+                ),
             )?;
         }
         Ok(())
@@ -307,14 +343,25 @@ impl Reader {
             return Ok(());
         }
         let now = seen.began;
-        let Some(last) = seen.deliveries.iter().rev().find(|delivery| delivery.at <= now) else {
+        let Some(last) = seen
+            .deliveries
+            .iter()
+            .rev()
+            .find(|delivery| delivery.at <= now)
+        else {
             return broken("age", format!("{} ns, though nothing has come", seen.age));
         };
         // As docs/ARCHITECTURE.md has it: half of max_age, or 2 ms.
         let allowed = (plan.max_age.0 / 2).max(2_000_000) + slack(plan);
         let truth = now - last.at;
         if truth > seen.age + allowed {
-            return broken("age", format!("told {} ns, and the last bytes came {truth} ns ago", seen.age));
+            return broken(
+                "age",
+                format!(
+                    "told {} ns, and the last bytes came {truth} ns ago",
+                    seen.age
+                ),
+            );
         }
         Ok(())
     }
@@ -337,7 +384,11 @@ impl Reader {
             if shown.stamp != FAIL_SAFE {
                 broken(
                     "left on",
-                    format!("station {station} shows {:?}, {} ns after its writer's last tick", Stamp::of(shown.stamp), now - last),
+                    format!(
+                        "station {station} shows {:?}, {} ns after its writer's last tick",
+                        Stamp::of(shown.stamp),
+                        now - last
+                    ),
                 )?;
             }
         }
@@ -345,12 +396,22 @@ impl Reader {
     }
 
     /// Whether the newest of what `writer` wrote `slack` before `now` has arrived.
-    pub(crate) fn judge_liveness(&self, plan: &Plan, writer: &Writer, now: i64) -> Result<(), Broken> {
+    pub(crate) fn judge_liveness(
+        &self,
+        plan: &Plan,
+        writer: &Writer,
+        now: i64,
+    ) -> Result<(), Broken> {
         let slack = slack(plan) + plan.max_age.0;
         let least = writer.newest_at(now - slack);
         match self.last_valid {
             Some((at, seen)) if now - at <= slack && seen >= least => Ok(()),
-            seen => broken("liveness", format!("at {now} the last valid values were {seen:?}, and {least:?} should be there")),
+            seen => broken(
+                "liveness",
+                format!(
+                    "at {now} the last valid values were {seen:?}, and {least:?} should be there"
+                ),
+            ),
         }
     }
 }

@@ -263,8 +263,14 @@ impl Network {
 
     /// The system closes what a process that was killed has left.
     pub fn kill(&mut self, process: usize, now: i64) {
-        self.listeners.retain(|_, listening| listening.process != process);
-        let ids: Vec<u64> = self.ends.iter().filter(|(_, end)| end.process == process).map(|(id, _)| *id).collect();
+        self.listeners
+            .retain(|_, listening| listening.process != process);
+        let ids: Vec<u64> = self
+            .ends
+            .iter()
+            .filter(|(_, end)| end.process == process)
+            .map(|(id, _)| *id)
+            .collect();
         for id in ids {
             self.close(id, now);
         }
@@ -341,7 +347,11 @@ impl Network {
         }
         let (conditions, own, other) = (self.conditions, id, end.other);
         let (least, most) = conditions.latency;
-        let Some(room) = self.ends.get(&other).map(|other| other.room(conditions.capacity)) else {
+        let Some(room) = self
+            .ends
+            .get(&other)
+            .map(|other| other.room(conditions.capacity))
+        else {
             // The other end is closed: its computer says so.
             let end = self.ends.get_mut(&own).expect("it was just there");
             end.reset.get_or_insert(now + most);
@@ -365,7 +375,9 @@ impl Network {
                 rest.len()
             };
             let last = other.incoming.back().map_or(0, |piece| piece.at);
-            let at = (now + random.within(least, most)).max(last).max(other.held_until);
+            let at = (now + random.within(least, most))
+                .max(last)
+                .max(other.held_until);
             let (piece, further) = rest.split_at(length);
             other.incoming.push_back(Piece {
                 at,
@@ -455,12 +467,17 @@ impl SimulatedStream for Stream {
     fn shutdown_write(&self) -> io::Result<()> {
         at_network(|network, _, now| {
             let latency = network.conditions.latency.1;
-            let end = network.ends.get_mut(&self.0).ok_or(ErrorKind::NotConnected)?;
+            let end = network
+                .ends
+                .get_mut(&self.0)
+                .ok_or(ErrorKind::NotConnected)?;
             end.has_shut_down = true;
             let other = end.other;
             if let Some(other) = network.ends.get_mut(&other) {
                 let last = other.incoming.back().map_or(now, |piece| piece.at);
-                other.fin.get_or_insert(last.max(now + latency).max(other.held_until));
+                other
+                    .fin
+                    .get_or_insert(last.max(now + latency).max(other.held_until));
             }
             Ok(())
         })
@@ -475,7 +492,10 @@ impl SimulatedStream for Stream {
 
     fn take_error(&self) -> io::Result<Option<io::Error>> {
         at_network(|network, _, _| {
-            let end = network.ends.get_mut(&self.0).ok_or(ErrorKind::NotConnected)?;
+            let end = network
+                .ends
+                .get_mut(&self.0)
+                .ok_or(ErrorKind::NotConnected)?;
             Ok(end.error.take().map(io::Error::from))
         })
     }

@@ -124,7 +124,13 @@ impl Plan {
         };
         let mut end = |is_controller: bool| {
             let period = Nanos(cycle.0 * random.of(&[3, 7, 10, 21, 40]) / 10);
-            let shortest = Nanos(max_age.0.max(cycle.0 * 10).max(period.0 * 4).max(10_000_000));
+            let shortest = Nanos(
+                max_age
+                    .0
+                    .max(cycle.0 * 10)
+                    .max(period.0 * 4)
+                    .max(10_000_000),
+            );
             EndPlan {
                 period,
                 halves: random.once_in(2),
@@ -140,15 +146,27 @@ impl Plan {
         let ends = [end(false), end(true)];
         let habits = Habits {
             preempts: if is(1) { random.of(&[8, 40, 200]) } else { 0 },
-            late: if is(2) { random.of(&[100_000, 2_000_000]) } else { 0 },
+            late: if is(2) {
+                random.of(&[100_000, 2_000_000])
+            } else {
+                0
+            },
         };
         let conditions = Conditions {
             latency: (1_000, random.of(&[20_000, 200_000, 3_000_000])),
             splits: if is(3) { random.of(&[2, 10]) } else { 0 },
-            capacity: if is(4) { random.of(&[16, 100]) } else { 64 * 1024 },
+            capacity: if is(4) {
+                random.of(&[16, 100])
+            } else {
+                64 * 1024
+            },
         };
         let span = Nanos(max_age.0 * random.within(1, 4));
-        let hold = if random.once_in(3) { cycle.times(random.within(1, 4)) } else { Nanos::ZERO };
+        let hold = if random.once_in(3) {
+            cycle.times(random.within(1, 4))
+        } else {
+            Nanos::ZERO
+        };
         let slowest = ends[0].period.max(ends[1].period).max(cycle);
         let pulses = Nanos(
             (slowest.0 * 6 + hold.0 * 2 + conditions.latency.1 * 4 + habits.late * 8)
@@ -161,12 +179,24 @@ impl Plan {
             let which = usize::try_from(random.below(2)).expect("small");
             let length = Nanos(random.within(1_000_000, max_age.0 * 4));
             let what = match random.below(6) {
-                0 if is(6) => Misfortune::Suspend { end: which, span: length },
-                1 if is(7) => Misfortune::Pause { end: which, span: length },
+                0 if is(6) => Misfortune::Suspend {
+                    end: which,
+                    span: length,
+                },
+                1 if is(7) => Misfortune::Pause {
+                    end: which,
+                    span: length,
+                },
                 2 if is(8) && bus != Bus::Loopback => Misfortune::Hold { span: length },
                 3 if is(9) && bus != Bus::Loopback => Misfortune::Reset,
-                4 if is(10) && bus != Bus::Loopback => Misfortune::Kill { end: which, span: length },
-                5 if is(11) => Misfortune::Close { end: which, span: length },
+                4 if is(10) && bus != Bus::Loopback => Misfortune::Kill {
+                    end: which,
+                    span: length,
+                },
+                5 if is(11) => Misfortune::Close {
+                    end: which,
+                    span: length,
+                },
                 _ => continue,
             };
             events.push(Event { at, what });
@@ -210,8 +240,18 @@ impl Plan {
         add(self.hold > Nanos::ZERO, "hold");
         add(self.numbers, "numbers");
         add(self.ends.iter().any(|end| end.halves), "halves");
-        add(self.ends.iter().any(|end| matches!(end.watchdog, Some(Some(_)))), "watchdog");
-        add(self.ends.iter().any(|end| matches!(end.watchdog, Some(None))), "no watchdog");
+        add(
+            self.ends
+                .iter()
+                .any(|end| matches!(end.watchdog, Some(Some(_)))),
+            "watchdog",
+        );
+        add(
+            self.ends
+                .iter()
+                .any(|end| matches!(end.watchdog, Some(None))),
+            "no watchdog",
+        );
         add(self.ends[1].holds_at_close, "at_close hold");
         add(self.ends[1].holds_while_stale, "while_stale hold");
         add(self.habits.preempts > 0, "preempted");
@@ -250,9 +290,14 @@ impl Plan {
             let _ = text.write_fmt(line);
             text.push('\n');
         };
-        line(format_args!("[driver]\nid = {}\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"", end + 1));
+        line(format_args!(
+            "[driver]\nid = {}\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"",
+            end + 1
+        ));
         let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
-        line(format_args!("cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"));
+        line(format_args!(
+            "cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
+        ));
         match plan.watchdog {
             None => {}
             Some(None) => line(format_args!("watchdog = \"off\"")),
@@ -260,8 +305,14 @@ impl Plan {
         }
         if end == 1 {
             let outputs = |holds| if holds { "hold" } else { "fail_safe" };
-            line(format_args!("at_close = \"{}\"", outputs(plan.holds_at_close)));
-            line(format_args!("while_stale = \"{}\"", outputs(plan.holds_while_stale)));
+            line(format_args!(
+                "at_close = \"{}\"",
+                outputs(plan.holds_at_close)
+            ));
+            line(format_args!(
+                "while_stale = \"{}\"",
+                outputs(plan.holds_while_stale)
+            ));
         }
         let serves = self.serves(end);
         let other = ["controller", "device"][end];
@@ -269,13 +320,19 @@ impl Plan {
             Bus::Loopback => line(format_args!("kind = \"loopback\"\nlink = \"{link}\"")),
             Bus::Socket | Bus::SocketOnChange => {
                 let role_tcp = if serves { "listen" } else { "connect" };
-                line(format_args!("kind = \"socket\"\naddress = \"127.0.0.1:20030\"\nrole_tcp = \"{role_tcp}\""));
+                line(format_args!(
+                    "kind = \"socket\"\naddress = \"127.0.0.1:20030\"\nrole_tcp = \"{role_tcp}\""
+                ));
                 if self.bus == Bus::SocketOnChange {
                     line(format_args!("send = \"on-change\""));
                 }
             }
-            Bus::Modbus if serves => line(format_args!("kind = \"modbus-server\"\naddress = \"127.0.0.1:20030\"")),
-            Bus::S7 if serves => line(format_args!("kind = \"s7-server\"\naddress = \"127.0.0.1:20030\"")),
+            Bus::Modbus if serves => line(format_args!(
+                "kind = \"modbus-server\"\naddress = \"127.0.0.1:20030\""
+            )),
+            Bus::S7 if serves => line(format_args!(
+                "kind = \"s7-server\"\naddress = \"127.0.0.1:20030\""
+            )),
             Bus::Modbus | Bus::S7 => {
                 let kind = if self.bus == Bus::S7 { "s7" } else { "modbus" };
                 line(format_args!(
@@ -291,12 +348,18 @@ impl Plan {
         for station in 0..self.stations {
             for area in ['Q', 'I'] {
                 let mut signal = |name: &str, address: &str, rest: &str| {
-                    line(format_args!("[[signal]]\nname = \"{name}{area}{station}\"\naddress = \"%{area}{address}\"\n{rest}"));
+                    line(format_args!(
+                        "[[signal]]\nname = \"{name}{area}{station}\"\naddress = \"%{area}{address}\"\n{rest}"
+                    ));
                     if self.stations > 1 {
                         line(format_args!("station = \"s{station}\""));
                     }
                 };
-                signal("stamp", "L0", &format!("type = \"LWORD\"\nfail_safe = {FAIL_SAFE}"));
+                signal(
+                    "stamp",
+                    "L0",
+                    &format!("type = \"LWORD\"\nfail_safe = {FAIL_SAFE}"),
+                );
                 let hold = if area == 'I' && self.hold > Nanos::ZERO {
                     format!("\nhold = \"{}\"", self.hold)
                 } else {
@@ -305,8 +368,16 @@ impl Plan {
                 signal("pulse", "X8.0", &format!("latch = \"rising\"{hold}"));
                 signal("level", "X8.1", "");
                 if self.numbers {
-                    signal("whole", "W10", "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7");
-                    signal("real", "D12", "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5");
+                    signal(
+                        "whole",
+                        "W10",
+                        "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7",
+                    );
+                    signal(
+                        "real",
+                        "D12",
+                        "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5",
+                    );
                 }
             }
         }

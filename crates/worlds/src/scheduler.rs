@@ -18,7 +18,7 @@ use std::time::Duration;
 use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
 use tickbus_base::os::{Interest, Ready};
-use tickbus_base::simulation::{Simulation, SimulatedListener, SimulatedStream};
+use tickbus_base::simulation::{SimulatedListener, SimulatedStream, Simulation};
 use tickbus_base::time::{Clock, Nanos, Stop};
 
 use crate::network::Network;
@@ -97,7 +97,12 @@ thread_local! {
 }
 
 fn with<R>(act: impl FnOnce(&mut World) -> R) -> R {
-    WORLD.with(|world| act(world.borrow_mut().as_mut().expect("a world runs on this thread")))
+    WORLD.with(|world| {
+        act(world
+            .borrow_mut()
+            .as_mut()
+            .expect("a world runs on this thread"))
+    })
 }
 
 /// Why a world has come to no end.
@@ -236,7 +241,9 @@ impl World {
                 }
                 is_any = true;
                 // A wake counts once: it is not to be asked for again.
-                if let Wait::Event { stop: Some(stop), .. } = &task.wait
+                if let Wait::Event {
+                    stop: Some(stop), ..
+                } = &task.wait
                     && stop.is_woken()
                 {
                     (task.wait, task.awake_since) = (Wait::Nothing, self.now);
@@ -385,9 +392,8 @@ impl Clock for SimulatedClock {
     fn now(&self) -> Nanos {
         let (now, is_preempted) = with(|world| {
             let preempts = world.habits.preempts;
-            let is_preempted = preempts > 0
-                && world.current.is_some()
-                && world.random.once_in(preempts);
+            let is_preempted =
+                preempts > 0 && world.current.is_some() && world.random.once_in(preempts);
             (world.now, is_preempted)
         });
         if is_preempted {
@@ -424,7 +430,9 @@ impl Clock for SimulatedClock {
 impl Simulation for SimulatedClock {
     fn spawn(&self, _name: &str, body: Box<dyn FnOnce() + Send>) {
         with(|world| {
-            let process = world.current.map_or(0, |current| world.tasks[current].process);
+            let process = world
+                .current
+                .map_or(0, |current| world.tasks[current].process);
             world.spawned.push((process, body));
         });
     }
@@ -461,7 +469,10 @@ impl Simulation for SimulatedClock {
         suspend(Wait::Event {
             deadline: deadline.0,
             stop: Some(stop.clone()),
-            sockets: sockets.iter().map(|(_, id, interest)| (*id, *interest)).collect(),
+            sockets: sockets
+                .iter()
+                .map(|(_, id, interest)| (*id, *interest))
+                .collect(),
         });
         look(ready);
     }
@@ -502,6 +513,8 @@ pub(crate) fn at_network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> 
 
 impl fmt::Debug for World {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("World").field("now", &self.now).finish_non_exhaustive()
+        f.debug_struct("World")
+            .field("now", &self.now)
+            .finish_non_exhaustive()
     }
 }

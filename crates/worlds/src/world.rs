@@ -112,7 +112,10 @@ fn fate(shared: &Rc<Shared>) {
     scheduler::sleep(began + plan.span - scheduler::now());
     recover(shared);
     for end in [1, 0] {
-        shared.ends[end].orders.borrow_mut().push_back(Order::Finish);
+        shared.ends[end]
+            .orders
+            .borrow_mut()
+            .push_back(Order::Finish);
         let asked = scheduler::now();
         scheduler::sleep_until(|| shared.ends[end].is_finished.get());
         let took = scheduler::now() - asked;
@@ -146,7 +149,9 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
             }
         }
         Misfortune::Pause { end, span } => order(end, Order::Pause(span)),
-        Misfortune::Hold { span } => scheduler::network(|network, _, now| network.hold_all(now, span.0)),
+        Misfortune::Hold { span } => {
+            scheduler::network(|network, _, now| network.hold_all(now, span.0))
+        }
         Misfortune::Reset => scheduler::network(|network, _, now| network.reset_all(now)),
         Misfortune::Close { end, span } => order(end, Order::Close(span)),
         Misfortune::Kill { end, span } => {
@@ -166,7 +171,9 @@ fn recover(shared: &Shared) {
         let now = scheduler::now();
         let judged = [0, 1].map(|end| {
             let (mine, theirs) = (&shared.ends[end], &shared.ends[1 - end]);
-            mine.reader.borrow().judge_liveness(&shared.plan, &theirs.writer.borrow(), now.0)
+            mine.reader
+                .borrow()
+                .judge_liveness(&shared.plan, &theirs.writer.borrow(), now.0)
         });
         let [one, other] = judged;
         let judged = one.and(other);
@@ -223,7 +230,12 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     }
 }
 
-fn one_tick(shared: &Shared, (end, process): (usize, usize), driver: &mut End, (life, tick): (u64, u64)) {
+fn one_tick(
+    shared: &Shared,
+    (end, process): (usize, usize),
+    driver: &mut End,
+    (life, tick): (u64, u64),
+) {
     let plan = &shared.plan;
     let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
     let began = scheduler::now().0;
@@ -244,7 +256,18 @@ fn one_tick(shared: &Shared, (end, process): (usize, usize), driver: &mut End, (
         });
         return;
     }
-    log::trace!("{began} end {end} life {life} tick {tick}{} {} age {} sequence {} {:?}", if is_pulse { " PULSE" } else { "" }, found.code.name(), found.age, found.sequence, found.stations.iter().map(|shown| (Stamp::of(shown.stamp).tick, shown.edges)).collect::<Vec<_>>());
+    log::trace!(
+        "{began} end {end} life {life} tick {tick}{} {} age {} sequence {} {:?}",
+        if is_pulse { " PULSE" } else { "" },
+        found.code.name(),
+        found.age,
+        found.sequence,
+        found
+            .stations
+            .iter()
+            .map(|shown| (Stamp::of(shown.stamp).tick, shown.edges))
+            .collect::<Vec<_>>()
+    );
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.entry(process).or_default();
@@ -257,7 +280,10 @@ fn one_tick(shared: &Shared, (end, process): (usize, usize), driver: &mut End, (
             stations: &found.stations,
             deliveries,
         };
-        let judged = state.reader.borrow_mut().judge(plan, end as u64, &writer, &seen);
+        let judged = state
+            .reader
+            .borrow_mut()
+            .judge(plan, end as u64, &writer, &seen);
         judged.and_then(|()| match watchdog(plan, 1 - end) {
             Some(limit) => Reader::judge_watchdog(plan, limit.0, &writer, &seen),
             None => Ok(()),
@@ -282,13 +308,19 @@ fn watchdog(plan: &Plan, end: usize) -> Option<Nanos> {
 fn judge_pulses(shared: &Shared) {
     let plan = &shared.plan;
     for end in 0..2 {
-        let (reader, writer) = (shared.ends[end].reader.borrow(), shared.ends[1 - end].writer.borrow());
+        let (reader, writer) = (
+            shared.ends[end].reader.borrow(),
+            shared.ends[1 - end].writer.borrow(),
+        );
         for station in 0..plan.stations {
-            let seen: u64 = reader.edges.get(station).map_or(0, |edges| edges.iter().map(|edge| edge.1).sum());
+            let seen: u64 = reader
+                .edges
+                .get(station)
+                .map_or(0, |edges| edges.iter().map(|edge| edge.1).sum());
             let written = writer.pulses.len() as u64;
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
-            let interrupts = watchdog(plan, 1 - end).is_some()
-                || end == 0 && !plan.ends[1].holds_while_stale;
+            let interrupts =
+                watchdog(plan, 1 - end).is_some() || end == 0 && !plan.ends[1].holds_while_stale;
             let repeats = matches!(plan.bus, Bus::Modbus | Bus::S7);
             if seen > written && !repeats && !interrupts {
                 shared.fail(Broken {

@@ -6,8 +6,8 @@ use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use super::stop::Shared;
-use crate::simulation::Simulation;
 use super::{Nanos, Stop};
+use crate::simulation::Simulation;
 
 /// A source of time that can also be waited on.
 pub trait Clock: Send + Sync + fmt::Debug {

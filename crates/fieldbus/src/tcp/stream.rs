@@ -41,10 +41,7 @@ pub fn is_for_later(error: &io::Error) -> bool {
 /// # Errors
 ///
 /// The system refuses one of these settings.
-pub fn prepare<'a>(
-    stream: impl Into<Option<&'a TcpStream>>,
-    patience: Nanos,
-) -> io::Result<()> {
+pub fn prepare<'a>(stream: impl Into<Option<&'a TcpStream>>, patience: Nanos) -> io::Result<()> {
     let Some(stream) = stream.into() else {
         return Ok(());
     };

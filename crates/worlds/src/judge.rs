@@ -155,6 +155,8 @@ pub(crate) struct Reader {
     pub(crate) edges: Vec<Vec<(i64, u64)>>,
     /// When it was last not stale, and what it saw then.
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
+    /// When it was first not stale.
+    pub(crate) first_valid: Option<i64>,
     /// The times at which it was stale.
     pub(crate) stale: Vec<i64>,
 }
@@ -172,22 +174,7 @@ fn slack(plan: &Plan) -> i64 {
         } else {
             0
         };
-    // A request is asked and answered before the next one, in as many pieces as the connection takes.
-    let ways = match plan.bus {
-        Bus::Modbus | Bus::S7 => 12,
-        Bus::Loopback | Bus::Socket | Bus::SocketOnChange => 4,
-    };
-    let pieces = if plan.conditions.capacity < 1_000 {
-        4
-    } else {
-        1
-    };
-    cycles + late + plan.conditions.latency.1 * ways * pieces + 1_000_000
-}
-
-/// Whether one end asks and the other answers: what an end asks for says that it lives, not that it writes.
-fn asks(plan: &Plan) -> bool {
-    matches!(plan.bus, Bus::Modbus | Bus::S7)
+    cycles + late + plan.round_trip() + 1_000_000
 }
 
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
@@ -195,7 +182,7 @@ fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold { span } => span.0,
         // A thread that has taken what to send may lose the processor before it sends that.
-        Misfortune::Suspend { span, .. } if plan.habits.preempts > 0 || asks(plan) => span.0,
+        Misfortune::Suspend { span, .. } if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
         _ => 0,
     });
     spans.sum()
@@ -253,6 +240,7 @@ impl Reader {
         }
         if !seen.is_stale {
             self.last_valid = Some((now, first.flatten()));
+            self.first_valid.get_or_insert(now);
         }
         Self::judge_age(plan, seen)
     }
@@ -310,7 +298,7 @@ impl Reader {
         }
         *newest = (life, tick);
         // Old data as young: the peer had written something newer before it sent what made the age so small.
-        let slack = slack(plan) + if asks(plan) { held(plan) } else { 0 };
+        let slack = slack(plan) + if plan.bus.asks() { held(plan) } else { 0 };
         let heard = now - seen.age;
         let sent = if plan.bus == Bus::Loopback {
             Some(heard)

@@ -5,14 +5,19 @@
 //! happen. [`Plan::run`] lets it happen, within a fraction of a millisecond, and returns the first promise that was broken. The
 //! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
 
+mod config;
 mod end;
 mod judge;
 mod network;
+mod pairs;
 mod plan;
 mod random;
 mod scheduler;
+mod seed;
 mod world;
 
 pub use judge::Broken;
+pub use pairs::Pairs;
 pub use plan::{Bus, Event, Misfortune, Plan};
 pub use random::Random;
+pub use seed::Seed;

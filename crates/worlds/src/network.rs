@@ -132,9 +132,10 @@ impl Network {
     /// When a socket can be read and written.
     fn ready_at(&self, id: u64) -> (i64, i64) {
         if let Some(listening) = self.listeners.get(&id) {
-            let first = listening.waiting.front();
-            let end = first.and_then(|end| self.ends.get(end));
-            return (end.map_or(i64::MAX, |end| end.connected), i64::MAX);
+            let waiting = listening.waiting.iter();
+            // One that is closed already is told by accepting it.
+            let connected = waiting.map(|id| self.ends.get(id).map_or(0, |end| end.connected));
+            return (connected.min().unwrap_or(i64::MAX), i64::MAX);
         }
         let Some(end) = self.ends.get(&id) else {
             return (i64::MIN, i64::MIN);
@@ -212,14 +213,10 @@ impl Network {
             has_shut_down: false,
             owed_since: None,
         };
-        if now < self.cut_until {
-            // Nobody answers; the caller's patience ends it, unless the cable is back before.
-            let connected = i64::MAX;
-            self.ends
-                .insert(one, end(process, own, address, other, connected, None));
-            return Ok(Box::new(Stream(one)));
-        }
-        let there = now + random.within(least, most);
+        // While nobody answers, the system tries again after 1, 3 and 7 s.
+        let tries = [0, 1, 3, 7].map(|seconds| now + seconds * 1_000_000_000);
+        let heard = tries.into_iter().find(|at| *at >= self.cut_until);
+        let there = heard.unwrap_or(tries[3]) + random.within(least, most);
         let back = there + random.within(least, most);
         let listener = self
             .listeners
@@ -410,17 +407,14 @@ impl SimulatedListener for Listener {
             let Some(listening) = network.listeners.get_mut(&self.0) else {
                 return Err(ErrorKind::InvalidInput.into());
             };
-            let first = listening.waiting.front().copied();
-            let id = first.ok_or(ErrorKind::WouldBlock)?;
+            let connected = |id: &u64| network.ends.get(id).map_or(0, |end| end.connected);
+            let place = listening.waiting.iter().position(|id| connected(id) <= now);
+            let place = place.ok_or(ErrorKind::WouldBlock)?;
+            let id = listening.waiting.remove(place).expect("it was just found");
             let Some(end) = network.ends.get(&id) else {
-                listening.waiting.pop_front();
                 return Err(ErrorKind::ConnectionAborted.into());
             };
-            if end.connected > now {
-                return Err(ErrorKind::WouldBlock.into());
-            }
             let peer = end.peer;
-            listening.waiting.pop_front();
             Ok((Box::new(Stream(id)) as _, peer))
         })
     }

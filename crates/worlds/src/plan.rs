@@ -1,21 +1,39 @@
 //! What a world consists of, drawn from its seed.
 
-use std::fmt::Write as _;
-
 use tickbus_base::time::Nanos;
 
 use crate::network::Conditions;
 use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
+use crate::seed::Seed;
 
 /// The line between the two ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Bus {
+    /// By link name, in one process.
     Loopback,
+    /// Records in each cycle.
     Socket,
+    /// Records when something has changed.
     SocketOnChange,
+    /// Modbus TCP.
     Modbus,
+    /// Modbus RTU over TCP.
+    ModbusRtu,
+    /// S7.
     S7,
+}
+
+impl Bus {
+    /// Whether one end asks and the other answers.
+    pub(crate) fn asks(self) -> bool {
+        matches!(self, Self::Modbus | Self::ModbusRtu | Self::S7)
+    }
+
+    /// Whether one message carries several stations.
+    fn has_stations(self) -> bool {
+        matches!(self, Self::Loopback | Self::Socket | Self::SocketOnChange)
+    }
 }
 
 /// What befalls a world.
@@ -63,7 +81,7 @@ pub struct EndPlan {
 #[derive(Clone, Debug)]
 pub struct Plan {
     /// What it was drawn from; rules all that is not here.
-    pub seed: u64,
+    pub seed: Seed,
     /// The line.
     pub bus: Bus,
     /// Whether the controller is the end that listens.
@@ -94,131 +112,127 @@ pub struct Plan {
     pub events: Vec<Event>,
 }
 
+impl EndPlan {
+    fn draw(random: &mut Random, cycle: Nanos, max_age: Nanos, is_controller: bool) -> Self {
+        let period = Nanos(cycle.0 * random.of(&[3, 7, 10, 21, 40]) / 10);
+        let least = [max_age.0, cycle.0 * 10, period.0 * 4, 10_000_000];
+        let least = Nanos(least.into_iter().max().unwrap_or_default());
+        let watchdog = least.times(random.within(1, 3));
+        Self {
+            period,
+            halves: random.once_in(2),
+            watchdog: match random.below(3) {
+                0 => None,
+                1 if is_controller => Some(None),
+                _ => Some(Some(watchdog)),
+            },
+            holds_at_close: random.once_in(4),
+            holds_while_stale: random.once_in(3),
+        }
+    }
+}
+
 const fn us(count: i64) -> Nanos {
     Nanos::from_micros(count)
 }
 
 impl Plan {
-    /// The world of a seed.
-    pub fn draw(seed: u64) -> Self {
-        let mut random = Random::new(scramble(seed));
+    /// The world of a seed. What a mask leaves out is drawn all the same, so that the rest stays as it is.
+    pub fn draw(seed: impl Into<Seed>) -> Self {
+        let seed = seed.into();
+        let random = &mut Random::new(scramble(seed.number));
         let bus = random.of(&[
             Bus::Loopback,
             Bus::Socket,
             Bus::Socket,
             Bus::SocketOnChange,
             Bus::Modbus,
+            Bus::ModbusRtu,
             Bus::S7,
         ]);
         let cycle = us(random.of(&[1_000, 2_000, 5_000, 10_000]));
         let max_age = cycle.times(random.within(3, 12));
         let max_age = Nanos(max_age.0.max(8_000_000));
         // Each world draws which misfortunes and habits exist at all.
-        let has = random.number();
+        let has = random.number() & u64::from(seed.features);
         let is = |bit: u32| has >> bit & 1 == 1;
-        let stations = match bus {
-            Bus::Loopback | Bus::Socket | Bus::SocketOnChange if is(0) => {
-                usize::try_from(random.within(2, 3)).expect("small")
-            }
-            _ => 1,
-        };
-        let mut end = |is_controller: bool| {
-            let period = Nanos(cycle.0 * random.of(&[3, 7, 10, 21, 40]) / 10);
-            let shortest = Nanos(
-                max_age
-                    .0
-                    .max(cycle.0 * 10)
-                    .max(period.0 * 4)
-                    .max(10_000_000),
-            );
-            EndPlan {
-                period,
-                halves: random.once_in(2),
-                watchdog: match random.below(3) {
-                    0 => None,
-                    1 if is_controller => Some(None),
-                    _ => Some(Some(shortest.times(random.within(1, 3)))),
-                },
-                holds_at_close: random.once_in(4),
-                holds_while_stale: random.once_in(3),
-            }
-        };
-        let ends = [end(false), end(true)];
+        let many = usize::try_from(random.within(2, 3)).expect("small");
+        let stations = if is(0) && bus.has_stations() { many } else { 1 };
+        let ends = [
+            EndPlan::draw(random, cycle, max_age, false),
+            EndPlan::draw(random, cycle, max_age, true),
+        ];
+        let (preempts, late) = (random.of(&[8, 40, 200]), random.of(&[100_000, 2_000_000]));
         let habits = Habits {
-            preempts: if is(1) { random.of(&[8, 40, 200]) } else { 0 },
-            late: if is(2) {
-                random.of(&[100_000, 2_000_000])
-            } else {
-                0
-            },
+            preempts: if is(1) { preempts } else { 0 },
+            late: if is(2) { late } else { 0 },
         };
+        let slowest = random.of(&[20_000, 200_000, 3_000_000]);
+        // An answer fits into what a system keeps for a connection.
+        let small = if bus.asks() { [600, 1_000] } else { [16, 100] };
+        let (splits, capacity) = (random.of(&[2, 10]), random.of(&small));
         let conditions = Conditions {
-            latency: (1_000, random.of(&[20_000, 200_000, 3_000_000])),
-            splits: if is(3) { random.of(&[2, 10]) } else { 0 },
-            capacity: if is(4) {
-                random.of(&[16, 100])
-            } else {
-                64 * 1024
-            },
+            latency: (1_000, slowest),
+            splits: if is(3) { splits } else { 0 },
+            capacity: if is(4) { capacity } else { 64 * 1024 },
         };
         let span = Nanos(max_age.0 * random.within(1, 4));
-        let hold = if random.once_in(3) {
-            cycle.times(random.within(1, 4))
-        } else {
-            Nanos::ZERO
-        };
-        let slowest = ends[0].period.max(ends[1].period).max(cycle);
-        let pulses = Nanos(
-            (slowest.0 * 6 + hold.0 * 2 + conditions.latency.1 * 4 + habits.late * 8)
-                .max(max_age.0 / 2),
-        );
-        let mut events = Vec::new();
-        let count = if is(5) { random.below(6) } else { 0 };
-        for _ in 0..count {
-            let at = Nanos(random.within(0, span.0));
-            let which = usize::try_from(random.below(2)).expect("small");
-            let length = Nanos(random.within(1_000_000, max_age.0 * 4));
-            let what = match random.below(6) {
-                0 if is(6) => Misfortune::Suspend {
-                    end: which,
-                    span: length,
-                },
-                1 if is(7) => Misfortune::Pause {
-                    end: which,
-                    span: length,
-                },
-                2 if is(8) && bus != Bus::Loopback => Misfortune::Hold { span: length },
-                3 if is(9) && bus != Bus::Loopback => Misfortune::Reset,
-                4 if is(10) && bus != Bus::Loopback => Misfortune::Kill {
-                    end: which,
-                    span: length,
-                },
-                5 if is(11) => Misfortune::Close {
-                    end: which,
-                    span: length,
-                },
-                _ => continue,
-            };
-            events.push(Event { at, what });
-        }
-        events.sort_by_key(|event| event.at);
-        Self {
+        let hold = cycle.times(random.within(1, 4));
+        let hold = if random.once_in(3) { hold } else { Nanos::ZERO };
+        let reconnect = us(random.of(&[10_000, 50_000]));
+        let count = random.below(6);
+        let mut plan = Self {
             seed,
             bus,
             controller_serves: is(12),
             stations,
             cycle,
             max_age,
-            reconnect: us(random.of(&[10_000, 50_000])),
+            reconnect,
             hold,
-            pulses,
+            pulses: Nanos::ZERO,
             numbers: is(13),
             ends,
             habits,
             conditions,
             span,
-            events,
+            events: Vec::new(),
+        };
+        for index in 0..count {
+            let drawn = plan.draw_event(random, &is);
+            plan.events
+                .extend(drawn.filter(|_| is(5) && seed.events >> index & 1 == 1));
         }
+        plan.events.sort_by_key(|event| event.at);
+        let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
+        let line = plan.round_trip() + plan.habits.late * 8;
+        plan.pulses = Nanos((slowest.0 * 6 + hold.0 * 2 + line).max(max_age.0 / 2));
+        plan
+    }
+
+    /// The time that the network takes for a whole cycle at most, in ns.
+    pub(crate) fn round_trip(&self) -> i64 {
+        // A request is asked and answered before the next one, in as many pieces as the connection takes.
+        let ways = if self.bus.asks() { 12 } else { 4 };
+        let pieces = if self.conditions.capacity < 500 { 4 } else { 1 };
+        self.conditions.latency.1 * ways * pieces
+    }
+
+    fn draw_event(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Option<Event> {
+        let at = Nanos(random.within(0, self.span.0));
+        let end = usize::try_from(random.below(2)).expect("small");
+        let span = Nanos(random.within(1_000_000, self.max_age.0 * 4));
+        let has_network = self.bus != Bus::Loopback;
+        let what = match random.below(6) {
+            0 if is(6) => Misfortune::Suspend { end, span },
+            1 if is(7) => Misfortune::Pause { end, span },
+            2 if is(8) && has_network => Misfortune::Hold { span },
+            3 if is(9) && has_network => Misfortune::Reset,
+            4 if is(10) && has_network => Misfortune::Kill { end, span },
+            5 if is(11) => Misfortune::Close { end, span },
+            _ => return None,
+        };
+        Some(Event { at, what })
     }
 
     /// The names of its features, for the table of pairs that have met.
@@ -228,6 +242,7 @@ impl Plan {
             Bus::Socket => "socket",
             Bus::SocketOnChange => "on change",
             Bus::Modbus => "modbus",
+            Bus::ModbusRtu => "modbus rtu",
             Bus::S7 => "s7",
         }];
         let mut add = |is: bool, name| {
@@ -257,7 +272,7 @@ impl Plan {
         add(self.habits.preempts > 0, "preempted");
         add(self.habits.late > 0, "woken late");
         add(self.conditions.splits > 0, "split bytes");
-        add(self.conditions.capacity < 1_000, "small buffers");
+        add(self.conditions.capacity <= 1_000, "small buffers");
         add(self.conditions.latency.1 > 1_000_000, "slow network");
         for event in &self.events {
             let name = match event.what {
@@ -274,116 +289,37 @@ impl Plan {
         }
         features
     }
-
-    /// Whether the end is the one that listens.
-    fn serves(&self, end: usize) -> bool {
-        (end == 1) == self.controller_serves
-    }
-
-    /// The driver.cfg of an end; `link` is the name of a loopback.
-    pub fn driver_cfg(&self, end: usize, link: &str) -> String {
-        let mut text = String::new();
-        let role = ["device", "controller"][end];
-        let plan = &self.ends[end];
-        let mut line = |line: std::fmt::Arguments<'_>| {
-            // Writing to a String cannot fail.
-            let _ = text.write_fmt(line);
-            text.push('\n');
-        };
-        line(format_args!(
-            "[driver]\nid = {}\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"",
-            end + 1
-        ));
-        let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
-        line(format_args!(
-            "cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
-        ));
-        match plan.watchdog {
-            None => {}
-            Some(None) => line(format_args!("watchdog = \"off\"")),
-            Some(Some(span)) => line(format_args!("watchdog = \"{span}\"")),
-        }
-        if end == 1 {
-            let outputs = |holds| if holds { "hold" } else { "fail_safe" };
-            line(format_args!(
-                "at_close = \"{}\"",
-                outputs(plan.holds_at_close)
-            ));
-            line(format_args!(
-                "while_stale = \"{}\"",
-                outputs(plan.holds_while_stale)
-            ));
-        }
-        let serves = self.serves(end);
-        let other = ["controller", "device"][end];
-        match self.bus {
-            Bus::Loopback => line(format_args!("kind = \"loopback\"\nlink = \"{link}\"")),
-            Bus::Socket | Bus::SocketOnChange => {
-                let role_tcp = if serves { "listen" } else { "connect" };
-                line(format_args!(
-                    "kind = \"socket\"\naddress = \"127.0.0.1:20030\"\nrole_tcp = \"{role_tcp}\""
-                ));
-                if self.bus == Bus::SocketOnChange {
-                    line(format_args!("send = \"on-change\""));
-                }
-            }
-            Bus::Modbus if serves => line(format_args!(
-                "kind = \"modbus-server\"\naddress = \"127.0.0.1:20030\""
-            )),
-            Bus::S7 if serves => line(format_args!(
-                "kind = \"s7-server\"\naddress = \"127.0.0.1:20030\""
-            )),
-            Bus::Modbus | Bus::S7 => {
-                let kind = if self.bus == Bus::S7 { "s7" } else { "modbus" };
-                line(format_args!(
-                    "kind = \"{kind}-client\"\naddress = \"127.0.0.1:20030\"\nwrite_to = \"tickbus {other}\""
-                ));
-            }
-        }
-        if self.stations > 1 {
-            for station in 0..self.stations {
-                line(format_args!("[[station]]\nname = \"s{station}\""));
-            }
-        }
-        for station in 0..self.stations {
-            for area in ['Q', 'I'] {
-                let mut signal = |name: &str, address: &str, rest: &str| {
-                    line(format_args!(
-                        "[[signal]]\nname = \"{name}{area}{station}\"\naddress = \"%{area}{address}\"\n{rest}"
-                    ));
-                    if self.stations > 1 {
-                        line(format_args!("station = \"s{station}\""));
-                    }
-                };
-                signal(
-                    "stamp",
-                    "L0",
-                    &format!("type = \"LWORD\"\nfail_safe = {FAIL_SAFE}"),
-                );
-                let hold = if area == 'I' && self.hold > Nanos::ZERO {
-                    format!("\nhold = \"{}\"", self.hold)
-                } else {
-                    String::new()
-                };
-                signal("pulse", "X8.0", &format!("latch = \"rising\"{hold}"));
-                signal("level", "X8.1", "");
-                if self.numbers {
-                    signal(
-                        "whole",
-                        "W10",
-                        "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7",
-                    );
-                    signal(
-                        "real",
-                        "D12",
-                        "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5",
-                    );
-                }
-            }
-        }
-        text
-    }
 }
+
+/// All features that a world can have, each of the buses one.
+pub(crate) const FEATURES: &[&str] = &[
+    "loopback",
+    "socket",
+    "on change",
+    "modbus",
+    "modbus rtu",
+    "s7",
+    "stations",
+    "controller serves",
+    "hold",
+    "numbers",
+    "halves",
+    "watchdog",
+    "no watchdog",
+    "at_close hold",
+    "while_stale hold",
+    "preempted",
+    "woken late",
+    "split bytes",
+    "small buffers",
+    "slow network",
+    "suspended",
+    "paused",
+    "bytes held",
+    "reset",
+    "killed",
+    "closed",
+];
 
 /// The fail-safe value of stamps: of no life.
 pub(crate) const FAIL_SAFE: u64 = 2_989;

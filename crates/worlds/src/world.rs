@@ -82,7 +82,7 @@ impl Plan {
             let shared = Rc::clone(&shared);
             move || fate(&shared)
         };
-        let result = scheduler::run(scramble(self.seed ^ 1), self.habits, main);
+        let result = scheduler::run(scramble(self.seed.number ^ 1), self.habits, main);
         if let Some(broken) = shared.broken.borrow_mut().take() {
             return Err(broken);
         }
@@ -111,6 +111,7 @@ fn fate(shared: &Rc<Shared>) {
     }
     scheduler::sleep(began + plan.span - scheduler::now());
     recover(shared);
+    let ended = scheduler::now();
     for end in [1, 0] {
         shared.ends[end]
             .orders
@@ -126,7 +127,7 @@ fn fate(shared: &Rc<Shared>) {
             });
         }
     }
-    judge_pulses(shared);
+    judge_pulses(shared, ended);
 }
 
 fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
@@ -192,7 +193,9 @@ fn recover(shared: &Shared) {
 fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let plan = &shared.plan;
     let state = &shared.ends[end];
-    let mut random = Random::new(scramble(plan.seed ^ scramble(life << 8 | end as u64)));
+    let mut random = Random::new(scramble(
+        plan.seed.number ^ scramble(life << 8 | end as u64),
+    ));
     let mut driver = End::open(plan, end, &shared.link);
     state.reader.borrow_mut().begin(plan.stations);
     state.is_open.set(true);
@@ -304,29 +307,55 @@ fn watchdog(plan: &Plan, end: usize) -> Option<Nanos> {
     }
 }
 
-/// In a world without misfortunes each pulse was seen, once; in no other one more were seen than written.
-fn judge_pulses(shared: &Shared) {
+/// Each pulse that is written while all is well is seen once; no more are seen than were written.
+fn judge_pulses(shared: &Shared, ended: Nanos) {
     let plan = &shared.plan;
+    let readers = [0, 1].map(|end| shared.ends[end].reader.borrow());
+    // From the first data on, if there were no misfortunes.
+    let well_since = readers
+        .iter()
+        .map(|reader| reader.first_valid.unwrap_or(i64::MAX))
+        .max();
+    let well_since = well_since
+        .filter(|_| plan.events.is_empty())
+        .unwrap_or(i64::MAX);
     for end in 0..2 {
-        let (reader, writer) = (
-            shared.ends[end].reader.borrow(),
-            shared.ends[1 - end].writer.borrow(),
-        );
+        let (reader, writer) = (&readers[end], shared.ends[1 - end].writer.borrow());
         for station in 0..plan.stations {
-            let seen: u64 = reader
-                .edges
-                .get(station)
-                .map_or(0, |edges| edges.iter().map(|edge| edge.1).sum());
+            let edges = reader.edges.get(station).map_or(&[][..], |edges| edges);
+            let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
             let interrupts =
                 watchdog(plan, 1 - end).is_some() || end == 0 && !plan.ends[1].holds_while_stale;
-            let repeats = matches!(plan.bus, Bus::Modbus | Bus::S7);
-            if seen > written && !repeats && !interrupts {
+            if seen > written && !plan.bus.asks() && !interrupts {
                 shared.fail(Broken {
                     promise: "edges",
                     what: format!("end {end} saw {seen} rising edges of station {station}, and {written} were written"),
                 });
+            }
+            for pulse in &writer.pulses {
+                let window = *pulse..pulse.saturating_add(plan.pulses.0);
+                let before = pulse - plan.max_age.0 * 2;
+                let is_well = before > well_since
+                    && window.end < ended.0
+                    && !readers.iter().any(|reader| {
+                        reader
+                            .stale
+                            .iter()
+                            .any(|at| (before..window.end).contains(at))
+                    });
+                let seen: u64 = edges
+                    .iter()
+                    .filter(|(at, _)| window.contains(at))
+                    .map(|edge| edge.1)
+                    .sum();
+                if is_well && seen != 1 {
+                    shared.fail(Broken {
+                        promise: "pulses",
+                        what: format!("end {end} saw {seen} rising edges of station {station} after a pulse at {pulse}"),
+                    });
+                }
             }
         }
     }

@@ -159,16 +159,15 @@ impl<S: Stream> Call<S> {
         let added = set.add(0, &self.stream, interest);
         added.map_err(|error| no_wait(&error))?;
         let mut readable = false;
-        match self.since.take() {
-            Some(since) => {
-                port.begin_to_look(since);
-                port.look_at_line(port.clock().now());
-                port.look_leaves_some();
-            }
-            None => port.begin_to_look(port.clock().now()),
-        }
+        let since = self.since.take();
+        port.begin_to_look(since.unwrap_or_else(|| port.clock().now()));
+        let mut is_first = true;
         while !stop.is_stopped() {
             port.look_at_line(port.clock().now());
+            if std::mem::take(&mut is_first) {
+                // Nothing is read before the system has said that there is something.
+                port.look_leaves_some();
+            }
             self.turn(readable, caller, port)?;
             let deadline = caller.deadline(port).min(port.due()).min(port.next_look());
             if interest != self.interest() {

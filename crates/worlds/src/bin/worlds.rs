@@ -1,8 +1,10 @@
-//! Runs worlds: `worlds SEED` one of them, `worlds SEED COUNT` so many from that seed on.
+//! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
+//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise.
 
-use std::time::Instant;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
-use tickbus_worlds::Plan;
+use tickbus_worlds::{Broken, Pairs, Plan, Seed};
 
 /// Prints what the drivers log.
 struct Log;
@@ -19,27 +21,80 @@ impl log::Log for Log {
     fn flush(&self) {}
 }
 
-fn main() {
-    let numbers: Vec<u64> = std::env::args()
-        .skip(1)
-        .map(|text| text.parse().expect("a number"))
-        .collect();
-    let first = numbers.first().copied().unwrap_or(0);
-    let count = numbers.get(1).copied().unwrap_or(1);
-    let begun = Instant::now();
-    let mut failed = 0;
-    for seed in first..first + count {
-        let plan = Plan::draw(seed);
-        if count == 1 {
-            let _ = log::set_logger(&Log);
-            log::set_max_level(log::LevelFilter::Trace);
-            println!("{plan:#?}\n{}", plan.driver_cfg(0, "link"));
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let texts: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match *texts {
+        [seed] => match seed.parse() {
+            Ok(seed) => one(seed),
+            Err(why) => usage(&why),
+        },
+        [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u64>()) {
+            (Ok(first), Ok(seconds)) => many(first, Duration::from_secs(seconds)),
+            _ => usage("FIRST and SECONDS are whole numbers"),
+        },
+        _ => usage("one seed, or two numbers, are expected"),
+    }
+}
+
+fn usage(why: &str) -> ExitCode {
+    eprintln!("worlds: {why}\nusage: worlds SEED\n       worlds FIRST SECONDS");
+    ExitCode::from(2)
+}
+
+fn one(seed: Seed) -> ExitCode {
+    // Nobody else sets one.
+    let _ = log::set_logger(&Log);
+    log::set_max_level(log::LevelFilter::Trace);
+    let plan = Plan::draw(seed);
+    println!("{plan:#?}");
+    for end in 0..2 {
+        println!("{}", plan.driver_cfg(end, "link"));
+    }
+    match plan.run() {
+        Ok(()) => {
+            println!("worlds: ok seed={seed}");
+            ExitCode::SUCCESS
         }
-        if let Err(broken) = plan.run() {
-            failed += 1;
-            println!("seed {seed}: {:?}: {broken}", plan.features());
+        Err(broken) => {
+            println!("worlds: failed seed={seed} {broken}");
+            ExitCode::FAILURE
         }
     }
-    let span = begun.elapsed().as_secs_f64();
-    println!("worlds={count} failed={failed} seconds={span:.2}");
+}
+
+fn many(first: u64, limit: Duration) -> ExitCode {
+    let begun = Instant::now();
+    let (mut worlds, mut failed) = (0, 0);
+    let mut pairs = Pairs::default();
+    while begun.elapsed() < limit {
+        let seed = Seed::from(first.wrapping_add(worlds));
+        let plan = Plan::draw(seed);
+        pairs.add(&plan);
+        worlds += 1;
+        if let Err(Broken { promise, what }) = plan.run() {
+            failed += 1;
+            let small = seed.shrunk(promise);
+            let features = Plan::draw(small).features().join(", ");
+            println!(
+                "{promise}: {what}\n  seed {seed}; smaller, with {features}:\n  worlds {small}"
+            );
+        }
+    }
+    let seconds = begun.elapsed().as_secs_f64();
+    println!(
+        "pairs of features that never met: {}",
+        pairs.strangers().join("; ")
+    );
+    #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
+    let rate = worlds as f64 / seconds;
+    println!(
+        "worlds={worlds} failed={failed} first={first} per_second={rate:.0} pairs={}",
+        pairs.met()
+    );
+    if failed > 0 {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
 }

@@ -1,6 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak worlds lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -35,6 +35,9 @@ bench: setup ## measure, and print each figure beside the one asked for
 
 soak: setup ## a device and a peer that dies again and again, for MINUTES (3)
 	@exec tools/soak $(MINUTES)
+
+worlds: setup ## simulated worlds, judged by a model, for MINUTES (10)
+	@exec tools/worlds $(MINUTES)
 
 lint: setup ## formatting, clippy, documentation, Java warnings, shell scripts
 	@exec tools/lint

@@ -18,6 +18,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/conformance/src/resources.rs",
     "crates/fmi/src/foreign/library",
     "crates/image/src/triple.rs",
+    "crates/worlds/src/scheduler.rs",
     "crates/plc/src/hosted/table.rs",
     "python/src/view.rs",
 ];

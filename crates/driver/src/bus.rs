@@ -101,7 +101,7 @@ fn open_hosted(
     let bus_of_program = bus(controller);
     let host = HostThread::start(
         hosted,
-        title,
+        &title,
         config,
         Role::Controller,
         bus_of_program,

@@ -95,9 +95,9 @@ impl Host {
             tape: ScanRecorder::start(config, role, is_stepped)?,
         };
         let thread = match bus {
-            Bus::Free(bus) => HostThread::start(hosted, title, config, role, bus, clock),
+            Bus::Free(bus) => HostThread::start(hosted, &title, config, role, bus, clock),
             Bus::Stepped(bus) => {
-                HostThread::start_in_steps(hosted, title, (config, role), (bus, stop), clock)
+                HostThread::start_in_steps(hosted, &title, (config, role), (bus, stop), clock)
             }
         };
         thread.map(Self)

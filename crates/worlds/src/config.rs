@@ -1,121 +1,113 @@
 //! The driver.cfg of each end of a world.
 
-use std::fmt::Write as _;
-
 use tickbus_base::time::Nanos;
 
-use crate::plan::{Bus, FAIL_SAFE, Plan};
+use crate::plan::{Bus, FAIL_SAFE, Plan, Watchdog};
+
+const ADDRESS: &str = "address = \"127.0.0.1:20030\"";
 
 impl Plan {
-    /// Whether the end is the one that listens.
-    fn serves(&self, end: usize) -> bool {
-        (end == 1) == self.controller_serves
-    }
-
     /// The driver.cfg of an end; `link` is the name of a loopback.
     pub fn driver_cfg(&self, end: usize, link: &str) -> String {
-        let mut text = String::new();
         let role = ["device", "controller"][end];
-        let plan = &self.ends[end];
-        let mut line = |line: std::fmt::Arguments<'_>| {
-            // Writing to a String cannot fail.
-            let _ = text.write_fmt(line);
-            text.push('\n');
-        };
-        line(format_args!(
-            "[driver]\nid = {}\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"",
-            end + 1
-        ));
-        let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
-        line(format_args!(
-            "cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
-        ));
-        match plan.watchdog {
-            None => {}
-            Some(None) => line(format_args!("watchdog = \"off\"")),
-            Some(Some(span)) => line(format_args!("watchdog = \"{span}\"")),
-        }
-        if end == 1 {
-            let outputs = |holds| if holds { "hold" } else { "fail_safe" };
-            line(format_args!(
-                "at_close = \"{}\"",
-                outputs(plan.holds_at_close)
-            ));
-            line(format_args!(
-                "while_stale = \"{}\"",
-                outputs(plan.holds_while_stale)
-            ));
-        }
-        let serves = self.serves(end);
-        let other = ["controller", "device"][end];
-        match self.bus {
-            Bus::Loopback => line(format_args!("kind = \"loopback\"\nlink = \"{link}\"")),
-            Bus::Socket | Bus::SocketOnChange => {
-                let role_tcp = if serves { "listen" } else { "connect" };
-                line(format_args!(
-                    "kind = \"socket\"\naddress = \"127.0.0.1:20030\"\nrole_tcp = \"{role_tcp}\""
-                ));
-                if self.bus == Bus::SocketOnChange {
-                    line(format_args!("send = \"on-change\""));
-                }
-            }
-            Bus::Modbus | Bus::ModbusRtu if serves => line(format_args!(
-                "kind = \"modbus-server\"\naddress = \"127.0.0.1:20030\""
-            )),
-            Bus::S7 if serves => line(format_args!(
-                "kind = \"s7-server\"\naddress = \"127.0.0.1:20030\""
-            )),
-            Bus::Modbus | Bus::ModbusRtu | Bus::S7 => {
-                let kind = if self.bus == Bus::S7 { "s7" } else { "modbus" };
-                line(format_args!(
-                    "kind = \"{kind}-client\"\naddress = \"127.0.0.1:20030\"\nwrite_to = \"tickbus {other}\""
-                ));
-            }
-        }
-        if self.bus == Bus::ModbusRtu {
-            line(format_args!("framing = \"rtu\""));
-        }
-        if self.stations > 1 {
-            for station in 0..self.stations {
-                line(format_args!("[[station]]\nname = \"s{station}\""));
+        let mut lines = vec![
+            format!("[driver]\nid = {}\nname = \"{role}\"", end + 1),
+            format!("[fieldbus]\nrole = \"{role}\""),
+        ];
+        lines.extend(self.fieldbus(end, link));
+        lines.extend(self.timing(end));
+        for station in 0..self.stations {
+            if self.stations > 1 {
+                lines.push(format!("[[station]]\nname = \"s{station}\""));
             }
         }
         for station in 0..self.stations {
             for area in ['Q', 'I'] {
-                let mut signal = |name: &str, address: &str, rest: &str| {
-                    line(format_args!(
-                        "[[signal]]\nname = \"{name}{area}{station}\"\naddress = \"%{area}{address}\"\n{rest}"
-                    ));
-                    if self.stations > 1 {
-                        line(format_args!("station = \"s{station}\""));
-                    }
-                };
-                signal(
-                    "stamp",
-                    "L0",
-                    &format!("type = \"LWORD\"\nfail_safe = {FAIL_SAFE}"),
-                );
-                let hold = if area == 'I' && self.hold > Nanos::ZERO {
-                    format!("\nhold = \"{}\"", self.hold)
-                } else {
-                    String::new()
-                };
-                signal("pulse", "X8.0", &format!("latch = \"rising\"{hold}"));
-                signal("level", "X8.1", "");
-                if self.numbers {
-                    signal(
-                        "whole",
-                        "W10",
-                        "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7",
-                    );
-                    signal(
-                        "real",
-                        "D12",
-                        "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5",
-                    );
-                }
+                lines.extend(self.signals(station, area));
             }
         }
-        text
+        lines.join("\n")
+    }
+
+    /// The bus, and what only some buses have.
+    fn fieldbus(&self, end: usize, link: &str) -> Vec<String> {
+        let serves = (end == 1) == self.controller_serves;
+        let (kind, place) = match (self.bus, serves) {
+            (Bus::Loopback, _) => return vec![format!("kind = \"loopback\"\nlink = \"{link}\"")],
+            (Bus::Socket | Bus::SocketOnChange, true) => ("socket", "role_tcp = \"listen\""),
+            (Bus::Socket | Bus::SocketOnChange, false) => ("socket", "role_tcp = \"connect\""),
+            (Bus::Modbus | Bus::ModbusRtu, true) => ("modbus-server", ""),
+            (Bus::Modbus | Bus::ModbusRtu, false) => ("modbus-client", ""),
+            (Bus::S7, true) => ("s7-server", ""),
+            (Bus::S7, false) => ("s7-client", ""),
+        };
+        let mut lines = vec![format!("kind = \"{kind}\"\n{ADDRESS}\n{place}")];
+        match self.bus {
+            Bus::SocketOnChange => lines.push("send = \"on-change\"".to_owned()),
+            Bus::ModbusRtu => lines.push("framing = \"rtu\"".to_owned()),
+            _ => {}
+        }
+        if self.bus.asks() && !serves {
+            let other = ["controller", "device"][end];
+            lines.push(format!("write_to = \"tickbus {other}\""));
+        }
+        lines
+    }
+
+    /// What every bus has.
+    fn timing(&self, end: usize) -> Vec<String> {
+        let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
+        let mut lines = vec![format!(
+            "cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
+        )];
+        match self.ends[end].watchdog {
+            Watchdog::Default => {}
+            Watchdog::Off => lines.push("watchdog = \"off\"".to_owned()),
+            Watchdog::After(span) => lines.push(format!("watchdog = \"{span}\"")),
+        }
+        if end == 1 {
+            let outputs = |holds| if holds { "hold" } else { "fail_safe" };
+            let at_close = outputs(self.ends[1].holds_at_close);
+            let while_stale = outputs(self.ends[1].holds_while_stale);
+            lines.push(format!(
+                "at_close = \"{at_close}\"\nwhile_stale = \"{while_stale}\""
+            ));
+        }
+        lines
+    }
+
+    /// The signals of a station in one direction.
+    fn signals(&self, station: usize, area: char) -> Vec<String> {
+        let of = if self.stations > 1 {
+            format!("\nstation = \"s{station}\"")
+        } else {
+            String::new()
+        };
+        let signal = |name: &str, place: &str, rest: &str| {
+            format!(
+                "[[signal]]\nname = \"{name}{area}{station}\"\naddress = \"%{area}{place}\"\n{rest}{of}"
+            )
+        };
+        let hold = if area == 'I' && self.hold > Nanos::ZERO {
+            format!("\nhold = \"{}\"", self.hold)
+        } else {
+            String::new()
+        };
+        let mut lines = vec![
+            signal(
+                "stamp",
+                "L0",
+                &format!("type = \"LWORD\"\nfail_safe = {FAIL_SAFE}"),
+            ),
+            signal("pulse", "X8.0", &format!("latch = \"rising\"{hold}")),
+            signal("level", "X8.1", ""),
+        ];
+        if self.numbers {
+            let whole = "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7";
+            let real =
+                "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5";
+            lines.extend([signal("whole", "W10", whole), signal("real", "D12", real)]);
+        }
+        lines
     }
 }

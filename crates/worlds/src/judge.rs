@@ -54,20 +54,21 @@ pub(crate) fn level(stamp: u64) -> bool {
 }
 
 pub(crate) fn whole(stamp: u64) -> i16 {
-    (scramble(stamp) >> 8) as u16 as i16
+    let [one, other, ..] = scramble(stamp).to_be_bytes();
+    i16::from_be_bytes([one, other])
 }
 
 /// In halves, so that it passes the scale and 32 bits unharmed.
 pub(crate) fn real(stamp: u64) -> f64 {
-    f64::from((scramble(stamp) >> 24) as u16 as i16) / 2.0
+    let [_, _, one, other, ..] = scramble(stamp).to_be_bytes();
+    f64::from(i16::from_be_bytes([one, other])) / 2.0
 }
 
-/// A tick of a writer: its number, and when its call began and returned.
+/// A tick of a writer: its number, and when its call returned.
 #[derive(Clone, Copy, Debug)]
 struct Written {
     life: u64,
     tick: u64,
-    began: i64,
     ended: i64,
 }
 
@@ -81,11 +82,10 @@ pub(crate) struct Writer {
 
 impl Writer {
     /// A tick begins.
-    pub(crate) fn begin(&mut self, life: u64, tick: u64, now: i64) {
+    pub(crate) fn begin(&mut self, life: u64, tick: u64) {
         self.written.push(Written {
             life,
             tick,
-            began: now,
             ended: i64::MAX,
         });
     }
@@ -180,9 +180,9 @@ fn slack(plan: &Plan) -> i64 {
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
 fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
-        Misfortune::Hold { span } => span.0,
+        Misfortune::Hold(span) => span.0,
         // A thread that has taken what to send may lose the processor before it sends that.
-        Misfortune::Suspend { span, .. } if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
+        Misfortune::Suspend(_, span) if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
         _ => 0,
     });
     spans.sum()

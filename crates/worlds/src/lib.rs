@@ -17,7 +17,8 @@ mod seed;
 mod world;
 
 pub use judge::Broken;
+pub use network::Conditions;
 pub use pairs::Pairs;
-pub use plan::{Bus, Event, Misfortune, Plan};
-pub use random::Random;
+pub use plan::{Bus, EndPlan, Event, Misfortune, Plan, Watchdog};
+pub use scheduler::Habits;
 pub use seed::Seed;

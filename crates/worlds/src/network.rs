@@ -44,7 +44,7 @@ struct Piece {
 
 /// Bytes that a process has read.
 #[derive(Clone, Copy, Debug)]
-pub struct Delivery {
+pub(crate) struct Delivery {
     /// When they arrived at its computer.
     pub at: i64,
     /// When they were sent, or earlier.
@@ -81,7 +81,7 @@ struct Listening {
 
 /// All sockets of a world.
 #[derive(Debug, Default)]
-pub struct Network {
+pub(crate) struct Network {
     pub(crate) conditions: Conditions,
     ends: BTreeMap<u64, End>,
     listeners: BTreeMap<u64, Listening>,
@@ -194,7 +194,7 @@ impl Network {
         process: usize,
         now: i64,
         random: &mut Random,
-    ) -> io::Result<Box<dyn SimulatedStream>> {
+    ) -> Box<dyn SimulatedStream> {
         self.ports += 1;
         let own = SocketAddr::from((Ipv4Addr::LOCALHOST, 40_000 + self.ports));
         let (one, other) = (self.identity(), self.identity());
@@ -226,7 +226,7 @@ impl Network {
             let refused = Some(ErrorKind::ConnectionRefused);
             self.ends
                 .insert(one, end(process, own, address, other, back, refused));
-            return Ok(Box::new(Stream(one)));
+            return Box::new(Stream(one));
         };
         listening.waiting.push_back(other);
         let theirs = listening.process;
@@ -234,11 +234,11 @@ impl Network {
             .insert(one, end(process, own, address, other, back, None));
         self.ends
             .insert(other, end(theirs, address, own, one, there, None));
-        Ok(Box::new(Stream(one)))
+        Box::new(Stream(one))
     }
 
     /// Breaks every connection, as a device in the middle that restarts does.
-    pub fn reset_all(&mut self, now: i64) {
+    pub(crate) fn reset_all(&mut self, now: i64) {
         for end in self.ends.values_mut() {
             end.reset.get_or_insert(now);
             end.incoming.clear();
@@ -246,7 +246,7 @@ impl Network {
     }
 
     /// Nothing arrives for `span`, and then everything.
-    pub fn hold_all(&mut self, now: i64, span: i64) {
+    pub(crate) fn hold_all(&mut self, now: i64, span: i64) {
         for end in self.ends.values_mut() {
             end.held_until = end.held_until.max(now + span);
             for piece in &mut end.incoming {
@@ -259,7 +259,7 @@ impl Network {
     }
 
     /// The system closes what a process that was killed has left.
-    pub fn kill(&mut self, process: usize, now: i64) {
+    pub(crate) fn kill(&mut self, process: usize, now: i64) {
         self.listeners
             .retain(|_, listening| listening.process != process);
         let ids: Vec<u64> = self

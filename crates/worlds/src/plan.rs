@@ -36,21 +36,21 @@ impl Bus {
     }
 }
 
-/// What befalls a world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+/// What befalls a world. Ends are 0, the device, and 1, the controller; spans say how long it lasts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Misfortune {
     /// All threads of an end stand still.
-    Suspend { end: usize, span: Nanos },
+    Suspend(usize, Nanos),
     /// The simulation or the program at an end does not tick.
-    Pause { end: usize, span: Nanos },
+    Pause(usize, Nanos),
     /// Bytes are held up, and connecting gets no answer.
-    Hold { span: Nanos },
+    Hold(Nanos),
     /// All connections break.
     Reset,
     /// The process of an end is killed, and another one starts later.
-    Kill { end: usize, span: Nanos },
+    Kill(usize, Nanos),
     /// The driver of an end closes, and opens again later.
-    Close { end: usize, span: Nanos },
+    Close(usize, Nanos),
 }
 
 /// When it does.
@@ -62,6 +62,17 @@ pub struct Event {
     pub what: Misfortune,
 }
 
+/// The key `watchdog` of an end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watchdog {
+    /// It is not there.
+    Default,
+    /// `"off"`.
+    Off,
+    /// A duration.
+    After(Nanos),
+}
+
 /// One end of the line: 0 is the device, 1 the controller.
 #[derive(Clone, Debug)]
 pub struct EndPlan {
@@ -69,8 +80,8 @@ pub struct EndPlan {
     pub period: Nanos,
     /// Whether ticks come in two halves.
     pub halves: bool,
-    /// `None`: as the driver does by default; `Some(None)`: off.
-    pub watchdog: Option<Option<Nanos>>,
+    /// When the other end gets fail-safe values if this one does not tick.
+    pub watchdog: Watchdog,
     /// `at_close = "hold"`.
     pub holds_at_close: bool,
     /// `while_stale = "hold"`.
@@ -122,9 +133,9 @@ impl EndPlan {
             period,
             halves: random.once_in(2),
             watchdog: match random.below(3) {
-                0 => None,
-                1 if is_controller => Some(None),
-                _ => Some(Some(watchdog)),
+                0 => Watchdog::Default,
+                1 if is_controller => Watchdog::Off,
+                _ => Watchdog::After(watchdog),
             },
             holds_at_close: random.once_in(4),
             holds_while_stale: random.once_in(3),
@@ -199,7 +210,7 @@ impl Plan {
             events: Vec::new(),
         };
         for index in 0..count {
-            let drawn = plan.draw_event(random, &is);
+            let drawn = plan.draw_event(random, is);
             plan.events
                 .extend(drawn.filter(|_| is(5) && seed.events >> index & 1 == 1));
         }
@@ -224,12 +235,12 @@ impl Plan {
         let span = Nanos(random.within(1_000_000, self.max_age.0 * 4));
         let has_network = self.bus != Bus::Loopback;
         let what = match random.below(6) {
-            0 if is(6) => Misfortune::Suspend { end, span },
-            1 if is(7) => Misfortune::Pause { end, span },
-            2 if is(8) && has_network => Misfortune::Hold { span },
+            0 if is(6) => Misfortune::Suspend(end, span),
+            1 if is(7) => Misfortune::Pause(end, span),
+            2 if is(8) && has_network => Misfortune::Hold(span),
             3 if is(9) && has_network => Misfortune::Reset,
-            4 if is(10) && has_network => Misfortune::Kill { end, span },
-            5 if is(11) => Misfortune::Close { end, span },
+            4 if is(10) && has_network => Misfortune::Kill(end, span),
+            5 if is(11) => Misfortune::Close(end, span),
             _ => return None,
         };
         Some(Event { at, what })
@@ -258,13 +269,11 @@ impl Plan {
         add(
             self.ends
                 .iter()
-                .any(|end| matches!(end.watchdog, Some(Some(_)))),
+                .any(|end| matches!(end.watchdog, Watchdog::After(_))),
             "watchdog",
         );
         add(
-            self.ends
-                .iter()
-                .any(|end| matches!(end.watchdog, Some(None))),
+            self.ends.iter().any(|end| end.watchdog == Watchdog::Off),
             "no watchdog",
         );
         add(self.ends[1].holds_at_close, "at_close hold");
@@ -276,12 +285,12 @@ impl Plan {
         add(self.conditions.latency.1 > 1_000_000, "slow network");
         for event in &self.events {
             let name = match event.what {
-                Misfortune::Suspend { .. } => "suspended",
-                Misfortune::Pause { .. } => "paused",
-                Misfortune::Hold { .. } => "bytes held",
+                Misfortune::Suspend(..) => "suspended",
+                Misfortune::Pause(..) => "paused",
+                Misfortune::Hold(..) => "bytes held",
                 Misfortune::Reset => "reset",
-                Misfortune::Kill { .. } => "killed",
-                Misfortune::Close { .. } => "closed",
+                Misfortune::Kill(..) => "killed",
+                Misfortune::Close(..) => "closed",
             };
             if !features.contains(&name) {
                 features.push(name);

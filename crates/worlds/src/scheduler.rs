@@ -107,7 +107,7 @@ fn with<R>(act: impl FnOnce(&mut World) -> R) -> R {
 
 /// Why a world has come to no end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stuck {
+pub(crate) enum Stuck {
     /// Every thread waits for another one.
     Deadlock,
     /// Threads go on and on.
@@ -123,7 +123,7 @@ pub enum Stuck {
 /// # Panics
 ///
 /// A thread panicked, or a world runs on this thread already.
-pub fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> Result<(), Stuck> {
+pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> Result<(), Stuck> {
     WORLD.with(|world| {
         let before = world.borrow_mut().replace(World {
             // Some time after the computer was switched on.
@@ -322,17 +322,17 @@ fn suspend(wait: Wait) {
 }
 
 /// The time in this world.
-pub fn now() -> Nanos {
+pub(crate) fn now() -> Nanos {
     with(|world| Nanos(world.now))
 }
 
 /// Ends the world, whatever its threads do.
-pub fn stop() {
+pub(crate) fn stop() {
     with(|world| world.is_over = true);
 }
 
 /// Lets the running thread sleep.
-pub fn sleep(span: Nanos) {
+pub(crate) fn sleep(span: Nanos) {
     let deadline = with(|world| world.now + span.0.max(0));
     suspend(Wait::Event {
         deadline,
@@ -342,7 +342,7 @@ pub fn sleep(span: Nanos) {
 }
 
 /// Lets the running thread sleep until `done`.
-pub fn sleep_until(done: impl Fn() -> bool) {
+pub(crate) fn sleep_until(done: impl Fn() -> bool) {
     while !done() {
         let seen = with(|world| world.turns);
         let deadline = with(|world| world.now + 1_000_000);
@@ -351,12 +351,12 @@ pub fn sleep_until(done: impl Fn() -> bool) {
 }
 
 /// Starts a thread of a process.
-pub fn spawn(process: usize, body: impl FnOnce() + 'static) {
+pub(crate) fn spawn(process: usize, body: impl FnOnce() + 'static) {
     with(|world| world.spawned.push((process, Box::new(body))));
 }
 
 /// A new process.
-pub fn new_process() -> usize {
+pub(crate) fn new_process() -> usize {
     with(|world| {
         world.processes.push(Process::default());
         world.processes.len() - 1
@@ -364,7 +364,7 @@ pub fn new_process() -> usize {
 }
 
 /// Stops all threads of a process for a time.
-pub fn suspend_process(process: usize, span: Nanos) {
+pub(crate) fn suspend_process(process: usize, span: Nanos) {
     with(|world| {
         let until = world.now + span.0;
         let process = &mut world.processes[process];
@@ -373,17 +373,17 @@ pub fn suspend_process(process: usize, span: Nanos) {
 }
 
 /// Acts on the network.
-pub fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
+pub(crate) fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
     with(|world| act(&mut world.network, &mut world.random, world.now))
 }
 
 /// The clock of the world that runs on this thread.
 #[derive(Clone, Copy, Debug)]
-pub struct SimulatedClock;
+pub(crate) struct SimulatedClock;
 
 impl SimulatedClock {
     /// The clock, to be handed in.
-    pub fn shared() -> Arc<dyn Clock> {
+    pub(crate) fn shared() -> Arc<dyn Clock> {
         Arc::new(Self)
     }
 }
@@ -489,9 +489,10 @@ impl Simulation for SimulatedClock {
         with(|world| {
             let current = world.current.expect("a thread of this world runs");
             let process = world.tasks[current].process;
-            world
+            let stream = world
                 .network
-                .connect(address, process, world.now, &mut world.random)
+                .connect(address, process, world.now, &mut world.random);
+            Ok(stream)
         })
     }
 }

@@ -66,6 +66,7 @@ impl FromStr for Seed {
 impl Seed {
     /// The smallest world found in which the same promise is broken: features and misfortunes are left out one by one, as long
     /// as it is.
+    #[must_use]
     pub fn shrunk(self, promise: &str) -> Self {
         let is_broken = |seed: Self| {
             Plan::draw(seed)

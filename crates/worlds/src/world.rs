@@ -9,7 +9,7 @@ use tickbus_driver::Code;
 
 use crate::end::End;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
-use crate::plan::{Bus, Misfortune, Plan};
+use crate::plan::{Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
 use crate::scheduler::{self, Stuck};
 
@@ -44,6 +44,8 @@ struct Shared {
     link: String,
     ends: [EndState; 2],
     broken: RefCell<Option<Broken>>,
+    /// What was found, if anybody wants it.
+    trace: Option<Rc<RefCell<String>>>,
 }
 
 impl Shared {
@@ -66,6 +68,18 @@ impl Plan {
     ///
     /// The first promise that was broken.
     pub fn run(&self) -> Result<(), Broken> {
+        self.happen(None)
+    }
+
+    /// What both ends found in each tick, as text: the same in every run.
+    pub fn trace(&self) -> String {
+        let trace = Rc::new(RefCell::new(String::new()));
+        // A world that breaks a promise has a trace, too.
+        let _ = self.happen(Some(Rc::clone(&trace)));
+        trace.take()
+    }
+
+    fn happen(&self, trace: Option<Rc<RefCell<String>>>) -> Result<(), Broken> {
         thread_local! {
             static WORLDS: Cell<u64> = const { Cell::new(0) };
         }
@@ -77,6 +91,7 @@ impl Plan {
             link: format!("world {number} of {thread:?}"),
             ends: Default::default(),
             broken: RefCell::default(),
+            trace,
         });
         let main = {
             let shared = Rc::clone(&shared);
@@ -140,7 +155,7 @@ fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
 fn befall(shared: &Rc<Shared>, what: Misfortune) {
     let order = |end: usize, order| shared.ends[end].orders.borrow_mut().push_back(order);
     match what {
-        Misfortune::Suspend { end, span } => {
+        Misfortune::Suspend(end, span) => {
             // Both ends of a loopback are one process.
             let both = shared.plan.bus == Bus::Loopback;
             for (which, state) in shared.ends.iter().enumerate() {
@@ -149,13 +164,13 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
                 }
             }
         }
-        Misfortune::Pause { end, span } => order(end, Order::Pause(span)),
-        Misfortune::Hold { span } => {
-            scheduler::network(|network, _, now| network.hold_all(now, span.0))
+        Misfortune::Pause(end, span) => order(end, Order::Pause(span)),
+        Misfortune::Hold(span) => {
+            scheduler::network(|network, _, now| network.hold_all(now, span.0));
         }
         Misfortune::Reset => scheduler::network(|network, _, now| network.reset_all(now)),
-        Misfortune::Close { end, span } => order(end, Order::Close(span)),
-        Misfortune::Kill { end, span } => {
+        Misfortune::Close(end, span) => order(end, Order::Close(span)),
+        Misfortune::Kill(end, span) => {
             // What the process does from now on reaches nobody.
             let process = shared.ends[end].process.get();
             scheduler::network(|network, _, now| network.kill(process, now));
@@ -242,7 +257,7 @@ fn one_tick(
     let plan = &shared.plan;
     let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
     let began = scheduler::now().0;
-    state.writer.borrow_mut().begin(life, tick, began);
+    state.writer.borrow_mut().begin(life, tick);
     let (found, is_pulse) = driver.tick(life, tick, plan.pulses);
     let ended = scheduler::now().0;
     {
@@ -259,18 +274,24 @@ fn one_tick(
         });
         return;
     }
-    log::trace!(
-        "{began} end {end} life {life} tick {tick}{} {} age {} sequence {} {:?}",
-        if is_pulse { " PULSE" } else { "" },
-        found.code.name(),
-        found.age,
-        found.sequence,
-        found
-            .stations
-            .iter()
+    let line = || {
+        let stations = found.stations.iter();
+        let shown: Vec<_> = stations
             .map(|shown| (Stamp::of(shown.stamp).tick, shown.edges))
-            .collect::<Vec<_>>()
-    );
+            .collect();
+        format!(
+            "{began} end {end} life {life} tick {tick} pulse {is_pulse} {} age {} sequence {} {shown:?}",
+            found.code.name(),
+            found.age,
+            found.sequence
+        )
+    };
+    if let Some(trace) = &shared.trace {
+        let mut trace = trace.borrow_mut();
+        trace.push_str(&line());
+        trace.push('\n');
+    }
+    log::trace!("{}", line());
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.entry(process).or_default();
@@ -298,12 +319,12 @@ fn one_tick(
 /// The watchdog of an end, as docs/driver-cfg.md has it.
 fn watchdog(plan: &Plan, end: usize) -> Option<Nanos> {
     match plan.ends[end].watchdog {
-        Some(watchdog) => watchdog,
-        None if end == 1 => {
+        Watchdog::After(limit) => Some(limit),
+        Watchdog::Default if end == 1 => {
             let least = plan.max_age.max(plan.cycle.times(10));
             Some(least.max(Nanos::from_millis(250)))
         }
-        None => None,
+        Watchdog::Off | Watchdog::Default => None,
     }
 }
 

@@ -106,7 +106,7 @@ impl HostThread {
     /// thread is called `name`.
     pub(crate) fn start(
         hosted: ScanSetup,
-        name: String,
+        name: &str,
         config: &Config,
         role: Role,
         bus: Box<dyn Free>,
@@ -121,7 +121,7 @@ impl HostThread {
     /// that hangs is noticed by the clock `wall`.
     pub(crate) fn start_in_steps(
         hosted: ScanSetup,
-        name: String,
+        name: &str,
         (config, role): (&Config, Role),
         (bus, stop): (Box<dyn Stepped>, Stop),
         wall: Arc<dyn Clock>,
@@ -132,7 +132,7 @@ impl HostThread {
 
     fn start_scanned(
         hosted: ScanSetup,
-        name: String,
+        name: &str,
         (config, role): (&Config, Role),
         scanned: Scanned,
         wall: Arc<dyn Clock>,
@@ -142,7 +142,7 @@ impl HostThread {
         let (mut cpu, bus_end) = half(hosted.program, config, role);
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);
-        let status = LinkStatus::new(&name, max_age);
+        let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
         // looks at its own end.
         let is_own = role == config.role;
@@ -169,7 +169,7 @@ impl HostThread {
             report,
             record,
             clock: Arc::clone(&clock),
-            wall: Arc::clone(&wall),
+            wall,
         };
         let figures = HostFigures::of(&counters, &status, &board);
         let watch = seen.map(|(config, handle)| watch(config, handle, figures));
@@ -177,7 +177,7 @@ impl HostThread {
             match scanned {
                 Scanned::Freely { bus, .. } => {
                     let timing = timing(config, is_own);
-                    let bus = BusThread::start(bus, port, &timing, status.clone(), &name);
+                    let bus = BusThread::start(bus, port, &timing, status.clone(), name);
                     let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                     let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
                     let scans = {
@@ -195,6 +195,7 @@ impl HostThread {
                     let mut port = port;
                     let scans = {
                         let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
+                        let wall = Arc::clone(&counters.wall);
                         let status = status.clone();
                         move || {
                             let line = (&mut *bus, &mut port, &*virtual_time);
@@ -211,7 +212,7 @@ impl HostThread {
                     (stop, None, Box::new(scans))
                 }
             };
-        let spawned = Thread::spawn(&*counters.wall, &name, move || {
+        let spawned = Thread::spawn(&*counters.wall, name, move || {
             let result = catch_unwind(AssertUnwindSafe(&mut scans));
             scanning.set(None);
             // What it holds may take its leave of the peer, which closing waits for.

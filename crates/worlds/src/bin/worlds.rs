@@ -2,8 +2,8 @@
 //! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise.
 
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
 
+use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_worlds::{Broken, Pairs, Plan, Seed};
 
 /// Prints what the drivers log.
@@ -29,8 +29,8 @@ fn main() -> ExitCode {
             Ok(seed) => one(seed),
             Err(why) => usage(&why),
         },
-        [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u64>()) {
-            (Ok(first), Ok(seconds)) => many(first, Duration::from_secs(seconds)),
+        [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
+            (Ok(first), Ok(seconds)) => many(first, Nanos::from_secs(seconds.into())),
             _ => usage("FIRST and SECONDS are whole numbers"),
         },
         _ => usage("one seed, or two numbers, are expected"),
@@ -63,11 +63,12 @@ fn one(seed: Seed) -> ExitCode {
     }
 }
 
-fn many(first: u64, limit: Duration) -> ExitCode {
-    let begun = Instant::now();
+fn many(first: u64, limit: Nanos) -> ExitCode {
+    let clock = Monotonic::shared();
+    let begun = clock.now();
     let (mut worlds, mut failed) = (0, 0);
     let mut pairs = Pairs::default();
-    while begun.elapsed() < limit {
+    while clock.now() - begun < limit {
         let seed = Seed::from(first.wrapping_add(worlds));
         let plan = Plan::draw(seed);
         pairs.add(&plan);
@@ -81,7 +82,7 @@ fn many(first: u64, limit: Duration) -> ExitCode {
             );
         }
     }
-    let seconds = begun.elapsed().as_secs_f64();
+    let seconds = (clock.now() - begun).to_duration().as_secs_f64();
     println!(
         "pairs of features that never met: {}",
         pairs.strangers().join("; ")

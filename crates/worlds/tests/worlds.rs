@@ -1,0 +1,60 @@
+//! Worlds that once broke a promise, and fresh ones.
+#![allow(missing_docs, reason = "tests")]
+
+use tickbus_base::time::{Clock as _, Monotonic, Nanos};
+use tickbus_worlds::{Pairs, Plan, Seed};
+
+/// How long fresh worlds are drawn, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
+const SECONDS: u32 = 10;
+
+#[track_caller]
+fn passes(seed: Seed) {
+    if let Err(broken) = Plan::draw(seed).run() {
+        let small = seed.shrunk(broken.promise);
+        panic!(
+            "{broken}\nin the world {seed}; smaller: cargo run --release -p tickbus-worlds -- {small}\nOnce mended, add it to \
+             crates/worlds/corpus.txt."
+        );
+    }
+}
+
+#[test]
+fn what_was_broken_once_is_whole() {
+    let mut count = 0;
+    for line in include_str!("../corpus.txt").lines() {
+        if !line.starts_with('#') {
+            passes(line.parse().expect("a seed"));
+            count += 1;
+        }
+    }
+    assert!(count > 0, "the corpus has no world");
+}
+
+#[test]
+fn the_same_seed_is_the_same_world() {
+    for seed in 0..20_u64 {
+        let plan = Plan::draw(seed);
+        let first = plan.trace();
+        assert!(!first.is_empty(), "nothing happens in the world {seed}");
+        assert_eq!(first, plan.trace(), "the world {seed}");
+    }
+}
+
+#[test]
+fn fresh_worlds_keep_all_promises() {
+    let seconds = std::env::var("TICKBUS_WORLDS_SECONDS");
+    let seconds = seconds.map_or(SECONDS, |text| text.parse().expect("whole seconds"));
+    let clock = Monotonic::shared();
+    // Others in each run, and printed.
+    let first = u64::from(std::process::id()) << 32;
+    println!("worlds from {first} on");
+    let begun = clock.now();
+    let (mut seed, mut pairs) = (first, Pairs::default());
+    while clock.now() - begun < Nanos::from_secs(seconds.into()) {
+        pairs.add(&Plan::draw(seed));
+        passes(seed.into());
+        seed += 1;
+    }
+    println!("{} worlds, {} pairs of features", seed - first, pairs.met());
+    assert!(seed > first + 10, "a world takes longer than a second");
+}

@@ -1,7 +1,6 @@
 //! A port whose line has faults, against a model of the line.
 
 use std::collections::VecDeque;
-use std::time::Duration;
 
 use tickbus_base::time::Manual;
 use tickbus_image::signal::{Area, Latch, SignalTable};
@@ -262,9 +261,9 @@ fn a_peer_has_the_last_values_when_no_fault_keeps_them_from_it() {
         let fault = rig.inject(effect);
         farewell.begin();
         assert_eq!(send(&mut rig, 1), [2, 2], "{effect:?}");
-        assert!(!farewell.wait(Duration::ZERO), "{effect:?}");
+        assert!(!farewell.wait(&*Manual::new(), Nanos::ZERO), "{effect:?}");
         rig.end(fault);
         assert_eq!(send(&mut rig, 30), [0, 0], "{effect:?}");
-        assert!(farewell.wait(Duration::ZERO), "{effect:?}");
+        assert!(farewell.wait(&*Manual::new(), Nanos::ZERO), "{effect:?}");
     }
 }

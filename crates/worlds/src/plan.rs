@@ -174,9 +174,11 @@ impl Plan {
             EndPlan::draw(random, cycle, max_age, true),
         ];
         let (preempts, late) = (random.of(&[8, 40, 200]), random.of(&[100_000, 2_000_000]));
+        let starves = max_age.0 * random.within(1, 3);
         let habits = Habits {
             preempts: if is(1) { preempts } else { 0 },
             late: if is(2) { late } else { 0 },
+            starves: if is(1) && is(14) { starves } else { 0 },
         };
         let slowest = random.of(&[20_000, 200_000, 3_000_000]);
         // An answer fits into what a system keeps for a connection.
@@ -280,6 +282,7 @@ impl Plan {
         add(self.ends[1].holds_while_stale, "while_stale hold");
         add(self.habits.preempts > 0, "preempted");
         add(self.habits.late > 0, "woken late");
+        add(self.habits.starves > 0, "starved");
         add(self.conditions.splits > 0, "split bytes");
         add(self.conditions.capacity <= 1_000, "small buffers");
         add(self.conditions.latency.1 > 1_000_000, "slow network");
@@ -319,6 +322,7 @@ pub(crate) const FEATURES: &[&str] = &[
     "while_stale hold",
     "preempted",
     "woken late",
+    "starved",
     "split bytes",
     "small buffers",
     "slow network",

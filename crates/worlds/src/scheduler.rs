@@ -27,6 +27,9 @@ use crate::random::Random;
 /// How much of a stack a thread of a driver has.
 const STACK: usize = 512 * 1024;
 
+/// So many times a thread is starved in a world.
+pub(crate) const STARVED: u32 = 3;
+
 /// A world in which nothing ends does so after that many turns.
 const MOST_TURNS: u64 = 2_000_000;
 
@@ -35,8 +38,10 @@ const MOST_TURNS: u64 = 2_000_000;
 pub struct Habits {
     /// A thread that looks at the clock loses the processor once in so many looks; 0 for never.
     pub preempts: u64,
-    /// A thread that is woken may get the processor late by up to this.
+    /// A thread that is woken may get the processor late by up to this, in ns.
     pub late: i64,
+    /// A thread that has lost the processor may be without it for up to this, in ns, [a few times](STARVED).
+    pub starves: i64,
 }
 
 type Thread = Coroutine<(), (), (), DefaultStack>;
@@ -86,6 +91,8 @@ struct World {
     network: Network,
     /// What was spawned since the last look.
     spawned: Vec<(usize, Box<dyn FnOnce()>)>,
+    /// How many times more a thread may be starved.
+    starvations: u32,
     /// The world is to end now.
     is_over: bool,
 }
@@ -136,6 +143,7 @@ pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> R
             turns: 0,
             network: Network::default(),
             spawned: vec![(0, Box::new(main))],
+            starvations: STARVED,
             is_over: false,
         });
         assert!(before.is_none(), "one world at a time");
@@ -225,6 +233,17 @@ fn begin_spawned() {
 }
 
 impl World {
+    /// Lets the running thread wait for the processor for longer, now and then.
+    fn starve(&mut self) {
+        let longest = self.habits.starves;
+        if longest == 0 || self.starvations == 0 || !self.random.once_in(10) {
+            return;
+        }
+        self.starvations -= 1;
+        let current = self.current.expect("a thread of this world runs");
+        self.tasks[current].not_before = self.now + self.random.within(0, longest);
+    }
+
     /// The thread to run next; `None` if all have ended.
     fn next(&mut self) -> Result<Option<usize>, Stuck> {
         if self.turns > MOST_TURNS {
@@ -394,6 +413,9 @@ impl Clock for SimulatedClock {
             let preempts = world.habits.preempts;
             let is_preempted =
                 preempts > 0 && world.current.is_some() && world.random.once_in(preempts);
+            if is_preempted {
+                world.starve();
+            }
             (world.now, is_preempted)
         });
         if is_preempted {

@@ -338,7 +338,7 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
         .map(|reader| reader.first_valid.unwrap_or(i64::MAX))
         .max();
     let well_since = well_since
-        .filter(|_| plan.events.is_empty())
+        .filter(|_| plan.events.is_empty() && plan.habits.starves == 0)
         .unwrap_or(i64::MAX);
     for end in 0..2 {
         let (reader, writer) = (&readers[end], shared.ends[1 - end].writer.borrow());

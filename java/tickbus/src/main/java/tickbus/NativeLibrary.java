@@ -182,8 +182,10 @@ final class NativeLibrary {
             what.append("\n  This JVM runs on the C library musl, but the library in the jar is made for glibc;"
                 + " build one on this system.");
         }
-        what.append("\n  Build it with `cargo build --release` in tickbus, then set -D").append(LIBRARY)
-            .append("=FILE, or put ").append(file).append(" beside the jar.");
+        what.append("\n  If it cannot be extracted to the temporary folder ").append(System.getProperty("java.io.tmpdir"))
+            .append(", or not be run there (noexec), name another folder by -Djava.io.tmpdir=FOLDER. Otherwise build it with")
+            .append(" `cargo build --release` in tickbus, then set -D").append(LIBRARY).append("=FILE, or put ").append(file)
+            .append(" beside the jar.");
         return new FieldbusException(Status.LIBRARY, what.toString());
     }
 

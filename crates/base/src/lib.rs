@@ -5,7 +5,7 @@
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`net`] | TCP sockets, of the operating system or simulated |
 //! | [`os`] | what only the operating system can do: waiting for sockets, and time |
-//! | [`simulation`] | what a whole simulated run puts in the operating system's place |
+//! | [`thread`] | threads whose end can be waited for with a limit |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 
@@ -14,8 +14,8 @@ pub mod net;
 pub mod os;
 mod percent;
 mod quick_clock;
-pub mod simulation;
 pub mod statistics;
+pub mod thread;
 pub mod time;
 pub mod toml_text;
 

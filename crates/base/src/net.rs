@@ -1,9 +1,9 @@
-//! Sockets of the operating system, or of a [simulation](crate::simulation).
+//! Sockets of the operating system, or of a [simulation](crate::time::Simulation).
 
 use std::io::{self, Read, Write};
 use std::net::{self, Shutdown, SocketAddr};
 
-use crate::simulation::{SimulatedListener, SimulatedStream, Simulation};
+use crate::time::{SimulatedListener, SimulatedStream, Simulation};
 
 /// A TCP connection.
 #[derive(Debug)]

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use super::driver_table::read_driver;
 use super::layout;
 use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
@@ -13,12 +14,6 @@ use tickbus_fieldbus::faults::{self, Fault};
 use tickbus_fieldbus::{At, BusKind, Events, LifeSigns, Role, Written};
 use tickbus_image::signal::{Addressing, SignalTable, Station};
 use tickbus_record as record;
-
-/// The longest name of a driver, in characters.
-const NAME_LIMIT: usize = 120;
-
-/// The longest path of a file, in characters.
-const PATH_LIMIT: usize = 1000;
 
 /// The checked contents of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
@@ -298,42 +293,6 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
             None => None,
         },
     })
-}
-
-struct DriverTable {
-    id: Option<i32>,
-    name: Option<String>,
-    addressing: Addressing,
-    faults: Option<String>,
-}
-
-fn read_driver(mut table: Table<'_>) -> DriverTable {
-    let id = table.require(
-        "id",
-        "write a number that no other driver has, such as id = 4711",
-    );
-    let name = table.require("name", "give the driver a name for people");
-    let addressing = table.take("addressing");
-    let faults = table.take("faults");
-    table.finish();
-    let choices = [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
-    DriverTable {
-        id: id
-            .and_then(|value| value.whole(1..=i32::MAX.into()))
-            .and_then(|id| i32::try_from(id).ok()),
-        name: name
-            .and_then(|value| value.label(NAME_LIMIT, "give the driver a name for people"))
-            .map(str::to_owned),
-        addressing: addressing
-            .and_then(|value| value.choice("ways of addressing", &choices))
-            .unwrap_or_default(),
-        faults: faults
-            .and_then(|value| {
-                let right = "name a file that has [[fault]] sections, such as \"faults.toml\"";
-                value.label(PATH_LIMIT, right)
-            })
-            .map(str::to_owned),
-    }
 }
 
 struct FieldbusTable<'a> {

@@ -3,6 +3,7 @@
 //! [`Config`] is what a file says, checked; [`Options`] lists the bus kinds.
 
 mod config;
+mod driver_table;
 mod kinds;
 mod layout;
 pub mod loopback;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use log::Level;
 use tickbus_base::os::wake_on_time;
-use tickbus_base::simulation::Thread;
+use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
 use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};

@@ -299,7 +299,7 @@ impl ShownRun {
 
 /// Whether all initial values are there.
 fn has_begun(view: &RunView) -> bool {
-    view.step.is_some_and(|step| step.sequence > 0)
+    view.step.is_some() && !matches!(view.state, State::Start | State::InitialWrite)
 }
 
 /// Whether a client has not answered yet; the logic of the server always has.

@@ -5,9 +5,10 @@ use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
+use crate::clock::SimulatedClock;
 use crate::judge::{Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
-use crate::scheduler::{SimulatedClock, now};
+use crate::scheduler::now;
 
 /// The slots of a station in one direction.
 #[derive(Clone, Copy, Debug)]

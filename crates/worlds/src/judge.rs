@@ -379,6 +379,21 @@ impl Reader {
         Ok(())
     }
 
+    /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
+    pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
+        let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
+        if holds || seen.is_stale || seen.began <= left + slack(plan) {
+            return Ok(());
+        }
+        match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
+            Some(shown) => broken(
+                "left on",
+                format!("{:?} after its controller closed", Stamp::of(shown.stamp)),
+            ),
+            None => Ok(()),
+        }
+    }
+
     /// Whether the newest of what `writer` wrote `slack` before `now` has arrived.
     pub(crate) fn judge_liveness(
         &self,

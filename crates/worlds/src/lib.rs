@@ -5,6 +5,7 @@
 //! happen. [`Plan::run`] lets it happen, within a fraction of a millisecond, and returns the first promise that was broken. The
 //! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
 
+mod clock;
 mod config;
 mod end;
 mod judge;
@@ -14,6 +15,7 @@ mod plan;
 mod random;
 mod scheduler;
 mod seed;
+mod shrink;
 mod world;
 
 pub use judge::Broken;

@@ -4,11 +4,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr};
 
-use tickbus_base::os::{Interest, Ready};
-use tickbus_base::simulation::{SimulatedListener, SimulatedSocket, SimulatedStream};
+use tickbus_base::time::{Interest, Ready};
 
 use crate::random::Random;
-use crate::scheduler::{at_network, awake_since};
 
 /// How the network of a world behaves.
 #[derive(Clone, Copy, Debug)]
@@ -166,11 +164,7 @@ impl Network {
         }
     }
 
-    pub(crate) fn listen(
-        &mut self,
-        process: usize,
-        addresses: &[SocketAddr],
-    ) -> io::Result<Box<dyn SimulatedListener>> {
+    pub(crate) fn listen(&mut self, process: usize, addresses: &[SocketAddr]) -> io::Result<u64> {
         let address = *addresses.first().ok_or(ErrorKind::InvalidInput)?;
         let mut taken = self.listeners.values();
         if taken.any(|listening| listening.address.port() == address.port()) {
@@ -185,7 +179,7 @@ impl Network {
                 waiting: VecDeque::new(),
             },
         );
-        Ok(Box::new(Listener(id)))
+        Ok(id)
     }
 
     pub(crate) fn connect(
@@ -194,7 +188,7 @@ impl Network {
         process: usize,
         now: i64,
         random: &mut Random,
-    ) -> Box<dyn SimulatedStream> {
+    ) -> u64 {
         self.ports += 1;
         let own = SocketAddr::from((Ipv4Addr::LOCALHOST, 40_000 + self.ports));
         let (one, other) = (self.identity(), self.identity());
@@ -226,7 +220,7 @@ impl Network {
             let refused = Some(ErrorKind::ConnectionRefused);
             self.ends
                 .insert(one, end(process, own, address, other, back, refused));
-            return Box::new(Stream(one));
+            return one;
         };
         listening.waiting.push_back(other);
         let theirs = listening.process;
@@ -234,7 +228,7 @@ impl Network {
             .insert(one, end(process, own, address, other, back, None));
         self.ends
             .insert(other, end(theirs, address, own, one, there, None));
-        Box::new(Stream(one))
+        one
     }
 
     /// Breaks every connection, as a device in the middle that restarts does.
@@ -273,7 +267,7 @@ impl Network {
         }
     }
 
-    fn close(&mut self, id: u64, now: i64) {
+    pub(crate) fn close(&mut self, id: u64, now: i64) {
         let latency = self.conditions.latency.1;
         let Some(end) = self.ends.remove(&id) else {
             return;
@@ -289,18 +283,67 @@ impl Network {
         }
     }
 
-    fn read(&mut self, id: u64, buffer: &mut [u8], now: i64) -> io::Result<usize> {
+    /// The next connection of a listener, and the address of the other end.
+    pub(crate) fn accept(&mut self, id: u64, now: i64) -> io::Result<(u64, SocketAddr)> {
+        let listening = self.listeners.get_mut(&id).ok_or(ErrorKind::InvalidInput)?;
+        let ends = &self.ends;
+        let connected = |id: &u64| ends.get(id).map_or(0, |end| end.connected);
+        let place = listening.waiting.iter().position(|id| connected(id) <= now);
+        let place = place.ok_or(ErrorKind::WouldBlock)?;
+        let id = listening.waiting.remove(place).expect("it was just found");
+        let end = self.ends.get(&id).ok_or(ErrorKind::ConnectionAborted)?;
+        Ok((id, end.peer))
+    }
+
+    /// Nobody listens there any more.
+    pub(crate) fn close_listener(&mut self, id: u64, now: i64) {
+        if let Some(listening) = self.listeners.remove(&id) {
+            for id in listening.waiting {
+                self.close(id, now);
+            }
+        }
+    }
+
+    /// The sending direction of a connection is closed.
+    pub(crate) fn shut_down(&mut self, id: u64, now: i64) -> io::Result<()> {
+        let latency = self.conditions.latency.1;
+        let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
+        end.has_shut_down = true;
+        let other = end.other;
+        if let Some(other) = self.ends.get_mut(&other) {
+            let last = other.incoming.back().map_or(now, |piece| piece.at);
+            let at = last.max(now + latency).max(other.held_until);
+            other.fin.get_or_insert(at);
+        }
+        Ok(())
+    }
+
+    /// Where a socket is, and where its other end is.
+    pub(crate) fn addresses(&self, id: u64) -> io::Result<(SocketAddr, SocketAddr)> {
+        if let Some(listening) = self.listeners.get(&id) {
+            return Ok((listening.address, listening.address));
+        }
+        let end = self.ends.get(&id).ok_or(ErrorKind::NotConnected)?;
+        Ok((end.own, end.peer))
+    }
+
+    /// Why connecting failed, once.
+    pub(crate) fn take_error(&mut self, id: u64) -> io::Result<Option<ErrorKind>> {
+        let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
+        Ok(end.error.take())
+    }
+
+    pub(crate) fn read(&mut self, id: u64, buffer: &mut [u8], now: i64) -> io::Result<usize> {
         let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
         if end.connected > now {
             return Err(ErrorKind::WouldBlock.into());
         }
-        if end.reset.is_some_and(|at| at <= now) {
-            return Err(ErrorKind::ConnectionReset.into());
-        }
+        // What came before the connection broke can still be read, as on Linux.
+        let until = now.min(end.reset.unwrap_or(i64::MAX));
         let mut count = 0;
         let log = self.deliveries.entry(end.process).or_default();
         while let Some(piece) = end.incoming.front_mut()
-            && piece.at <= now
+            && piece.at <= until
             && count < buffer.len()
         {
             let rest = &piece.bytes[piece.read..];
@@ -319,13 +362,16 @@ impl Network {
         if count > 0 || buffer.is_empty() {
             return Ok(count);
         }
-        if end.fin.is_some_and(|at| at <= now) {
+        if end.fin.is_some_and(|at| at <= until) {
             return Ok(0);
+        }
+        if end.reset.is_some_and(|at| at <= now) {
+            return Err(ErrorKind::ConnectionReset.into());
         }
         Err(ErrorKind::WouldBlock.into())
     }
 
-    fn write(
+    pub(crate) fn write(
         &mut self,
         id: u64,
         bytes: &[u8],
@@ -385,118 +431,5 @@ impl Network {
             rest = further;
         }
         Ok(count)
-    }
-}
-
-#[derive(Debug)]
-struct Listener(u64);
-
-impl SimulatedSocket for Listener {
-    fn identity(&self) -> u64 {
-        self.0
-    }
-
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        at_network(|network, _, _| Ok(network.listeners[&self.0].address))
-    }
-}
-
-impl SimulatedListener for Listener {
-    fn accept(&self) -> io::Result<(Box<dyn SimulatedStream>, SocketAddr)> {
-        at_network(|network, _, now| {
-            let Some(listening) = network.listeners.get_mut(&self.0) else {
-                return Err(ErrorKind::InvalidInput.into());
-            };
-            let connected = |id: &u64| network.ends.get(id).map_or(0, |end| end.connected);
-            let place = listening.waiting.iter().position(|id| connected(id) <= now);
-            let place = place.ok_or(ErrorKind::WouldBlock)?;
-            let id = listening.waiting.remove(place).expect("it was just found");
-            let Some(end) = network.ends.get(&id) else {
-                return Err(ErrorKind::ConnectionAborted.into());
-            };
-            let peer = end.peer;
-            Ok((Box::new(Stream(id)) as _, peer))
-        })
-    }
-}
-
-impl Drop for Listener {
-    fn drop(&mut self) {
-        at_network(|network, _, now| {
-            if let Some(listening) = network.listeners.remove(&self.0) {
-                for id in listening.waiting {
-                    network.close(id, now);
-                }
-            }
-        });
-    }
-}
-
-#[derive(Debug)]
-struct Stream(u64);
-
-impl SimulatedSocket for Stream {
-    fn identity(&self) -> u64 {
-        self.0
-    }
-
-    fn local_addr(&self) -> io::Result<SocketAddr> {
-        at_network(|network, _, _| {
-            let end = network.ends.get(&self.0).ok_or(ErrorKind::NotConnected)?;
-            Ok(end.own)
-        })
-    }
-}
-
-impl SimulatedStream for Stream {
-    fn read(&self, buffer: &mut [u8]) -> io::Result<usize> {
-        at_network(|network, _, now| network.read(self.0, buffer, now))
-    }
-
-    fn write(&self, bytes: &[u8]) -> io::Result<usize> {
-        let times = awake_since();
-        at_network(|network, random, _| network.write(self.0, bytes, times, random))
-    }
-
-    fn shutdown_write(&self) -> io::Result<()> {
-        at_network(|network, _, now| {
-            let latency = network.conditions.latency.1;
-            let end = network
-                .ends
-                .get_mut(&self.0)
-                .ok_or(ErrorKind::NotConnected)?;
-            end.has_shut_down = true;
-            let other = end.other;
-            if let Some(other) = network.ends.get_mut(&other) {
-                let last = other.incoming.back().map_or(now, |piece| piece.at);
-                other
-                    .fin
-                    .get_or_insert(last.max(now + latency).max(other.held_until));
-            }
-            Ok(())
-        })
-    }
-
-    fn peer_addr(&self) -> io::Result<SocketAddr> {
-        at_network(|network, _, _| {
-            let end = network.ends.get(&self.0).ok_or(ErrorKind::NotConnected)?;
-            Ok(end.peer)
-        })
-    }
-
-    fn take_error(&self) -> io::Result<Option<io::Error>> {
-        at_network(|network, _, _| {
-            let end = network
-                .ends
-                .get_mut(&self.0)
-                .ok_or(ErrorKind::NotConnected)?;
-            Ok(end.error.take().map(io::Error::from))
-        })
-    }
-}
-
-impl Drop for Stream {
-    fn drop(&mut self) {
-        at_network(|network, _, now| network.close(self.0, now));
     }
 }

@@ -9,17 +9,10 @@
 )]
 
 use std::cell::RefCell;
-use std::fmt;
-use std::io;
-use std::net::SocketAddr;
-use std::sync::Arc;
-use std::time::Duration;
 
 use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
-use tickbus_base::os::{Interest, Ready};
-use tickbus_base::simulation::{SimulatedListener, SimulatedStream, Simulation};
-use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::time::{Interest, Nanos, Stop};
 
 use crate::network::Network;
 use crate::random::Random;
@@ -396,148 +389,62 @@ pub(crate) fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) 
     with(|world| act(&mut world.network, &mut world.random, world.now))
 }
 
-/// The clock of the world that runs on this thread.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct SimulatedClock;
-
-impl SimulatedClock {
-    /// The clock, to be handed in.
-    pub(crate) fn shared() -> Arc<dyn Clock> {
-        Arc::new(Self)
-    }
-}
-
-impl Clock for SimulatedClock {
-    fn now(&self) -> Nanos {
-        let (now, is_preempted) = with(|world| {
-            let preempts = world.habits.preempts;
-            let is_preempted =
-                preempts > 0 && world.current.is_some() && world.random.once_in(preempts);
-            if is_preempted {
-                world.starve();
-            }
-            (world.now, is_preempted)
-        });
+/// The time in this world, as the running thread reads it: it may lose the processor right after that.
+pub(crate) fn look() -> Nanos {
+    let (now, is_preempted) = with(|world| {
+        let preempts = world.habits.preempts;
+        let is_preempted =
+            preempts > 0 && world.current.is_some() && world.random.once_in(preempts);
         if is_preempted {
-            suspend(Wait::Nothing);
+            world.starve();
         }
-        Nanos(now)
+        (world.now, is_preempted)
+    });
+    if is_preempted {
+        suspend(Wait::Nothing);
     }
+    Nanos(now)
+}
 
-    fn wait_until(&self, deadline: Nanos, stop: &Stop) {
-        if stop.is_woken() {
-            return;
+/// Lets the running thread wait until `deadline`, until `stop` is stopped or woken, or until one of these sockets is ready.
+pub(crate) fn wait(deadline: Nanos, stop: &Stop, sockets: Vec<(u64, Interest)>) {
+    suspend(Wait::Event {
+        deadline: deadline.0,
+        stop: Some(stop.clone()),
+        sockets,
+    });
+}
+
+/// Lets others run until `done` holds, or for `limit`; returns whether it held in time.
+pub(crate) fn wait_for(limit: Nanos, done: &mut dyn FnMut() -> bool) -> bool {
+    let deadline = with(|world| world.now.saturating_add(limit.0));
+    loop {
+        if done() {
+            return true;
         }
-        suspend(Wait::Event {
-            deadline: deadline.0,
-            stop: Some(stop.clone()),
-            sockets: Vec::new(),
-        });
-    }
-
-    fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
-        self.wait_until(deadline, stop);
-        sleep(Some(Duration::ZERO));
-    }
-
-    fn passes_alone(&self) -> bool {
-        true
-    }
-
-    fn simulation(&self) -> Option<&dyn Simulation> {
-        Some(self)
+        let (now, seen) = with(|world| (world.now, world.turns));
+        if now >= deadline {
+            return false;
+        }
+        suspend(Wait::Anything { deadline, seen });
     }
 }
 
-impl Simulation for SimulatedClock {
-    fn spawn(&self, _name: &str, body: Box<dyn FnOnce() + Send>) {
-        with(|world| {
-            let process = world
-                .current
-                .map_or(0, |current| world.tasks[current].process);
-            world.spawned.push((process, body));
-        });
-    }
-
-    fn wait_for(&self, limit: Nanos, done: &mut dyn FnMut() -> bool) -> bool {
-        let deadline = with(|world| world.now.saturating_add(limit.0));
-        loop {
-            if done() {
-                return true;
-            }
-            let (now, seen) = with(|world| (world.now, world.turns));
-            if now >= deadline {
-                return false;
-            }
-            suspend(Wait::Anything { deadline, seen });
-        }
-    }
-
-    fn poll(
-        &self,
-        sockets: &[(usize, u64, Interest)],
-        deadline: Nanos,
-        stop: &Stop,
-        ready: &mut Vec<Ready>,
-    ) {
-        let is_woken = stop.is_woken();
-        let look = |ready: &mut Vec<Ready>| {
-            with(|world| world.network.look(sockets, world.now, ready));
-        };
-        look(ready);
-        if is_woken || !ready.is_empty() {
-            return;
-        }
-        suspend(Wait::Event {
-            deadline: deadline.0,
-            stop: Some(stop.clone()),
-            sockets: sockets
-                .iter()
-                .map(|(_, id, interest)| (*id, *interest))
-                .collect(),
-        });
-        look(ready);
-    }
-
-    fn listen(&self, addresses: &[SocketAddr]) -> io::Result<Box<dyn SimulatedListener>> {
-        with(|world| {
-            let current = world.current.expect("a thread of this world runs");
-            let process = world.tasks[current].process;
-            world.network.listen(process, addresses)
-        })
-    }
-
-    fn connect(&self, address: SocketAddr) -> io::Result<Box<dyn SimulatedStream>> {
-        with(|world| {
-            let current = world.current.expect("a thread of this world runs");
-            let process = world.tasks[current].process;
-            let stream = world
-                .network
-                .connect(address, process, world.now, &mut world.random);
-            Ok(stream)
-        })
-    }
-}
-
-/// Since when the running thread has not waited.
-pub(crate) fn awake_since() -> (i64, i64) {
+/// The process of the running thread.
+pub(crate) fn process() -> usize {
     with(|world| {
-        let since = world
+        world
             .current
-            .map_or(world.now, |current| world.tasks[current].awake_since);
-        (world.now, since)
+            .map_or(0, |current| world.tasks[current].process)
     })
 }
 
-/// The network, and chance, of the world that runs on this thread.
-pub(crate) fn at_network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
-    network(act)
-}
-
-impl fmt::Debug for World {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("World")
-            .field("now", &self.now)
-            .finish_non_exhaustive()
-    }
+/// The time, and since when the running thread has not waited.
+pub(crate) fn awake_since() -> (i64, i64) {
+    with(|world| {
+        let current = world
+            .current
+            .map(|current| world.tasks[current].awake_since);
+        (world.now, current.unwrap_or(world.now))
+    })
 }

@@ -1,10 +1,7 @@
-//! What a world is drawn from, and how a world that broke a promise is made smaller.
+//! What a world is drawn from.
 
 use std::fmt;
 use std::str::FromStr;
-
-use crate::judge::Broken;
-use crate::plan::Plan;
 
 /// What a world is drawn from. All bits of both masks are set, but in a world that was shrunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,39 +57,6 @@ impl FromStr for Seed {
                 "\"{text}\" is no seed; write a number, as in 4711, or number:features:events, as in 4711:3ff:5"
             )
         })
-    }
-}
-
-impl Seed {
-    /// The smallest world found in which the same promise is broken: features and misfortunes are left out one by one, as long
-    /// as it is.
-    #[must_use]
-    pub fn shrunk(self, promise: &str) -> Self {
-        let is_broken = |seed: Self| {
-            Plan::draw(seed)
-                .run()
-                .is_err_and(|Broken { promise: other, .. }| other == promise)
-        };
-        let mut smallest = self;
-        for bit in 0..u16::BITS {
-            let fewer = Self {
-                features: smallest.features & !(1 << bit),
-                ..smallest
-            };
-            if is_broken(fewer) {
-                smallest = fewer;
-            }
-        }
-        for bit in 0..u8::BITS {
-            let fewer = Self {
-                events: smallest.events & !(1 << bit),
-                ..smallest
-            };
-            if is_broken(fewer) {
-                smallest = fewer;
-            }
-        }
-        smallest
     }
 }
 

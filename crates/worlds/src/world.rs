@@ -44,6 +44,8 @@ struct Shared {
     link: String,
     ends: [EndState; 2],
     broken: RefCell<Option<Broken>>,
+    /// When the controller had closed for good.
+    controller_left: Cell<Option<i64>>,
     /// What was found, if anybody wants it.
     trace: Option<Rc<RefCell<String>>>,
 }
@@ -91,6 +93,7 @@ impl Plan {
             link: format!("world {number} of {thread:?}"),
             ends: Default::default(),
             broken: RefCell::default(),
+            controller_left: Cell::default(),
             trace,
         });
         let main = {
@@ -140,6 +143,10 @@ fn fate(shared: &Rc<Shared>) {
                 promise: "close",
                 what: format!("end {end} took {took}"),
             });
+        }
+        if end == 1 {
+            shared.controller_left.set(Some(scheduler::now().0));
+            scheduler::sleep(plan.max_age);
         }
     }
     judge_pulses(shared, ended);
@@ -304,14 +311,15 @@ fn one_tick(
             stations: &found.stations,
             deliveries,
         };
-        let judged = state
-            .reader
-            .borrow_mut()
-            .judge(plan, end as u64, &writer, &seen);
-        judged.and_then(|()| match watchdog(plan, 1 - end) {
-            Some(limit) => Reader::judge_watchdog(plan, limit.0, &writer, &seen),
-            None => Ok(()),
-        })
+        let mut reader = state.reader.borrow_mut();
+        reader.judge(plan, end as u64, &writer, &seen)?;
+        if let Some(limit) = watchdog(plan, 1 - end) {
+            Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
+        }
+        match shared.controller_left.get() {
+            Some(left) if end == 0 => Reader::judge_farewell(plan, left, &seen),
+            _ => Ok(()),
+        }
     });
     shared.check(judged);
 }

@@ -27,6 +27,8 @@ mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
+/// What a [`PollSet`] is asked, and what it says.
+pub use crate::time::{Interest, Ready};
 #[cfg(unix)]
 pub use at_exit::at_exit;
 pub use file_lock::{Lock, lock_file, lock_holder, unlock_file};
@@ -44,8 +46,7 @@ pub use open_files::raise_open_files;
 #[cfg(unix)]
 pub use own_file::own_file;
 pub use peer_silence::peer_silence;
-pub use poll::Interest;
-pub use poll_set::{PollSet, Ready};
+pub use poll_set::PollSet;
 pub use pollable::{Pollable, Source};
 #[cfg(unix)]
 pub use process_watch::ProcessWatch;

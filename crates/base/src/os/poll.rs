@@ -6,17 +6,6 @@ use std::time::Duration;
 use rustix::event::{PollFd, Timespec, poll};
 use rustix::fd::{AsFd, BorrowedFd};
 
-/// What to wait for on a socket.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interest {
-    /// There is something to read, the peer has closed, or an error is pending.
-    Read,
-    /// There is room to write, or an error is pending.
-    Write,
-    /// Either.
-    ReadWrite,
-}
-
 /// A time-out within the range that the system accepts.
 pub(super) fn timespec(patience: Duration) -> Timespec {
     // Within every system's range, and rare enough to cost nothing.

@@ -7,9 +7,9 @@ use std::time::Duration;
 
 use rustix::fd::AsFd;
 
-use super::poll::{Interest, wake};
+use super::poll::wake;
 use super::pollable::{Pollable, Source};
-use crate::time::{Clock, Nanos, Stop};
+use crate::time::{Clock, Interest, Nanos, Ready, Stop};
 
 /// Lets one thread wait for sockets, for a deadline, and for its [`Stop`], whichever is first.
 ///
@@ -34,17 +34,6 @@ impl fmt::Debug for PollSet {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("PollSet").finish_non_exhaustive()
     }
-}
-
-/// A socket that is ready.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ready {
-    /// The key that the socket was added with.
-    pub key: usize,
-    /// A read would not block.
-    pub is_readable: bool,
-    /// A write would not block.
-    pub is_writable: bool,
 }
 
 /// The key of the socket by which other threads wake this one.

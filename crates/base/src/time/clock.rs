@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicI64, AtomicUsize, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use super::simulation::Simulation;
 use super::stop::Shared;
 use super::{Nanos, Stop};
-use crate::simulation::Simulation;
 
 /// A source of time that can also be waited on.
 pub trait Clock: Send + Sync + fmt::Debug {

@@ -9,6 +9,7 @@ mod histogram;
 mod nanos;
 mod pace;
 mod shared_histogram;
+mod simulation;
 mod stop;
 mod wall;
 
@@ -17,5 +18,8 @@ pub use histogram::TimeHistogram;
 pub use nanos::Nanos;
 pub use pace::Pace;
 pub use shared_histogram::SharedHistogram;
+pub use simulation::{
+    Interest, Ready, SimulatedListener, SimulatedSocket, SimulatedStream, Simulation,
+};
 pub use stop::{Stop, Waker};
 pub use wall::{WallClock, system_time};

@@ -16,6 +16,7 @@ use tickbus_image::signal::{Plan, RawValues, Scale, Signal, SignalTable, Slot};
 use super::manager::Nodes;
 use super::space;
 use super::watched::{Variable, Watched};
+use super::writers::Writers;
 
 /// How long a notification that is due may take to leave.
 const TO_LEAVE: Nanos = Nanos::from_millis(100);
@@ -39,6 +40,7 @@ pub(super) struct Show {
     pub(super) nodes: Arc<Nodes>,
     pub(super) subscriptions: Arc<SubscriptionCache>,
     pub(super) watched: Watched,
+    pub(super) writers: Arc<Writers>,
     pub(super) wall: WallClock,
 }
 
@@ -138,6 +140,11 @@ impl Image {
             show,
             every_write,
         }
+    }
+
+    /// A client has left.
+    pub(super) fn forget_writers_that_left(&self) {
+        self.show.writers.forget_gone();
     }
 
     /// Continues with another server, whose nodes have no values yet.

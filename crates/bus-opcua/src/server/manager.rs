@@ -66,7 +66,7 @@ pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
     pub(super) watched: Watched,
-    pub(super) writers: Writers,
+    pub(super) writers: Arc<Writers>,
     pub(super) inbox: Inbox<Visit>,
     pub(super) wall: WallClock,
     /// Whether a client's certificate must belong to its application.

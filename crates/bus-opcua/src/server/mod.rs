@@ -101,14 +101,15 @@ impl Server {
         let (watched, tasks_alone) = (Watched::default(), Arc::default());
         let wall = self.pki.wall;
         let max_age = port.max_age();
+        let writers = Arc::new(Writers::new(
+            self.options.is_single_writer,
+            self.table.signals.len(),
+            (Arc::clone(port.clock()), max_age),
+        ));
         let own = Own {
             reads: self.role.areas().1,
             watched: watched.clone(),
-            writers: Writers::new(
-                self.options.is_single_writer,
-                self.table.signals.len(),
-                (Arc::clone(port.clock()), max_age),
-            ),
+            writers: Arc::clone(&writers),
             inbox: inbox.clone(),
             wall,
             checks_applications: self.pki.trust == Trust::Listed,
@@ -123,6 +124,7 @@ impl Server {
             nodes: nodes.expect("it was handed to the server"),
             subscriptions: Arc::clone(handle.subscriptions()),
             watched,
+            writers,
             wall,
         };
         if self.is_secure() {
@@ -388,6 +390,7 @@ impl Service<'_> {
     fn look(&mut self, port: &mut Port, now: Nanos) {
         let seen = self.peers.look(|station| port.touch(station, now));
         if seen != Seen::Same {
+            self.image.forget_writers_that_left();
             port.tell("clients", &self.peers.count().to_string());
         }
         if seen == Seen::Gone {

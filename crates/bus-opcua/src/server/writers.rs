@@ -50,6 +50,12 @@ impl Writers {
         }
     }
 
+    /// Forgets sessions that are over, with all that the crate has of them.
+    pub(super) fn forget_gone(&self) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.sessions.retain(Visitor::is_there);
+    }
+
     /// The session `id` writes a signal. Returns the client that wrote it in another session within `max_age`; a write that
     /// is refused for that reason does not count.
     pub(super) fn write(&self, id: u32, signal: usize) -> Option<String> {

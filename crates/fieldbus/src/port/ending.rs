@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, Sender};
 
-use tickbus_base::simulation::wait_for;
+use tickbus_base::thread::wait_for;
 use tickbus_base::time::{Clock, Nanos};
 
 use super::{Port, Receipt};

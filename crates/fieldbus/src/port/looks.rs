@@ -104,6 +104,14 @@ mod tests {
     }
 
     #[test]
+    fn what_is_read_long_after_a_look_counts_as_found_by_that_look() {
+        let mut looks = looks();
+        looks.look(at(1025));
+        // The thread was without a processor between the look and the reading.
+        assert_eq!(looks.arrival(at(1900)), at(1025));
+    }
+
+    #[test]
     fn what_a_late_look_finds_may_have_come_right_after_the_one_before() {
         let mut looks = looks();
         looks.look(at(1051));

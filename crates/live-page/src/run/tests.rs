@@ -10,7 +10,12 @@ use super::*;
 fn view(members: &Arc<Members>, sequence: u64, waited: Nanos) -> RunView {
     RunView {
         members: Arc::clone(members),
-        state: State::Write,
+        // The first step is that in which the clients write their initial values.
+        state: if sequence == 0 {
+            State::InitialWrite
+        } else {
+            State::Write
+        },
         step: Some(Step {
             sequence,
             time: Nanos::ZERO,

@@ -1,17 +1,36 @@
 //! The operating system's part in a run that is simulated as a whole: threads, connections and waiting, all on one clock.
 //!
-//! A program that simulates whole runs implements [`Simulation`] and hands it in with its [`Clock`](crate::time::Clock).
+//! A program that simulates whole runs implements [`Simulation`] and hands it in with its [`Clock`](super::Clock).
 //! Adapters and supervision then run unchanged: they spawn, connect, listen and wait through this trait where the clock has
 //! one, and through the operating system where it has none. No product has one.
 
 use std::fmt;
 use std::io;
 use std::net::SocketAddr;
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError, TryRecvError};
-use std::thread::JoinHandle;
 
-use crate::os::{Interest, Ready};
-use crate::time::{Clock, Nanos, Stop};
+use super::{Nanos, Stop};
+
+/// What to wait for on a socket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interest {
+    /// There is something to read, the peer has closed, or an error is pending.
+    Read,
+    /// There is room to write, or an error is pending.
+    Write,
+    /// Either.
+    ReadWrite,
+}
+
+/// A socket that is ready.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ready {
+    /// The key by which the waiting thread knows the socket.
+    pub key: usize,
+    /// A read would not block.
+    pub is_readable: bool,
+    /// A write would not block.
+    pub is_writable: bool,
+}
 
 /// What replaces the operating system.
 pub trait Simulation {
@@ -106,69 +125,4 @@ pub trait SimulatedStream: SimulatedSocket {
     ///
     /// As of a socket of the operating system.
     fn take_error(&self) -> io::Result<Option<io::Error>>;
-}
-
-/// A thread of a driver, whose end can be waited for with a limit.
-#[derive(Debug)]
-pub struct Thread {
-    /// Disconnected when the thread has dropped all that it had.
-    ended: Receiver<()>,
-    /// `None` in a simulation.
-    handle: Option<JoinHandle<()>>,
-}
-
-impl Thread {
-    /// Starts a thread.
-    ///
-    /// # Errors
-    ///
-    /// The system has no further one.
-    pub fn spawn(
-        clock: &dyn Clock,
-        name: &str,
-        body: impl FnOnce() + Send + 'static,
-    ) -> io::Result<Self> {
-        let (end, ended) = mpsc::channel();
-        let body = move || {
-            let _end: mpsc::Sender<()> = end;
-            body();
-        };
-        let handle = match clock.simulation() {
-            Some(simulation) => {
-                simulation.spawn(name, Box::new(body));
-                None
-            }
-            None => Some(
-                std::thread::Builder::new()
-                    .name(name.to_owned())
-                    .spawn(body)?,
-            ),
-        };
-        Ok(Self { ended, handle })
-    }
-
-    /// Whether it is still running.
-    pub fn is_running(&self) -> bool {
-        self.ended.try_recv() == Err(TryRecvError::Empty)
-    }
-
-    /// Waits for its end; after `limit` it is left behind with everything it uses. Returns whether it has ended.
-    pub fn join_within(self, clock: &dyn Clock, limit: Nanos) -> bool {
-        let has_ended = wait_for(clock, &self.ended, limit);
-        if has_ended && let Some(handle) = self.handle {
-            // A panic was reported where it happened.
-            let _ = handle.join();
-        }
-        has_ended
-    }
-}
-
-/// Waits until there is news on `receiver`, or its sender is gone; returns whether that was within `limit`.
-pub fn wait_for(clock: &dyn Clock, receiver: &Receiver<()>, limit: Nanos) -> bool {
-    match clock.simulation() {
-        Some(simulation) => simulation.wait_for(limit, &mut || {
-            receiver.try_recv() != Err(TryRecvError::Empty)
-        }),
-        None => receiver.recv_timeout(limit.to_duration()) != Err(RecvTimeoutError::Timeout),
-    }
 }

@@ -1,0 +1,48 @@
+//! The table `[driver]` of a driver.cfg.
+
+use tickbus_base::toml_text::Table;
+use tickbus_image::signal::Addressing;
+
+/// The longest name of a driver, in characters.
+const NAME_LIMIT: usize = 120;
+
+/// The longest path of a file, in characters.
+pub(crate) const PATH_LIMIT: usize = 1000;
+
+/// What `[driver]` says.
+pub(crate) struct DriverTable {
+    pub(crate) id: Option<i32>,
+    pub(crate) name: Option<String>,
+    pub(crate) addressing: Addressing,
+    pub(crate) faults: Option<String>,
+}
+
+/// Reads the table.
+pub(crate) fn read_driver(mut table: Table<'_>) -> DriverTable {
+    let id = table.require(
+        "id",
+        "write a number that no other driver has, such as id = 4711",
+    );
+    let name = table.require("name", "give the driver a name for people");
+    let addressing = table.take("addressing");
+    let faults = table.take("faults");
+    table.finish();
+    let choices = [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
+    DriverTable {
+        id: id
+            .and_then(|value| value.whole(1..=i32::MAX.into()))
+            .and_then(|id| i32::try_from(id).ok()),
+        name: name
+            .and_then(|value| value.label(NAME_LIMIT, "give the driver a name for people"))
+            .map(str::to_owned),
+        addressing: addressing
+            .and_then(|value| value.choice("ways of addressing", &choices))
+            .unwrap_or_default(),
+        faults: faults
+            .and_then(|value| {
+                let right = "name a file that has [[fault]] sections, such as \"faults.toml\"";
+                value.label(PATH_LIMIT, right)
+            })
+            .map(str::to_owned),
+    }
+}

@@ -1,0 +1,38 @@
+//! How a world that broke a promise is made smaller.
+
+use crate::judge::Broken;
+use crate::plan::Plan;
+use crate::seed::Seed;
+
+impl Seed {
+    /// The smallest world found in which the same promise is broken: features and misfortunes are left out one by one, as long
+    /// as it is.
+    #[must_use]
+    pub fn shrunk(self, promise: &str) -> Self {
+        let is_broken = |seed: Self| {
+            Plan::draw(seed)
+                .run()
+                .is_err_and(|Broken { promise: other, .. }| other == promise)
+        };
+        let mut smallest = self;
+        for bit in 0..u16::BITS {
+            let fewer = Self {
+                features: smallest.features & !(1 << bit),
+                ..smallest
+            };
+            if is_broken(fewer) {
+                smallest = fewer;
+            }
+        }
+        for bit in 0..u8::BITS {
+            let fewer = Self {
+                events: smallest.events & !(1 << bit),
+                ..smallest
+            };
+            if is_broken(fewer) {
+                smallest = fewer;
+            }
+        }
+        smallest
+    }
+}

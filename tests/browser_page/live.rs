@@ -1,6 +1,7 @@
 //! The live page: it shows what a driver sees, forces it, and tells when it cannot.
 
-use std::fmt::Write as _;
+mod large;
+
 use std::fs;
 use std::io::{BufRead as _, BufReader};
 use std::path::PathBuf;
@@ -565,58 +566,6 @@ fn an_open_page_can_force_after_a_restart_that_keeps_its_token() {
     browser.wait("document.getElementById('access').textContent === 'may force'");
     wait_marked(&browser, "Level low", "forced");
     machine.kill();
-}
-
-/// So many signals, half of them `%I` words and half `%Q` bits.
-fn many(count: usize) -> String {
-    let mut text = String::new();
-    for n in 0..count / 2 {
-        let _ = writeln!(
-            text,
-            "[[signal]]\nname = \"Word {n}\"\naddress = \"%IW{}\"\ntype = \"INT\"\nunit = \"mm\"\n[[signal]]\nname = \"Bit {n}\"\naddress = \"%QX{}.{}\"",
-            2 * n,
-            n / 8,
-            n % 8
-        );
-    }
-    text
-}
-
-#[test]
-fn ten_thousand_signals_are_scrolled_filtered_and_chosen() {
-    let machine = Machine::new("modbus-server", "", &many(10_000));
-    let browser = open(&machine, 1280, 800);
-    let rows = "Array.from(document.querySelectorAll('.row.signal')).filter((it) => !it.hidden)";
-    browser.wait("document.getElementById('found').textContent === '10,000 signals'");
-    // Through all of them, a page in each picture.
-    browser.run(
-        "const list = document.getElementById('list'); for (let top = 0; top < list.scrollHeight; top += 5000) { list.scrollTop = top; \
-         await new Promise((go) => requestAnimationFrame(go)); }",
-    );
-    let count = browser.run("return document.querySelectorAll('.row').length");
-    assert!(
-        count.as_i64() < Some(100),
-        "only what is seen exists, not {count} rows"
-    );
-    let longest = browser.run("return tickbusPage.drawn.longest");
-    println!("the longest picture while 10,000 signals were scrolled took {longest} ms");
-    browser.run("document.getElementById('list').focus()");
-    browser.keys(END);
-    browser.wait("document.getElementById('chosen-name').textContent === 'Bit 4999'");
-    browser.wait(&format!("{rows}.some((it) => it.parts.name.textContent === 'Bit 4999' && it.getAttribute('aria-selected') === 'true')"));
-    browser.keys("/");
-    browser.wait("document.activeElement.id === 'filter'");
-    browser.keys("mm %iw9996");
-    browser.wait("document.getElementById('found').textContent === '1 of 10,000 signals'");
-    wait_shown(&browser, "Word 4998", "0.00mm");
-    browser.run("document.getElementById('filter').select()");
-    browser.keys("%qx0.3");
-    browser.wait("document.getElementById('found').textContent === '1 of 10,000 signals'");
-    machine.write("0", "3", "1");
-    wait_shown(&browser, "Bit 3", "TRUE");
-    browser.keys("?");
-    browser.wait("document.getElementById('empty').textContent === 'No signal fits the filter.'");
-    assert_quiet(&browser);
 }
 
 #[test]

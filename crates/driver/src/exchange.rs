@@ -309,16 +309,15 @@ impl Driver {
             image.write_word(now, word);
             return;
         }
-        let mut all = stations.iter().enumerate();
-        let is_published = all.all(|(index, station)| {
-            let word = station.encode.word(slots);
-            word.is_some_and(|word| image.is_published(index, word))
-        });
-        if is_published {
-            image.ticks(now);
-        } else {
-            write(image, stations, now, slots, &mut self.counters);
+        let mut is_same = true;
+        for (index, station) in stations.iter().enumerate() {
+            let Some(word) = station.encode.word(slots) else {
+                write(image, stations, now, slots, &mut self.counters);
+                return;
+            };
+            is_same &= image.keep_word(index, word);
         }
+        image.write_kept(now, is_same);
     }
 
     /// The half that receives: what it found, and whether it could.

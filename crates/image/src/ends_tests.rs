@@ -108,11 +108,11 @@ fn a_level_that_returns_to_its_first_value_is_sent_again() {
         (0x80, 0x80),
     ] {
         assert!(
-            tick.is_published(0, u64::from(level)) == (level == outgoing(&mut bus, 1, None)),
+            tick.keep_word(0, u64::from(level)) == (level == outgoing(&mut bus, 1, None)),
             "what is published is what the bus has"
         );
         write(&mut tick, 1, level);
-        assert!(tick.is_published(0, u64::from(level)));
+        assert!(tick.keep_word(0, u64::from(level)));
         assert_eq!(outgoing(&mut bus, 1, None), expected);
         bus.sent(0);
     }

@@ -347,6 +347,23 @@ fn next_written(before: [u8; 2], random: &mut Random) -> [u8; 2] {
     }
 }
 
+/// Writes these bytes of all stations in one of the ways that there are; returns whether they were published already.
+fn write_somehow(tick: &mut TickEnd, now: Nanos, bytes: &[[u8; 2]], way: u64) -> bool {
+    let words = bytes.iter().map(|bytes| u16::from_le_bytes(*bytes).into());
+    let words: Vec<u64> = words.collect();
+    let mut is_same = true;
+    for (index, word) in words.iter().enumerate() {
+        is_same &= tick.keep_word(index, *word);
+    }
+    match (way, &words[..]) {
+        (0, [word]) => tick.write_word(now, *word),
+        (1, _) => tick.write_kept(now, is_same),
+        _ if is_same => tick.ticks(now),
+        _ => tick.write(now, |index, frame| frame.copy_from_slice(&bytes[index])),
+    }
+    is_same
+}
+
 fn sent(mut random: Random, stations: usize) {
     let bits: Vec<_> = (0..stations).map(|_| latched(&mut random)).collect();
     let streams = bits.iter().map(|bits| StationStreams {
@@ -370,19 +387,8 @@ fn sent(mut random: Random, stations: usize) {
                     .iter()
                     .map(|bytes| next_written(*bytes, &mut random))
                     .collect();
-                let word = |bytes: [u8; 2]| u64::from(u16::from_le_bytes(bytes));
-                let is_same =
-                    (0..stations).all(|index| tick.is_published(index, word(drawn[index])));
+                let is_same = write_somehow(&mut tick, Nanos(now), &drawn, random.below(3));
                 assert_eq!(is_same, drawn == written, "step {step}");
-                if stations == 1 && random.below(2) == 0 {
-                    tick.write_word(Nanos(now), word(drawn[0]));
-                } else if is_same {
-                    tick.ticks(Nanos(now));
-                } else {
-                    tick.write(Nanos(now), |index, bytes| {
-                        bytes.copy_from_slice(&drawn[index]);
-                    });
-                }
                 (written, ticked) = (drawn, Some(now));
                 for (index, bytes) in written.iter().enumerate() {
                     for (model, bit) in models[index].iter_mut().zip(&bits[index]) {

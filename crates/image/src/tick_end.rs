@@ -34,6 +34,8 @@ struct Sent {
     signals: Box<[usize]>,
     /// The bytes published last, up to eight, as a number whose least significant byte comes first.
     word: u64,
+    /// The same of this tick.
+    kept: u64,
 }
 
 /// The incoming half of a station.
@@ -105,6 +107,7 @@ impl TickEnd {
             edges: EdgeCounter::new(&streams.tx_latched, &streams.tx_fail_safe),
             signals: streams.tx_latched.iter().map(|bit| bit.signal).collect(),
             word: as_word(&streams.tx_fail_safe),
+            kept: 0,
         });
         let shown = stations.iter().zip(shown).map(|(streams, place)| Shown {
             place,
@@ -152,11 +155,40 @@ impl TickEnd {
         self.ticks(now);
     }
 
-    /// Whether the bytes of a station published last, which are up to eight, are this number, the least significant byte
-    /// first. If so for all stations, a tick has nothing to [`write`](Self::write), and only [`ticks`](Self::ticks).
+    /// Keeps the bytes of a station, which are up to eight, as a number whose least significant byte comes first, for
+    /// [`write_kept`](Self::write_kept). Returns whether they are those published last.
     #[inline]
-    pub fn is_published(&self, station: usize, word: u64) -> bool {
-        self.sent[station].word == word
+    pub fn keep_word(&mut self, station: usize, word: u64) -> bool {
+        let sent = &mut self.sent[station];
+        sent.kept = word;
+        sent.word == word
+    }
+
+    /// As [`write`](Self::write), of what was [kept](Self::keep_word) of all stations in this tick; `is_same`: that was published
+    /// already.
+    #[inline]
+    pub fn write_kept(&mut self, now: Nanos, is_same: bool) {
+        if !is_same {
+            self.publish_kept();
+        }
+        self.ticks(now);
+    }
+
+    #[inline(never)]
+    fn publish_kept(&mut self) {
+        let sent = &mut self.sent;
+        self.tx.with_buffer(|frame| {
+            for station in sent {
+                station.word = station.kept;
+                let bytes = &mut frame.bytes[station.place.bytes.clone()];
+                for (to, from) in bytes.iter_mut().zip(station.word.to_le_bytes()) {
+                    *to = from;
+                }
+                let edges = &mut frame.edges[station.place.edges.clone()];
+                station.edges.count(bytes, edges);
+            }
+        });
+        self.tx.publish();
     }
 
     /// As [`write`](Self::write), for an image of one station of up to eight bytes that are at hand as a number, the least

@@ -27,6 +27,8 @@ final class NativeLibrary {
     private final String file = System.mapLibraryName("tickbus");
     private final String platform = platform(System.getProperty("os.name"), System.getProperty("os.arch"));
     private final List<String> tried = new ArrayList<>();
+    /** Whether the library was to be extracted to the temporary folder. */
+    private boolean extracts;
 
     private NativeLibrary() {
     }
@@ -140,6 +142,7 @@ final class NativeLibrary {
     }
 
     private boolean fromCopy(String place, InputStream content) throws IOException {
+        extracts = true;
         Path copy = Files.createTempFile("tickbus-", "-" + file);
         // Where a loaded library cannot be deleted (Windows), the file stays until the JVM ends, or longer.
         copy.toFile().deleteOnExit();
@@ -182,10 +185,12 @@ final class NativeLibrary {
             what.append("\n  This JVM runs on the C library musl, but the library in the jar is made for glibc;"
                 + " build one on this system.");
         }
-        what.append("\n  If it cannot be extracted to the temporary folder ").append(System.getProperty("java.io.tmpdir"))
-            .append(", or not be run there (noexec), name another folder by -Djava.io.tmpdir=FOLDER. Otherwise build it with")
-            .append(" `cargo build --release` in tickbus, then set -D").append(LIBRARY).append("=FILE, or put ").append(file)
-            .append(" beside the jar.");
+        if (extracts) {
+            what.append("\n  If the temporary folder ").append(System.getProperty("java.io.tmpdir")).append(" is full or read-only, or")
+                .append(" nothing may be run there (noexec), name another one by -Djava.io.tmpdir=FOLDER.");
+        }
+        what.append("\n  Build it with `cargo build --release` in tickbus, then set -D").append(LIBRARY)
+            .append("=FILE, or put ").append(file).append(" beside the jar.");
         return new FieldbusException(Status.LIBRARY, what.toString());
     }
 

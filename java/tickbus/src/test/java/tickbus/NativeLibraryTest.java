@@ -98,6 +98,14 @@ class NativeLibraryTest {
     }
 
     @Test
+    void aTemporaryFolderThatIsOfNoUseIsNamedWithTheCure() throws Exception {
+        Path none = directory.resolve("none");
+        ChildJvm.Outcome outcome = load(jar(BUILT), "-Djava.io.tmpdir=" + none);
+        assertEquals(1, outcome.exit());
+        assertLines(outcome, "If the temporary folder .*none is full or read-only, .* by -Djava\\.io\\.tmpdir=FOLDER\\.");
+    }
+
+    @Test
     void aWrongPropertyIsNotPassedOver() throws Exception {
         ChildJvm.Outcome outcome = load(jar(BUILT), "-Dtickbus.library=" + directory.resolve("no.so"));
         assertEquals(1, outcome.exit());

@@ -214,7 +214,7 @@ fn the_page_shows_a_run_its_clients_and_its_variables() {
         let (_, metrics) = page.ask("GET /metrics", "");
         assert!(metrics.contains("key=\"run.steps\"} 3\n"), "{metrics}");
         assert!(
-            metrics.contains("signal=\"ratio\",unit=\"\"} 2.5\n"),
+            metrics.contains("signal=\"ratio\",station=\"machine\",unit=\"\"} 2.5\n"),
             "{metrics}"
         );
 

@@ -33,7 +33,7 @@ pub struct Habits {
     pub preempts: u64,
     /// A thread that is woken may get the processor late by up to this, in ns.
     pub late: i64,
-    /// A thread that has lost the processor may be without it for up to this, in ns, [a few times](STARVED).
+    /// A thread that has lost the processor may be without it for up to this, in ns, three times in a world.
     pub starves: i64,
 }
 

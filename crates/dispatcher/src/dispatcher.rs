@@ -8,7 +8,7 @@ mod saving;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser};
+use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser, may_become_browser};
 
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::{Channel, Counts};
@@ -374,6 +374,9 @@ impl Dispatcher {
                 self.heard(now, seat);
                 at += quick;
                 continue;
+            }
+            if !session.is_skipping && may_become_browser(rest) {
+                break;
             }
             let Some(end) = rest.iter().position(|byte| *byte == b'\n') else {
                 if session.is_skipping {

@@ -28,24 +28,35 @@ fn what_a_web_site_has_a_browser_send_is_refused_with_its_body() {
             "\x16\x03\x01\x01\x7c\x01\0\x01\x78\x03\x03{}\r\n",
             "a".repeat(200)
         ),
+        // One whose length is a line feed.
+        format!(
+            "\x16\x03\x01\x01\x0e\x01\0\x01\x0a\x03\x03{}\r\n",
+            "a".repeat(200)
+        ),
     ] {
-        let mut lab = Lab::new();
-        let pump = lab.join("VP PUMP Q01 I01");
-        let browser = lab.connect();
         let request = format!("{head}VR EVIL Q01 I01\r\nCONNECT Q1:PUMP:I1\r\nP Q1=24\r\n");
         // In the pieces of a slow network, too.
-        for piece in request.as_bytes().chunks(1000) {
-            lab.send(browser, piece);
+        for size in [request.len(), 1000, 1] {
+            refuses_browser(request.as_bytes().chunks(size));
         }
-        assert!(lab.dispatcher.is_closing(browser));
-        let heard = lab.hear(browser);
-        assert!(
-            heard.len() == 1 && heard[0].contains("HTTP request"),
-            "{heard:?}"
-        );
-        assert_eq!(lab.hear(pump), [""; 0]);
-        assert_eq!(lab.dispatcher.patch().iter().count(), 0);
     }
+}
+
+fn refuses_browser<'a>(pieces: impl Iterator<Item = &'a [u8]>) {
+    let mut lab = Lab::new();
+    let pump = lab.join("VP PUMP Q01 I01");
+    let browser = lab.connect();
+    for piece in pieces {
+        lab.send(browser, piece);
+    }
+    assert!(lab.dispatcher.is_closing(browser));
+    let heard = lab.hear(browser);
+    assert!(
+        heard.len() == 1 && heard[0].contains("HTTP request"),
+        "{heard:?}"
+    );
+    assert_eq!(lab.hear(pump), [""; 0]);
+    assert_eq!(lab.dispatcher.patch().iter().count(), 0);
 }
 
 #[test]

@@ -39,13 +39,24 @@ fn is_tls_hello(bytes: &[u8]) -> bool {
     record.checked_sub(4) == Some(u16::from_be_bytes([hello_high, hello_low]))
 }
 
+/// The types that browsers send begin with 0 or 1: the methods of STUN and TURN (RFC 8489, RFC 8656) and the class.
 fn is_stun(bytes: &[u8]) -> bool {
-    bytes.first().is_some_and(|first| *first < 0x40) && bytes.get(4..8) == Some(&STUN_COOKIE)
+    matches!(bytes, [0 | 1, ..]) && bytes.get(4..8) == Some(&STUN_COOKIE)
+}
+
+/// Whether bytes that [`begins_like_browser`] does not know yet may turn out to be a browser's with those that follow.
+///
+/// A hello of TLS and a message of STUN may have a line feed among their first bytes, so that a port that takes lines must not
+/// take such a line for one before the rest is there.
+pub fn may_become_browser(bytes: &[u8]) -> bool {
+    /// What [`is_tls_hello`] looks at, which is more than [`is_stun`] does.
+    const ENOUGH: usize = 10;
+    matches!(bytes, [0 | 1 | 0x16, ..]) && bytes.len() < ENOUGH
 }
 
 #[cfg(test)]
 mod tests {
-    use super::begins_like_browser;
+    use super::{begins_like_browser, may_become_browser};
 
     #[test]
     fn requests_of_browsers_are_told_from_lines_and_records() {
@@ -81,9 +92,18 @@ mod tests {
             b"\x16\x03\x01\x00\x03\x01\x00\xff\xff\x03\x03",
             b"\x16\x03\x01\x07",
             b"\x00\x03\x00\x08\x21\x12\xa4\x43",
-            b"\x40\x03\x00\x08\x21\x12\xa4\x42",
+            b"\x02\x03\x00\x08\x21\x12\xa4\x42",
         ] {
             assert!(!begins_like_browser(record), "{record:02x?}");
         }
+        for whole in [hello.as_slice(), allocate] {
+            let known = (1..).find(|count| begins_like_browser(&whole[..*count]));
+            let known = known.expect("it is known at some byte");
+            for count in 1..known {
+                assert!(may_become_browser(&whole[..count]), "{count} bytes of {whole:02x?}");
+            }
+        }
+        assert!(!may_become_browser(b"P Q1=24\n"));
+        assert!(!may_become_browser(&[0; 10]));
     }
 }

@@ -15,7 +15,7 @@ mod writers;
 use super::BusError;
 
 pub use address::{Address, Host};
-pub use browser::{IS_BROWSER, begins_like_browser};
+pub use browser::{IS_BROWSER, begins_like_browser, may_become_browser};
 pub use connect::{connect, reach};
 pub use dial::{Call, Caller, Stream, dial};
 pub use dialler::Dialler;

@@ -4,16 +4,20 @@
 //! can be judged without a look into the drivers. Each promise has a file.
 
 mod age;
+mod files;
 mod liveness;
 mod outputs;
 mod reader;
+mod recording;
 mod stamp;
 mod station;
 mod writer;
 
 use std::fmt;
 
+pub(crate) use self::files::{Contents, FileRow, area_of};
 pub(crate) use self::reader::{Reader, Seen, Shown};
+pub(crate) use self::recording::judge_recording;
 pub(crate) use self::stamp::{Stamp, level, real, whole};
 pub(crate) use self::writer::Writer;
 

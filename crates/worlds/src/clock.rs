@@ -1,7 +1,9 @@
 //! The clock of a simulated world, and the sockets that it has in the place of the system's.
 
+use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -84,6 +86,11 @@ impl Simulation for SimulatedClock {
         let process = scheduler::process();
         let id = network(|network, random, now| network.connect(address, process, now, random));
         Ok(Box::new(Socket(id)))
+    }
+
+    fn write(&self, file: &File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        let process = scheduler::process();
+        scheduler::disk(|disk, _| disk.write(process, file, path, bytes))
     }
 }
 

@@ -16,6 +16,14 @@ impl Plan {
         ];
         lines.extend(self.fieldbus(end, link));
         lines.extend(self.timing(end));
+        lines.extend(self.record_section(end));
+        lines.push(self.signal_sections());
+        lines.join("\n")
+    }
+
+    /// The stations and their signals.
+    pub(crate) fn signal_sections(&self) -> String {
+        let mut lines = Vec::new();
         for station in 0..self.stations {
             if self.stations > 1 {
                 lines.push(format!("[[station]]\nname = \"s{station}\""));

@@ -6,9 +6,10 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::clock::SimulatedClock;
-use crate::judge::{Shown, Stamp, level, real, whole};
+use crate::judge::{Broken, Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
 use crate::scheduler::now;
+use crate::tape::{Row, Tape};
 
 /// The slots of a station in one direction.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +31,9 @@ pub(crate) struct End {
     reads: Vec<Places>,
     halves: bool,
     next_pulse: i64,
+    plan: Plan,
+    end: usize,
+    tape: Option<Tape>,
 }
 
 /// What a tick found.
@@ -42,10 +46,22 @@ pub(crate) struct Found {
 }
 
 impl End {
-    pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Self {
+    pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Result<Self, Broken> {
         let text = plan.driver_cfg(end, link);
-        let config = Config::parse("driver.cfg", &text)
+        let mut tape = Tape::begin(plan, end);
+        let folder = tape.as_ref().and_then(|tape| tape.path.parent());
+        let path = folder.map_or("driver.cfg".into(), |folder| folder.join("driver.cfg"));
+        let path = path.to_str().expect("a plain path");
+        let config = Config::parse(path, &text)
             .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+        if let Some(tape) = &tape {
+            let open = || {
+                let config = Config::parse(path, &text).ok()?;
+                let refused = Driver::open(config, SimulatedClock::shared()).err();
+                refused.map(|why| why.to_string())
+            };
+            tape.judge_refusal(open)?;
+        }
         let driver = Driver::open(config, SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
         let slots = driver.initial_slots();
@@ -71,7 +87,22 @@ impl End {
         } else {
             (places('Q'), places('I'))
         };
-        Self {
+        if let Some(tape) = &mut tape {
+            tape.names = signals.iter().map(|signal| signal.name.clone()).collect();
+            let edges = driver.slots().edges.iter().zip(signals);
+            let mut edges: Vec<_> = edges
+                .filter_map(|(slot, signal)| Some(((*slot)?, format!("{}.edges", signal.name))))
+                .collect();
+            edges.sort();
+            tape.names.extend(edges.into_iter().map(|(_, name)| name));
+        }
+        if let Some(tape) = &tape {
+            tape.judge_lock(plan, end)?;
+        }
+        Ok(Self {
+            plan: plan.clone(),
+            end,
+            tape,
             writes,
             reads,
             driver,
@@ -79,7 +110,7 @@ impl End {
             area: 1 - end as u64,
             halves: plan.ends[end].halves,
             next_pulse: now().0 + plan.pulses.0,
-        }
+        })
     }
 
     /// One tick, the `tick`th of this `life`; returns what it found, and whether it wrote a pulse.
@@ -89,8 +120,9 @@ impl End {
         if is_pulse {
             self.next_pulse = time + pulses.0;
         }
+        let given = self.plan.features.times[self.end].at(tick);
         let found = if self.halves {
-            let found = self.driver.receive(None, &mut self.slots);
+            let found = self.driver.receive(given.map(Nanos), &mut self.slots);
             let shown = self.shown();
             self.write(life, tick, is_pulse);
             let sent = self.driver.send(&mut self.slots);
@@ -98,7 +130,7 @@ impl End {
             (found, shown)
         } else {
             self.write(life, tick, is_pulse);
-            let found = self.driver.exchange(None, &mut self.slots);
+            let found = self.driver.exchange(given.map(Nanos), &mut self.slots);
             (found, self.shown())
         };
         let (exchange, stations) = found;
@@ -108,6 +140,15 @@ impl End {
             sequence: exchange.sequence,
             stations,
         };
+        if let Some(tape) = &mut self.tape {
+            tape.rows.push(Row {
+                began: time,
+                ended: now().0,
+                time: given,
+                code: found.code.code(),
+                values: self.slots.iter().map(|slot| slot.0).collect(),
+            });
+        }
         (found, is_pulse)
     }
 
@@ -150,7 +191,12 @@ impl End {
         shown.collect()
     }
 
-    pub(crate) fn close(self) {
+    /// Closes the driver, and judges what it leaves behind.
+    pub(crate) fn close(self) -> Result<(), Broken> {
         self.driver.close();
+        match &self.tape {
+            Some(tape) => tape.judge(&self.plan, self.end),
+            None => Ok(()),
+        }
     }
 }

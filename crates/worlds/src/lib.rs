@@ -7,17 +7,22 @@
 
 mod clock;
 mod config;
+mod disk;
 mod end;
+mod features;
 mod judge;
 mod network;
 mod pairs;
 mod plan;
 mod random;
+mod replay;
 mod scheduler;
 mod seed;
 mod shrink;
+mod tape;
 mod world;
 
+pub use features::{Features, RecordPlan, Times};
 pub use judge::Broken;
 pub use network::Conditions;
 pub use pairs::Pairs;

@@ -2,6 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
+use crate::features::{self, Features};
 use crate::network::Conditions;
 use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
@@ -121,6 +122,8 @@ pub struct Plan {
     pub span: Nanos,
     /// What happens, in the order of time.
     pub events: Vec<Event>,
+    /// What both ends have besides.
+    pub features: Features,
 }
 
 impl EndPlan {
@@ -210,6 +213,7 @@ impl Plan {
             conditions,
             span,
             events: Vec::new(),
+            features: Features::draw(seed),
         };
         for index in 0..count {
             let drawn = plan.draw_event(random, is);
@@ -299,12 +303,17 @@ impl Plan {
                 features.push(name);
             }
         }
+        features.extend(self.features.names());
         features
     }
 }
 
 /// All features that a world can have, each of the buses one.
-pub(crate) const FEATURES: &[&str] = &[
+pub(crate) fn all_features() -> Vec<&'static str> {
+    [FEATURES, features::NAMES].concat()
+}
+
+const FEATURES: &[&str] = &[
     "loopback",
     "socket",
     "on change",

@@ -12,6 +12,8 @@ pub struct Seed {
     pub features: u16,
     /// Which of the misfortunes drawn happen.
     pub events: u8,
+    /// Which of the features that are drawn last may exist.
+    pub more: u32,
 }
 
 impl From<u64> for Seed {
@@ -20,22 +22,29 @@ impl From<u64> for Seed {
             number,
             features: u16::MAX,
             events: u8::MAX,
+            more: u32::MAX,
         }
     }
 }
 
-/// As it is written in the corpus, and on the command line: `number`, or `number:features:events`.
+/// As it is written in the corpus, and on the command line: `number`, `number:features:events`, which has none of the features
+/// that are drawn last, or `number:features:events:more`.
 impl fmt::Display for Seed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             number,
             features,
             events,
+            more,
         } = self;
         if *self == Self::from(*number) {
             return write!(f, "{number}");
         }
-        write!(f, "{number}:{features:x}:{events:x}")
+        write!(f, "{number}:{features:x}:{events:x}")?;
+        if *more > 0 {
+            write!(f, ":{more:x}")?;
+        }
+        Ok(())
     }
 }
 
@@ -49,12 +58,14 @@ impl FromStr for Seed {
             if let Some(features) = parts.next() {
                 seed.features = u16::from_str_radix(features, 16).ok()?;
                 seed.events = u8::from_str_radix(parts.next()?, 16).ok()?;
+                let more = parts.next().unwrap_or("0");
+                seed.more = u32::from_str_radix(more, 16).ok()?;
             }
             parts.next().is_none().then_some(seed)
         };
         read().ok_or_else(|| {
             format!(
-                "\"{text}\" is no seed; write a number, as in 4711, or number:features:events, as in 4711:3ff:5"
+                "\"{text}\" is no seed; write a number, as in 4711, or number:features:events, as in 4711:3ff:5, or number:features:events:more"
             )
         })
     }
@@ -70,12 +81,21 @@ mod tests {
             number: 4711,
             features: 0x3FF,
             events: 5,
+            more: 0,
         };
-        for (seed, text) in [(Seed::from(4711), "4711"), (small, "4711:3ff:5")] {
+        let more = Seed {
+            more: 0x10,
+            ..small
+        };
+        for (seed, text) in [
+            (Seed::from(4711), "4711"),
+            (small, "4711:3ff:5"),
+            (more, "4711:3ff:5:10"),
+        ] {
             assert_eq!(seed.to_string(), text);
             assert_eq!(text.parse(), Ok(seed));
         }
-        for wrong in ["", "x", "1:2", "1:2:3:4", "-1"] {
+        for wrong in ["", "x", "1:2", "1:2:3:4:5", "-1"] {
             assert!(wrong.parse::<Seed>().is_err(), "{wrong}");
         }
     }

@@ -24,6 +24,15 @@ impl Seed {
                 smallest = fewer;
             }
         }
+        for bit in 0..u32::BITS {
+            let fewer = Self {
+                more: smallest.more & !(1 << bit),
+                ..smallest
+            };
+            if is_broken(fewer) {
+                smallest = fewer;
+            }
+        }
         for bit in 0..u8::BITS {
             let fewer = Self {
                 events: smallest.events & !(1 << bit),

@@ -181,6 +181,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
             // What the process does from now on reaches nobody.
             let process = shared.ends[end].process.get();
             scheduler::network(|network, _, now| network.kill(process, now));
+            scheduler::disk(|disk, now| disk.kill(process, now));
             order(end, Order::Kill(span));
         }
     }
@@ -218,7 +219,10 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let mut random = Random::new(scramble(
         plan.seed.number ^ scramble(life << 8 | end as u64),
     ));
-    let mut driver = End::open(plan, end, &shared.link);
+    let mut driver = match End::open(plan, end, &shared.link) {
+        Ok(driver) => driver,
+        Err(broken) => return shared.fail(broken),
+    };
     state.reader.borrow_mut().begin(plan.stations);
     state.is_open.set(true);
     let mut tick = 0;
@@ -228,14 +232,14 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
             None => {}
             Some(Order::Pause(span)) => scheduler::sleep(span),
             Some(Order::Finish) => {
-                driver.close();
+                shared.check(driver.close());
                 state.is_finished.set(true);
                 return;
             }
             Some(Order::Close(span) | Order::Kill(span)) => {
                 state.is_open.set(false);
                 let asked = scheduler::now();
-                driver.close();
+                shared.check(driver.close());
                 let took = scheduler::now() - asked;
                 if took > LONGEST_CLOSE {
                     shared.fail(Broken {

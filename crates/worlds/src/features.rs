@@ -1,0 +1,128 @@
+//! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
+
+use crate::random::{Random, scramble};
+use crate::seed::Seed;
+
+/// The simulation time that an end hands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Times {
+    /// None.
+    Clock,
+    /// That many nanoseconds more in each tick.
+    Steps(i64),
+    /// The same, but every so often a tick is as early as one before.
+    Back(i64),
+}
+
+/// The table `[record]` of an end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordPlan {
+    /// CSV, and not VCD.
+    pub is_csv: bool,
+    /// The key `ring`.
+    pub ring: Option<u64>,
+    /// How long the file may become.
+    pub disk: Option<u64>,
+    /// Others want the same file.
+    pub is_contended: bool,
+    /// The file is cut somewhere after a kill, as by a power failure.
+    pub is_torn: bool,
+}
+
+/// What both ends have besides.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Features {
+    /// The recording of each end.
+    pub recordings: [Option<RecordPlan>; 2],
+    /// The simulation time of each end.
+    pub times: [Times; 2],
+    /// Recordings are replayed: by exchanges of the same kind, and by ticks at other times.
+    pub replays: bool,
+}
+
+impl Features {
+    /// The features of a seed.
+    pub(crate) fn draw(seed: Seed) -> Self {
+        let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
+        // Of each of them a quarter of all worlds has some.
+        let has = random.number() & random.number() & u64::from(seed.more);
+        let is = |bit: u32| has >> bit & 1 == 1;
+        let recordings = [0, 1].map(|end| {
+            let plan = RecordPlan {
+                is_csv: random.once_in(2),
+                ring: random.once_in(3).then(|| random.of(&[1, 4, 16, 64])),
+                disk: random
+                    .once_in(3)
+                    .then(|| random.below(30_000))
+                    .filter(|_| is(2)),
+                is_contended: is(3) && random.once_in(2),
+                is_torn: is(4) && random.once_in(2),
+            };
+            is(end).then_some(plan)
+        });
+        let times = [5, 6].map(|bit| {
+            let step = random.of(&[1, 1_000, 999_999, 10_000_000]);
+            let times = random.of(&[Times::Steps(step), Times::Back(step)]);
+            if is(bit) { times } else { Times::Clock }
+        });
+        Self {
+            recordings,
+            times,
+            replays: is(7),
+        }
+    }
+
+    /// Their names.
+    pub(crate) fn names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        let mut add = |is: bool, name| {
+            if is {
+                names.push(name);
+            }
+        };
+        let any = |test: &dyn Fn(&RecordPlan) -> bool| {
+            self.recordings
+                .iter()
+                .any(|plan| plan.as_ref().is_some_and(test))
+        };
+        add(any(&|plan| plan.is_csv), "record csv");
+        add(any(&|plan| !plan.is_csv), "record vcd");
+        add(any(&|plan| plan.ring.is_some()), "small ring");
+        add(any(&|plan| plan.disk.is_some()), "full disk");
+        add(any(&|plan| plan.is_contended), "file in use");
+        add(any(&|plan| plan.is_torn), "torn file");
+        add(any(&|_| self.replays), "replay");
+        let has = |test: &dyn Fn(Times) -> bool| self.times.iter().any(|times| test(*times));
+        add(has(&|times| matches!(times, Times::Steps(_))), "own time");
+        add(
+            has(&|times| matches!(times, Times::Back(_))),
+            "time goes back",
+        );
+        names
+    }
+}
+
+/// All of them.
+pub(crate) const NAMES: &[&str] = &[
+    "record csv",
+    "record vcd",
+    "small ring",
+    "full disk",
+    "file in use",
+    "torn file",
+    "replay",
+    "own time",
+    "time goes back",
+];
+
+impl Times {
+    /// The time of a tick, from 1.
+    pub(crate) fn at(self, tick: u64) -> Option<i64> {
+        let tick = i64::try_from(tick).expect("small");
+        match self {
+            Self::Clock => None,
+            Self::Steps(step) => Some(step * tick),
+            Self::Back(step) => Some(step * if tick % 7 == 0 { tick - 3 } else { tick }),
+        }
+    }
+}

@@ -1,5 +1,8 @@
 //! One end of a world's line: its driver, and what ticks it.
 
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
@@ -41,12 +44,33 @@ pub(crate) struct Found {
     pub(crate) stations: Vec<Shown>,
 }
 
+/// How many files are known at a time: those of two ends, and of two worlds.
+const KNOWN: usize = 4;
+
+/// What a driver.cfg says. Several worlds have the same one, and reading it takes longer than a life of its driver.
+fn read(text: String) -> Config {
+    thread_local! {
+        static READ: RefCell<VecDeque<(String, Config)>> = const { RefCell::new(VecDeque::new()) };
+    }
+    let known = READ.with_borrow(|files| {
+        let known = files.iter().find(|(known, _)| *known == text);
+        known.map(|(_, config)| config.clone())
+    });
+    known.unwrap_or_else(|| {
+        let config = Config::parse("driver.cfg", &text)
+            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+        READ.with_borrow_mut(|files| {
+            files.truncate(KNOWN - 1);
+            files.push_front((text, config.clone()));
+        });
+        config
+    })
+}
+
 impl End {
     pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Self {
         let text = plan.driver_cfg(end, link);
-        let config = Config::parse("driver.cfg", &text)
-            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
-        let driver = Driver::open(config, SimulatedClock::shared())
+        let driver = Driver::open(read(text), SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
         let slots = driver.initial_slots();
         let signals = &driver.config().table.signals;

@@ -83,14 +83,14 @@ impl Plan {
 
     fn happen(&self, trace: Option<Rc<RefCell<String>>>) -> Result<(), Broken> {
         thread_local! {
-            static WORLDS: Cell<u64> = const { Cell::new(0) };
+            static LEAKED: Cell<u64> = const { Cell::new(0) };
         }
-        // Links are shared by all worlds of the process.
-        let number = WORLDS.replace(WORLDS.get() + 1);
+        // Links are shared by all worlds of the process; what a broken world leaves is never let go.
+        let leaked = LEAKED.get();
         let thread = std::thread::current().id();
         let shared = Rc::new(Shared {
             plan: self.clone(),
-            link: format!("world {number} of {thread:?}"),
+            link: format!("{leaked} of {thread:?}"),
             ends: Default::default(),
             broken: RefCell::default(),
             controller_left: Cell::default(),
@@ -100,7 +100,9 @@ impl Plan {
             let shared = Rc::clone(&shared);
             move || fate(&shared)
         };
-        let result = scheduler::run(scramble(self.seed.number ^ 1), self.habits, main);
+        let result = scheduler::run(scramble(self.seed.chance() ^ 1), self.habits, main);
+        let is_broken = result.is_err() || shared.broken.borrow().is_some();
+        LEAKED.set(leaked + u64::from(is_broken));
         if let Some(broken) = shared.broken.borrow_mut().take() {
             return Err(broken);
         }
@@ -216,7 +218,7 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let plan = &shared.plan;
     let state = &shared.ends[end];
     let mut random = Random::new(scramble(
-        plan.seed.number ^ scramble(life << 8 | end as u64),
+        plan.seed.chance() ^ scramble(life << 8 | end as u64),
     ));
     let mut driver = End::open(plan, end, &shared.link);
     state.reader.borrow_mut().begin(plan.stations);

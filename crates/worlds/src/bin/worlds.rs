@@ -68,8 +68,10 @@ fn many(first: u64, limit: Nanos) -> ExitCode {
     let begun = clock.now();
     let (mut worlds, mut failed) = (0, 0);
     let mut pairs = Pairs::default();
+    let mut next = Seed::from(first);
     while clock.now() - begun < limit {
-        let seed = Seed::from(first.wrapping_add(worlds));
+        let seed = next;
+        next = seed.next();
         let plan = Plan::draw(seed);
         pairs.add(&plan);
         worlds += 1;

@@ -252,6 +252,11 @@ impl Network {
         self.cut_until = self.cut_until.max(now + span);
     }
 
+    /// Whether bytes are held up.
+    pub(crate) fn is_held(&self, now: i64) -> bool {
+        self.cut_until > now
+    }
+
     /// The system closes what a process that was killed has left.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
         self.listeners

@@ -202,7 +202,10 @@ fn recover(shared: &Shared) {
         });
         let [one, other] = judged;
         let judged = one.and(other);
-        let is_whole = judged.is_ok() && shared.ends.iter().all(|end| end.is_open.get());
+        // What is held up would arrive after the farewell that is judged next.
+        let is_held = scheduler::network(|network, _, now| network.is_held(now));
+        let is_whole =
+            judged.is_ok() && !is_held && shared.ends.iter().all(|end| end.is_open.get());
         if is_whole {
             return;
         }

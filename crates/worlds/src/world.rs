@@ -73,12 +73,15 @@ impl Plan {
         self.happen(None)
     }
 
-    /// What both ends found in each tick, as text: the same in every run.
+    /// What both ends found in each tick, and which promise was broken, as text: the same in every run.
     pub fn trace(&self) -> String {
         let trace = Rc::new(RefCell::new(String::new()));
-        // A world that breaks a promise has a trace, too.
-        let _ = self.happen(Some(Rc::clone(&trace)));
-        trace.take()
+        let result = self.happen(Some(Rc::clone(&trace)));
+        let mut trace = trace.take();
+        if let Err(broken) = result {
+            trace.push_str(&broken.to_string());
+        }
+        trace
     }
 
     fn happen(&self, trace: Option<Rc<RefCell<String>>>) -> Result<(), Broken> {

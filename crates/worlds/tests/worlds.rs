@@ -1,6 +1,8 @@
 //! Worlds that once broke a promise, and fresh ones.
 #![allow(missing_docs, reason = "tests")]
 
+use std::process::Command;
+
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_worlds::{Pairs, Plan, Seed};
 
@@ -38,6 +40,38 @@ fn the_same_seed_is_the_same_world() {
         assert!(!first.is_empty(), "nothing happens in the world {seed}");
         assert_eq!(first, plan.trace(), "the world {seed}");
     }
+}
+
+/// Nothing of the computer shows in a world: neither where the system puts its memory, which is another place in each process, nor
+/// the seeds of hash tables, nor the environment. No number is kept here, since each change of the product changes it;
+/// `worlds traces` prints it, for other machines to compare.
+#[test]
+fn another_process_has_the_same_worlds() {
+    let traces = |setting: &mut dyn FnMut(&mut Command)| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_worlds"));
+        command.args(["traces", "4711", "200"]).env_clear();
+        setting(&mut command);
+        let output = command.output().expect("worlds runs");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let first = traces(&mut |_| {});
+    assert!(
+        first.starts_with("worlds=200 first=4711 traces="),
+        "{first}"
+    );
+    let folder = std::env::temp_dir();
+    let other = traces(&mut |command| {
+        // A long environment moves the stack.
+        command
+            .env("LANG", "tr_TR.UTF-8")
+            .env("TZ", "Asia/Kathmandu");
+        command
+            .env("TICKBUS_LOG", "debug")
+            .env("LONG", "x".repeat(100_000));
+        command.current_dir(&folder);
+    });
+    assert_eq!(first, other);
 }
 
 #[test]

@@ -359,13 +359,16 @@ impl Dispatcher {
         let mut at = 0;
         let mut counts = self.board.device(seat).map(|device| device.counts);
         while at < bytes.len() {
-            let is_skipping = match &self.sessions[seat] {
+            // The first line of a client that was silent is looked at alone: it restores the values of all its outputs.
+            let (is_skipping, is_silent) = match &self.sessions[seat] {
                 Some(session) if session.progress == Progress::Closing => return bytes.len(),
-                Some(session) if session.progress == Progress::Going => session.is_skipping,
+                Some(session) if session.progress == Progress::Going => {
+                    (session.is_skipping, session.is_silent)
+                }
                 _ => break,
             };
             let rest = &bytes[at..];
-            let quick = counts.filter(|_| !is_skipping);
+            let quick = counts.filter(|_| !is_skipping && !is_silent);
             let quick = quick.map_or(0, |counts| self.quick_lines(seat, rest, counts));
             let Some(session) = &mut self.sessions[seat] else {
                 break;
@@ -405,6 +408,7 @@ impl Dispatcher {
             self.heard(now, seat);
             self.board.traffic.lines += 1;
             if was_skipping {
+                self.speak_again(now, seat);
                 continue;
             }
             if begins_like_browser(rest) {
@@ -412,6 +416,7 @@ impl Dispatcher {
                 return bytes.len();
             }
             if end >= LONGEST_LINE {
+                self.speak_again(now, seat);
                 self.refuse_length(seat);
                 continue;
             }
@@ -419,18 +424,25 @@ impl Dispatcher {
             if let Err(refusal) = self.obey(now, seat, line.strip_suffix(b"\r").unwrap_or(line)) {
                 self.refuse(seat, &refusal);
             }
+            self.speak_again(now, seat);
             counts = self.board.device(seat).map(|device| device.counts);
         }
         at
     }
 
-    /// A line of a client has come. If it was silent, its outputs have values again.
+    /// A line of a client has come.
     #[inline]
     fn heard(&mut self, now: Nanos, seat: usize) {
+        if let Some(session) = &mut self.sessions[seat] {
+            session.heard = now;
+        }
+    }
+
+    /// If a client was silent, its outputs have values again.
+    fn speak_again(&mut self, now: Nanos, seat: usize) {
         let Some(session) = &mut self.sessions[seat] else {
             return;
         };
-        session.heard = now;
         if std::mem::take(&mut session.is_silent) {
             self.next_look = self
                 .next_look
@@ -465,7 +477,12 @@ impl Dispatcher {
 
     /// Carries a line out.
     fn obey(&mut self, now: Nanos, seat: usize, line: &[u8]) -> Result<(), Refusal> {
-        let line = grammar::parse(line)?;
+        let line = grammar::parse(line);
+        // New values count before those of the time when it fell silent: these would be shown for a moment.
+        if !matches!(line, Ok(Line::Values(_))) {
+            self.speak_again(now, seat);
+        }
+        let line = line?;
         let is_plugged = self.board.device(seat).is_some();
         let may_come_first = matches!(
             line,

@@ -66,6 +66,23 @@ fn a_client_that_breaks_its_promise_to_speak_is_lost_until_it_speaks() {
     }
 }
 
+#[test]
+fn after_a_silence_new_values_come_alone_and_no_pulse_is_swallowed() {
+    // As most write it, and as some do.
+    for line in ["P Q1=5", "p  q1 = 5"] {
+        let mut lab = Lab::new();
+        let logo = lab.join("VR LOGO I02 V=3");
+        let pump = lab.join("VP PUMP Q02 V=2 ALIVE=500ms");
+        lab.say(logo, "CONNECT I1:PUMP:Q1 I2:PUMP:Q2");
+        lab.say(pump, "P Q1=24 Q2=1");
+        lab.hear(logo);
+        lab.wait(Nanos::from_millis(600));
+        assert_eq!(lab.hear(logo), ["P I1=? I2=?"]);
+        lab.send(pump, format!("{line}\nP Q1=6\n").as_bytes());
+        assert_eq!(lab.hear(logo), ["P I1=5 I2=1", "P I1=6"], "{line}");
+    }
+}
+
 fn to_strings(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|line| (*line).to_owned()).collect()
 }

@@ -250,16 +250,24 @@ impl Dispatcher {
     /// The system has taken this many bytes for a client.
     pub fn wrote(&mut self, seat: usize, count: usize) {
         self.board.outbox(seat).wrote(count);
-        let may_go_on = self.may_answer(seat);
-        if may_go_on
+        let is_stuck = self
+            .session(seat)
+            .is_some_and(|session| session.progress == Progress::Stuck);
+        if is_stuck
+            && self.may_answer(seat)
+            && !self.is_owed_answer(seat)
             && let Some(session) = &mut self.sessions[seat]
-            && session.progress == Progress::Stuck
-            && !self.promised.iter().any(|it| it.author.is(seat))
-            && !self.waiting.iter().any(|it| it.author.is(seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
         }
+    }
+
+    /// Whether a client waits for the disk, or for another dispatcher.
+    fn is_owed_answer(&self, seat: usize) -> bool {
+        let promised = self.promised.iter().map(|it| &it.author);
+        let waiting = self.waiting.iter().map(|it| &it.author);
+        promised.chain(waiting).any(|author| author.is(seat))
     }
 
     /// When [`tick`](Self::tick) has something to do even if nothing arrives.
@@ -310,13 +318,16 @@ impl Dispatcher {
                 continue;
             };
             promise = promise.min(alive);
-            if session.is_silent || session.progress == Progress::Stuck {
+            if session.is_silent {
                 continue;
             }
             let due = session.heard + alive;
             if now < due || is_late {
                 first = first.min(due);
-            } else {
+            } else if self.is_owed_answer(seat) {
+                // Its lines are not read. Once they are, it has its time again.
+                first = first.min(now + alive);
+            } else if let Some(session) = &mut self.sessions[seat] {
                 session.is_silent = true;
                 self.board.fall_silent(seat);
             }

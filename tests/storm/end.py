@@ -43,7 +43,7 @@ with tickbus.open(path) as plc:
         else:
             status = plc.exchange()
         ended = time.monotonic_ns()
-        line = [tick, began, received if halves else ended, ended, int(status), round(plc.age * 1e9), plc.sequence]
+        line = [tick, began, received if halves else ended, ended, int(status), round(min(plc.age, 9e9) * 1e9), plc.sequence]
         for stamp, pulse, level, whole, real in read:
             line += [stamp.value, int(level.value), pulse.edges, whole.value, real.value]
         os.write(out, (" ".join(map(str, line)) + "\n").encode())

@@ -22,6 +22,8 @@ class Life:
     # While it was suspended, or cut off.
     downs: list = field(default_factory=list)
     is_second: bool = False
+    # When its process was started.
+    born: int = 0
 
 
 @dataclass(eq=False)
@@ -66,7 +68,7 @@ class Judge:
     def __init__(self, plan, lives, stalls):
         self.plan, self.lives, self.stalls = plan, lives, stalls
         self.findings = []
-        self.judged = {"values": 0, "pulses": 0, "ages": 0, "deaths": 0}
+        self.judged = {"values": 0, "pulses": 0, "ages": 0}
         self.ended = {life: [tick.ended for tick in life.ticks] for life in lives}
 
     def finding(self, promise, reader, tick, what):
@@ -160,8 +162,7 @@ class Judge:
         for life in lives:
             spans = life.downs + ([(life.ended, None)] if life.ended else [])
             begins = [begin for begin, end in spans if begin <= at and (end is None or at <= end)]
-            started = life.ticks[0].began if life.ticks else None
-            if not begins and (started is None or started - 5 * SECOND > at):
+            if life.born > at:
                 continue
             if not begins:
                 return None
@@ -249,25 +250,27 @@ class Judge:
                 reader_end = end if back else 1 - end
                 readers = [life for life in self.lives if life.end == reader_end and life.ticks]
                 readers = [life for life in readers if life.ticks[0].began <= since and life.ticks[-1].ended >= until]
-                if len(readers) == 1 and self.is_well(since, until) and self.is_steady(readers[0], since, until):
+                if len(readers) == 1 and self.is_well(since, until) and self.is_steady(readers[0], writer, since, until):
                     self.pulse(readers[0], writer, tick)
 
     def is_well(self, since, until):
         """Whether nothing befell either end around a span, and the machine had time."""
         for life in self.lives:
-            begins = life.ticks[0].began if life.ticks else None
-            spans = list(life.downs)
-            spans += [(life.ended, life.ended)] if life.ended else []
-            spans += [(begins, begins)] if begins else []
+            begins = life.ticks[0].began if life.ticks else life.born
+            spans = [*life.downs, (life.born, begins)] + ([(life.ended, life.ended)] if life.ended else [])
             if any(begin <= until and (end is None or end + SECOND >= since) for begin, end in spans):
                 return False
-            if life.is_second and begins and begins <= until and (life.ended is None or life.ended >= since - SECOND):
+            if life.is_second and life.born <= until and (life.ended is None or life.ended >= since - SECOND):
                 return False
         return self.stalls.longest(since, until) == 0
 
-    def is_steady(self, reader, since, until):
-        seen = [tick for tick in reader.ticks if since <= tick.began <= until]
-        return all(tick.status != STALE and tick.age <= self.plan.max_age // 2 for tick in seen)
+    def is_steady(self, reader, writer, since, until):
+        """Whether the reader had young data all the time, and both ticked."""
+        for life in (reader, writer):
+            times = [since, *(tick.began for tick in life.ticks if since <= tick.began <= until), until]
+            if any(after - before > 150 * MS for before, after in zip(times, times[1:])):
+                return False
+        return all(tick.status != STALE and tick.age <= self.plan.max_age // 2 for tick in reader.ticks if since <= tick.began <= until)
 
     def pulse(self, reader, writer, tick):
         self.judged["pulses"] += 1

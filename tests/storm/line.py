@@ -10,7 +10,7 @@ from pathlib import Path
 import judge
 import logs
 from machine import Disk, Network, Process, Stalls
-from plan import CONTROLLER, DEVICE, FAIL_SAFE, MS, ROLES, SECOND, driver_cfg
+from plan import CONTROLLER, DEVICE, FAIL_SAFE, MS, ROLES, SECOND, driver_cfg, patch
 
 HERE = Path(__file__).parent
 # Faults that are over have to be forgotten within this time: pauses between attempts to connect, and a JVM that starts.
@@ -40,6 +40,26 @@ class Artefacts:
         if self.fmpy.exists():
             self.programs.append("fmu")
         self.programs.append("command")
+
+    def without_opcua(self):
+        """The programs whose library was built without OPC UA."""
+        config = self.folder / "opcua.cfg"
+        config.write_text(
+            '[driver]\nid = 1\nname = "probe"\n[fieldbus]\nkind = "opcua-client"\nurl = "opc.tcp://127.0.0.1:1"\nsecurity = "None"\n'
+            '[[signal]]\nname = "signal"\naddress = "%QX0.0"\n'
+        )
+        python = ["-c", "import sys, tickbus; tickbus.open(sys.argv[1])", config]
+        own = [config, self.folder / "ticks", 1, "I", 1, 1, 1, 0, 0, 0]
+        probes = {"command": [self.command, "mirror", config, "--duration", "1ms"], "python": [self.python, *python]}
+        probes |= {"c": [self.folder / "end", *own], "java": ["java", "-cp", f"{self.jar}:{self.folder}", "End", *own]}
+        without = set()
+        for program, command in probes.items():
+            if program in self.programs:
+                done = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=self.folder)
+                if "is not in this build" in done.stderr:
+                    # An FMU has the library that C has.
+                    without |= {"c", "fmu"} if program == "c" else {program}
+        return without
 
     @staticmethod
     def _make(*command):
@@ -101,6 +121,13 @@ class Line:
         if done.returncode:
             self.findings.append(f"export: {done.stderr}")
 
+    def start_dispatcher(self):
+        """The server between both ends; it stands where the device is."""
+        command = [self.artefacts.command, "dispatch", "--listen", self.address, "--patch", self.folder / "patch.toml"]
+        command = [*self.network.prefix(DEVICE), *map(str, command)]
+        log = self.folder / f"dispatcher-{len(self.story)}.log"
+        self.dispatcher = Process(command, log, os.environ)
+
     def tell(self, what):
         self.story.append((time.monotonic_ns(), what))
 
@@ -115,6 +142,7 @@ class Line:
         command = [*self.network.prefix(end), *map(str, command)]
         environment = {**os.environ, "TMPDIR": str(self.folder)}
         life.process = Process(command, self.folder / f"{ROLES[end]}-{number}.log", environment)
+        life.born = life.process.started
         self.lives.append(life)
         (self.second if is_second else self.processes)[end] = life
         self.tell(f"{ROLES[end]} life {number} starts{' as a second one' if is_second else ''}")
@@ -164,6 +192,10 @@ class Line:
         elif event.what == "cut":
             self.network.cut(True)
             self.cuts = getattr(self, "cuts", []) + [[time.monotonic_ns(), None]]
+        elif event.what == "dispatcher killed":
+            self.dispatcher.kill()
+        elif event.what == "dispatcher stopped":
+            self.dispatcher.signal(signal.SIGSTOP)
         elif event.what == "second" and event.end not in self.second:
             self.start(event.end, is_second=True)
 
@@ -174,8 +206,12 @@ class Line:
         elif event.what in ("killed", "terminated") and not life:
             self.start(event.end)
         elif event.what == "cut":
-            self.network.cut(False)
             self.cuts[-1][1] = time.monotonic_ns()
+            self.network.cut(False)
+        elif event.what == "dispatcher killed" and self.dispatcher.ended:
+            self.start_dispatcher()
+        elif event.what == "dispatcher stopped":
+            self.dispatcher.signal(signal.SIGCONT)
         elif event.what == "second":
             self.over(event.end, int(event.span * 1000) % 2 == 0, self.second)
         self.tell(f"over: {event}")
@@ -220,6 +256,9 @@ class Line:
         return self.judged()
 
     def live(self):
+        if self.plan.bus == "dispatcher":
+            (self.folder / "patch.toml").write_text(patch())
+            self.start_dispatcher()
         for end in (DEVICE, CONTROLLER):
             self.start(end)
         if not self.until_lively("at first"):
@@ -267,6 +306,7 @@ class Line:
         one = judge.Judge(self.plan, self.lives, self.stalls)
         self.findings += one.judge()
         befallen = {event.what for event in self.plan.events} | ({"paused"} if any(end.pause for end in self.plan.ends) else set())
+        befallen |= {"stalled"} if any(until - since > self.plan.max_age // 4 for since, until in self.stalls.found) else set()
         befallen |= {"small disk"} if self.disk and any(self.plan.records) else set()
         for life in self.lives:
             text = life.process.log.read_text(errors="replace")

@@ -85,7 +85,7 @@ class Plan:
         )
 
 
-def draw(seed, programs, buses, has_network):
+def draw(seed, programs, buses, without_opcua, has_network):
     """The line of a seed, of what this machine has."""
     of = random.Random(seed)
     bus = of.choice([bus for bus in BUSES if bus in buses])
@@ -97,6 +97,8 @@ def draw(seed, programs, buses, has_network):
     if both == ["command", "command"] or bus == "dispatcher" and "command" in both:
         both[of.randrange(2)] = "c"
         both = ["c" if program == "command" and bus == "dispatcher" else program for program in both]
+    if bus == "opcua" and set(both) & set(without_opcua):
+        bus = "socket"
     ends = []
     for program in both:
         period = of.choice([3, 5, 10, 20]) * MS
@@ -137,8 +139,6 @@ def driver_cfg(plan, end, address, recording):
     lines = [f'[driver]\nid = {end + 1}\nname = "{role}"', f'[fieldbus]\nrole = "{role}"']
     lines += fieldbus(plan, end, address)
     lines += [f'cycle = "{plan.cycle}ns"\nmax_age = "{plan.max_age}ns"\nreconnect = ["100ms"]']
-    if plan.bus == "dispatcher":
-        lines += connections(plan, end)
     if recording:
         lines += [f'[record]\nfile = "{recording}"']
     if plan.stations > 1:
@@ -171,12 +171,13 @@ def fieldbus(plan, end, address):
     return lines
 
 
-def connections(plan, end):
-    """All that this end reads, from what the other end writes. Digital and analog channels are counted apart."""
+def patch():
+    """The dispatcher's patch: all that an end reads, from what the other one writes. It stands there from the start, since connections that
+    a client asks for are made one after another. Digital and analog channels are counted apart."""
     channels = [("I1", "Q1"), ("I2", "Q2"), ("AI1", "AQ1"), ("AI2", "AQ2"), ("AI3", "AQ3")]
-    other = ROLES[1 - end].upper()
-    wanted = ", ".join(f'"{own}:{other}:{its}"' for own, its in channels)
-    return [f"connect = [{wanted}]"]
+    pairs = [(role.upper(), other.upper()) for role, other in (ROLES, ROLES[::-1])]
+    lines = [f'"{end}:{own}" = "{other}:{its}"' for end, other in pairs for own, its in channels]
+    return "\n".join(["[patch]", *lines]) + "\n"
 
 
 def signals(plan, station, area):
@@ -185,8 +186,8 @@ def signals(plan, station, area):
         f'[[signal]]\nname = "{name}{area}{station}"\naddress = "%{area}{place}"\n{of}{rest}'
         for name, place, rest in (
             ("stamp", "L0", f'type = "LWORD"\nfail_safe = {FAIL_SAFE}'),
-            ("pulse", "X8.0", 'latch = "rising"'),
-            ("level", "X8.1", ""),
+            ("pulse", "X8.0", 'latch = "rising"\nfail_safe = false'),
+            ("level", "X8.1", "fail_safe = false"),
             ("whole", "W10", f'type = "INT"\norder = "DCBA"\nfail_safe = {FAIL_SAFE_WHOLE}'),
             ("real", "D12", f'type = "REAL"\nscale = {{ raw = [0, 100], value = [0.0, 50.0] }}\nfail_safe = {FAIL_SAFE_REAL}'),
         )

@@ -31,26 +31,28 @@ def options():
     parser.add_argument("--out", type=Path, default=ROOT / "target/storm")
     parser.add_argument("--buses", default=",".join(BUSES))
     parser.add_argument("--programs", default=",".join(PROGRAMS))
+    parser.add_argument("--without-opcua", help="programs whose library was built without it; found if not stated")
     parser.add_argument("--line")
     return parser.parse_args()
 
 
 def one_line(given, seed, artefacts, namespaces):
     programs = [program for program in artefacts.programs if program in given.programs.split(",")]
-    plan = draw(seed, programs, given.buses.split(","), namespaces)
+    plan = draw(seed, programs, given.buses.split(","), given.without_opcua.split(","), namespaces)
     folder = given.out / seed
-    print(json.dumps({"plan": str(plan), "names": plan.names()}), flush=True)
+    print(plan, flush=True)
     result = Line(plan, artefacts, folder, namespaces).run()
     if not result["findings"]:
         shutil.rmtree(folder, ignore_errors=True)
-    print(json.dumps(result), flush=True)
+    print(*(f"  {line}" for line in result["findings"]), sep="\n")
+    Path(f"{folder}.json").write_text(json.dumps({"plan": str(plan), "names": plan.names(), **result}))
 
 
 def command(given, seed):
     """The command that runs a line, in a process of its own: so it is measured by itself, and repeated alone."""
     return [
         sys.executable, __file__, "--line", seed, "--product", str(given.product), "--out", str(given.out),
-        "--buses", given.buses, "--programs", given.programs,
+        "--buses", given.buses, "--programs", given.programs, "--without-opcua", given.without_opcua,
     ]
 
 
@@ -64,23 +66,25 @@ def storm(given):
         while len(running) < given.jobs and passed < given.minutes * 60:
             number += 1
             seed = f"{given.seed}.{number}"
-            running[seed] = subprocess.Popen(command(given, seed), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            running[seed] = subprocess.Popen(command(given, seed), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         for seed, process in list(running.items()):
             if process.poll() is None:
                 continue
             del running[seed]
-            out, trouble = process.communicate()
-            told = [json.loads(line) for line in out.splitlines()]
-            if process.returncode or len(told) != 2:
-                findings.append(f"{seed}: the storm itself failed\n{out}{trouble}")
+            _, trouble = process.communicate()
+            told = given.out / f"{seed}.json"
+            if process.returncode or not told.exists():
+                findings.append(seed)
+                print(f"FOUND {seed}: the storm itself failed\n{trouble}", flush=True)
                 continue
-            plan, result = told
+            result = json.loads(told.read_text())
+            told.unlink()
             totals.update({"lines": 1, "ticks": result["ticks"], **result["judged"]})
-            ends, *others = plan["names"]
+            ends, *others = result["names"]
             met.update((ends, other) for other in others or ["quiet"])
             if result["findings"]:
-                findings.append(plan["plan"])
-                print(f"FOUND {plan['plan']}")
+                findings.append(seed)
+                print(f"FOUND {result['plan']}")
                 print(*(f"  {line[:300]}" for line in result["findings"][:8]), sep="\n")
                 print(f"  {len(result['findings'])} in all; again: {' '.join(command(given, seed)[1:])}", flush=True)
         if time.monotonic() - minute > 60 or not running:
@@ -106,11 +110,22 @@ def table(met):
 def main():
     given = options()
     given.out.mkdir(parents=True, exist_ok=True)
-    if given.line:
-        with tempfile.TemporaryDirectory() as folder:
-            one_line(given, given.line, Artefacts(given.product, Path(folder)), has_namespaces())
-        return 0
-    return storm(given)
+    with tempfile.TemporaryDirectory() as folder:
+        artefacts = Artefacts(given.product, Path(folder))
+        if given.without_opcua is None:
+            given.without_opcua = ",".join(sorted(artefacts.without_opcua()))
+        if given.line:
+            one_line(given, given.line, artefacts, has_namespaces())
+            return 0
+        lacking = sorted(set(PROGRAMS) - set(artefacts.programs))
+        for what, is_lacking in (
+            (f"ends that are not built: {', '.join(lacking)}", lacking),
+            (f"without OPC UA: {given.without_opcua}", given.without_opcua),
+            ("this user may make no network namespaces here: nothing is cut off", not has_namespaces()),
+        ):
+            if is_lacking:
+                print(f"storm: {what}")
+        return storm(given)
 
 
 if __name__ == "__main__":

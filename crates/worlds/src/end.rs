@@ -10,9 +10,10 @@ use crate::judge::{Broken, Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
 use crate::scheduler::now;
 use crate::tape::{Row, Tape};
+use crate::typed::Typed;
 
 /// The slots of a station in one direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Places {
     stamp: usize,
     pulse: usize,
@@ -20,6 +21,8 @@ struct Places {
     edges: Option<usize>,
     level: usize,
     numbers: Option<(usize, usize)>,
+    /// The signals beside the stamp.
+    typed: Vec<usize>,
 }
 
 /// An open driver.
@@ -68,6 +71,8 @@ impl End {
         let signals = &driver.config().table.signals;
         let place = |name: String| signals.iter().position(|signal| signal.name == name);
         let places = |area: char| {
+            let typed = plan.features.beside(area);
+            let reads = (area == 'Q') == (end == 0);
             let stations = 0..plan.stations;
             let places = stations.map(|station| {
                 let at = |name: &str| place(format!("{name}{area}{station}"));
@@ -78,6 +83,11 @@ impl End {
                     edges: driver.slots().edges[pulse],
                     level: at("level").expect("it is in the file"),
                     numbers: at("whole").zip(at("real")),
+                    typed: typed
+                        .iter()
+                        .flat_map(|typed| typed.names(area, station, reads))
+                        .map(|name| place(name).expect("it is in the file"))
+                        .collect(),
                 }
             });
             places.collect()
@@ -140,13 +150,15 @@ impl End {
             sequence: exchange.sequence,
             stations,
         };
-        if let Some(tape) = &mut self.tape {
+        let on_line = self.tape.as_ref().map(|_| self.on_line());
+        if let (Some(tape), Some(on_line)) = (&mut self.tape, on_line) {
             tape.rows.push(Row {
                 began: time,
                 ended: now().0,
                 time: given,
                 code: found.code.code(),
                 values: self.slots.iter().map(|slot| slot.0).collect(),
+                on_line,
             });
         }
         (found, is_pulse)
@@ -164,11 +176,32 @@ impl End {
             self.slots[places.stamp] = Slot::from_unsigned(stamp);
             self.slots[places.pulse] = Slot::from_real(f64::from(is_pulse));
             self.slots[places.level] = Slot::from_real(f64::from(level(stamp)));
+            let typed = self.plan.features.beside(['Q', 'I'][1 - self.end]);
+            for (place, typed) in places.typed.iter().zip(typed) {
+                self.slots[*place] = Slot(typed.written(stamp));
+            }
             if let Some((whole_at, real_at)) = places.numbers {
                 self.slots[whole_at] = Slot::from_real(whole(stamp).into());
                 self.slots[real_at] = Slot::from_real(real(stamp));
             }
         }
+    }
+
+    /// The slots, with what this end sends as it is on the line.
+    fn on_line(&self) -> Vec<u64> {
+        let mut values: Vec<u64> = self.slots.iter().map(|slot| slot.0).collect();
+        for places in &self.writes {
+            let stamp = values[places.stamp];
+            for (place, typed) in places.typed.iter().zip(self.beside()) {
+                values[*place] = typed.shown(Some(stamp), false)[0];
+            }
+        }
+        values
+    }
+
+    /// The signals beside the stamps that it writes.
+    fn beside(&self) -> &[Typed] {
+        self.plan.features.beside(['Q', 'I'][1 - self.end])
     }
 
     fn shown(&self) -> Vec<Shown> {
@@ -186,6 +219,11 @@ impl End {
                 numbers: places
                     .numbers
                     .map(|(whole, half)| (real(whole), real(half))),
+                typed: places
+                    .typed
+                    .iter()
+                    .map(|place| self.slots[*place].0)
+                    .collect(),
             }
         });
         shown.collect()

@@ -1,7 +1,9 @@
 //! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
 
+use crate::plan::Bus;
 use crate::random::{Random, scramble};
 use crate::seed::Seed;
+use crate::typed::Typed;
 
 /// The simulation time that an end hands in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +32,7 @@ pub struct RecordPlan {
 }
 
 /// What both ends have besides.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     /// The recording of each end.
     pub recordings: [Option<RecordPlan>; 2],
@@ -38,11 +40,18 @@ pub struct Features {
     pub times: [Times; 2],
     /// Recordings are replayed: by exchanges of the same kind, and by ticks at other times.
     pub replays: bool,
+    /// What is beside the stamps: of what the device reads, and of what the controller reads.
+    pub typed: [Vec<Typed>; 2],
 }
 
 impl Features {
     /// The features of a seed.
-    pub(crate) fn draw(seed: Seed) -> Self {
+    pub(crate) fn draw(seed: Seed, bus: Bus, numbers: bool) -> Self {
+        // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
+        let (first, has_gaps) = match bus {
+            Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
+            _ => (16, true),
+        };
         let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
         // Of each of them a quarter of all worlds has some.
         let has = random.number() & random.number() & u64::from(seed.more);
@@ -65,7 +74,12 @@ impl Features {
             let times = random.of(&[Times::Steps(step), Times::Back(step)]);
             if is(bit) { times } else { Times::Clock }
         });
+        let typed = [8, 9].map(|bit| {
+            let typed = Typed::draw(random, first, has_gaps);
+            if is(bit) { typed } else { Vec::new() }
+        });
         Self {
+            typed,
             recordings,
             times,
             replays: is(7),
@@ -98,7 +112,31 @@ impl Features {
             has(&|times| matches!(times, Times::Back(_))),
             "time goes back",
         );
+        let typed = |test: &dyn Fn(&Typed) -> bool| self.typed.iter().flatten().any(test);
+        add(typed(&|typed| typed.order != "ABCD"), "byte order");
+        add(typed(&|typed| typed.scale.is_some()), "scale");
+        add(typed(&|typed| typed.is_split), "bytes read");
+        for number in [8, 16, 32, 64] {
+            let name = match number {
+                8 => "8 bits",
+                16 => "16 bits",
+                32 => "32 bits",
+                _ => "64 bits",
+            };
+            add(typed(&|typed| typed.bits == number), name);
+        }
         names
+    }
+
+    /// How many bytes a station has in one direction at most.
+    pub(crate) fn frame(&self) -> usize {
+        let typed = self.typed.iter().flatten();
+        typed.map(|typed| typed.place + 8).max().unwrap_or(16)
+    }
+
+    /// The signals beside the stamps in one direction.
+    pub(crate) fn beside(&self, area: char) -> &[Typed] {
+        &self.typed[usize::from(area == 'I')]
     }
 }
 
@@ -113,6 +151,13 @@ pub(crate) const NAMES: &[&str] = &[
     "replay",
     "own time",
     "time goes back",
+    "byte order",
+    "scale",
+    "bytes read",
+    "8 bits",
+    "16 bits",
+    "32 bits",
+    "64 bits",
 ];
 
 impl Times {

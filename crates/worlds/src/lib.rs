@@ -20,6 +20,7 @@ mod scheduler;
 mod seed;
 mod shrink;
 mod tape;
+mod typed;
 mod world;
 
 pub use features::{Features, RecordPlan, Times};
@@ -29,3 +30,4 @@ pub use pairs::Pairs;
 pub use plan::{Bus, EndPlan, Event, Misfortune, Plan, Watchdog};
 pub use scheduler::Habits;
 pub use seed::Seed;
+pub use typed::Typed;

@@ -52,7 +52,7 @@ pub(crate) fn open(
         "[driver]\nid = 9\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"\nkind = \"loopback\"\nreplay = \"{shown}\"\n\
          max_age = \"{}\"\n{again}{}",
         plan.max_age,
-        plan.signal_sections()
+        plan.signal_sections(end)
     );
     let config = Config::parse("driver.cfg", &text)
         .unwrap_or_else(|why| panic!("a replay that tickbus refuses:\n{why}\n{text}"));

@@ -6,12 +6,14 @@ use crate::network::Delivery;
 use crate::plan::{FAIL_SAFE, Plan};
 
 /// What a station shows in one tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Shown {
     pub(crate) stamp: u64,
     pub(crate) level: bool,
     pub(crate) edges: u64,
     pub(crate) numbers: Option<(f64, f64)>,
+    /// The slots of the signals beside the stamp.
+    pub(crate) typed: Vec<u64>,
 }
 
 /// A tick as its end got it.
@@ -71,7 +73,7 @@ impl Reader {
         }
         let mut first = None;
         for (station, shown) in seen.stations.iter().enumerate() {
-            self.judge_station(plan, (area, station), writer, seen, *shown)?;
+            self.judge_station(plan, (area, station), writer, seen, shown)?;
             let stamp = (shown.stamp != FAIL_SAFE).then(|| {
                 let Stamp { life, tick, .. } = Stamp::of(shown.stamp);
                 (life, tick)

@@ -12,7 +12,7 @@ impl Reader {
         (area, station): (u64, usize),
         writer: &Writer,
         seen: &Seen<'_>,
-        shown: Shown,
+        shown: &Shown,
     ) -> Result<(), Broken> {
         if shown.stamp == FAIL_SAFE {
             let is_right =
@@ -20,6 +20,7 @@ impl Reader {
             if !is_right {
                 broken("fail-safe", format!("station {station} shows {shown:?}"))?;
             }
+            judge_typed(plan, area, None, shown)?;
             if seen.is_stale && shown.edges > 0 {
                 broken(
                     "stale edges",
@@ -49,6 +50,7 @@ impl Reader {
                 format!("station {station} shows {shown:?} in the tick of {stamp:?}"),
             )?;
         }
+        judge_typed(plan, area, Some(shown.stamp), shown)?;
         let newest = &mut self.newest[station];
         if (life, tick) < *newest {
             broken(
@@ -59,4 +61,21 @@ impl Reader {
         *newest = (life, tick);
         super::age::judge_young(plan, writer, seen, (station, stamp))
     }
+}
+
+/// The signals beside a stamp follow from it, whatever their types, orders and scales.
+fn judge_typed(plan: &Plan, area: u64, stamp: Option<u64>, shown: &Shown) -> Result<(), Broken> {
+    let letter = if area == 0 { 'Q' } else { 'I' };
+    let typed = plan.features.beside(letter).iter();
+    let expected: Vec<u64> = typed.flat_map(|typed| typed.shown(stamp, true)).collect();
+    if shown.typed != expected {
+        return broken(
+            "types",
+            format!(
+                "{:x?} are shown, and {expected:x?} were written",
+                shown.typed
+            ),
+        );
+    }
+    Ok(())
 }

@@ -18,6 +18,7 @@ impl Plan {
         lines.extend(self.timing(end));
         lines.extend(self.record_section(end));
         lines.push(self.signal_sections(end));
+        lines.extend(self.fault_sections(end));
         lines.join("\n")
     }
 

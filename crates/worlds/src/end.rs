@@ -6,6 +6,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::clock::SimulatedClock;
+use crate::injector::Injector;
 use crate::judge::{Broken, Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
 use crate::scheduler::now;
@@ -37,6 +38,7 @@ pub(crate) struct End {
     plan: Plan,
     end: usize,
     tape: Option<Tape>,
+    injector: Injector,
 }
 
 /// What a tick found.
@@ -46,6 +48,8 @@ pub(crate) struct Found {
     pub(crate) age: i64,
     pub(crate) sequence: u64,
     pub(crate) stations: Vec<Shown>,
+    /// What the end itself found.
+    pub(crate) broken: Option<Broken>,
 }
 
 impl End {
@@ -65,7 +69,7 @@ impl End {
             };
             tape.judge_refusal(open)?;
         }
-        let driver = Driver::open(config, SimulatedClock::shared())
+        let mut driver = Driver::open(config, SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
         let slots = driver.initial_slots();
         let signals = &driver.config().table.signals;
@@ -106,6 +110,7 @@ impl End {
             edges.sort();
             tape.names.extend(edges.into_iter().map(|(_, name)| name));
         }
+        let injector = Injector::new(plan, end, &mut driver);
         if let Some(tape) = &tape {
             tape.judge_lock(plan, end)?;
         }
@@ -113,6 +118,7 @@ impl End {
             plan: plan.clone(),
             end,
             tape,
+            injector,
             writes,
             reads,
             driver,
@@ -130,6 +136,7 @@ impl End {
         if is_pulse {
             self.next_pulse = time + pulses.0;
         }
+        let injected = self.injector.before(tick, &mut self.driver);
         let given = self.plan.features.times[self.end].at(tick);
         let found = if self.halves {
             let found = self.driver.receive(given.map(Nanos), &mut self.slots);
@@ -149,6 +156,9 @@ impl End {
             age: exchange.age.0,
             sequence: exchange.sequence,
             stations,
+            broken: injected
+                .and_then(|()| self.judge_own(tick, exchange.code))
+                .err(),
         };
         let on_line = self.tape.as_ref().map(|_| self.on_line());
         if let (Some(tape), Some(on_line)) = (&mut self.tape, on_line) {
@@ -162,6 +172,25 @@ impl End {
             });
         }
         (found, is_pulse)
+    }
+
+    /// What it wrote it finds again, and who looks sees what it has.
+    fn judge_own(&mut self, tick: u64, code: Code) -> Result<(), Broken> {
+        let slots = self.slots.clone();
+        for places in &self.writes {
+            let stamp = slots[places.stamp].unsigned();
+            let numbers = places.numbers.is_none_or(|(at, other)| {
+                slots[at].real() == f64::from(whole(stamp)) && slots[other].real() == real(stamp)
+            });
+            let is_own = slots[places.level].real() == f64::from(u8::from(level(stamp)));
+            if Stamp::of(stamp).tick != tick || !is_own || !numbers {
+                return Err(Broken {
+                    promise: "own values",
+                    what: format!("tick {tick} of end {} finds others than it wrote", self.end),
+                });
+            }
+        }
+        self.injector.behind(tick, code, &slots)
     }
 
     fn write(&mut self, life: u64, tick: u64, is_pulse: bool) {

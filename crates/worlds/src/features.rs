@@ -1,5 +1,6 @@
 //! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
 
+use crate::faults::{Effect, FaultPlan, Way};
 use crate::plan::Bus;
 use crate::random::{Random, scramble};
 use crate::seed::Seed;
@@ -42,11 +43,15 @@ pub struct Features {
     pub replays: bool,
     /// What is beside the stamps: of what the device reads, and of what the controller reads.
     pub typed: [Vec<Typed>; 2],
+    /// Injected faults, and forced signals.
+    pub faults: Vec<FaultPlan>,
+    /// Somebody looks at an end.
+    pub watched: [bool; 2],
 }
 
 impl Features {
     /// The features of a seed.
-    pub(crate) fn draw(seed: Seed, bus: Bus, numbers: bool) -> Self {
+    pub(crate) fn draw(seed: Seed, bus: Bus, numbers: bool, max_age: i64) -> Self {
         // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
         let (first, has_gaps) = match bus {
             Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
@@ -78,7 +83,15 @@ impl Features {
             let typed = Typed::draw(random, first, has_gaps);
             if is(bit) { typed } else { Vec::new() }
         });
+        let faults = FaultPlan::draw(random, numbers, max_age).into_iter();
+        let faults = faults.filter(|fault| match fault.way {
+            Way::Forced => is(11),
+            _ if fault.is_of_line() => is(12),
+            _ => is(10),
+        });
         Self {
+            faults: faults.collect(),
+            watched: [13, 14].map(is),
             typed,
             recordings,
             times,
@@ -125,6 +138,24 @@ impl Features {
             };
             add(typed(&|typed| typed.bits == number), name);
         }
+        add(self.watched.contains(&true), "watched");
+        for fault in &self.faults {
+            let name = match fault.effect {
+                _ if fault.way == Way::Forced => "forced",
+                Effect::Stuck(..) => "stuck",
+                Effect::Invert(_) => "inverted",
+                Effect::Offset(..) => "offset",
+                Effect::Noise(..) | Effect::Flicker(_) => "noise",
+                Effect::Delay(_) => "delay",
+                Effect::SlowAnswers(_) => "slow answers",
+                Effect::Drop(_) => "dropped frames",
+                Effect::Duplicate(_) => "duplicate",
+                Effect::LinkDown => "link down",
+            };
+            add(true, name);
+        }
+        names.sort_unstable();
+        names.dedup();
         names
     }
 
@@ -158,6 +189,17 @@ pub(crate) const NAMES: &[&str] = &[
     "16 bits",
     "32 bits",
     "64 bits",
+    "watched",
+    "forced",
+    "stuck",
+    "inverted",
+    "offset",
+    "noise",
+    "delay",
+    "slow answers",
+    "dropped frames",
+    "duplicate",
+    "link down",
 ];
 
 impl Times {

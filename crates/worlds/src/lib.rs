@@ -9,7 +9,9 @@ mod clock;
 mod config;
 mod disk;
 mod end;
+mod faults;
 mod features;
+mod injector;
 mod judge;
 mod network;
 mod pairs;
@@ -23,6 +25,7 @@ mod tape;
 mod typed;
 mod world;
 
+pub use faults::{Effect, FaultPlan, Way};
 pub use features::{Features, RecordPlan, Times};
 pub use judge::Broken;
 pub use network::Conditions;

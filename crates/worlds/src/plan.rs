@@ -213,7 +213,7 @@ impl Plan {
             conditions,
             span,
             events: Vec::new(),
-            features: Features::draw(seed, bus, is(13)),
+            features: Features::draw(seed, bus, is(13), max_age.0),
         };
         for index in 0..count {
             let drawn = plan.draw_event(random, is);

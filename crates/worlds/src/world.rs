@@ -8,6 +8,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver::Code;
 
 use crate::end::End;
+use crate::faults::FaultPlan;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
 use crate::plan::{Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
@@ -37,6 +38,9 @@ struct EndState {
     is_finished: Cell<bool>,
     writer: RefCell<Writer>,
     reader: RefCell<Reader>,
+    tick: Cell<u64>,
+    /// Since when its line is down on purpose.
+    down_since: Cell<Option<i64>>,
 }
 
 struct Shared {
@@ -127,7 +131,13 @@ fn fate(shared: &Rc<Shared>) {
         scheduler::sleep(at - scheduler::now());
         befall(shared, event.what);
     }
-    scheduler::sleep(began + plan.span - scheduler::now());
+    // What a cable holds back comes, however long after that.
+    let holds = plan.events.iter().map(|event| match event.what {
+        Misfortune::Hold(span) => event.at + span,
+        _ => Nanos::ZERO,
+    });
+    let over = holds.fold(plan.span, Nanos::max);
+    scheduler::sleep(began + over - scheduler::now());
     recover(shared);
     let ended = scheduler::now();
     for end in [1, 0] {
@@ -189,6 +199,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
 
 /// Without further misfortunes both ends have each other's newest values soon.
 fn recover(shared: &Shared) {
+    let plan = &shared.plan;
     let limit = scheduler::now() + PATIENCE;
     loop {
         scheduler::sleep(shared.plan.max_age);
@@ -201,7 +212,10 @@ fn recover(shared: &Shared) {
         });
         let [one, other] = judged;
         let judged = one.and(other);
-        let is_whole = judged.is_ok() && shared.ends.iter().all(|end| end.is_open.get());
+        let is_over = |end: usize| plan.has_no_more_faults(end, shared.ends[end].tick.get());
+        let is_whole = judged.is_ok()
+            && shared.ends.iter().all(|end| end.is_open.get())
+            && [0, 1].into_iter().all(is_over);
         if is_whole {
             return;
         }
@@ -225,6 +239,8 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     };
     state.reader.borrow_mut().begin(plan.stations);
     state.is_open.set(true);
+    state.tick.set(0);
+    state.down_since.set(None);
     let mut tick = 0;
     loop {
         let order = state.orders.borrow_mut().pop_front();
@@ -269,7 +285,7 @@ fn one_tick(
     let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
     let began = scheduler::now().0;
     state.writer.borrow_mut().begin(life, tick);
-    let (found, is_pulse) = driver.tick(life, tick, plan.pulses);
+    let (mut found, is_pulse) = driver.tick(life, tick, plan.pulses);
     let ended = scheduler::now().0;
     {
         let mut writer = state.writer.borrow_mut();
@@ -277,6 +293,16 @@ fn one_tick(
         if is_pulse {
             writer.pulses.push(began);
         }
+    }
+    if let Some(broken) = found.broken.take() {
+        return shared.fail(broken);
+    }
+    state.tick.set(tick);
+    let down_since = state.down_since.get().unwrap_or(began);
+    let is_down = plan.is_down(end, tick);
+    state.down_since.set(is_down.then_some(down_since));
+    if plan.is_disturbed(end, tick) {
+        state.reader.borrow_mut().stale.push(began);
     }
     if found.code.code() < 0 {
         shared.fail(Broken {
@@ -308,6 +334,7 @@ fn one_tick(
         let deliveries = network.deliveries.entry(process).or_default();
         let seen = Seen {
             began,
+            tick,
             is_stale: found.code == Code::Stale,
             is_fresh: found.code == Code::Fresh,
             age: found.age,
@@ -319,6 +346,9 @@ fn one_tick(
         reader.judge(plan, end as u64, &writer, &seen)?;
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
+        }
+        for since in [state, peer].iter().filter_map(|end| end.down_since.get()) {
+            Reader::judge_down(plan, since, &seen)?;
         }
         match shared.controller_left.get() {
             Some(left) if end == 0 => Reader::judge_farewell(plan, left, &seen),
@@ -359,8 +389,9 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
             let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
-            let interrupts =
-                watchdog(plan, 1 - end).is_some() || end == 0 && !plan.ends[1].holds_while_stale;
+            let interrupts = plan.features.faults.iter().any(FaultPlan::is_of_line)
+                || watchdog(plan, 1 - end).is_some()
+                || end == 0 && !plan.ends[1].holds_while_stale;
             if seen > written && !plan.bus.asks() && !interrupts {
                 shared.fail(Broken {
                     promise: "edges",

@@ -15,7 +15,7 @@ pub(super) fn slack(plan: &Plan) -> i64 {
         } else {
             0
         };
-    cycles + late + plan.round_trip() + 1_000_000
+    cycles + late + plan.round_trip() + plan.held_by_faults() + 1_000_000
 }
 
 /// How long what was taken to be sent may be on its way, beyond what the network takes.

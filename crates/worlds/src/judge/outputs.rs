@@ -50,4 +50,16 @@ impl Reader {
             None => Ok(()),
         }
     }
+
+    /// A line that is down on purpose, at either end, is stale soon.
+    pub(crate) fn judge_down(plan: &Plan, since: i64, seen: &Seen<'_>) -> Result<(), Broken> {
+        let limit = plan.max_age.0 + slack(plan) + held(plan);
+        if seen.is_stale || seen.began - since <= limit {
+            return Ok(());
+        }
+        broken(
+            "link down",
+            format!("not stale, {} ns after it went down", seen.began - since),
+        )
+    }
 }

@@ -1,7 +1,10 @@
 //! What one end sees, tick by tick: nothing torn across stations, and fresh only what is new.
 
+use std::collections::BTreeMap;
+
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
+use crate::faults;
 use crate::network::Delivery;
 use crate::plan::{FAIL_SAFE, Plan};
 
@@ -20,6 +23,8 @@ pub(crate) struct Shown {
 #[derive(Debug)]
 pub(crate) struct Seen<'a> {
     pub(crate) began: i64,
+    /// The tick of the end that sees.
+    pub(crate) tick: u64,
     pub(crate) is_stale: bool,
     pub(crate) is_fresh: bool,
     pub(crate) age: i64,
@@ -39,14 +44,20 @@ pub(crate) struct Reader {
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
     /// When it was first not stale.
     pub(crate) first_valid: Option<i64>,
-    /// The times at which it was stale.
+    /// The times at which it was stale, or its line disturbed on purpose.
     pub(crate) stale: Vec<i64>,
+    /// What the signals beside the stamp of station 0 were in the tick before.
+    pub(super) before: [f64; 3],
+    /// What was shown when faults of this end began, by their numbers.
+    pub(super) held: BTreeMap<usize, f64>,
 }
 
 impl Reader {
     /// A new driver looks: it knows nothing of what the one before it saw.
     pub(crate) fn begin(&mut self, stations: usize) {
         self.newest = vec![(0, 0); stations];
+        self.before = faults::values(None);
+        self.held.clear();
         self.sequence = 0;
     }
 

@@ -257,7 +257,10 @@ pub(crate) fn expected(
 ) -> [Vec<Span>; 3] {
     let reader = usize::from(area == 'I');
     let mut all = values(stamp).map(|value| vec![(value, value)]);
-    for (index, fault) in plan.features.faults.iter().enumerate() {
+    let faults = plan.features.faults.iter().enumerate();
+    // Those of the end that writes come first, whichever is the first in the list.
+    let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
+    for (index, fault) in others.into_iter().chain(own) {
         let Some((signal, of)) = fault.signal() else {
             continue;
         };
@@ -325,6 +328,14 @@ impl Plan {
             _ => fault.held(),
         });
         held.sum()
+    }
+
+    /// How old values may become besides: slow answers wait for a pulse that nobody has read, for a second at most, and for as
+    /// long as it is held.
+    pub(crate) fn waits_for_pulses(&self) -> i64 {
+        let faults = self.features.faults.iter();
+        let slow = faults.filter(|fault| matches!(fault.effect, Effect::SlowAnswers(_)));
+        i64::try_from(slow.count()).expect("few") * (1_000_000_000 + self.hold.0)
     }
 
     /// Whether the line of an end is down in a tick.

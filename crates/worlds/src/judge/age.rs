@@ -62,7 +62,8 @@ pub(super) fn judge_young(
 ) -> Result<(), Broken> {
     let now = seen.began;
     let Stamp { life, tick, .. } = stamp;
-    let slack = slack(plan) + if plan.bus.asks() { held(plan) } else { 0 };
+    let slack =
+        slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
     let sent = if plan.bus == Bus::Loopback {
         Some(heard)

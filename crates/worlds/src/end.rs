@@ -1,5 +1,8 @@
 //! One end of a world's line: its driver, and what ticks it.
 
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
@@ -52,6 +55,33 @@ pub(crate) struct Found {
     pub(crate) broken: Option<Broken>,
 }
 
+/// How many files are known at a time: those of two ends, and of two worlds.
+const KNOWN: usize = 4;
+
+/// What a driver.cfg says. Several worlds have the same one, and reading it takes longer than a life of its driver.
+fn read(path: &str, text: String) -> Config {
+    /// A file's path and text, and what it says.
+    type Known = (String, String, Config);
+    thread_local! {
+        static READ: RefCell<VecDeque<Known>> = const { RefCell::new(VecDeque::new()) };
+    }
+    let known = READ.with_borrow(|files| {
+        let known = files
+            .iter()
+            .find(|known| known.0 == path && known.1 == text);
+        known.map(|known| known.2.clone())
+    });
+    known.unwrap_or_else(|| {
+        let config = Config::parse(path, &text)
+            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+        READ.with_borrow_mut(|files| {
+            files.truncate(KNOWN - 1);
+            files.push_front((path.to_owned(), text, config.clone()));
+        });
+        config
+    })
+}
+
 impl End {
     pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Result<Self, Broken> {
         let text = plan.driver_cfg(end, link);
@@ -59,12 +89,10 @@ impl End {
         let folder = tape.as_ref().and_then(|tape| tape.path.parent());
         let path = folder.map_or("driver.cfg".into(), |folder| folder.join("driver.cfg"));
         let path = path.to_str().expect("a plain path");
-        let config = Config::parse(path, &text)
-            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+        let config = read(path, text);
         if let Some(tape) = &tape {
             let open = || {
-                let config = Config::parse(path, &text).ok()?;
-                let refused = Driver::open(config, SimulatedClock::shared()).err();
+                let refused = Driver::open(config.clone(), SimulatedClock::shared()).err();
                 refused.map(|why| why.to_string())
             };
             tape.judge_refusal(open)?;

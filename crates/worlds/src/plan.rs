@@ -146,6 +146,30 @@ impl EndPlan {
     }
 }
 
+/// Which habits a world has, of those that may exist.
+fn draw_habits(random: &mut Random, is: impl Fn(u32) -> bool, max_age: Nanos) -> Habits {
+    let (preempts, late) = (random.of(&[8, 40, 200]), random.of(&[100_000, 2_000_000]));
+    let starves = max_age.0 * random.within(1, 3);
+    Habits {
+        preempts: if is(1) { preempts } else { 0 },
+        late: if is(2) { late } else { 0 },
+        starves: if is(1) && is(14) { starves } else { 0 },
+    }
+}
+
+/// What the network of a world is like.
+fn draw_conditions(random: &mut Random, is: impl Fn(u32) -> bool, bus: Bus) -> Conditions {
+    let slowest = random.of(&[20_000, 200_000, 3_000_000]);
+    // An answer fits into what a system keeps for a connection.
+    let small = if bus.asks() { [600, 1_000] } else { [16, 100] };
+    let (splits, capacity) = (random.of(&[2, 10]), random.of(&small));
+    Conditions {
+        latency: (1_000, slowest),
+        splits: if is(3) { splits } else { 0 },
+        capacity: if is(4) { capacity } else { 64 * 1024 },
+    }
+}
+
 const fn us(count: i64) -> Nanos {
     Nanos::from_micros(count)
 }
@@ -176,27 +200,12 @@ impl Plan {
             EndPlan::draw(random, cycle, max_age, false),
             EndPlan::draw(random, cycle, max_age, true),
         ];
-        let (preempts, late) = (random.of(&[8, 40, 200]), random.of(&[100_000, 2_000_000]));
-        let starves = max_age.0 * random.within(1, 3);
-        let habits = Habits {
-            preempts: if is(1) { preempts } else { 0 },
-            late: if is(2) { late } else { 0 },
-            starves: if is(1) && is(14) { starves } else { 0 },
-        };
-        let slowest = random.of(&[20_000, 200_000, 3_000_000]);
-        // An answer fits into what a system keeps for a connection.
-        let small = if bus.asks() { [600, 1_000] } else { [16, 100] };
-        let (splits, capacity) = (random.of(&[2, 10]), random.of(&small));
-        let conditions = Conditions {
-            latency: (1_000, slowest),
-            splits: if is(3) { splits } else { 0 },
-            capacity: if is(4) { capacity } else { 64 * 1024 },
-        };
+        let habits = draw_habits(random, is, max_age);
+        let conditions = draw_conditions(random, is, bus);
         let span = Nanos(max_age.0 * random.within(1, 4));
         let hold = cycle.times(random.within(1, 4));
         let hold = if random.once_in(3) { hold } else { Nanos::ZERO };
         let reconnect = us(random.of(&[10_000, 50_000]));
-        let count = random.below(6);
         let mut plan = Self {
             seed,
             bus,
@@ -215,16 +224,36 @@ impl Plan {
             events: Vec::new(),
             features: Features::draw(seed, bus, is(13), max_age.0),
         };
-        for index in 0..count {
-            let drawn = plan.draw_event(random, is);
-            plan.events
-                .extend(drawn.filter(|_| is(5) && seed.events >> index & 1 == 1));
+        plan.draw_events(random, is);
+        if seed.turn > 0 {
+            plan.turn();
         }
-        plan.events.sort_by_key(|event| event.at);
         let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
         let line = plan.round_trip() + plan.habits.late * 8;
         plan.pulses = Nanos((slowest.0 * 6 + hold.0 * 2 + line).max(max_age.0 / 2));
         plan
+    }
+
+    /// The same two drivers, and other habits, another network, other misfortunes.
+    fn turn(&mut self) {
+        let random = &mut Random::new(scramble(self.seed.chance()));
+        let has = random.number() & u64::from(self.seed.features);
+        let is = |bit: u32| has >> bit & 1 == 1;
+        self.habits = draw_habits(random, is, self.max_age);
+        self.conditions = draw_conditions(random, is, self.bus);
+        self.span = Nanos(self.max_age.0 * random.within(1, 4));
+        self.draw_events(random, is);
+    }
+
+    /// Draws what happens, and when.
+    fn draw_events(&mut self, random: &mut Random, is: impl Fn(u32) -> bool + Copy) {
+        self.events.clear();
+        for index in 0..random.below(6) {
+            let drawn = self.draw_event(random, is);
+            self.events
+                .extend(drawn.filter(|_| is(5) && self.seed.events >> index & 1 == 1));
+        }
+        self.events.sort_by_key(|event| event.at);
     }
 
     /// The time that the network takes for a whole cycle at most, in ns.

@@ -3,11 +3,15 @@
 use std::fmt;
 use std::str::FromStr;
 
+use crate::random::scramble;
+
 /// What a world is drawn from. All bits of both masks are set, but in a world that was shrunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed {
     /// The source of all chance.
     pub number: u64,
+    /// 0, or another fate for the same two drivers: reading two files costs as much as what happens to them.
+    pub turn: u8,
     /// Which features may exist.
     pub features: u16,
     /// Which of the misfortunes drawn happen.
@@ -20,6 +24,7 @@ impl From<u64> for Seed {
     fn from(number: u64) -> Self {
         Self {
             number,
+            turn: 0,
             features: u16::MAX,
             events: u8::MAX,
             more: u32::MAX,
@@ -27,20 +32,49 @@ impl From<u64> for Seed {
     }
 }
 
-/// As it is written in the corpus, and on the command line: `number`, `number:features:events`, which has none of the features
-/// that are drawn last, or `number:features:events:more`.
+impl Seed {
+    /// How many turns a number has, where many worlds are run.
+    pub const TURNS: u8 = 8;
+
+    /// The seed after this one, where many are run.
+    #[must_use]
+    pub fn next(self) -> Self {
+        let turn = (self.turn + 1) % Self::TURNS;
+        Self {
+            number: self.number.wrapping_add(u64::from(turn == 0)),
+            turn,
+            ..self
+        }
+    }
+
+    /// The number that rules what happens to the two drivers.
+    pub(crate) fn chance(self) -> u64 {
+        if self.turn == 0 {
+            return self.number;
+        }
+        self.number ^ scramble(u64::from(self.turn))
+    }
+}
+
+/// As it is written in the corpus, and on the command line: `number` or `number/turn`; with `:features:events` behind that, which
+/// has none of the features that are drawn last, or with `:features:events:more`.
 impl fmt::Display for Seed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             number,
+            turn,
             features,
             events,
             more,
         } = self;
-        if *self == Self::from(*number) {
-            return write!(f, "{number}");
+        write!(f, "{number}")?;
+        if *turn > 0 {
+            write!(f, "/{turn}")?;
         }
-        write!(f, "{number}:{features:x}:{events:x}")?;
+        if (*features, *events, *more) == (u16::MAX, u8::MAX, u32::MAX) {
+            return Ok(());
+        }
+        write!(f, ":{features:x}:{events:x}")?;
         if *more > 0 {
             write!(f, ":{more:x}")?;
         }
@@ -54,7 +88,10 @@ impl FromStr for Seed {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut parts = text.split(':');
         let mut read = || -> Option<Self> {
-            let mut seed = Self::from(parts.next()?.parse::<u64>().ok()?);
+            let number = parts.next()?;
+            let (number, turn) = number.split_once('/').unwrap_or((number, "0"));
+            let mut seed = Self::from(number.parse::<u64>().ok()?);
+            seed.turn = turn.parse().ok()?;
             if let Some(features) = parts.next() {
                 seed.features = u16::from_str_radix(features, 16).ok()?;
                 seed.events = u8::from_str_radix(parts.next()?, 16).ok()?;
@@ -65,7 +102,7 @@ impl FromStr for Seed {
         };
         read().ok_or_else(|| {
             format!(
-                "\"{text}\" is no seed; write a number, as in 4711, or number:features:events, as in 4711:3ff:5, or number:features:events:more"
+                "\"{text}\" is no seed; write a number, as in 4711, number/turn, as in 4711/2, or either with :features:events or :features:events:more behind it, as in 4711:3ff:5"
             )
         })
     }
@@ -79,6 +116,7 @@ mod tests {
     fn a_seed_is_read_as_it_is_written() {
         let small = Seed {
             number: 4711,
+            turn: 0,
             features: 0x3FF,
             events: 5,
             more: 0,
@@ -87,15 +125,18 @@ mod tests {
             more: 0x10,
             ..small
         };
+        let turned = Seed { turn: 3, ..small };
         for (seed, text) in [
             (Seed::from(4711), "4711"),
             (small, "4711:3ff:5"),
             (more, "4711:3ff:5:10"),
+            (turned, "4711/3:3ff:5"),
+            (Seed::from(4711).next(), "4711/1"),
         ] {
             assert_eq!(seed.to_string(), text);
             assert_eq!(text.parse(), Ok(seed));
         }
-        for wrong in ["", "x", "1:2", "1:2:3:4:5", "-1"] {
+        for wrong in ["", "x", "1:2", "1:2:3:4:5", "-1", "1/", "1/256", "1/2/3"] {
             assert!(wrong.parse::<Seed>().is_err(), "{wrong}");
         }
     }

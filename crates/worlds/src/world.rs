@@ -77,24 +77,27 @@ impl Plan {
         self.happen(None)
     }
 
-    /// What both ends found in each tick, as text: the same in every run.
+    /// What both ends found in each tick, and which promise was broken, as text: the same in every run.
     pub fn trace(&self) -> String {
         let trace = Rc::new(RefCell::new(String::new()));
-        // A world that breaks a promise has a trace, too.
-        let _ = self.happen(Some(Rc::clone(&trace)));
-        trace.take()
+        let result = self.happen(Some(Rc::clone(&trace)));
+        let mut trace = trace.take();
+        if let Err(broken) = result {
+            trace.push_str(&broken.to_string());
+        }
+        trace
     }
 
     fn happen(&self, trace: Option<Rc<RefCell<String>>>) -> Result<(), Broken> {
         thread_local! {
-            static WORLDS: Cell<u64> = const { Cell::new(0) };
+            static LEAKED: Cell<u64> = const { Cell::new(0) };
         }
-        // Links are shared by all worlds of the process.
-        let number = WORLDS.replace(WORLDS.get() + 1);
+        // Links are shared by all worlds of the process; what a broken world leaves is never let go.
+        let leaked = LEAKED.get();
         let thread = std::thread::current().id();
         let shared = Rc::new(Shared {
             plan: self.clone(),
-            link: format!("world {number} of {thread:?}"),
+            link: format!("{leaked} of {thread:?}"),
             ends: Default::default(),
             broken: RefCell::default(),
             controller_left: Cell::default(),
@@ -104,7 +107,9 @@ impl Plan {
             let shared = Rc::clone(&shared);
             move || fate(&shared)
         };
-        let result = scheduler::run(scramble(self.seed.number ^ 1), self.habits, main);
+        let result = scheduler::run(scramble(self.seed.chance() ^ 1), self.habits, main);
+        let is_broken = result.is_err() || shared.broken.borrow().is_some();
+        LEAKED.set(leaked + u64::from(is_broken));
         if let Some(broken) = shared.broken.borrow_mut().take() {
             return Err(broken);
         }
@@ -231,7 +236,7 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let plan = &shared.plan;
     let state = &shared.ends[end];
     let mut random = Random::new(scramble(
-        plan.seed.number ^ scramble(life << 8 | end as u64),
+        plan.seed.chance() ^ scramble(life << 8 | end as u64),
     ));
     let mut driver = match End::open(plan, end, &shared.link) {
         Ok(driver) => driver,

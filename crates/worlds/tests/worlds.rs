@@ -1,6 +1,8 @@
 //! Worlds that once broke a promise, and fresh ones.
 #![allow(missing_docs, reason = "tests")]
 
+use std::process::Command;
+
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_worlds::{Pairs, Plan, Seed};
 
@@ -40,6 +42,38 @@ fn the_same_seed_is_the_same_world() {
     }
 }
 
+/// Nothing of the computer shows in a world: neither where the system puts its memory, which is another place in each process, nor
+/// the seeds of hash tables, nor the environment. No number is kept here, since each change of the product changes it;
+/// `worlds traces` prints it, for other machines to compare.
+#[test]
+fn another_process_has_the_same_worlds() {
+    let traces = |setting: &mut dyn FnMut(&mut Command)| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_worlds"));
+        command.args(["traces", "4711", "200"]).env_clear();
+        setting(&mut command);
+        let output = command.output().expect("worlds runs");
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let first = traces(&mut |_| {});
+    assert!(
+        first.starts_with("worlds=200 first=4711 traces="),
+        "{first}"
+    );
+    let folder = std::env::temp_dir();
+    let other = traces(&mut |command| {
+        // A long environment moves the stack.
+        command
+            .env("LANG", "tr_TR.UTF-8")
+            .env("TZ", "Asia/Kathmandu");
+        command
+            .env("TICKBUS_LOG", "debug")
+            .env("LONG", "x".repeat(100_000));
+        command.current_dir(&folder);
+    });
+    assert_eq!(first, other);
+}
+
 #[test]
 fn fresh_worlds_keep_all_promises() {
     let seconds = std::env::var("TICKBUS_WORLDS_SECONDS");
@@ -49,12 +83,12 @@ fn fresh_worlds_keep_all_promises() {
     let first = u64::from(std::process::id()) << 32;
     println!("worlds from {first} on");
     let begun = clock.now();
-    let (mut seed, mut pairs) = (first, Pairs::default());
+    let (mut seed, mut worlds, mut pairs) = (Seed::from(first), 0, Pairs::default());
     while clock.now() - begun < Nanos::from_secs(seconds.into()) {
         pairs.add(&Plan::draw(seed));
-        passes(seed.into());
-        seed += 1;
+        passes(seed);
+        (seed, worlds) = (seed.next(), worlds + 1);
     }
-    println!("{} worlds, {} pairs of features", seed - first, pairs.met());
-    assert!(seed > first + 10, "a world takes longer than a second");
+    println!("{worlds} worlds, {} pairs of features", pairs.met());
+    assert!(worlds > 10, "a world takes longer than a second");
 }

@@ -1,5 +1,6 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
-//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise.
+//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
+//! prints one number for all that happens in so many worlds, the same on every machine.
 
 use std::process::ExitCode;
 
@@ -33,12 +34,18 @@ fn main() -> ExitCode {
             (Ok(first), Ok(seconds)) => many(first, Nanos::from_secs(seconds.into())),
             _ => usage("FIRST and SECONDS are whole numbers"),
         },
+        ["traces", first, count] => match (first.parse::<u64>(), count.parse::<u32>()) {
+            (Ok(first), Ok(count)) => traces(first, count),
+            _ => usage("FIRST and COUNT are whole numbers"),
+        },
         _ => usage("one seed, or two numbers, are expected"),
     }
 }
 
 fn usage(why: &str) -> ExitCode {
-    eprintln!("worlds: {why}\nusage: worlds SEED\n       worlds FIRST SECONDS");
+    eprintln!(
+        "worlds: {why}\nusage: worlds SEED\n       worlds FIRST SECONDS\n       worlds traces FIRST COUNT"
+    );
     ExitCode::from(2)
 }
 
@@ -63,13 +70,29 @@ fn one(seed: Seed) -> ExitCode {
     }
 }
 
+fn traces(first: u64, count: u32) -> ExitCode {
+    let mut seed = Seed::from(first);
+    // FNV-1a, which every machine computes alike.
+    let mut hash = 0xCBF2_9CE4_8422_2325_u64;
+    for _ in 0..count {
+        for byte in Plan::draw(seed).trace().bytes() {
+            hash = (hash ^ u64::from(byte)).wrapping_mul(0x100_0000_01B3);
+        }
+        seed = seed.next();
+    }
+    println!("worlds={count} first={first} traces={hash:016x}");
+    ExitCode::SUCCESS
+}
+
 fn many(first: u64, limit: Nanos) -> ExitCode {
     let clock = Monotonic::shared();
     let begun = clock.now();
     let (mut worlds, mut failed) = (0, 0);
     let mut pairs = Pairs::default();
+    let mut next = Seed::from(first);
     while clock.now() - begun < limit {
-        let seed = Seed::from(first.wrapping_add(worlds));
+        let seed = next;
+        next = seed.next();
         let plan = Plan::draw(seed);
         pairs.add(&plan);
         worlds += 1;

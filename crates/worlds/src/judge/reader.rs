@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::faults;
+use crate::faults::{self, FaultPlan};
 use crate::network::Delivery;
 use crate::plan::{FAIL_SAFE, Plan};
 
@@ -70,7 +70,10 @@ impl Reader {
         seen: &Seen<'_>,
     ) -> Result<(), Broken> {
         let now = seen.began;
-        if seen.is_stale {
+        // A client that got no answer may read again before it writes again.
+        let is_unwritten = plan.features.faults.iter().any(FaultPlan::is_of_line)
+            && seen.stations.iter().any(|shown| shown.stamp == FAIL_SAFE);
+        if seen.is_stale || is_unwritten {
             self.stale.push(now);
         }
         if !seen.is_stale && seen.age > plan.max_age.0 {

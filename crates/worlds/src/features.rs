@@ -47,11 +47,18 @@ pub struct Features {
     pub faults: Vec<FaultPlan>,
     /// Somebody looks at an end.
     pub watched: [bool; 2],
+    /// An end is a PLC program that tickbus scans.
+    pub hosted: Option<usize>,
 }
 
 impl Features {
     /// The features of a seed.
-    pub(crate) fn draw(seed: Seed, bus: Bus, numbers: bool, max_age: i64) -> Self {
+    pub(crate) fn draw(
+        seed: Seed,
+        (bus, stations): (Bus, usize),
+        numbers: bool,
+        max_age: i64,
+    ) -> Self {
         // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
         let (first, has_gaps) = match bus {
             Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
@@ -89,14 +96,29 @@ impl Features {
             _ if fault.is_of_line() => is(12),
             _ => is(10),
         });
-        Self {
+        let mut features = Self {
+            hosted: None,
             faults: faults.collect(),
             watched: [13, 14].map(is),
             typed,
             recordings,
             times,
             replays: is(7),
+        };
+        let hosted = usize::try_from(random.below(2)).expect("small");
+        if is(15) && stations == 1 {
+            features.host(hosted);
         }
+        features
+    }
+
+    /// Makes an end a program: it has no recording, hands in no time, and its faults are those of its driver.cfg.
+    fn host(&mut self, end: usize) {
+        self.hosted = Some(end);
+        self.recordings[end] = None;
+        self.watched[end] = false;
+        self.faults
+            .retain(|fault| fault.end != end || fault.way == Way::File);
     }
 
     /// Their names.
@@ -138,6 +160,8 @@ impl Features {
             };
             add(typed(&|typed| typed.bits == number), name);
         }
+        add(self.hosted == Some(0), "hosted device");
+        add(self.hosted == Some(1), "hosted controller");
         add(self.watched.contains(&true), "watched");
         for fault in &self.faults {
             let name = match fault.effect {
@@ -189,6 +213,8 @@ pub(crate) const NAMES: &[&str] = &[
     "16 bits",
     "32 bits",
     "64 bits",
+    "hosted device",
+    "hosted controller",
     "watched",
     "forced",
     "stuck",

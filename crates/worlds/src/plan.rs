@@ -222,7 +222,7 @@ impl Plan {
             conditions,
             span,
             events: Vec::new(),
-            features: Features::draw(seed, bus, is(13), max_age.0),
+            features: Features::draw(seed, (bus, stations), is(13), max_age.0),
         };
         plan.draw_events(random, is);
         if seed.turn > 0 {

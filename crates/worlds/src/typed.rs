@@ -263,7 +263,11 @@ impl Typed {
     /// The bytes of bits on the line, in its order.
     fn laid_out(&self, bits: u64) -> Vec<u8> {
         let size = self.size();
-        let big = bits.to_be_bytes()[8 - size..].to_vec();
+        self.ordered(bits.to_be_bytes()[8 - size..].to_vec())
+    }
+
+    /// Bytes from the greatest on, in its order; and the other way round, which is the same.
+    fn ordered(&self, big: Vec<u8>) -> Vec<u8> {
         match self.order {
             "DCBA" => big.into_iter().rev().collect(),
             "CDAB" => big.chunks(2).rev().flatten().copied().collect(),
@@ -274,6 +278,22 @@ impl Typed {
                 .collect(),
             _ => big,
         }
+    }
+
+    /// The bytes of a tick with this stamp.
+    pub(crate) fn bytes(&self, stamp: u64) -> Vec<u8> {
+        self.laid_out(self.on_line(self.written(stamp)))
+    }
+
+    /// What bytes that begin with its own are, as an end is [shown](Self::shown) them.
+    pub(crate) fn taken(&self, bytes: &[u8], reads: bool) -> Vec<u64> {
+        let bytes = &bytes[..self.size()];
+        if self.is_split_at(reads) {
+            let bytes = bytes.iter();
+            return bytes.map(|byte| f64::from(*byte).to_bits()).collect();
+        }
+        let big = self.ordered(bytes.to_vec()).into_iter();
+        vec![self.read(big.fold(0, |bits, byte| bits << 8 | u64::from(byte)))]
     }
 
     /// What an end is shown of a tick with this stamp, or of fail-safe values.

@@ -1,13 +1,15 @@
 //! A world as it happens.
 
+mod hosted;
+
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
 use tickbus_base::time::Nanos;
-use tickbus_driver::Code;
+use tickbus_driver::{Code, Host};
 
-use crate::end::End;
+use crate::end::{End, Found};
 use crate::faults::FaultPlan;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
 use crate::plan::{Bus, Misfortune, Plan, Watchdog};
@@ -39,6 +41,8 @@ struct EndState {
     writer: RefCell<Writer>,
     reader: RefCell<Reader>,
     tick: Cell<u64>,
+    /// How long the next scan of its program is to take.
+    stall: Cell<Nanos>,
     /// Since when its line is down on purpose.
     down_since: Cell<Option<i64>>,
 }
@@ -107,7 +111,9 @@ impl Plan {
             let shared = Rc::clone(&shared);
             move || fate(&shared)
         };
+        hosted::enter(&shared);
         let result = scheduler::run(scramble(self.seed.chance() ^ 1), self.habits, main);
+        hosted::leave();
         let is_broken = result.is_err() || shared.broken.borrow().is_some();
         LEAKED.set(leaked + u64::from(is_broken));
         if let Some(broken) = shared.broken.borrow_mut().take() {
@@ -238,20 +244,27 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let mut random = Random::new(scramble(
         plan.seed.chance() ^ scramble(life << 8 | end as u64),
     ));
-    let mut driver = match End::open(plan, end, &shared.link) {
-        Ok(driver) => driver,
-        Err(broken) => return shared.fail(broken),
-    };
     state.reader.borrow_mut().begin(plan.stations);
-    state.is_open.set(true);
     state.tick.set(0);
     state.down_since.set(None);
+    let mut driver = if plan.features.hosted == Some(end) {
+        Ticker::Hosted(hosted::open(shared, (end, process), life))
+    } else {
+        match End::open(plan, end, &shared.link) {
+            Ok(driver) => Ticker::Driven(Box::new(driver)),
+            Err(broken) => return shared.fail(broken),
+        }
+    };
+    state.is_open.set(true);
     let mut tick = 0;
     loop {
         let order = state.orders.borrow_mut().pop_front();
         match order {
             None => {}
-            Some(Order::Pause(span)) => scheduler::sleep(span),
+            Some(Order::Pause(span)) => match driver {
+                Ticker::Driven(_) => scheduler::sleep(span),
+                Ticker::Hosted(_) => state.stall.set(span),
+            },
             Some(Order::Finish) => {
                 shared.check(driver.close());
                 state.is_finished.set(true);
@@ -273,10 +286,27 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
                 return;
             }
         }
-        tick += 1;
-        one_tick(shared, (end, process), &mut driver, (life, tick));
+        if let Ticker::Driven(driver) = &mut driver {
+            tick += 1;
+            one_tick(shared, (end, process), driver, (life, tick));
+        }
         let period = plan.ends[end].period.0;
         scheduler::sleep(Nanos(random.within(period / 2, period + period / 2)));
+    }
+}
+
+/// What ticks an end.
+enum Ticker {
+    Driven(Box<End>),
+    Hosted(Host),
+}
+
+impl Ticker {
+    fn close(self) -> Result<(), Broken> {
+        match self {
+            Self::Driven(driver) => driver.close(),
+            Self::Hosted(host) => hosted::close(host),
+        }
     }
 }
 
@@ -287,10 +317,10 @@ fn one_tick(
     (life, tick): (u64, u64),
 ) {
     let plan = &shared.plan;
-    let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
+    let state = &shared.ends[end];
     let began = scheduler::now().0;
     state.writer.borrow_mut().begin(life, tick);
-    let (mut found, is_pulse) = driver.tick(life, tick, plan.pulses);
+    let (found, is_pulse) = driver.tick(life, tick, plan.pulses);
     let ended = scheduler::now().0;
     {
         let mut writer = state.writer.borrow_mut();
@@ -299,6 +329,25 @@ fn one_tick(
             writer.pulses.push(began);
         }
     }
+    judge_tick(
+        shared,
+        (end, process),
+        (life, tick),
+        (began, is_pulse),
+        found,
+    );
+}
+
+/// Judges what a tick found.
+fn judge_tick(
+    shared: &Shared,
+    (end, process): (usize, usize),
+    (life, tick): (u64, u64),
+    (began, is_pulse): (i64, bool),
+    mut found: Found,
+) {
+    let plan = &shared.plan;
+    let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
     if let Some(broken) = found.broken.take() {
         return shared.fail(broken);
     }

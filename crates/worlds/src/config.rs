@@ -17,12 +17,13 @@ impl Plan {
         lines.extend(self.fieldbus(end, link));
         lines.extend(self.timing(end));
         lines.extend(self.record_section(end));
-        lines.push(self.signal_sections());
+        lines.push(self.signal_sections(end));
+        lines.extend(self.fault_sections(end));
         lines.join("\n")
     }
 
     /// The stations and their signals.
-    pub(crate) fn signal_sections(&self) -> String {
+    pub(crate) fn signal_sections(&self, end: usize) -> String {
         let mut lines = Vec::new();
         for station in 0..self.stations {
             if self.stations > 1 {
@@ -31,7 +32,7 @@ impl Plan {
         }
         for station in 0..self.stations {
             for area in ['Q', 'I'] {
-                lines.extend(self.signals(station, area));
+                lines.extend(self.signals(station, area, (area == 'Q') == (end == 0)));
             }
         }
         lines.join("\n")
@@ -85,7 +86,7 @@ impl Plan {
     }
 
     /// The signals of a station in one direction.
-    fn signals(&self, station: usize, area: char) -> Vec<String> {
+    fn signals(&self, station: usize, area: char, reads: bool) -> Vec<String> {
         let of = if self.stations > 1 {
             format!("\nstation = \"s{station}\"")
         } else {
@@ -115,6 +116,10 @@ impl Plan {
             let real =
                 "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5";
             lines.extend([signal("whole", "W10", whole), signal("real", "D12", real)]);
+        }
+        for typed in self.features.beside(area) {
+            let sections = typed.sections(area, station, reads).into_iter();
+            lines.extend(sections.map(|section| section + &of));
         }
         lines
     }

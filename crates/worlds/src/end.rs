@@ -9,13 +9,15 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::clock::SimulatedClock;
+use crate::injector::Injector;
 use crate::judge::{Broken, Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
 use crate::scheduler::now;
 use crate::tape::{Row, Tape};
+use crate::typed::Typed;
 
 /// The slots of a station in one direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Places {
     stamp: usize,
     pulse: usize,
@@ -23,6 +25,8 @@ struct Places {
     edges: Option<usize>,
     level: usize,
     numbers: Option<(usize, usize)>,
+    /// The signals beside the stamp.
+    typed: Vec<usize>,
 }
 
 /// An open driver.
@@ -37,6 +41,7 @@ pub(crate) struct End {
     plan: Plan,
     end: usize,
     tape: Option<Tape>,
+    injector: Injector,
 }
 
 /// What a tick found.
@@ -46,6 +51,8 @@ pub(crate) struct Found {
     pub(crate) age: i64,
     pub(crate) sequence: u64,
     pub(crate) stations: Vec<Shown>,
+    /// What the end itself found.
+    pub(crate) broken: Option<Broken>,
 }
 
 /// How many files are known at a time: those of two ends, and of two worlds.
@@ -90,12 +97,14 @@ impl End {
             };
             tape.judge_refusal(open)?;
         }
-        let driver = Driver::open(config, SimulatedClock::shared())
+        let mut driver = Driver::open(config, SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
         let slots = driver.initial_slots();
         let signals = &driver.config().table.signals;
         let place = |name: String| signals.iter().position(|signal| signal.name == name);
         let places = |area: char| {
+            let typed = plan.features.beside(area);
+            let reads = (area == 'Q') == (end == 0);
             let stations = 0..plan.stations;
             let places = stations.map(|station| {
                 let at = |name: &str| place(format!("{name}{area}{station}"));
@@ -106,6 +115,11 @@ impl End {
                     edges: driver.slots().edges[pulse],
                     level: at("level").expect("it is in the file"),
                     numbers: at("whole").zip(at("real")),
+                    typed: typed
+                        .iter()
+                        .flat_map(|typed| typed.names(area, station, reads))
+                        .map(|name| place(name).expect("it is in the file"))
+                        .collect(),
                 }
             });
             places.collect()
@@ -124,6 +138,7 @@ impl End {
             edges.sort();
             tape.names.extend(edges.into_iter().map(|(_, name)| name));
         }
+        let injector = Injector::new(plan, end, &mut driver);
         if let Some(tape) = &tape {
             tape.judge_lock(plan, end)?;
         }
@@ -131,6 +146,7 @@ impl End {
             plan: plan.clone(),
             end,
             tape,
+            injector,
             writes,
             reads,
             driver,
@@ -148,6 +164,7 @@ impl End {
         if is_pulse {
             self.next_pulse = time + pulses.0;
         }
+        let injected = self.injector.before(tick, &mut self.driver);
         let given = self.plan.features.times[self.end].at(tick);
         let found = if self.halves {
             let found = self.driver.receive(given.map(Nanos), &mut self.slots);
@@ -167,17 +184,41 @@ impl End {
             age: exchange.age.0,
             sequence: exchange.sequence,
             stations,
+            broken: injected
+                .and_then(|()| self.judge_own(tick, exchange.code))
+                .err(),
         };
-        if let Some(tape) = &mut self.tape {
+        let on_line = self.tape.as_ref().map(|_| self.on_line());
+        if let (Some(tape), Some(on_line)) = (&mut self.tape, on_line) {
             tape.rows.push(Row {
                 began: time,
                 ended: now().0,
                 time: given,
                 code: found.code.code(),
                 values: self.slots.iter().map(|slot| slot.0).collect(),
+                on_line,
             });
         }
         (found, is_pulse)
+    }
+
+    /// What it wrote it finds again, and who looks sees what it has.
+    fn judge_own(&mut self, tick: u64, code: Code) -> Result<(), Broken> {
+        let slots = self.slots.clone();
+        for places in &self.writes {
+            let stamp = slots[places.stamp].unsigned();
+            let numbers = places.numbers.is_none_or(|(at, other)| {
+                slots[at].real() == f64::from(whole(stamp)) && slots[other].real() == real(stamp)
+            });
+            let is_own = slots[places.level].real() == f64::from(u8::from(level(stamp)));
+            if Stamp::of(stamp).tick != tick || !is_own || !numbers {
+                return Err(Broken {
+                    promise: "own values",
+                    what: format!("tick {tick} of end {} finds others than it wrote", self.end),
+                });
+            }
+        }
+        self.injector.behind(tick, code, &slots)
     }
 
     fn write(&mut self, life: u64, tick: u64, is_pulse: bool) {
@@ -192,11 +233,32 @@ impl End {
             self.slots[places.stamp] = Slot::from_unsigned(stamp);
             self.slots[places.pulse] = Slot::from_real(f64::from(is_pulse));
             self.slots[places.level] = Slot::from_real(f64::from(level(stamp)));
+            let typed = self.plan.features.beside(['Q', 'I'][1 - self.end]);
+            for (place, typed) in places.typed.iter().zip(typed) {
+                self.slots[*place] = Slot(typed.written(stamp));
+            }
             if let Some((whole_at, real_at)) = places.numbers {
                 self.slots[whole_at] = Slot::from_real(whole(stamp).into());
                 self.slots[real_at] = Slot::from_real(real(stamp));
             }
         }
+    }
+
+    /// The slots, with what this end sends as it is on the line.
+    fn on_line(&self) -> Vec<u64> {
+        let mut values: Vec<u64> = self.slots.iter().map(|slot| slot.0).collect();
+        for places in &self.writes {
+            let stamp = values[places.stamp];
+            for (place, typed) in places.typed.iter().zip(self.beside()) {
+                values[*place] = typed.shown(Some(stamp), false)[0];
+            }
+        }
+        values
+    }
+
+    /// The signals beside the stamps that it writes.
+    fn beside(&self) -> &[Typed] {
+        self.plan.features.beside(['Q', 'I'][1 - self.end])
     }
 
     fn shown(&self) -> Vec<Shown> {
@@ -214,6 +276,11 @@ impl End {
                 numbers: places
                     .numbers
                     .map(|(whole, half)| (real(whole), real(half))),
+                typed: places
+                    .typed
+                    .iter()
+                    .map(|place| self.slots[*place].0)
+                    .collect(),
             }
         });
         shown.collect()

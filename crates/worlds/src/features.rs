@@ -1,7 +1,10 @@
 //! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
 
+use crate::faults::{Effect, FaultPlan, Way};
+use crate::plan::Bus;
 use crate::random::{Random, scramble};
 use crate::seed::Seed;
+use crate::typed::Typed;
 
 /// The simulation time that an end hands in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,7 +33,7 @@ pub struct RecordPlan {
 }
 
 /// What both ends have besides.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     /// The recording of each end.
     pub recordings: [Option<RecordPlan>; 2],
@@ -38,11 +41,29 @@ pub struct Features {
     pub times: [Times; 2],
     /// Recordings are replayed: by exchanges of the same kind, and by ticks at other times.
     pub replays: bool,
+    /// What is beside the stamps: of what the device reads, and of what the controller reads.
+    pub typed: [Vec<Typed>; 2],
+    /// Injected faults, and forced signals.
+    pub faults: Vec<FaultPlan>,
+    /// Somebody looks at an end.
+    pub watched: [bool; 2],
+    /// An end is a PLC program that tickbus scans.
+    pub hosted: Option<usize>,
 }
 
 impl Features {
     /// The features of a seed.
-    pub(crate) fn draw(seed: Seed) -> Self {
+    pub(crate) fn draw(
+        seed: Seed,
+        (bus, stations): (Bus, usize),
+        numbers: bool,
+        max_age: i64,
+    ) -> Self {
+        // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
+        let (first, has_gaps) = match bus {
+            Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
+            _ => (16, true),
+        };
         let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
         // Of each of them a quarter of all worlds has some.
         let has = random.number() & random.number() & u64::from(seed.more);
@@ -65,11 +86,39 @@ impl Features {
             let times = random.of(&[Times::Steps(step), Times::Back(step)]);
             if is(bit) { times } else { Times::Clock }
         });
-        Self {
+        let typed = [8, 9].map(|bit| {
+            let typed = Typed::draw(random, first, has_gaps);
+            if is(bit) { typed } else { Vec::new() }
+        });
+        let faults = FaultPlan::draw(random, numbers, max_age).into_iter();
+        let faults = faults.filter(|fault| match fault.way {
+            Way::Forced => is(11),
+            _ if fault.is_of_line() => is(12),
+            _ => is(10),
+        });
+        let mut features = Self {
+            hosted: None,
+            faults: faults.collect(),
+            watched: [13, 14].map(is),
+            typed,
             recordings,
             times,
             replays: is(7),
+        };
+        let hosted = usize::try_from(random.below(2)).expect("small");
+        if is(15) && stations == 1 {
+            features.host(hosted);
         }
+        features
+    }
+
+    /// Makes an end a program: it has no recording, hands in no time, and its faults are those of its driver.cfg.
+    fn host(&mut self, end: usize) {
+        self.hosted = Some(end);
+        self.recordings[end] = None;
+        self.watched[end] = false;
+        self.faults
+            .retain(|fault| fault.end != end || fault.way == Way::File);
     }
 
     /// Their names.
@@ -98,7 +147,51 @@ impl Features {
             has(&|times| matches!(times, Times::Back(_))),
             "time goes back",
         );
+        let typed = |test: &dyn Fn(&Typed) -> bool| self.typed.iter().flatten().any(test);
+        add(typed(&|typed| typed.order != "ABCD"), "byte order");
+        add(typed(&|typed| typed.scale.is_some()), "scale");
+        add(typed(&|typed| typed.is_split), "bytes read");
+        for number in [8, 16, 32, 64] {
+            let name = match number {
+                8 => "8 bits",
+                16 => "16 bits",
+                32 => "32 bits",
+                _ => "64 bits",
+            };
+            add(typed(&|typed| typed.bits == number), name);
+        }
+        add(self.hosted == Some(0), "hosted device");
+        add(self.hosted == Some(1), "hosted controller");
+        add(self.watched.contains(&true), "watched");
+        for fault in &self.faults {
+            let name = match fault.effect {
+                _ if fault.way == Way::Forced => "forced",
+                Effect::Stuck(..) => "stuck",
+                Effect::Invert(_) => "inverted",
+                Effect::Offset(..) => "offset",
+                Effect::Noise(..) | Effect::Flicker(_) => "noise",
+                Effect::Delay(_) => "delay",
+                Effect::SlowAnswers(_) => "slow answers",
+                Effect::Drop(_) => "dropped frames",
+                Effect::Duplicate(_) => "duplicate",
+                Effect::LinkDown => "link down",
+            };
+            add(true, name);
+        }
+        names.sort_unstable();
+        names.dedup();
         names
+    }
+
+    /// How many bytes a station has in one direction at most.
+    pub(crate) fn frame(&self) -> usize {
+        let typed = self.typed.iter().flatten();
+        typed.map(|typed| typed.place + 8).max().unwrap_or(16)
+    }
+
+    /// The signals beside the stamps in one direction.
+    pub(crate) fn beside(&self, area: char) -> &[Typed] {
+        &self.typed[usize::from(area == 'I')]
     }
 }
 
@@ -113,6 +206,26 @@ pub(crate) const NAMES: &[&str] = &[
     "replay",
     "own time",
     "time goes back",
+    "byte order",
+    "scale",
+    "bytes read",
+    "8 bits",
+    "16 bits",
+    "32 bits",
+    "64 bits",
+    "hosted device",
+    "hosted controller",
+    "watched",
+    "forced",
+    "stuck",
+    "inverted",
+    "offset",
+    "noise",
+    "delay",
+    "slow answers",
+    "dropped frames",
+    "duplicate",
+    "link down",
 ];
 
 impl Times {

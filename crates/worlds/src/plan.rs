@@ -222,7 +222,7 @@ impl Plan {
             conditions,
             span,
             events: Vec::new(),
-            features: Features::draw(seed),
+            features: Features::draw(seed, (bus, stations), is(13), max_age.0),
         };
         plan.draw_events(random, is);
         if seed.turn > 0 {
@@ -260,7 +260,12 @@ impl Plan {
     pub(crate) fn round_trip(&self) -> i64 {
         // A request is asked and answered before the next one, in as many pieces as the connection takes.
         let ways = if self.bus.asks() { 12 } else { 4 };
-        let pieces = if self.conditions.capacity < 500 { 4 } else { 1 };
+        let bytes = self.features.frame() * self.stations;
+        let pieces = match self.conditions.capacity {
+            capacity if capacity < 500 => (bytes / capacity + 1).max(4),
+            _ => 1,
+        };
+        let pieces = i64::try_from(pieces).expect("small");
         self.conditions.latency.1 * ways * pieces
     }
 

@@ -29,6 +29,8 @@ pub(crate) struct Row {
     pub(crate) code: i32,
     /// All slots behind it, as bits.
     pub(crate) values: Vec<u64>,
+    /// The same, with what this end sends as it is on the line.
+    pub(crate) on_line: Vec<u64>,
 }
 
 /// The ticks of one life of an end, from its first.

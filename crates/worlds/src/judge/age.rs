@@ -15,7 +15,7 @@ pub(super) fn slack(plan: &Plan) -> i64 {
         } else {
             0
         };
-    cycles + late + plan.round_trip() + 1_000_000
+    cycles + late + plan.round_trip() + plan.held_by_faults() + 1_000_000
 }
 
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
@@ -62,7 +62,8 @@ pub(super) fn judge_young(
 ) -> Result<(), Broken> {
     let now = seen.began;
     let Stamp { life, tick, .. } = stamp;
-    let slack = slack(plan) + if plan.bus.asks() { held(plan) } else { 0 };
+    let slack =
+        slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
     let sent = if plan.bus == Bus::Loopback {
         Some(heard)

@@ -24,19 +24,17 @@ pub(crate) struct Contents {
     pub(crate) end: Option<String>,
 }
 
-/// The bits of a slot with a number as it is written; unsigned 64-bit integers are the bits themselves.
+/// The bits of a slot with a number as it is written: those of an integer where the name says so, or else of a double.
 fn bits(name: &str, text: &str) -> Result<u64, String> {
     let wrong = |_| format!("\"{text}\" is no value of {name}");
-    if is_integer(name) {
+    if name.starts_with("stamp") || name.starts_with("u64") {
         text.parse::<u64>().map_err(|_| wrong(()))
+    } else if name.starts_with("i64") {
+        let signed = text.parse::<i64>().map_err(|_| wrong(()))?;
+        Ok(signed.cast_unsigned())
     } else {
         text.parse::<f64>().map(f64::to_bits).map_err(|_| wrong(()))
     }
-}
-
-/// Whether the slot of a signal has an integer, and no double.
-pub(crate) fn is_integer(name: &str) -> bool {
-    name.starts_with("stamp") || name.starts_with("u64")
 }
 
 /// The area of a signal, which its name has.

@@ -18,7 +18,10 @@ impl Reader {
         let Some(last) = writer.last_ended(now) else {
             return Ok(());
         };
-        if writer.is_ticking() || now - last <= limit + plan.max_age.0 + slack(plan) + held(plan) {
+        if writer.is_ticking()
+            || now - last
+                <= limit + plan.max_age.0 + slack(plan) + plan.waits_for_pulses() + held(plan)
+        {
             return Ok(());
         }
         for (station, shown) in seen.stations.iter().enumerate() {
@@ -39,7 +42,7 @@ impl Reader {
     /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
     pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
         let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
-        if holds || seen.is_stale || seen.began <= left + slack(plan) {
+        if holds || seen.is_stale || seen.began <= left + slack(plan) + plan.waits_for_pulses() {
             return Ok(());
         }
         match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
@@ -49,5 +52,17 @@ impl Reader {
             ),
             None => Ok(()),
         }
+    }
+
+    /// A line that is down on purpose, at either end, is stale soon.
+    pub(crate) fn judge_down(plan: &Plan, since: i64, seen: &Seen<'_>) -> Result<(), Broken> {
+        let limit = plan.max_age.0 + slack(plan) + held(plan);
+        if seen.is_stale || seen.began - since <= limit {
+            return Ok(());
+        }
+        broken(
+            "link down",
+            format!("not stale, {} ns after it went down", seen.began - since),
+        )
     }
 }

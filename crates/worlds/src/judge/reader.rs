@@ -1,23 +1,30 @@
 //! What one end sees, tick by tick: nothing torn across stations, and fresh only what is new.
 
+use std::collections::BTreeMap;
+
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
+use crate::faults::{self, FaultPlan};
 use crate::network::Delivery;
 use crate::plan::{FAIL_SAFE, Plan};
 
 /// What a station shows in one tick.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Shown {
     pub(crate) stamp: u64,
     pub(crate) level: bool,
     pub(crate) edges: u64,
     pub(crate) numbers: Option<(f64, f64)>,
+    /// The slots of the signals beside the stamp.
+    pub(crate) typed: Vec<u64>,
 }
 
 /// A tick as its end got it.
 #[derive(Debug)]
 pub(crate) struct Seen<'a> {
     pub(crate) began: i64,
+    /// The tick of the end that sees.
+    pub(crate) tick: u64,
     pub(crate) is_stale: bool,
     pub(crate) is_fresh: bool,
     pub(crate) age: i64,
@@ -37,14 +44,20 @@ pub(crate) struct Reader {
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
     /// When it was first not stale.
     pub(crate) first_valid: Option<i64>,
-    /// The times at which it was stale.
+    /// The times at which it was stale, or its line disturbed on purpose.
     pub(crate) stale: Vec<i64>,
+    /// What the signals beside the stamp of station 0 were in the tick before.
+    pub(super) before: [f64; 3],
+    /// What was shown when faults of this end began, by their numbers.
+    pub(super) held: BTreeMap<usize, f64>,
 }
 
 impl Reader {
     /// A new driver looks: it knows nothing of what the one before it saw.
     pub(crate) fn begin(&mut self, stations: usize) {
         self.newest = vec![(0, 0); stations];
+        self.before = faults::values(None);
+        self.held.clear();
         self.sequence = 0;
     }
 
@@ -57,7 +70,10 @@ impl Reader {
         seen: &Seen<'_>,
     ) -> Result<(), Broken> {
         let now = seen.began;
-        if seen.is_stale {
+        // A client that got no answer may read again before it writes again.
+        let is_unwritten = plan.features.faults.iter().any(FaultPlan::is_of_line)
+            && seen.stations.iter().any(|shown| shown.stamp == FAIL_SAFE);
+        if seen.is_stale || is_unwritten {
             self.stale.push(now);
         }
         if !seen.is_stale && seen.age > plan.max_age.0 {
@@ -71,7 +87,7 @@ impl Reader {
         }
         let mut first = None;
         for (station, shown) in seen.stations.iter().enumerate() {
-            self.judge_station(plan, (area, station), writer, seen, *shown)?;
+            self.judge_station(plan, (area, station), writer, seen, shown)?;
             let stamp = (shown.stamp != FAIL_SAFE).then(|| {
                 let Stamp { life, tick, .. } = Stamp::of(shown.stamp);
                 (life, tick)

@@ -93,7 +93,7 @@ fn judge_rows(plan: &Plan, end: usize, tape: &Tape, contents: &Contents) -> Resu
         {
             return wrong(format!("stations {:?} of {}", row.stations, row.status));
         }
-        for (name, (place, value)) in tape.names.iter().zip(places.iter().zip(&delivered.values)) {
+        for (name, (place, value)) in tape.names.iter().zip(places.iter().zip(&delivered.on_line)) {
             if row.values[*place] != *value {
                 return wrong(format!(
                     "{name} is {:x}, and was {value:x}",

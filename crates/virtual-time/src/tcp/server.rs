@@ -48,7 +48,8 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let (listener, address) = bind(address)?;
+        let (listener, address) = bind(address, None)?;
+        let listener = listener.into_os()?;
         Ok(Self { listener, address })
     }
 

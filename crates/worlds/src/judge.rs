@@ -145,6 +145,17 @@ pub(crate) struct Seen<'a> {
     pub(crate) sequence: u64,
     pub(crate) stations: &'a [Shown],
     pub(crate) deliveries: &'a [Delivery],
+    /// Through a dispatcher.
+    pub(crate) known: Option<Known>,
+}
+
+/// What who stands between both ends knew of a writer when it sent what a reader has heard.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    /// When the writer had sent the newest of what has to be seen; `None` if there is nothing.
+    pub(crate) until: Option<i64>,
+    /// For how long nothing had come from the writer, in ns.
+    pub(crate) silent: i64,
 }
 
 /// What one end has seen.
@@ -167,7 +178,7 @@ fn broken(promise: &'static str, what: String) -> Result<(), Broken> {
 }
 
 /// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
-fn slack(plan: &Plan) -> i64 {
+pub(crate) fn slack(plan: &Plan) -> i64 {
     let cycles = plan.cycle.0 * 4;
     let late = plan.habits.late * 6
         + if plan.habits.preempts > 0 {
@@ -179,7 +190,7 @@ fn slack(plan: &Plan) -> i64 {
 }
 
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
-fn held(plan: &Plan) -> i64 {
+pub(crate) fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold(span) => span.0,
         // A thread that has taken what to send may lose the processor before it sends that.
@@ -205,7 +216,10 @@ impl Reader {
         seen: &Seen<'_>,
     ) -> Result<(), Broken> {
         let now = seen.began;
-        if seen.is_stale {
+        // Behind a dispatcher, a source that is lost leaves fail-safe values as well.
+        let is_lost = plan.bus == Bus::Dispatcher
+            && (seen.stations.iter()).all(|shown| shown.stamp == FAIL_SAFE);
+        if seen.is_stale || is_lost {
             self.stale.push(now);
         }
         if !seen.is_stale && seen.age > plan.max_age.0 {
@@ -301,15 +315,17 @@ impl Reader {
         // Old data as young: the peer had written something newer before it sent what made the age so small.
         let slack = slack(plan) + if plan.bus.asks() { held(plan) } else { 0 };
         let heard = now - seen.age;
-        let sent = if plan.bus == Bus::Loopback {
-            Some(heard)
-        } else {
-            let before = seen
-                .deliveries
-                .partition_point(|delivery| delivery.at <= heard - 1_000_000);
-            before
-                .checked_sub(1)
-                .map(|index| seen.deliveries[index].sent)
+        let sent = match plan.bus {
+            Bus::Loopback => Some(heard),
+            Bus::Dispatcher => seen.known.and_then(|known| known.until),
+            _ => {
+                let before = seen
+                    .deliveries
+                    .partition_point(|delivery| delivery.at <= heard - 1_000_000);
+                before
+                    .checked_sub(1)
+                    .map(|index| seen.deliveries[index].sent)
+            }
         };
         if let Some(sent) = sent
             && let Some(least) = writer.newest_at(sent - slack)

@@ -22,6 +22,8 @@ pub enum Bus {
     ModbusRtu,
     /// S7.
     S7,
+    /// Lines of values, which a dispatcher in a process of its own passes on.
+    Dispatcher,
 }
 
 impl Bus {
@@ -32,11 +34,14 @@ impl Bus {
 
     /// Whether one message carries several stations.
     fn has_stations(self) -> bool {
-        matches!(self, Self::Loopback | Self::Socket | Self::SocketOnChange)
+        matches!(
+            self,
+            Self::Loopback | Self::Socket | Self::SocketOnChange | Self::Dispatcher
+        )
     }
 }
 
-/// What befalls a world. Ends are 0, the device, and 1, the controller; spans say how long it lasts.
+/// What befalls a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], who stands between them; spans say how long it lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Misfortune {
     /// All threads of an end stand still.
@@ -52,6 +57,12 @@ pub enum Misfortune {
     /// The driver of an end closes, and opens again later.
     Close(usize, Nanos),
 }
+
+/// The dispatcher, where misfortunes name an end.
+pub const BETWEEN: usize = 2;
+
+/// What makes the numbers that came later others than those of the seed.
+const LATER: u64 = 0x6C61_7465_7200;
 
 /// When it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -165,8 +176,11 @@ impl Plan {
         let max_age = cycle.times(random.within(3, 12));
         let max_age = Nanos(max_age.0.max(8_000_000));
         // Each world draws which misfortunes and habits exist at all.
-        let has = random.number() & u64::from(seed.features);
+        let has = random.number() & seed.features;
         let is = |bit: u32| has >> bit & 1 == 1;
+        // Buses that came later are drawn from numbers of their own: old seeds keep their meaning.
+        let later = &mut Random::new(scramble(seed.number ^ LATER));
+        let bus = if is(40) { Bus::Dispatcher } else { bus };
         let many = usize::try_from(random.within(2, 3)).expect("small");
         let stations = if is(0) && bus.has_stations() { many } else { 1 };
         let ends = [
@@ -182,7 +196,11 @@ impl Plan {
         };
         let slowest = random.of(&[20_000, 200_000, 3_000_000]);
         // An answer fits into what a system keeps for a connection.
-        let small = if bus.asks() { [600, 1_000] } else { [16, 100] };
+        let small = if bus.asks() || bus == Bus::Dispatcher {
+            [600, 1_000]
+        } else {
+            [16, 100]
+        };
         let (splits, capacity) = (random.of(&[2, 10]), random.of(&small));
         let conditions = Conditions {
             latency: (1_000, slowest),
@@ -216,6 +234,7 @@ impl Plan {
             plan.events
                 .extend(drawn.filter(|_| is(5) && seed.events >> index & 1 == 1));
         }
+        plan.events.extend(plan.events_between(later, is));
         plan.events.sort_by_key(|event| event.at);
         let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
         let line = plan.round_trip() + plan.habits.late * 8;
@@ -226,9 +245,32 @@ impl Plan {
     /// The time that the network takes for a whole cycle at most, in ns.
     pub(crate) fn round_trip(&self) -> i64 {
         // A request is asked and answered before the next one, in as many pieces as the connection takes.
-        let ways = if self.bus.asks() { 12 } else { 4 };
+        let ways = match self.bus {
+            Bus::Dispatcher => 8,
+            bus if bus.asks() => 12,
+            _ => 4,
+        };
         let pieces = if self.conditions.capacity < 500 { 4 } else { 1 };
         self.conditions.latency.1 * ways * pieces
+    }
+
+    /// What befalls who stands between the ends.
+    fn events_between(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Vec<Event> {
+        let mut events = Vec::new();
+        for index in 5..8 {
+            let at = Nanos(random.within(0, self.span.0));
+            let span = Nanos(random.within(1_000_000, self.max_age.0 * 4));
+            let what = match random.below(6) {
+                0 | 1 if is(6) => Misfortune::Suspend(BETWEEN, span),
+                2 if is(10) => Misfortune::Kill(BETWEEN, span),
+                3 if is(11) => Misfortune::Close(BETWEEN, span),
+                _ => continue,
+            };
+            if self.bus == Bus::Dispatcher && is(5) && self.seed.events >> index & 1 == 1 {
+                events.push(Event { at, what });
+            }
+        }
+        events
     }
 
     fn draw_event(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Option<Event> {
@@ -257,6 +299,7 @@ impl Plan {
             Bus::Modbus => "modbus",
             Bus::ModbusRtu => "modbus rtu",
             Bus::S7 => "s7",
+            Bus::Dispatcher => "dispatcher",
         }];
         let mut add = |is: bool, name| {
             if is {
@@ -288,6 +331,9 @@ impl Plan {
         add(self.conditions.latency.1 > 1_000_000, "slow network");
         for event in &self.events {
             let name = match event.what {
+                Misfortune::Suspend(BETWEEN, _) => "dispatcher suspended",
+                Misfortune::Kill(BETWEEN, _) => "dispatcher killed",
+                Misfortune::Close(BETWEEN, _) => "dispatcher closed",
                 Misfortune::Suspend(..) => "suspended",
                 Misfortune::Pause(..) => "paused",
                 Misfortune::Hold(..) => "bytes held",
@@ -311,6 +357,7 @@ pub(crate) const FEATURES: &[&str] = &[
     "modbus",
     "modbus rtu",
     "s7",
+    "dispatcher",
     "stations",
     "controller serves",
     "hold",
@@ -332,6 +379,9 @@ pub(crate) const FEATURES: &[&str] = &[
     "reset",
     "killed",
     "closed",
+    "dispatcher suspended",
+    "dispatcher killed",
+    "dispatcher closed",
 ];
 
 /// The fail-safe value of stamps: of no life.

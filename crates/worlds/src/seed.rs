@@ -9,7 +9,7 @@ pub struct Seed {
     /// The source of all chance.
     pub number: u64,
     /// Which features may exist.
-    pub features: u16,
+    pub features: u64,
     /// Which of the misfortunes drawn happen.
     pub events: u8,
 }
@@ -18,7 +18,7 @@ impl From<u64> for Seed {
     fn from(number: u64) -> Self {
         Self {
             number,
-            features: u16::MAX,
+            features: u64::MAX,
             events: u8::MAX,
         }
     }
@@ -47,7 +47,7 @@ impl FromStr for Seed {
         let mut read = || -> Option<Self> {
             let mut seed = Self::from(parts.next()?.parse::<u64>().ok()?);
             if let Some(features) = parts.next() {
-                seed.features = u16::from_str_radix(features, 16).ok()?;
+                seed.features = u64::from_str_radix(features, 16).ok()?;
                 seed.events = u8::from_str_radix(parts.next()?, 16).ok()?;
             }
             parts.next().is_none().then_some(seed)

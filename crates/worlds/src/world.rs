@@ -9,7 +9,8 @@ use tickbus_driver::Code;
 
 use crate::end::End;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
-use crate::plan::{Bus, Misfortune, Plan, Watchdog};
+use crate::laboratory::{self, Laboratory};
+use crate::plan::{BETWEEN, Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
 use crate::scheduler::{self, Stuck};
 
@@ -43,6 +44,7 @@ struct Shared {
     plan: Plan,
     link: String,
     ends: [EndState; 2],
+    laboratory: Rc<Laboratory>,
     broken: RefCell<Option<Broken>>,
     /// When the controller had closed for good.
     controller_left: Cell<Option<i64>>,
@@ -92,6 +94,7 @@ impl Plan {
             plan: self.clone(),
             link: format!("world {number} of {thread:?}"),
             ends: Default::default(),
+            laboratory: Rc::default(),
             broken: RefCell::default(),
             controller_left: Cell::default(),
             trace,
@@ -119,6 +122,9 @@ fn fate(shared: &Rc<Shared>) {
     let plan = &shared.plan;
     scheduler::network(|network, _, _| network.conditions = plan.conditions);
     let began = scheduler::now();
+    if plan.bus == Bus::Dispatcher {
+        shared.laboratory.begin(plan);
+    }
     for end in 0..2 {
         begin(shared, end, 1);
     }
@@ -149,12 +155,16 @@ fn fate(shared: &Rc<Shared>) {
             scheduler::sleep(plan.max_age);
         }
     }
+    if plan.bus == Bus::Dispatcher {
+        shared.check(shared.laboratory.end());
+    }
     judge_pulses(shared, ended);
 }
 
 fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
     let process = scheduler::new_process();
     shared.ends[end].process.set(process);
+    shared.laboratory.joins(end, process);
     let shared = Rc::clone(shared);
     scheduler::spawn(process, move || live(&shared, end, life, process));
 }
@@ -162,6 +172,9 @@ fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
 fn befall(shared: &Rc<Shared>, what: Misfortune) {
     let order = |end: usize, order| shared.ends[end].orders.borrow_mut().push_back(order);
     match what {
+        Misfortune::Suspend(BETWEEN, _)
+        | Misfortune::Kill(BETWEEN, _)
+        | Misfortune::Close(BETWEEN, _) => shared.laboratory.befall(&shared.plan, what),
         Misfortune::Suspend(end, span) => {
             // Both ends of a loopback are one process.
             let both = shared.plan.bus == Bus::Loopback;
@@ -301,7 +314,9 @@ fn one_tick(
     log::trace!("{}", line());
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
-        let deliveries = network.deliveries.entry(process).or_default();
+        let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
+        let heard = (end, began - found.age);
+        let known = shared.laboratory.known(plan, network, heard, deliveries);
         let seen = Seen {
             began,
             is_stale: found.code == Code::Stale,
@@ -310,9 +325,13 @@ fn one_tick(
             sequence: found.sequence,
             stations: &found.stations,
             deliveries,
+            known,
         };
         let mut reader = state.reader.borrow_mut();
         reader.judge(plan, end as u64, &writer, &seen)?;
+        if let Some(known) = known.filter(|_| plan.bus == Bus::Dispatcher) {
+            laboratory::judge_silence(plan, known, &seen)?;
+        }
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
@@ -355,8 +374,9 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
             let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
-            let interrupts =
-                watchdog(plan, 1 - end).is_some() || end == 0 && !plan.ends[1].holds_while_stale;
+            let interrupts = watchdog(plan, 1 - end).is_some()
+                || plan.bus == Bus::Dispatcher
+                || end == 0 && !plan.ends[1].holds_while_stale;
             if seen > written && !plan.bus.asks() && !interrupts {
                 shared.fail(Broken {
                     promise: "edges",

@@ -54,11 +54,26 @@ impl Plan {
             Bus::ModbusRtu => lines.push("framing = \"rtu\"".to_owned()),
             _ => {}
         }
+        if self.laboratory.is_asked {
+            let cables = self.cables().map(|(input, output)| {
+                format!("\"{input}:{}:{output}\"", NAMES[1 - end].0)
+            });
+            lines.push(format!("connect = [{}]", cables.collect::<Vec<_>>().join(", ")));
+        }
         if self.bus.asks() && !serves {
             let other = ["controller", "device"][end];
             lines.push(format!("write_to = \"tickbus {other}\""));
         }
         lines
+    }
+
+    /// Which input of an end belongs to which output of the other one, at a dispatcher.
+    pub(crate) fn cables(&self) -> impl Iterator<Item = (String, String)> {
+        let analog = if self.numbers { 3 } else { 1 };
+        let kinds = [("", 2 * self.stations), ("A", analog * self.stations)];
+        kinds.into_iter().flat_map(|(kind, count)| {
+            (1..=count).map(move |number| (format!("{kind}I{number}"), format!("{kind}Q{number}")))
+        })
     }
 
     /// What every bus has.

@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use tickbus_base::time::{Clock as _, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, LEAST_PROMISE, Patch, Pin, Settings};
+use tickbus_dispatcher::{Dispatcher, LEAST_PROMISE, OnLoss, Patch, Pin, Settings};
 use tickbus_fieldbus::tcp::Address;
 
 use crate::clock::SimulatedClock;
@@ -45,13 +45,15 @@ impl Laboratory {
         }
         let process = scheduler::new_process();
         let (stop, patch) = (Stop::new(), patch(plan));
+        let on_loss = if plan.laboratory.holds { OnLoss::Hold } else { OnLoss::FailSafe };
+        let settings = Settings { on_loss, ..Settings::default() };
         self.process.set(process);
         self.is_running.set(true);
         self.is_ending.set(false);
         *self.stop.borrow_mut() = stop.clone();
         let laboratory = Rc::clone(self);
         scheduler::spawn(process, move || {
-            serve(patch, &stop);
+            serve(settings, patch, &stop);
             laboratory.is_running.set(false);
         });
     }
@@ -129,7 +131,7 @@ impl Laboratory {
     }
 }
 
-/// A source that has been silent for longer than it promised is lost: nothing of it counts any more.
+/// A source that has been silent for longer than it promised is lost: nothing of it counts any more, unless the dispatcher holds.
 pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Result<(), Broken> {
     // A dispatcher that was held up itself reads first what has come meanwhile.
     let suspended = plan.events.iter().map(|event| match event.what {
@@ -139,7 +141,7 @@ pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Resul
     let promise = plan.max_age.max(LEAST_PROMISE).0;
     let allowed = promise + promise / 2 + slack(plan) + held(plan) + suspended.sum::<i64>();
     match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
-        Some(shown) if known.silent > allowed => Err(Broken {
+        Some(shown) if known.silent > allowed && !plan.laboratory.holds => Err(Broken {
             promise: "left on",
             what: format!(
                 "{:?}, when the dispatcher had not heard its writer for {} ns",
@@ -151,11 +153,11 @@ pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Resul
     }
 }
 
-fn serve(patch: Patch, stop: &Stop) {
+fn serve(settings: Settings, patch: Patch, stop: &Stop) {
     let clock = SimulatedClock;
     let listener = Listener::bind_in(&Address::local(PORT), clock.simulation());
     let listener = listener.expect("nobody else listens there");
-    let mut dispatcher = Dispatcher::new(Settings::default(), patch);
+    let mut dispatcher = Dispatcher::new(settings, patch);
     let hosting = Hosting {
         clock: &clock,
         stop,
@@ -168,20 +170,19 @@ fn serve(patch: Patch, stop: &Stop) {
         .expect("a simulation can wait");
 }
 
-/// Each output of an end is connected with the input of the same number of the other one.
+/// Each output of an end is connected with the input of the same number of the other one, unless they ask for that.
 fn patch(plan: &Plan) -> Patch {
-    let digital = 2 * plan.stations;
-    let analog = plan.stations * if plan.numbers { 3 } else { 1 };
     let mut patch = Patch::new();
+    if plan.laboratory.is_asked {
+        return patch;
+    }
     for end in 0..2 {
-        for (kind, count) in [("", digital), ("A", analog)] {
-            for number in 1..=count {
-                let pin = |client: usize, way: char| {
-                    let text = format!("{}:{kind}{way}{number}", NAMES[client].0);
-                    Pin::parse(&text).expect("a pin")
-                };
-                patch.connect(pin(1 - end, 'I'), pin(end, 'Q'));
-            }
+        for (input, output) in plan.cables() {
+            let pin = |client: usize, channel: &str| {
+                let text = format!("{}:{channel}", NAMES[client].0);
+                Pin::parse(&text).expect("a pin")
+            };
+            patch.connect(pin(1 - end, &input), pin(end, &output));
         }
     }
     patch

@@ -22,6 +22,6 @@ mod world;
 pub use judge::Broken;
 pub use network::Conditions;
 pub use pairs::Pairs;
-pub use plan::{BETWEEN, Bus, EndPlan, Event, Misfortune, Plan, Watchdog};
+pub use plan::{BETWEEN, Bus, EndPlan, Event, LaboratoryPlan, Misfortune, Plan, Watchdog};
 pub use scheduler::Habits;
 pub use seed::Seed;

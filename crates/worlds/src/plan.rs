@@ -99,6 +99,15 @@ pub struct EndPlan {
     pub holds_while_stale: bool,
 }
 
+/// What the dispatcher of a world does.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LaboratoryPlan {
+    /// The ends ask for their connections; without that, they stand in its patch.
+    pub is_asked: bool,
+    /// `--hold`: an input that has lost its source keeps its value.
+    pub holds: bool,
+}
+
 /// A whole world.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -122,6 +131,8 @@ pub struct Plan {
     pub pulses: Nanos,
     /// A bit that is written beside the others, so that the frames have other sizes.
     pub numbers: bool,
+    /// What the dispatcher does, if there is one.
+    pub laboratory: LaboratoryPlan,
     /// Both ends.
     pub ends: [EndPlan; 2],
     /// What the scheduler does.
@@ -223,6 +234,11 @@ impl Plan {
             hold,
             pulses: Nanos::ZERO,
             numbers: is(13),
+            laboratory: LaboratoryPlan {
+                // Rarely: what was refused is asked for again after 5 s, and such a world takes long.
+                is_asked: bus == Bus::Dispatcher && is(41) && later.once_in(6),
+                holds: bus == Bus::Dispatcher && is(42),
+            },
             ends,
             habits,
             conditions,
@@ -309,6 +325,8 @@ impl Plan {
         add(self.stations > 1, "stations");
         add(self.controller_serves, "controller serves");
         add(self.hold > Nanos::ZERO, "hold");
+        add(self.laboratory.is_asked, "dispatcher asked");
+        add(self.laboratory.holds, "dispatcher holds");
         add(self.numbers, "numbers");
         add(self.ends.iter().any(|end| end.halves), "halves");
         add(
@@ -379,6 +397,8 @@ pub(crate) const FEATURES: &[&str] = &[
     "reset",
     "killed",
     "closed",
+    "dispatcher asked",
+    "dispatcher holds",
     "dispatcher suspended",
     "dispatcher killed",
     "dispatcher closed",

@@ -105,6 +105,9 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn write(&self, bytes: &[u8]) -> io::Result<usize>;
 
+    /// Waits until it is ready, or for `limit`; returns whether it is.
+    fn wait(&self, interest: Interest, limit: Nanos) -> bool;
+
     /// Closes the sending direction.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ mod clock;
 mod config;
 mod end;
 mod judge;
+mod neighbours;
 mod network;
 mod pairs;
 mod plan;
@@ -19,6 +20,7 @@ mod shrink;
 mod world;
 
 pub use judge::Broken;
+pub use neighbours::Neighbour;
 pub use network::Conditions;
 pub use pairs::Pairs;
 pub use plan::{Bus, EndPlan, Event, Misfortune, Plan, Watchdog};

@@ -44,9 +44,7 @@ fn main() -> ExitCode {
 }
 
 fn usage(why: &str) -> ExitCode {
-    eprintln!(
-        "worlds: {why}\nusage: worlds [board|barrier] SEED\n       worlds [board|barrier] FIRST SECONDS"
-    );
+    eprintln!("worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS");
     ExitCode::from(2)
 }
 

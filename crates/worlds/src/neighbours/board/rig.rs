@@ -206,7 +206,8 @@ impl Rig {
         let seat = &self.seats[&slot];
         let request = match request {
             _ if seat.is_deaf && seat.asked >= ASKED => return,
-            Request::List if seat.is_deaf => Request::Ping,
+            // With a slow disk, whose list and whose leaving comes first depends on who is written to first.
+            Request::List if seat.is_deaf || self.is_disk_slow => Request::Ping,
             request => request,
         };
         self.write(slot, request, random);

@@ -1,5 +1,4 @@
-//! The neighbours of the drivers, each against a model from the same seeds: the dispatcher's board, and the barrier of virtual
-//! time.
+//! The neighbours of the drivers, each against a model from the same seeds: so far the dispatcher's board.
 
 mod board;
 

@@ -9,11 +9,15 @@ impl Seed {
     /// as it is.
     #[must_use]
     pub fn shrunk(self, promise: &str) -> Self {
-        let is_broken = |seed: Self| {
+        self.smallest(|seed| {
             Plan::draw(seed)
                 .run()
                 .is_err_and(|Broken { promise: other, .. }| other == promise)
-        };
+        })
+    }
+
+    /// The smallest seed found that is still broken.
+    pub(crate) fn smallest(self, is_broken: impl Fn(Self) -> bool) -> Self {
         let mut smallest = self;
         for bit in 0..u64::BITS {
             let fewer = Self {

@@ -1,11 +1,12 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
 //! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
-//! prints one number for all that happens in so many worlds, the same on every machine.
+//! prints one number for all that happens in so many worlds, the same on every machine. With the name of a neighbour before the
+//! first two, such as `worlds board SEED`, the same of that.
 
 use std::process::ExitCode;
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
-use tickbus_worlds::{Broken, Pairs, Plan, Seed};
+use tickbus_worlds::{Broken, Neighbour, Pairs, Plan, Seed};
 
 /// Prints what the drivers log.
 struct Log;
@@ -25,6 +26,11 @@ impl log::Log for Log {
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let texts: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    if let Some((name, rest)) = texts.split_first()
+        && let Ok(neighbour) = name.parse()
+    {
+        return of_neighbour(neighbour, rest);
+    }
     match *texts {
         [seed] => match seed.parse() {
             Ok(seed) => one(seed),
@@ -44,7 +50,7 @@ fn main() -> ExitCode {
 
 fn usage(why: &str) -> ExitCode {
     eprintln!(
-        "worlds: {why}\nusage: worlds SEED\n       worlds FIRST SECONDS\n       worlds traces FIRST COUNT"
+        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds traces FIRST COUNT"
     );
     ExitCode::from(2)
 }
@@ -116,6 +122,59 @@ fn many(first: u64, limit: Nanos) -> ExitCode {
         "worlds={worlds} failed={failed} first={first} per_second={rate:.0} pairs={}",
         pairs.met()
     );
+    if failed > 0 {
+        ExitCode::FAILURE
+    } else {
+        ExitCode::SUCCESS
+    }
+}
+
+fn of_neighbour(neighbour: Neighbour, texts: &[&str]) -> ExitCode {
+    match *texts {
+        [seed] => match seed.parse() {
+            Ok(seed) => one_of(neighbour, seed),
+            Err(why) => usage(&why),
+        },
+        [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
+            (Ok(first), Ok(seconds)) => many_of(neighbour, first, Nanos::from_secs(seconds.into())),
+            _ => usage("FIRST and SECONDS are whole numbers"),
+        },
+        _ => usage("one seed, or two numbers, are expected"),
+    }
+}
+
+fn one_of(neighbour: Neighbour, seed: Seed) -> ExitCode {
+    let mut trace = Vec::new();
+    let outcome = neighbour.run(seed, &mut trace);
+    for line in trace {
+        println!("{line}");
+    }
+    match outcome {
+        Ok(()) => {
+            println!("{neighbour}: ok seed={seed}");
+            ExitCode::SUCCESS
+        }
+        Err(broken) => {
+            println!("{neighbour}: failed seed={seed} {broken}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn many_of(neighbour: Neighbour, first: u64, limit: Nanos) -> ExitCode {
+    let clock = Monotonic::shared();
+    let begun = clock.now();
+    let (mut runs, mut failed) = (0, 0);
+    while clock.now() - begun < limit {
+        let seed = Seed::from(first.wrapping_add(runs));
+        runs += 1;
+        if let Err(broken) = neighbour.run(seed, &mut Vec::new()) {
+            failed += 1;
+            let small = neighbour.shrunk(seed, broken.promise);
+            println!("{broken}\n  seed {seed}; smaller:\n  worlds {neighbour} {small}");
+        }
+    }
+    println!("{neighbour}: runs={runs} failed={failed} first={first}");
     if failed > 0 {
         ExitCode::FAILURE
     } else {

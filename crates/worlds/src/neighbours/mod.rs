@@ -1,0 +1,65 @@
+//! The neighbours of the drivers, each against a model from the same seeds: so far the dispatcher's board.
+
+mod board;
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::judge::Broken;
+use crate::seed::Seed;
+
+/// What is judged beside worlds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Neighbour {
+    /// The dispatcher, its clients and their lines.
+    Board,
+}
+
+impl Neighbour {
+    /// All of them.
+    pub const ALL: [Self; 1] = [Self::Board];
+
+    /// Its name, as in the corpus.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Board => "board",
+        }
+    }
+
+    /// Lets happen what is drawn from this seed; what happened is added to `trace`.
+    ///
+    /// # Errors
+    ///
+    /// The product and the model differ.
+    pub fn run(self, seed: Seed, trace: &mut Vec<String>) -> Result<(), Broken> {
+        match self {
+            Self::Board => board::run(seed, trace),
+        }
+    }
+
+    /// The smallest seed found that breaks the same promise.
+    #[must_use]
+    pub fn shrunk(self, seed: Seed, promise: &str) -> Seed {
+        seed.smallest(|seed| {
+            let broken = self.run(seed, &mut Vec::new());
+            broken.is_err_and(|broken| broken.promise == promise)
+        })
+    }
+}
+
+impl fmt::Display for Neighbour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Neighbour {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut all = Self::ALL.into_iter();
+        all.find(|it| it.name() == text)
+            .ok_or_else(|| format!("\"{text}\" is no neighbour; write board"))
+    }
+}

@@ -125,12 +125,16 @@ impl SimulatedStream for Socket {
         network(|network, random, _| network.write(self.0, bytes, times, random))
     }
 
-    fn shutdown_write(&self) -> io::Result<()> {
-        network(|network, _, now| network.shut_down(self.0, now))
+    fn wait(&self, interest: Interest, limit: Nanos) -> bool {
+        let sockets = [(0, self.0, interest)];
+        let mut ready = Vec::new();
+        let deadline = Nanos(scheduler::now().0.saturating_add(limit.0));
+        SimulatedClock.poll(&sockets, deadline, &Stop::new(), &mut ready);
+        !ready.is_empty()
     }
 
-    fn close_by_reset(&self) {
-        network(|network, _, now| network.close_by_reset(self.0, now));
+    fn shutdown_write(&self) -> io::Result<()> {
+        network(|network, _, now| network.shut_down(self.0, now))
     }
 
     fn peer_addr(&self) -> io::Result<SocketAddr> {

@@ -4,7 +4,11 @@ use tickbus_base::time::Nanos;
 
 use crate::plan::{Bus, FAIL_SAFE, Plan, Watchdog};
 
-const ADDRESS: &str = "address = \"127.0.0.1:20030\"";
+/// The port of the world's line.
+pub(crate) const PORT: u16 = 20_030;
+
+/// The names of both ends at a dispatcher, and the lines that give them.
+pub(crate) const NAMES: [(&str, &str); 2] = [("D", "name = \"D\""), ("C", "name = \"C\"")];
 
 impl Plan {
     /// The driver.cfg of an end; `link` is the name of a loopback.
@@ -49,18 +53,39 @@ impl Plan {
             (Bus::Modbus | Bus::ModbusRtu, false) => ("modbus-client", ""),
             (Bus::S7, true) => ("s7-server", ""),
             (Bus::S7, false) => ("s7-client", ""),
+            (Bus::Dispatcher, _) => ("dispatcher", NAMES[end].1),
         };
-        let mut lines = vec![format!("kind = \"{kind}\"\n{ADDRESS}\n{place}")];
+        let mut lines = vec![format!(
+            "kind = \"{kind}\"\naddress = \"127.0.0.1:{PORT}\"\n{place}"
+        )];
         match self.bus {
             Bus::SocketOnChange => lines.push("send = \"on-change\"".to_owned()),
             Bus::ModbusRtu => lines.push("framing = \"rtu\"".to_owned()),
             _ => {}
+        }
+        if self.laboratory.is_asked {
+            let cables = self
+                .cables()
+                .map(|(input, output)| format!("\"{input}:{}:{output}\"", NAMES[1 - end].0));
+            lines.push(format!(
+                "connect = [{}]",
+                cables.collect::<Vec<_>>().join(", ")
+            ));
         }
         if self.bus.asks() && !serves {
             let other = ["controller", "device"][end];
             lines.push(format!("write_to = \"tickbus {other}\""));
         }
         lines
+    }
+
+    /// Which input of an end belongs to which output of the other one, at a dispatcher.
+    pub(crate) fn cables(&self) -> impl Iterator<Item = (String, String)> {
+        let analog = if self.numbers { 3 } else { 1 };
+        let kinds = [("", 2 * self.stations), ("A", analog * self.stations)];
+        kinds.into_iter().flat_map(|(kind, count)| {
+            (1..=count).map(move |number| (format!("{kind}I{number}"), format!("{kind}Q{number}")))
+        })
     }
 
     /// What every bus has.

@@ -67,6 +67,8 @@ impl Features {
         let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
         // Of each of them a quarter of all worlds has some.
         let has = random.number() & random.number() & u64::from(seed.more);
+        // A dispatcher has a station for all that it carries, and no room beside it.
+        let has = if bus == Bus::Dispatcher { 0 } else { has };
         let is = |bit: u32| has >> bit & 1 == 1;
         let recordings = [0, 1].map(|end| {
             let plan = RecordPlan {

@@ -29,9 +29,6 @@ impl Default for Conditions {
     }
 }
 
-/// An end that sends nothing asks after so long whether the other one is still there, in ns.
-const KEEP_ALIVE: i64 = 1_000_000_000;
-
 /// Bytes on their way, or waiting to be read.
 #[derive(Debug)]
 struct Piece {
@@ -39,6 +36,8 @@ struct Piece {
     at: i64,
     /// Since when the sender had not waited when it sent them.
     sent: i64,
+    /// The sender's process.
+    from: usize,
     bytes: Vec<u8>,
     read: usize,
 }
@@ -50,6 +49,8 @@ pub(crate) struct Delivery {
     pub at: i64,
     /// When they were sent, or earlier.
     pub sent: i64,
+    /// The process that sent them.
+    pub from: usize,
 }
 
 #[derive(Debug)]
@@ -292,25 +293,6 @@ impl Network {
         }
     }
 
-    /// As [`close`](Self::close), and what is not there when bytes would be is dropped.
-    pub(crate) fn close_by_reset(&mut self, id: u64, now: i64) {
-        let Some(end) = self.ends.remove(&id) else {
-            return;
-        };
-        let last = now + self.conditions.latency.1;
-        if let Some(other) = self.ends.get_mut(&end.other) {
-            other.incoming.retain(|piece| piece.at <= last);
-            // Nobody repeats a reset: while the cable is pulled it is lost, and the other end finds out by its keep-alive.
-            let is_cut = other.held_until > last;
-            let found = if is_cut {
-                other.held_until + KEEP_ALIVE
-            } else {
-                last
-            };
-            other.reset.get_or_insert(found);
-        }
-    }
-
     /// The next connection of a listener, and the address of the other end.
     pub(crate) fn accept(&mut self, id: u64, now: i64) -> io::Result<(u64, SocketAddr)> {
         let listening = self.listeners.get_mut(&id).ok_or(ErrorKind::InvalidInput)?;
@@ -383,6 +365,7 @@ impl Network {
                 log.push(Delivery {
                     at: piece.at,
                     sent: piece.sent,
+                    from: piece.from,
                 });
                 end.incoming.pop_front();
             }
@@ -416,7 +399,7 @@ impl Network {
         if end.connected > now {
             return Err(ErrorKind::WouldBlock.into());
         }
-        let (conditions, own, other) = (self.conditions, id, end.other);
+        let (conditions, own, other, from) = (self.conditions, id, end.other, end.process);
         let (least, most) = conditions.latency;
         let Some(room) = self
             .ends
@@ -453,6 +436,7 @@ impl Network {
             other.incoming.push_back(Piece {
                 at,
                 sent,
+                from,
                 bytes: piece.to_vec(),
                 read: 0,
             });

@@ -13,7 +13,7 @@ pub struct Seed {
     /// 0, or another fate for the same two drivers: reading two files costs as much as what happens to them.
     pub turn: u8,
     /// Which features may exist.
-    pub features: u16,
+    pub features: u64,
     /// Which of the misfortunes drawn happen.
     pub events: u8,
     /// Which of the features that are drawn last may exist.
@@ -25,7 +25,7 @@ impl From<u64> for Seed {
         Self {
             number,
             turn: 0,
-            features: u16::MAX,
+            features: u64::MAX,
             events: u8::MAX,
             more: u32::MAX,
         }
@@ -71,7 +71,7 @@ impl fmt::Display for Seed {
         if *turn > 0 {
             write!(f, "/{turn}")?;
         }
-        if (*features, *events, *more) == (u16::MAX, u8::MAX, u32::MAX) {
+        if (*features, *events, *more) == (u64::MAX, u8::MAX, u32::MAX) {
             return Ok(());
         }
         write!(f, ":{features:x}:{events:x}")?;
@@ -93,7 +93,7 @@ impl FromStr for Seed {
             let mut seed = Self::from(number.parse::<u64>().ok()?);
             seed.turn = turn.parse().ok()?;
             if let Some(features) = parts.next() {
-                seed.features = u16::from_str_radix(features, 16).ok()?;
+                seed.features = u64::from_str_radix(features, 16).ok()?;
                 seed.events = u8::from_str_radix(parts.next()?, 16).ok()?;
                 let more = parts.next().unwrap_or("0");
                 seed.more = u32::from_str_radix(more, 16).ok()?;

@@ -12,7 +12,8 @@ use tickbus_driver::{Code, Host};
 use crate::end::{End, Found};
 use crate::faults::FaultPlan;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
-use crate::plan::{Bus, Misfortune, Plan, Watchdog};
+use crate::laboratory::{self, Laboratory};
+use crate::plan::{BETWEEN, Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
 use crate::scheduler::{self, Stuck};
 
@@ -51,6 +52,7 @@ struct Shared {
     plan: Plan,
     link: String,
     ends: [EndState; 2],
+    laboratory: Rc<Laboratory>,
     broken: RefCell<Option<Broken>>,
     /// When the controller had closed for good.
     controller_left: Cell<Option<i64>>,
@@ -103,6 +105,7 @@ impl Plan {
             plan: self.clone(),
             link: format!("{leaked} of {thread:?}"),
             ends: Default::default(),
+            laboratory: Rc::default(),
             broken: RefCell::default(),
             controller_left: Cell::default(),
             trace,
@@ -134,6 +137,9 @@ fn fate(shared: &Rc<Shared>) {
     let plan = &shared.plan;
     scheduler::network(|network, _, _| network.conditions = plan.conditions);
     let began = scheduler::now();
+    if plan.bus == Bus::Dispatcher {
+        shared.laboratory.begin(plan);
+    }
     for end in 0..2 {
         begin(shared, end, 1);
     }
@@ -170,12 +176,16 @@ fn fate(shared: &Rc<Shared>) {
             scheduler::sleep(plan.max_age);
         }
     }
+    if plan.bus == Bus::Dispatcher {
+        shared.check(shared.laboratory.end());
+    }
     judge_pulses(shared, ended);
 }
 
 fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
     let process = scheduler::new_process();
     shared.ends[end].process.set(process);
+    shared.laboratory.joins(end, process);
     let shared = Rc::clone(shared);
     scheduler::spawn(process, move || live(&shared, end, life, process));
 }
@@ -183,6 +193,9 @@ fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
 fn befall(shared: &Rc<Shared>, what: Misfortune) {
     let order = |end: usize, order| shared.ends[end].orders.borrow_mut().push_back(order);
     match what {
+        Misfortune::Suspend(BETWEEN, _)
+        | Misfortune::Kill(BETWEEN, _)
+        | Misfortune::Close(BETWEEN, _) => shared.laboratory.befall(&shared.plan, what),
         Misfortune::Suspend(end, span) => {
             // Both ends of a loopback are one process.
             let both = shared.plan.bus == Bus::Loopback;
@@ -392,7 +405,9 @@ fn judge_tick(
     let down = state.down_since.get().into_iter().chain(heard);
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
-        let deliveries = network.deliveries.entry(process).or_default();
+        let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
+        let heard = (end, began - found.age);
+        let known = shared.laboratory.known(plan, network, heard, deliveries);
         let seen = Seen {
             began,
             tick,
@@ -402,9 +417,13 @@ fn judge_tick(
             sequence: found.sequence,
             stations: &found.stations,
             deliveries,
+            known,
         };
         let mut reader = state.reader.borrow_mut();
         reader.judge(plan, end as u64, &writer, &seen)?;
+        if let Some(known) = known.filter(|_| plan.bus == Bus::Dispatcher) {
+            laboratory::judge_silence(plan, known, &seen)?;
+        }
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
@@ -452,6 +471,7 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
             let interrupts = plan.features.faults.iter().any(FaultPlan::is_of_line)
                 || watchdog(plan, 1 - end).is_some()
+                || plan.bus == Bus::Dispatcher
                 || end == 0 && !plan.ends[1].holds_while_stale;
             if seen > written && !plan.bus.asks() && !interrupts {
                 shared.fail(Broken {

@@ -1,9 +1,11 @@
 //! Worlds that once broke a promise, and fresh ones.
 #![allow(missing_docs, reason = "tests")]
 
+use std::path::Path;
 use std::process::Command;
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
+use tickbus_base::toml_text::{Collector, read_text};
 use tickbus_worlds::{Pairs, Plan, Seed};
 
 /// How long fresh worlds are drawn, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
@@ -72,6 +74,33 @@ fn another_process_has_the_same_worlds() {
         command.current_dir(&folder);
     });
     assert_eq!(first, other);
+}
+
+/// `tools/mutants` puts them back into the code; here it is only seen that it can.
+#[test]
+fn every_mutant_fits_the_code() {
+    let list = include_str!("../mutants/mutants.toml");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut collector = Collector::new("mutants.toml", list);
+    let mutants = read_text(&mut collector, list, |mut root| {
+        let tables = root.take("mutant")?.tables("[[mutant]]");
+        let mutants = tables.into_iter().map(|mut table| {
+            let mut text = |key| Some(table.take(key)?.text("write a text")?.to_owned());
+            Some((text("name")?, text("file")?, text("old")?, text("new")?))
+        });
+        mutants.collect::<Option<Vec<_>>>()
+    });
+    let mutants = mutants.expect("a list of mutants");
+    assert!(mutants.len() >= 20, "{} mutants", mutants.len());
+    for (name, file, old, new) in mutants {
+        let code = std::fs::read_to_string(root.join(&file)).expect("a file of the code");
+        assert_eq!(
+            code.matches(&old).count(),
+            1,
+            "{name}: change \"old\" as {file} has changed"
+        );
+        assert!(new.contains("MUTANT"), "{name}");
+    }
 }
 
 #[test]

@@ -117,15 +117,15 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn write(&self, bytes: &[u8]) -> io::Result<usize>;
 
+    /// Waits until it is ready, or for `limit`; returns whether it is.
+    fn wait(&self, interest: Interest, limit: Nanos) -> bool;
+
     /// Closes the sending direction.
     ///
     /// # Errors
     ///
     /// As of a socket of the operating system.
     fn shutdown_write(&self) -> io::Result<()>;
-
-    /// Closing it will break the connection, and drop what the other end has not got.
-    fn close_by_reset(&self);
 
     /// The address of the other end.
     ///

@@ -16,13 +16,13 @@ use super::BusError;
 
 pub use address::{Address, Host};
 pub use browser::{IS_BROWSER, begins_like_browser, may_become_browser};
-pub use connect::{connect, reach};
+pub use connect::{connect, reach, reach_in};
 pub use dial::{Call, Caller, Stream, dial};
 pub use dialler::Dialler;
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
-pub use stream::{close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};
+pub use stream::{close_gracefully, is_for_later, prepare, watch_peer};
 pub use writers::{Writer, Writers, report_second};
 
 /// The system cannot wait on this thread, or for this socket.

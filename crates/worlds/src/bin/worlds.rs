@@ -87,7 +87,7 @@ fn traces(first: u64, count: u32) -> ExitCode {
 fn many(first: u64, limit: Nanos) -> ExitCode {
     let clock = Monotonic::shared();
     let begun = clock.now();
-    let (mut worlds, mut failed) = (0, 0);
+    let (mut worlds, mut failed) = (0_u64, 0);
     let mut pairs = Pairs::default();
     let mut next = Seed::from(first);
     while clock.now() - begun < limit {

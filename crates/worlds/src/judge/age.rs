@@ -7,7 +7,7 @@ use crate::plan::{Bus, Misfortune, Plan};
 use crate::scheduler::STARVED;
 
 /// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
-pub(super) fn slack(plan: &Plan) -> i64 {
+pub(crate) fn slack(plan: &Plan) -> i64 {
     let cycles = plan.cycle.0 * 4;
     let late = plan.habits.late * 6
         + if plan.habits.preempts > 0 {
@@ -19,7 +19,7 @@ pub(super) fn slack(plan: &Plan) -> i64 {
 }
 
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
-pub(super) fn held(plan: &Plan) -> i64 {
+pub(crate) fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold(span) => span.0,
         // A thread that has taken what to send may lose the processor before it sends that.
@@ -65,15 +65,17 @@ pub(super) fn judge_young(
     let slack =
         slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
-    let sent = if plan.bus == Bus::Loopback {
-        Some(heard)
-    } else {
-        let before = seen
-            .deliveries
-            .partition_point(|delivery| delivery.at <= heard - 1_000_000);
-        before
-            .checked_sub(1)
-            .map(|index| seen.deliveries[index].sent)
+    let sent = match plan.bus {
+        Bus::Loopback => Some(heard),
+        Bus::Dispatcher => seen.known.and_then(|known| known.until),
+        _ => {
+            let before = seen
+                .deliveries
+                .partition_point(|delivery| delivery.at <= heard - 1_000_000);
+            before
+                .checked_sub(1)
+                .map(|index| seen.deliveries[index].sent)
+        }
     };
     if let Some(sent) = sent
         && let Some(least) = writer.newest_at(sent - slack)

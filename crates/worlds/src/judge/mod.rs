@@ -15,8 +15,9 @@ mod writer;
 
 use std::fmt;
 
+pub(crate) use self::age::{held, slack};
 pub(crate) use self::files::{Contents, FileRow, area_of};
-pub(crate) use self::reader::{Reader, Seen, Shown};
+pub(crate) use self::reader::{Known, Reader, Seen, Shown};
 pub(crate) use self::recording::judge_recording;
 pub(crate) use self::stamp::{Stamp, level, real, whole};
 pub(crate) use self::writer::Writer;

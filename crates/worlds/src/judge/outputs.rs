@@ -18,7 +18,10 @@ impl Reader {
         let Some(last) = writer.last_ended(now) else {
             return Ok(());
         };
-        if writer.is_ticking()
+        // A dispatcher that holds the values of a source that is gone does as it was told.
+        let holds = plan.laboratory.holds && !plan.events.is_empty();
+        if holds
+            || writer.is_ticking()
             || now - last
                 <= limit + plan.max_age.0 + slack(plan) + plan.waits_for_pulses() + held(plan)
         {

@@ -6,7 +6,7 @@ use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::faults::{self, FaultPlan};
 use crate::network::Delivery;
-use crate::plan::{FAIL_SAFE, Plan};
+use crate::plan::{Bus, FAIL_SAFE, Plan};
 
 /// What a station shows in one tick.
 #[derive(Clone, Debug)]
@@ -31,6 +31,17 @@ pub(crate) struct Seen<'a> {
     pub(crate) sequence: u64,
     pub(crate) stations: &'a [Shown],
     pub(crate) deliveries: &'a [Delivery],
+    /// Through a dispatcher.
+    pub(crate) known: Option<Known>,
+}
+
+/// What who stands between both ends knew of a writer when it sent what a reader has heard.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    /// When the writer had sent the newest of what has to be seen; `None` if there is nothing.
+    pub(crate) until: Option<i64>,
+    /// For how long nothing had come from the writer, in ns.
+    pub(crate) silent: i64,
 }
 
 /// What one end has seen.
@@ -73,7 +84,10 @@ impl Reader {
         // A client that got no answer may read again before it writes again.
         let is_unwritten = plan.features.faults.iter().any(FaultPlan::is_of_line)
             && seen.stations.iter().any(|shown| shown.stamp == FAIL_SAFE);
-        if seen.is_stale || is_unwritten {
+        // Behind a dispatcher, a source that is lost leaves fail-safe values as well.
+        let is_lost = plan.bus == Bus::Dispatcher
+            && (seen.stations.iter()).all(|shown| shown.stamp == FAIL_SAFE);
+        if seen.is_stale || is_unwritten || is_lost {
             self.stale.push(now);
         }
         if !seen.is_stale && seen.age > plan.max_age.0 {

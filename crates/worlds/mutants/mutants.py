@@ -1,0 +1,215 @@
+"""Builds tickbus with every mutation of mutants.toml as a switch, and runs simulated worlds until they find each of them.
+
+With --random COUNT it changes that many lines of image, fieldbus, driver and the buses by chance (always the same ones), and
+lets the unit tests of the crate judge each of them before the worlds do.
+"""
+
+import argparse
+import json
+import os
+import shutil
+import subprocess
+import sys
+import threading
+import time
+import tomllib
+from pathlib import Path
+
+import chance
+
+HERE = Path(__file__).parent
+ROOT = HERE.parents[2]
+OUT = ROOT / "target" / "mutants"
+TREE = OUT / "tree"
+BUILT = Path(os.environ.get("MUTANTS_TARGET", OUT / "target"))
+PROFILE = ["--profile", "bench", "--config", "tests/profile.toml", "--config", "profile.bench.opt-level=1"]
+SWITCH = """
+/// Whether this run is that of the mutation with this number.
+pub fn mutant(number: u32) -> bool {
+    static CHOSEN: std::sync::LazyLock<u32> = std::sync::LazyLock::new(|| {
+        std::env::var("TICKBUS_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
+    });
+    *CHOSEN == number
+}
+"""
+# Crates whose lines are changed by chance.
+CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7"]
+
+
+def write_tree(texts):
+    """The files that git knows, with these changes; those that are as they were keep their times, and are not compiled anew."""
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
+    for name in filter(None, names.decode().split("\0")):
+        source, target = ROOT / name, TREE / name
+        if not source.is_file():
+            continue
+        wanted = texts[name].encode() if name in texts else source.read_bytes()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if not target.exists() or target.read_bytes() != wanted:
+            target.write_bytes(wanted)
+            shutil.copymode(source, target)
+
+
+def cargo(command, arguments):
+    environment = dict(os.environ, CARGO_TARGET_DIR=str(BUILT), CARGO_INCREMENTAL="0")
+    line = ["cargo", command, "--locked", *PROFILE, *arguments]
+    return subprocess.run(line, cwd=TREE, env=environment, capture_output=True, text=True)
+
+
+def put_back(mutants, texts):
+    """Each mutation as a switch, numbered from 1."""
+    stale = []
+    for number, mutant in enumerate(mutants, 1):
+        file = mutant["file"]
+        text = texts.setdefault(file, (ROOT / file).read_text())
+        if text.count(mutant["old"]) != 1:
+            stale.append(f"{mutant['name']}: \"old\" occurs {text.count(mutant['old'])} times in {file}")
+        new = mutant["new"].replace("MUTANT", f"tickbus_base::mutant({number})")
+        texts[file] = text.replace(mutant["old"], new)
+    if stale:
+        sys.exit("mutants: change mutants.toml as the code has changed:\n" + "\n".join(stale))
+
+
+def worlds(number, seconds):
+    """How long worlds take to find a mutation, and by which promise."""
+    environment = dict(os.environ, TICKBUS_MUTANT=str(number))
+    binary = BUILT / "release" / "worlds"
+    begun = time.monotonic()
+    process = subprocess.Popen(
+        [binary, "100000", str(seconds)], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    # A mutation may let a thread go on for ever, in which no world ends.
+    patience = threading.Timer(seconds + 60, process.kill)
+    patience.start()
+    found, seed, last = None, "", ""
+    for line in process.stdout:
+        last = line
+        if found is None and not line.startswith(("pairs", "worlds=")):
+            found = line.split(":")[0]
+            took = time.monotonic() - begun
+        if line.startswith("  seed"):
+            seed = line.split(";")[0].split()[1]
+            break
+    is_late = not patience.is_alive()
+    patience.cancel()
+    if found is not None:
+        process.kill()
+        process.wait()
+        return took, found, seed
+    took = time.monotonic() - begun
+    if process.wait() != 0:
+        return took, "hangs" if is_late else "panics", ""
+    return took, None, last.split()[0]
+
+
+def known(names, seconds):
+    mutants = tomllib.loads((HERE / "mutants.toml").read_text())["mutant"]
+    texts = {}
+    put_back(mutants, texts)
+    build(texts, ["-p", "tickbus-worlds"])
+    left = []
+    for number, mutant in enumerate(mutants, 1):
+        if names and mutant["name"] not in names:
+            continue
+        took, found, seed = worlds(number, seconds)
+        print(f"{mutant['name']:22} {took:6.1f} s  {found or 'NOT FOUND':14} {seed}", flush=True)
+        if not found:
+            left.append(mutant["name"])
+    count = len(names) or len(mutants)
+    print(f"mutants: found={count - len(left)} of={count} not_found={','.join(left) or '-'}")
+    return 1 if left else 0
+
+
+def by_chance(count, seconds):
+    files = {}
+    for crate in CRATES:
+        for path in sorted((ROOT / "crates" / crate / "src").rglob("*.rs")):
+            if "test" not in str(path.relative_to(ROOT / "crates")):
+                files[str(path.relative_to(ROOT))] = path.read_text()
+    # Some do not compile.
+    changes = chance.drawn(files, count * 2, lambda index: f"tickbus_base::mutant({index + 1})")
+    packages = [word for crate in CRATES for word in ("-p", f"tickbus-{crate}")]
+    changes = compiling(files, changes, ["--keep-going", *packages])[:count]
+    texts = changed(files, changes)
+    build(texts, ["-p", "tickbus-worlds"])
+    built = cargo("test", ["--no-run", "--lib", "--message-format", "json", *packages])
+    if built.returncode:
+        sys.exit(f"mutants: the tests do not compile:\n{built.stderr[-4000:]}")
+    tests = {}
+    for message in map(json.loads, built.stdout.splitlines()):
+        if message.get("executable"):
+            tests[Path(message["manifest_path"]).parent.name] = message["executable"]
+    killed = 0
+    for change in changes:
+        crate = change["file"].split("/")[1]
+        begun = time.monotonic()
+        verdict, seed = unit_tests(tests[crate], crate, change["number"]), ""
+        took = time.monotonic() - begun
+        if not verdict:
+            took, verdict, seed = worlds(change["number"], seconds)
+        killed += bool(verdict)
+        place = f"{change['file'].removeprefix('crates/')}:{change['line'] + 1}"
+        print(f"{place}: {change['what'][:60]}\n    {took:6.1f} s  {verdict or 'LIVES'} {seed}", flush=True)
+    print(f"mutants: killed={killed} of={len(changes)}")
+    return 0
+
+
+def compiling(files, changes, arguments):
+    """The changes that compile; the compiler names the lines of the others."""
+    while True:
+        base = "crates/base/src/lib.rs"
+        texts = changed(files, changes)
+        texts[base] = (ROOT / base).read_text() + SWITCH
+        write_tree(texts)
+        checked = cargo("check", ["--message-format", "json", *arguments])
+        wrong = set()
+        for message in map(json.loads, checked.stdout.splitlines()):
+            message = message.get("message", {})
+            if isinstance(message, dict) and message.get("level") == "error":
+                wrong |= {(span["file_name"], span["line_start"] - 1) for span in message["spans"]}
+        left = [change for change in changes if (change["file"], change["line"]) not in wrong]
+        if checked.returncode == 0:
+            return changes
+        if len(left) == len(changes):
+            sys.exit(f"mutants: they do not compile:\n{checked.stderr[-4000:]}")
+        changes = left
+
+
+def changed(files, changes):
+    """The texts of the files with these changes; each keeps its number."""
+    texts = {}
+    for change in changes:
+        lines = texts.setdefault(change["file"], files[change["file"]].split("\n"))
+        lines[change["line"]] = change["new"]
+    return {name: "\n".join(lines) for name, lines in texts.items()}
+
+
+def unit_tests(binary, crate, number):
+    environment = dict(os.environ, TICKBUS_MUTANT=str(number))
+    try:
+        done = subprocess.run(
+            [binary, "-q"], cwd=TREE / "crates" / crate, env=environment, capture_output=True, timeout=120, check=False
+        )
+    except subprocess.TimeoutExpired:
+        return "unit tests hang"
+    return "unit tests" if done.returncode else None
+
+
+def build(texts, arguments):
+    base = "crates/base/src/lib.rs"
+    texts[base] = (ROOT / base).read_text() + SWITCH
+    write_tree(texts)
+    built = cargo("build", arguments)
+    if built.returncode:
+        sys.exit(f"mutants: they do not compile:\n{built.stderr[-4000:]}")
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="tools/mutants", description=__doc__.splitlines()[0])
+    parser.add_argument("names", nargs="*", help="some of the mutations; all by default")
+    parser.add_argument("--seconds", type=int, default=300, help="how long worlds look for each")
+    parser.add_argument("--random", type=int, metavar="COUNT", help="so many changes by chance in place of them")
+    arguments = parser.parse_args()
+    if arguments.random:
+        sys.exit(by_chance(arguments.random, arguments.seconds))
+    sys.exit(known(arguments.names, arguments.seconds))

@@ -427,6 +427,7 @@ fn judge_tick(
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
+        Reader::judge_frozen(plan, 1 - end, &writer, &seen)?;
         for since in down {
             Reader::judge_down(plan, since, &seen)?;
         }

@@ -62,6 +62,44 @@ def beside(stamp):
     return mixed >> 63, float(signed[0]), signed[1] / 2
 
 
+def recording(path, life_of, plan, end):
+    """What a recording in CSV says otherwise than the end that made it: its rows are the ticks, none is missing and not counted, and none
+    is cut; only a process that was killed may leave the last one incomplete."""
+    lines = path.read_text().splitlines(keepends=True)
+    if len(lines) < 2:
+        return []
+    names = lines[0].rstrip().split(",")
+    own, other = "IQ"[end], "QI"[end]
+    life, before, findings = None, None, []
+    for at, line in enumerate(lines[1:], 2):
+        row = dict(zip(names, line.rstrip("\n").split(",")))
+        if not line.endswith("\n") or len(row) != len(names):
+            if at < len(lines) or not (life and life.ended and not life.closed):
+                findings.append(f"recording: {path.name} line {at} is cut: {line!r}")
+            break
+        tick, dropped = int(row["bus.tick"]), int(row["bus.dropped"])
+        life = life or life_of(int(row[f"stamp{own}0"]) >> 48)
+        if life is None:
+            return [f"recording: {path.name} begins with a stamp that nobody wrote"]
+        if before and tick - before[0] - 1 != dropped - before[1]:
+            findings.append(f"recording: {path.name} line {at}: tick {tick} after {before[0]}, dropped {dropped} after {before[1]}")
+        before = tick, dropped
+        if tick > len(life.ticks):
+            continue
+        seen = life.ticks[tick - 1]
+        for station, (stamp, level, edges, whole, real) in enumerate(seen.stations):
+            written = life.number << 48 | (end == DEVICE) << 44 | station << 40 | tick
+            expected = {f"stamp{own}{station}": written, f"stamp{other}{station}": stamp, f"level{other}{station}": level}
+            expected |= {f"pulse{other}{station}.edges": edges, f"whole{other}{station}": whole, f"real{other}{station}": real}
+            # A stamp has more digits than a double.
+            wrong = {name: row[name] for name, value in expected.items() if (int if "stamp" in name else float)(row[name]) != value}
+            if wrong or int(row["bus.status"]) != seen.status:
+                findings.append(f"recording: {path.name} line {at}: {wrong or row['bus.status']}, and the end had {seen}")
+    if not findings and life.closed and not plan.small_disk and before[0] < len(life.ticks) - 1:
+        findings.append(f"recording: {path.name} ends with tick {before[0]}, and its driver was closed after tick {len(life.ticks)}")
+    return findings[:5]
+
+
 class Judge:
     """Judges all lives of a line."""
 

@@ -20,26 +20,29 @@ MEMORY = {"java": 64_000, "python": 6_000, "fmu": 12_000, "c": 3_000, "command":
 
 
 class Artefacts:
-    """What the ends are made of, as tools/build and tools/python leave it."""
+    """What the ends are made of: what tools/dist makes for users, and the environments of tools/python and tools/peers."""
 
     def __init__(self, product, folder):
-        self.product, self.folder = product, folder
-        release = product / "target/release"
-        self.command = release / "tickbus"
+        self.folder = folder
+        made = product / "target/dist"
+        zipped = next(made.glob("tickbus-[0-9]*/DeviceDriver"), made)
+        in_c = next(made.glob("tickbus-c-[0-9]*/include"), made).parent
+        self.command, self.library = zipped / "tickbus", in_c / "lib/libtickbus.so"
+        self.jar = next(zipped.glob("device-drivers-*.jar"), None)
         self.python = product / "target/python/environment/bin/python"
         self.fmpy = product / "target/peers/fmi/bin/python"
-        self.jar = next(iter(sorted((product / "java/tickbus/target").glob("tickbus-[0-9]*[0-9].jar"))), None)
         self.programs = []
-        if self._make("cc", "-O1", "-Wall", "-Wextra", "-Werror", "-I", product / "include", HERE / "end.c", "-L", release, "-ltickbus",
-                      f"-Wl,-rpath,{release}", "-o", folder / "end"):
+        link = ["-L", self.library.parent, "-ltickbus", f"-Wl,-rpath,{self.library.parent}"]
+        if self._make("cc", "-Wall", "-Wextra", "-Werror", "-I", in_c / "include", HERE / "end.c", *link, "-o", folder / "end"):
             self.programs.append("c")
         if self.python.exists():
             self.programs.append("python")
         if self.jar and self._make("javac", "-cp", self.jar, "-d", folder, HERE / "End.java"):
             self.programs.append("java")
-        if self.fmpy.exists():
+        if self.fmpy.exists() and self.library.exists():
             self.programs.append("fmu")
-        self.programs.append("command")
+        if self.command.exists():
+            self.programs.append("command")
 
     def without_opcua(self):
         """The programs whose library was built without OPC UA."""
@@ -101,7 +104,7 @@ class Line:
         folder.mkdir(parents=True)
         self.network = Network(f"storm-{os.getpid()}", has_namespaces)
         self.disk = Disk(folder / "disk") if plan.small_disk else None
-        self.configs = []
+        self.configs, self.recordings = [], []
         server = plan.server()
         host = self.network.hosts[DEVICE if server is None else server]
         self.address = f"{host}:{self.network.port()}"
@@ -109,6 +112,7 @@ class Line:
             config = folder / f"{ROLES[end]}.cfg"
             place = self.disk.folder if self.disk else folder
             recording = place / f"{ROLES[end]}.csv" if plan.records[end] else None
+            self.recordings.append(recording)
             config.write_text(driver_cfg(plan, end, self.address, recording))
             self.configs.append(config)
             if plan.ends[end].program == "fmu":
@@ -116,7 +120,7 @@ class Line:
 
     def export(self, config):
         out = config.with_suffix(".fmu")
-        command = [self.artefacts.command, "export", config, "--for", "fmi3", "--out", out]
+        command = [self.artefacts.command, "export", config, "--for", "fmi3", "--library", self.artefacts.library, "--out", out]
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             self.findings.append(f"export: {done.stderr}")
@@ -169,6 +173,9 @@ class Line:
         if not is_over:
             self.findings.append(f"close: {ROLES[life.end]} life {life.number} still runs 8 s after SIGTERM")
             life.process.kill()
+        elif life.is_second and life.program != "c" and (was is not None or life.process.child.returncode in (1, 3)):
+            # It was refused, and ended with an error; what it logs is judged.
+            pass
         elif was is not None or life.process.child.returncode not in (0, -15, 143):
             code = life.process.child.returncode if was is None else was
             self.findings.append(f"died: {ROLES[life.end]} life {life.number}, with {code}")
@@ -250,6 +257,10 @@ class Line:
             if self.dispatcher:
                 self.dispatcher.kill()
             self.network.close()
+            for recording in self.recordings:
+                # Off the small disk, which is gone in a moment.
+                if recording and recording.exists():
+                    shutil.copy(recording, self.folder / f"kept-{recording.name}")
             if self.disk:
                 self.disk.close()
         self.tell("is judged")
@@ -305,6 +316,10 @@ class Line:
         # A dataclass with lists has no hash: lives are told apart by themselves.
         one = judge.Judge(self.plan, self.lives, self.stalls)
         self.findings += one.judge()
+        for end, recording in enumerate(self.recordings):
+            kept = recording and self.folder / f"kept-{recording.name}"
+            if kept and kept.exists():
+                self.findings += judge.recording(kept, {life.number: life for life in self.lives}.get, self.plan, end)
         befallen = {event.what for event in self.plan.events} | ({"paused"} if any(end.pause for end in self.plan.ends) else set())
         befallen |= {"stalled"} if any(until - since > self.plan.max_age // 4 for since, until in self.stalls.found) else set()
         befallen |= {"small disk"} if self.disk and any(self.plan.records) else set()

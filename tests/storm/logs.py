@@ -12,25 +12,31 @@ DEATHS = {"killed", "terminated", "second", "cut", "stopped"}
 # The states of a line, in the words of the driver and of the command; what has to have befallen the line for it.
 STATE = r'^(?:driver "\w+" is|mirror:|plc:|\[[^]]* WARN +tickbus_fieldbus::link\] driver "\w+" is) '
 KNOWN = [
-    (STATE + r"(opening|running): (listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
+    (STATE + r"(opening|running): (opening the line|listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
     (STATE + r"running: serving ", ALWAYS),
     (STATE + r"(stale|opening|failed): nothing has come from ", SILENT),
-    (STATE + r"(opening|failed): the peer left: \S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
+    (STATE + r"(opening|failed): the peer left: (the dispatcher at )?\S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \(Connection refused", ALWAYS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \((Network is unreachable|No route to host|.*timed out)", {"cut"}),
-    (STATE + r"(opening|failed): the link failed: \S+ has been silent for ", SILENT),
+    (STATE + r"(opening|failed): the link failed: \S+ has (been silent|not answered) for ", SILENT),
     (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection timed out|No route|Network is)", {"cut"}),
     (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection reset|Broken pipe)", DEATHS),
     # A newcomer is turned away while another one is served, and a server that is not the only one gets no port.
     (STATE + r"(opening|failed): the peer left: \S+ closed the connection( before it had sent anything)?; if it serves", DEATHS),
     (STATE + r"failed: .*Address already in use", {"second"}),
+    (r"^(mirror|plc): failed reason=the line never ran: .*", {"second"}),
+    (r'driver "\w+": \S+ was turned away, since one client is served at a time', DEATHS),
+    (STATE + r"(opening|failed): the link failed: \S+ has been silent for \S+ \S+ takes its place", DEATHS),
+    (STATE + r"(opening|failed|stale): the link failed: unit \d+ of \S+, asked to .*, did not answer within ", SILENT),
     (r'^(\[[^]]* WARN [^]]*\] )?driver "\w+": \S+ writes what \S+ wrote less than ', DEATHS),
     (STATE + r"opening: refused: unit \d+ of \S+ refused to write .* \(server device busy\)", DEATHS),
     (STATE + r"failed: refused: \S+ refuses writing .* access is not allowed \(code 0x03\)", DEATHS),
     # OPC UA, and the dispatcher.
+    (STATE + r"(opening: asking|opening: opening a session with|running: in session with) ", ALWAYS),
     (STATE + r"(failed|opening): the peer left: the (server|last client) closed (the|its) session", ALWAYS),
     (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
     (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
+    (STATE + r"failed: refused: the dispatcher has another client ", DEATHS | DISPATCHER),
     # Recordings.
     (r"the recording ended with tick \d+ of the file: No space left on device", {"small disk"}),
     (r": process \d+ records to this file, or replays it; name another file", {"second"}),

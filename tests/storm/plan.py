@@ -113,7 +113,7 @@ def draw(seed, programs, buses, without_opcua, has_network):
         max_age=max_age,
         writers=of.choice([0, 1]),
         ends=ends,
-        records=[of.random() < 0.4 and end.program != "fmu" for end in ends],
+        records=[of.random() < 0.4 and end.program not in ("fmu", "command") for end in ends],
         small_disk=of.random() < 0.5,
         span=of.choice([8.0, 12.0, 16.0]),
     )

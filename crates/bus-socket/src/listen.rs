@@ -41,6 +41,8 @@ pub(super) fn listen(
 ) -> Result<(), BusError> {
     let mut lines = ConnectionStates::new(places.iter().map(|place| place.name.clone()));
     let mut servers = Vec::new();
+    // A client may come as soon as the system listens, and this thread later.
+    let since = port.clock().now();
     for (line, place) in places.into_iter().enumerate() {
         let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
             return Ok(());
@@ -67,9 +69,14 @@ pub(super) fn listen(
         lines.opening(server.line, &server.waiting, port);
     }
     let mut set = PollSet::new(stop);
-    port.begin_to_look(port.clock().now());
+    port.begin_to_look(since);
     while !stop.is_stopped() {
         turn(&mut servers, &mut lines, &mut set, port)?;
+    }
+    for server in &mut servers {
+        if let Some((call, _)) = &mut server.served {
+            call.end(port);
+        }
     }
     Ok(())
 }
@@ -211,7 +218,7 @@ impl Server<'_> {
                 return;
             }
         };
-        if let Some((_, served)) = &self.served {
+        if let Some((call, served)) = &mut self.served {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();
                 if stream.set_nonblocking().is_ok() {
@@ -220,6 +227,7 @@ impl Server<'_> {
                 turn_away(peer, served, port);
                 return;
             };
+            call.condemn();
             let error = BusError::Link(format!(
                 "{} has been silent for {}",
                 served.peer(),

@@ -399,7 +399,8 @@ fn a_client_that_goes_is_named_and_the_others_learn_it() {
         let joined = scope.spawn(|| tcp::join(&address, &mut good));
         scope.spawn(|| {
             let gone = tickbus_virtual_time::client::Client::new(gone).expect("it is right");
-            let mut gone = tcp::connect(&address, gone, &clock(), &Stop::new()).expect("it listens");
+            let mut gone =
+                tcp::connect(&address, gone, &clock(), &Stop::new()).expect("it listens");
             gone.wait(Nanos::MAX).expect("it starts");
             gone.answer(&[]);
             gone.wait(Nanos::MAX).expect("the first step");

@@ -137,6 +137,10 @@ impl SimulatedStream for Socket {
         network(|network, _, now| network.shut_down(self.0, now))
     }
 
+    fn close_by_reset(&self) {
+        network(|network, _, now| network.close_by_reset(self.0, now));
+    }
+
     fn peer_addr(&self) -> io::Result<SocketAddr> {
         network(|network, _, _| Ok(network.addresses(self.0)?.1))
     }

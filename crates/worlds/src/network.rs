@@ -29,6 +29,9 @@ impl Default for Conditions {
     }
 }
 
+/// An end that sends nothing asks after so long whether the other one is still there, in ns.
+const KEEP_ALIVE: i64 = 1_000_000_000;
+
 /// Bytes on their way, or waiting to be read.
 #[derive(Debug)]
 struct Piece {
@@ -290,6 +293,25 @@ impl Network {
             } else if !end.has_shut_down {
                 other.fin.get_or_insert(at);
             }
+        }
+    }
+
+    /// As [`close`](Self::close), and what is not there when bytes would be is dropped.
+    pub(crate) fn close_by_reset(&mut self, id: u64, now: i64) {
+        let Some(end) = self.ends.remove(&id) else {
+            return;
+        };
+        let last = now + self.conditions.latency.1;
+        if let Some(other) = self.ends.get_mut(&end.other) {
+            other.incoming.retain(|piece| piece.at <= last);
+            // Nobody repeats a reset: while the cable is pulled it is lost, and the other end finds out by its keep-alive.
+            let is_cut = other.held_until > last;
+            let found = if is_cut {
+                other.held_until + KEEP_ALIVE
+            } else {
+                last
+            };
+            other.reset.get_or_insert(found);
         }
     }
 

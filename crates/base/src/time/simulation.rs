@@ -127,6 +127,9 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn shutdown_write(&self) -> io::Result<()>;
 
+    /// Closing it will break the connection, and drop what the other end has not got.
+    fn close_by_reset(&self);
+
     /// The address of the other end.
     ///
     /// # Errors

@@ -219,6 +219,8 @@ impl Free for Server {
         loop {
             let reactor = Reactor::new(stop)?;
             let listener = listener.try_clone().map_err(refused)?;
+            // A client may come at once, and this thread later.
+            port.begin_to_look(port.clock().now());
             let mut started = self.start(&reactor, port, listener, &rejects)?;
             let show = started.show.clone();
             let service = match &mut service {
@@ -286,7 +288,6 @@ impl Service<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), cycle);
         let mut news = Vec::new();
-        port.begin_to_look(clock.now());
         while !stop.is_stopped() {
             let now = clock.now();
             port.look_at_line(now);

@@ -75,6 +75,8 @@ struct Taker {
     missing: u32,
     /// Whether its write guard lets anything through.
     may_write: bool,
+    /// Whether a frame with the last values was made for it.
+    is_offered: bool,
 }
 
 impl Taker {
@@ -94,6 +96,7 @@ impl Ending {
                 .map(|missing| Taker {
                     missing,
                     may_write: true,
+                    is_offered: false,
                 })
                 .collect(),
             done: sender,
@@ -111,8 +114,10 @@ impl Ending {
     }
 
     /// A frame of this station is about to be sent.
-    pub(super) fn is_used(&self, station: usize) {
-        if self.stations[station].is_owed() {
+    pub(super) fn is_used(&mut self, station: usize) {
+        let taker = &mut self.stations[station];
+        taker.is_offered |= self.is_begun;
+        if taker.is_owed() {
             self.shared.is_used.store(true, Ordering::Relaxed);
         }
     }
@@ -177,6 +182,16 @@ impl Port {
                 let _ = ending.done.send(());
             }
         }
+    }
+
+    /// Whether the driver closes with values under way to a peer that the fail-safe values do not follow: what the peer has not
+    /// got yet must not reach it later.
+    pub fn leaves_old_values(&self) -> bool {
+        self.image.ending.as_ref().is_some_and(|ending| {
+            let mut takers = ending.stations.iter();
+            ending.shared.begun.load(Ordering::Relaxed)
+                && takers.any(|taker| taker.is_owed() && !taker.is_offered)
+        })
     }
 
     /// A write guard permits or forbids writes to these stations: closing waits for none that nothing is written to.
@@ -270,6 +285,19 @@ mod tests {
         );
         send(&mut port, 1);
         assert!(farewell.wait(&*Manual::new(), Nanos::ZERO));
+    }
+
+    #[test]
+    fn old_values_are_left_until_a_frame_has_the_last_ones() {
+        let mut port = port(&[1]);
+        let farewell = port.farewell(2);
+        send(&mut port, 0);
+        assert!(!port.leaves_old_values(), "they are meant");
+        farewell.begin();
+        assert!(port.leaves_old_values());
+        // It follows the old ones, whether or not the peer confirms it in time.
+        send(&mut port, 0);
+        assert!(!port.leaves_old_values());
     }
 
     #[test]

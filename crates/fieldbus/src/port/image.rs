@@ -45,7 +45,7 @@ impl ImagePort {
 
     /// Whether the fail-safe values are to be sent, although the simulation ticks.
     fn is_untrusted(&mut self, station: usize, now: Nanos) -> bool {
-        let is_ending = self.ending.as_ref().is_some_and(|ending| {
+        let is_ending = self.ending.as_mut().is_some_and(|ending| {
             ending.is_used(station);
             ending.is_begun()
         });

@@ -10,7 +10,8 @@ use tickbus_base::os::{Interest, PollSet, Pollable};
 use tickbus_base::os::{LinkedTerminal, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::{Address, close_gracefully, connect, is_for_later, no_wait};
+use super::stream::linger_not;
+use super::{Address, close_by_reset, close_gracefully, connect, is_for_later, no_wait};
 
 /// At most this many bytes are read at once.
 const BUFFER: usize = 16 * 1024;
@@ -73,11 +74,18 @@ pub trait Caller {
 pub trait Stream: Read + Write + Pollable {
     /// It is about to be dropped.
     fn close(&mut self) {}
+
+    /// It is about to be dropped with what the peer has not got yet.
+    fn close_by_reset(&mut self) {}
 }
 
 impl Stream for TcpStream {
     fn close(&mut self) {
         close_gracefully(self);
+    }
+
+    fn close_by_reset(&mut self) {
+        close_by_reset(self);
     }
 }
 
@@ -85,11 +93,19 @@ impl Stream for net::TcpStream {
     fn close(&mut self) {
         close_gracefully(self);
     }
+
+    fn close_by_reset(&mut self) {
+        linger_not(self);
+    }
 }
 
 impl<S: Stream + ?Sized> Stream for Box<S> {
     fn close(&mut self) {
         (**self).close();
+    }
+
+    fn close_by_reset(&mut self) {
+        (**self).close_by_reset();
     }
 }
 
@@ -121,7 +137,8 @@ pub fn dial(
 }
 
 /// A connection with one peer: transfers bytes between a stream and a [`Caller`]. It is closed properly when
-/// dropped.
+/// dropped, or broken if the peer may still get what is no longer meant: after a time-out, or at an
+/// [end](Self::end) without the last values.
 #[derive(Debug)]
 pub struct Call<S: Stream> {
     stream: S,
@@ -130,6 +147,8 @@ pub struct Call<S: Stream> {
     blocked: bool,
     /// When connecting began, until the first look: what the peer has sent may wait since then.
     since: Option<Nanos>,
+    /// Whether nothing that the peer has not got yet may reach it.
+    is_condemned: bool,
 }
 
 impl<S: Stream> Call<S> {
@@ -140,6 +159,7 @@ impl<S: Stream> Call<S> {
             buffer: vec![0; BUFFER].into(),
             blocked: false,
             since: None,
+            is_condemned: false,
         }
     }
 
@@ -179,7 +199,18 @@ impl<S: Stream> Call<S> {
             waited.map_err(|error| no_wait(&error))?;
             readable = set.ready().iter().any(|ready| ready.is_readable);
         }
+        self.end(port);
         Ok(())
+    }
+
+    /// Its owner ends it although nothing has failed.
+    pub fn end(&mut self, port: &Port) {
+        self.is_condemned |= port.leaves_old_values();
+    }
+
+    /// What the peer has not got yet must not reach it any more.
+    pub fn condemn(&mut self) {
+        self.is_condemned = true;
     }
 
     /// The stream to wait for.
@@ -203,6 +234,18 @@ impl<S: Stream> Call<S> {
     ///
     /// Why the connection has ended.
     pub fn turn(
+        &mut self,
+        readable: bool,
+        caller: &mut impl Caller,
+        port: &mut Port,
+    ) -> Result<(), BusError> {
+        let turned = self.try_turn(readable, caller, port);
+        // On a new connection newer values would overtake those that wait for the cable.
+        self.is_condemned |= matches!(turned, Err(BusError::Link(_)));
+        turned
+    }
+
+    fn try_turn(
         &mut self,
         readable: bool,
         caller: &mut impl Caller,
@@ -284,7 +327,11 @@ impl<S: Stream> Call<S> {
 
 impl<S: Stream> Drop for Call<S> {
     fn drop(&mut self) {
-        self.stream.close();
+        if self.is_condemned {
+            self.stream.close_by_reset();
+        } else {
+            self.stream.close();
+        }
     }
 }
 

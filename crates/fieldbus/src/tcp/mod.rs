@@ -22,7 +22,7 @@ pub use dialler::Dialler;
 pub use listen::{bind, is_of_the_client, listen, not_accepted};
 pub use server::serve;
 pub use server::{Limits, Service};
-pub use stream::{close_gracefully, is_for_later, prepare, watch_peer};
+pub use stream::{close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};
 pub use writers::{Writer, Writers, report_second};
 
 /// The system cannot wait on this thread, or for this socket.

@@ -9,8 +9,8 @@ use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{
-    Address, close_gracefully, is_for_later, is_of_the_client, listen, no_wait, not_accepted,
-    prepare,
+    Address, close_by_reset, close_gracefully, is_for_later, is_of_the_client, listen, no_wait,
+    not_accepted, prepare,
 };
 
 /// The key of the listener in the poll set; a client's key is its place.
@@ -80,6 +80,8 @@ pub fn serve<S: Service>(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
+    // A client may come as soon as the system listens, and this thread later.
+    let since = port.clock().now();
     let Some((listener, bound)) = listen(address, port, stop)? else {
         return Ok(());
     };
@@ -101,9 +103,14 @@ pub fn serve<S: Service>(
     assert!(limit <= BUFFER, "a telegram fits into one read");
     port.opening(&server.waiting);
     server.listen(true).map_err(|error| no_wait(&error))?;
-    port.begin_to_look(port.clock().now());
+    port.begin_to_look(since);
     while !stop.is_stopped() {
         server.turn(port)?;
+    }
+    if port.leaves_old_values() {
+        for (_, client) in server.clients.iter() {
+            close_by_reset(&client.stream);
+        }
     }
     Ok(())
 }
@@ -472,7 +479,10 @@ impl<S: Service> Server<'_, S> {
             return;
         };
         self.set.remove(place, &client.stream);
-        close_gracefully(&client.stream);
+        match error {
+            BusError::Link(_) => close_by_reset(&client.stream),
+            _ => close_gracefully(&client.stream),
+        }
         if !matches!(error, BusError::Left(_)) {
             port.count("clients.dropped");
         }

@@ -1,11 +1,12 @@
 //! System settings that every connection needs.
 
 use std::io::{self, ErrorKind, Read};
-use std::net::TcpStream;
+use std::net;
+use std::time::Duration;
 
 use socket2::SockRef;
 
-use tickbus_base::net::HalfClose;
+use tickbus_base::net::{HalfClose, TcpStream};
 use tickbus_base::time::Nanos;
 
 /// How many times a socket is read at most while it is being closed.
@@ -30,6 +31,23 @@ where
     }
 }
 
+/// Makes the system break a connection that is about to be dropped, and drop what the peer has not got.
+///
+/// For values that are no longer meant: the system would go on sending them to a peer whose cable is pulled after the
+/// program has ended, and they would count there when the cable is back.
+pub fn close_by_reset(stream: &TcpStream) {
+    match stream {
+        TcpStream::Os(stream) => linger_not(stream),
+        TcpStream::Simulated(stream) => stream.close_by_reset(),
+    }
+}
+
+/// As [`close_by_reset`], of a socket of the system.
+pub(super) fn linger_not(stream: &net::TcpStream) {
+    // If this fails, the connection has failed already.
+    let _ = SockRef::from(stream).set_linger(Some(Duration::ZERO));
+}
+
 /// Whether the call has not failed, but has to be repeated when the socket is ready.
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
@@ -41,7 +59,10 @@ pub fn is_for_later(error: &io::Error) -> bool {
 /// # Errors
 ///
 /// The system refuses one of these settings.
-pub fn prepare<'a>(stream: impl Into<Option<&'a TcpStream>>, patience: Nanos) -> io::Result<()> {
+pub fn prepare<'a>(
+    stream: impl Into<Option<&'a net::TcpStream>>,
+    patience: Nanos,
+) -> io::Result<()> {
     let Some(stream) = stream.into() else {
         return Ok(());
     };
@@ -66,7 +87,7 @@ pub fn prepare<'a>(stream: impl Into<Option<&'a TcpStream>>, patience: Nanos) ->
 /// # Errors
 ///
 /// The system refuses one of these settings.
-pub fn watch_peer<'a>(stream: impl Into<Option<&'a TcpStream>>) -> io::Result<()> {
+pub fn watch_peer<'a>(stream: impl Into<Option<&'a net::TcpStream>>) -> io::Result<()> {
     let Some(stream) = stream.into() else {
         return Ok(());
     };

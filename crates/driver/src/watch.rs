@@ -133,8 +133,8 @@ impl Watch {
             .any(|fault| fault.id == id && fault.phase != Phase::Over)
     }
 
-    /// Holds the signal with this index to a value from the next tick on: a fault of the kind "stuck", called
-    /// `forced: <its name>`. Gives the fault's number.
+    /// Holds the signal with this index to a value: a fault of the kind "stuck", called `forced: <its name>`. The next tick takes
+    /// it over at its end, so that the one after that is the first that shows it. Gives the fault's number.
     ///
     /// # Errors
     ///
@@ -164,7 +164,7 @@ impl Watch {
         Ok(id)
     }
 
-    /// Ends a fault at the next tick.
+    /// Ends a fault. The next tick learns of that at its end, and the one after that is the first without it.
     ///
     /// # Errors
     ///

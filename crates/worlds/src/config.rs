@@ -20,6 +20,7 @@ impl Plan {
         ];
         lines.extend(self.fieldbus(end, link));
         lines.extend(self.timing(end));
+        lines.extend(self.life_signs(end));
         lines.extend(self.record_section(end));
         lines.push(self.signal_sections(end));
         lines.extend(self.fault_sections(end));
@@ -88,6 +89,31 @@ impl Plan {
         })
     }
 
+    /// How often an end beats, and within which time the other one wants to see that.
+    pub(crate) fn beat(&self, end: usize) -> Option<(Nanos, Option<Nanos>)> {
+        let (ticks, is_watched) = self.features.beats[end]?;
+        let period = self.ends[end].period;
+        let every = Nanos((period.0 * ticks).max(1_000_000));
+        let within = (every + period.times(2) + self.cycle).times(3) + self.max_age;
+        let within = Nanos(within.0.max(10_000_000));
+        Some((every, is_watched.then_some(within)))
+    }
+
+    /// The signs of life of an end.
+    fn life_signs(&self, end: usize) -> Vec<String> {
+        let areas = ['I', 'Q'];
+        let own = self.beat(end).map(|(every, _)| {
+            let area = areas[end];
+            format!("heartbeat = {{ signal = \"beat{area}0\", every = \"{every}\" }}")
+        });
+        let other = self.beat(1 - end).and_then(|(_, within)| within);
+        let other = other.map(|within| {
+            let area = areas[1 - end];
+            format!("alive = {{ signal = \"beat{area}0\", within = \"{within}\" }}")
+        });
+        own.into_iter().chain(other).collect()
+    }
+
     /// What every bus has.
     fn timing(&self, end: usize) -> Vec<String> {
         let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
@@ -136,6 +162,9 @@ impl Plan {
             signal("pulse", "X8.0", &format!("latch = \"rising\"{hold}")),
             signal("level", "X8.1", ""),
         ];
+        if station == 0 && self.beat(usize::from(area == 'Q')).is_some() {
+            lines.push(signal("beat", "B9", "type = \"USINT\""));
+        }
         if self.numbers {
             let whole = "type = \"INT\"\norder = \"DCBA\"\nfail_safe = -7";
             let real =

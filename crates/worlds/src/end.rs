@@ -27,6 +27,7 @@ struct Places {
     numbers: Option<(usize, usize)>,
     /// The signals beside the stamp.
     typed: Vec<usize>,
+    beat: Option<usize>,
 }
 
 /// An open driver.
@@ -115,6 +116,7 @@ impl End {
                     edges: driver.slots().edges[pulse],
                     level: at("level").expect("it is in the file"),
                     numbers: at("whole").zip(at("real")),
+                    beat: at("beat"),
                     typed: typed
                         .iter()
                         .flat_map(|typed| typed.names(area, station, reads))
@@ -276,6 +278,12 @@ impl End {
                 numbers: places
                     .numbers
                     .map(|(whole, half)| (real(whole), real(half))),
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    clippy::cast_sign_loss,
+                    reason = "a USINT"
+                )]
+                beat: places.beat.map(|place| real(place) as u8),
                 typed: places
                     .typed
                     .iter()

@@ -47,6 +47,8 @@ pub struct Features {
     pub faults: Vec<FaultPlan>,
     /// Somebody looks at an end.
     pub watched: [bool; 2],
+    /// Each end beats every so many of its ticks, and the other one watches that.
+    pub beats: [Option<(i64, bool)>; 2],
     /// An end is a PLC program that tickbus scans.
     pub hosted: Option<usize>,
 }
@@ -100,6 +102,7 @@ impl Features {
         });
         let mut features = Self {
             hosted: None,
+            beats: [None; 2],
             faults: faults.collect(),
             watched: [13, 14].map(is),
             typed,
@@ -108,6 +111,10 @@ impl Features {
             replays: is(7),
         };
         let hosted = usize::try_from(random.below(2)).expect("small");
+        features.beats = [16, 17].map(|bit| {
+            let beat = (random.of(&[1, 3]), random.once_in(2));
+            (is(bit) && stations == 1).then_some(beat)
+        });
         if is(15) && stations == 1 {
             features.host(hosted);
         }
@@ -119,6 +126,8 @@ impl Features {
         self.hosted = Some(end);
         self.recordings[end] = None;
         self.watched[end] = false;
+        // What a program beats is its own affair.
+        self.beats[end] = None;
         self.faults
             .retain(|fault| fault.end != end || fault.way == Way::File);
     }
@@ -162,6 +171,9 @@ impl Features {
             };
             add(typed(&|typed| typed.bits == number), name);
         }
+        let beats = self.beats.iter().flatten();
+        add(beats.clone().count() > 0, "heartbeat");
+        add(beats.clone().any(|(_, is_watched)| *is_watched), "alive");
         add(self.hosted == Some(0), "hosted device");
         add(self.hosted == Some(1), "hosted controller");
         add(self.watched.contains(&true), "watched");
@@ -215,6 +227,8 @@ pub(crate) const NAMES: &[&str] = &[
     "16 bits",
     "32 bits",
     "64 bits",
+    "heartbeat",
+    "alive",
     "hosted device",
     "hosted controller",
     "watched",

@@ -116,6 +116,12 @@ impl End {
 }
 
 impl Network {
+    /// When the newest connection of a process was made.
+    pub(crate) fn last_connected(&self, process: usize) -> i64 {
+        let ends = self.ends.values().filter(|end| end.process == process);
+        ends.map(|end| end.connected).max().unwrap_or_default()
+    }
+
     fn identity(&mut self) -> u64 {
         self.next += 1;
         self.next

@@ -396,6 +396,13 @@ fn judge_tick(
         trace.push('\n');
     }
     log::trace!("{}", line());
+    let connected = scheduler::network(|network, _, _| network.last_connected(process));
+    // A client connects and asks who answers though its line is down, and any request is a sign of life.
+    let heard = peer.down_since.get().map(|since| match plan.bus.asks() {
+        true => since.max(connected),
+        false => since,
+    });
+    let down = state.down_since.get().into_iter().chain(heard);
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
@@ -420,7 +427,8 @@ fn judge_tick(
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
-        for since in [state, peer].iter().filter_map(|end| end.down_since.get()) {
+        Reader::judge_frozen(plan, 1 - end, &writer, &seen)?;
+        for since in down {
             Reader::judge_down(plan, since, &seen)?;
         }
         match shared.controller_left.get() {

@@ -62,6 +62,8 @@ struct Wire {
     out: Outgoing,
     /// Received frames that are held back.
     waiting: Option<Ring>,
+    /// When the last of them came.
+    released: Nanos,
     rx_len: usize,
 }
 
@@ -85,6 +87,7 @@ impl LineFaults {
             went: true,
             out: Outgoing::new(shape.last_sent, shape.latched),
             waiting: None,
+            released: Nanos(i64::MIN),
             rx_len: shape.rx_len,
         };
         Self {
@@ -340,27 +343,28 @@ impl LineFaults {
         }
     }
 
-    /// The next held frame that is due by `now`. When the ring is nearly full, the oldest frame is released
-    /// early: the order is kept, and every edge is counted.
-    pub fn release(&mut self, station: usize, now: Nanos, into: &mut [u8]) -> bool {
+    /// The next held frame that is due by `now`, and when it came: where nobody looked for long, as while the process was
+    /// suspended, that was long ago. When the ring is nearly full, the oldest frame is released early: the order is kept, and
+    /// every edge is counted.
+    pub fn release(&mut self, station: usize, now: Nanos, into: &mut [u8]) -> Option<Nanos> {
         let delay = self.sum.delay;
-        let Some(ring) = &mut self.stations[station].waiting else {
-            return false;
-        };
-        let Some((taken, bytes)) = ring.front() else {
-            return false;
-        };
-        let due = delay == Nanos::ZERO || taken + delay <= now;
-        let early = !due && ring.is_nearly_full();
-        if !due && !early {
-            return false;
+        let wire = &mut self.stations[station];
+        let ring = wire.waiting.as_mut()?;
+        let (taken, bytes) = ring.front()?;
+        let came = taken + delay;
+        let early = came > now && ring.is_nearly_full();
+        if came > now && !early {
+            return None;
         }
+        // A delay that has become shorter lets nothing come before what came already.
+        let came = came.max(wire.released).min(now);
+        wire.released = came;
         into.copy_from_slice(bytes);
         ring.pop();
         if early {
             self.board.hurried.fetch_add(1, Ordering::Relaxed);
         }
-        true
+        Some(came)
     }
 
     /// Whether received frames of the station are held back.

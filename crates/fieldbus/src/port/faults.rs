@@ -63,8 +63,8 @@ impl FaultLayer {
         };
         let is_part = std::mem::replace(&mut port.is_held, true);
         for (station, frame) in self.frames.iter_mut().enumerate() {
-            while line.release(station, now, frame) {
-                port.received(station, now, frame);
+            while let Some(came) = line.release(station, now, frame) {
+                port.received(station, came, frame);
             }
         }
         port.is_held = is_part;

@@ -106,6 +106,7 @@ impl Rig {
 #[derive(Default)]
 struct Incoming {
     held: VecDeque<(i64, u8)>,
+    released: i64,
     heard: Option<i64>,
     byte: u8,
 }
@@ -116,7 +117,9 @@ impl Incoming {
             && (delay == 0 || came + delay <= now)
         {
             self.held.pop_front();
-            (self.heard, self.byte) = (Some(now), byte);
+            // It came when it was due, however late the port looks; and after what came before.
+            let due = (came + delay).max(self.released);
+            (self.released, self.heard, self.byte) = (due, Some(due), byte);
         }
     }
 }

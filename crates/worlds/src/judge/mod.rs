@@ -4,6 +4,7 @@
 //! can be judged without a look into the drivers. Each promise has a file.
 
 mod age;
+mod beats;
 mod files;
 mod liveness;
 mod outputs;

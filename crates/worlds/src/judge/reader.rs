@@ -17,6 +17,8 @@ pub(crate) struct Shown {
     pub(crate) numbers: Option<(f64, f64)>,
     /// The slots of the signals beside the stamp.
     pub(crate) typed: Vec<u64>,
+    /// The heartbeat of station 0, if there is one.
+    pub(crate) beat: Option<u8>,
 }
 
 /// A tick as its end got it.
@@ -61,6 +63,8 @@ pub(crate) struct Reader {
     pub(super) before: [f64; 3],
     /// What was shown when faults of this end began, by their numbers.
     pub(super) held: BTreeMap<usize, f64>,
+    /// The heartbeat that was shown last, and with which stamp.
+    pub(super) beat: Option<(Stamp, u8)>,
 }
 
 impl Reader {
@@ -69,6 +73,7 @@ impl Reader {
         self.newest = vec![(0, 0); stations];
         self.before = faults::values(None);
         self.held.clear();
+        self.beat = None;
         self.sequence = 0;
     }
 

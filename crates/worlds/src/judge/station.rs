@@ -39,6 +39,8 @@ impl Reader {
         }
         self.judge_beside(plan, (area, station), Some(shown.stamp), (seen.tick, shown))?;
         judge_typed(plan, area, Some(shown.stamp), shown)?;
+        let writing = usize::from(area == 0);
+        self.judge_beat(plan, writer, (writing, stamp), shown.beat)?;
         let newest = &mut self.newest[station];
         if (life, tick) < *newest {
             broken(

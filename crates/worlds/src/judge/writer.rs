@@ -42,6 +42,18 @@ impl Writer {
         Some((written.life, written.tick))
     }
 
+    /// When the ticks of a life from one to another ended.
+    pub(super) fn times(&self, life: u64, first: u64, last: u64) -> Vec<i64> {
+        let of_life = self.written.iter().rev();
+        let ticks = of_life
+            .take_while(|written| (written.life, written.tick) >= (life, first))
+            .filter(|written| (written.life, written.tick) <= (life, last));
+        let mut times: Vec<i64> = ticks.map(|written| written.ended).collect();
+        times.reverse();
+        times.retain(|time| *time < i64::MAX);
+        times
+    }
+
     pub(super) fn has_begun(&self, life: u64, tick: u64) -> bool {
         let newest = self.written.last();
         newest.is_some_and(|newest| (life, tick) <= (newest.life, newest.tick))

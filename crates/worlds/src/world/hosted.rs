@@ -121,6 +121,7 @@ impl Stamped {
             level: frame[8] >> 1 & 1 == 1,
             edges: u64::from(has_pulse && !had_pulse),
             numbers,
+            beat: self.plan.beat(1 - self.end).map(|_| frame[9]),
             typed: typed
                 .flat_map(|typed| typed.taken(&frame[typed.place..], true))
                 .collect(),
@@ -137,6 +138,7 @@ impl Stamped {
             edges: 0,
             numbers: self.plan.numbers.then_some((-7.0, 2.5)),
             typed: typed.flat_map(|typed| typed.shown(None, true)).collect(),
+            beat: None,
         }
     }
 }

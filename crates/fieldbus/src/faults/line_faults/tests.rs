@@ -99,7 +99,7 @@ impl Rig {
     fn released(&mut self, now: i64) -> Vec<u8> {
         let mut come = Vec::new();
         let mut frame = [0; 2];
-        while self.wires.release(0, Nanos(now), &mut frame) {
+        while self.wires.release(0, Nanos(now), &mut frame).is_some() {
             assert_eq!(frame[0], !frame[1], "a whole frame");
             come.push(frame[0]);
         }

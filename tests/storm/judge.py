@@ -24,6 +24,8 @@ class Life:
     is_second: bool = False
     # When its process was started.
     born: int = 0
+    # By how many misfortunes at once.
+    suspended: int = 0
 
 
 @dataclass(eq=False)

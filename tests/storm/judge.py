@@ -197,11 +197,12 @@ class Judge:
         return life.number, number
 
     def are_two_that_bring_back(self, end, at):
-        """Whether two processes of the command bring back the same values: then one may be behind the other."""
+        """Whether two processes of the command bring back the same values: then one may be behind the other. What one has sent may
+        arrive after a cut."""
         if self.plan.ends[end].program != "command":
             return False
         second = [life for life in self.lives if life.end == end and life.is_second]
-        return any(life.born <= at and (life.ended is None or at <= life.ended + SECOND) for life in second)
+        return any(life.born <= at and (life.ended is None or at <= life.ended + 5 * SECOND) for life in second)
 
     def down_since(self, lives, at):
         """Since when all lives of an end are dead, suspended or cut off; None if one is not, or has come back a moment ago."""

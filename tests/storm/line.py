@@ -312,6 +312,13 @@ class Line:
             if (descriptors, threads) == before[:2] or time.monotonic() > until:
                 break
             time.sleep(0.2)
+        # Of a peer that ended while the network was cut nobody tells this end: its connection is there until it times out.
+        lost = sum(
+            any(begin <= (other.ended or 0) and (end is None or other.ended <= end) for begin, end in self.cuts)
+            for other in self.lives
+            if other.end != life.end
+        )
+        descriptors["socket:N"] = descriptors.get("socket:N", 0) - lost
         for what, now, then in (("descriptors", descriptors, before[0]), ("threads", threads, before[1])):
             more = {kind: (then.get(kind, 0), count) for kind, count in now.items() if count > then.get(kind, 0)}
             if more:

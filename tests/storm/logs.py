@@ -37,6 +37,8 @@ KNOWN = [
     (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
     (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
     (STATE + r"failed: refused: the dispatcher has another client ", DEATHS | DISPATCHER),
+    # A second writer, which was refused, cannot leave its fail-safe values behind; nor can one that is cut off.
+    (r"closes, and the peer has not confirmed the fail-safe values within ", DEATHS | DISPATCHER),
     # Recordings.
     (r"the recording ended with tick \d+ of the file: No space left on device", {"small disk"}),
     (r": (process \d+|another process) records to this file, or replays it; name another file", {"second"}),

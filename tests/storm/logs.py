@@ -34,6 +34,8 @@ KNOWN = [
     # OPC UA, and the dispatcher.
     (STATE + r"(opening: asking|opening: opening a session with|running: in session with) ", ALWAYS),
     (STATE + r"(failed|opening): the peer left: the (server|last client) closed (the|its) session", ALWAYS),
+    # Its server ends in the middle of a greeting.
+    (STATE + r"failed: the protocol was broken: \S+ does not answer as an OPC UA server \(BadConnectionClosed", DEATHS),
     (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
     (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
     (STATE + r"failed: refused: the dispatcher has another client ", DEATHS | DISPATCHER),

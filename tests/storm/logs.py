@@ -46,7 +46,7 @@ KNOWN = [
     (r": (process \d+|another process) records to this file, or replays it; name another file", {"second"}),
     # What Python and FMPy print of it.
     (r"^(Traceback \(most recent call last\):|  File .*|    .*)$", {"second"}),
-    (r"client::writings\] the server does not take the value of \"\w+\" \(BadUserAccessDenied", DEATHS),
+    (r"the server does not take the value of \"\w+\" \(BadUserAccessDenied", DEATHS),
     (r"^  correct the lines named in the message; `tickbus check FILE`", {"second"}),
     (r"^\tat (tickbus\.Tickbus|End\.main)", {"second"}),
     # What the command prints in the end.

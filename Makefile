@@ -1,6 +1,6 @@
 # The commands of this project. What they do stands in tools/; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak worlds lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak worlds storm lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -38,6 +38,9 @@ soak: setup ## a device and a peer that dies again and again, for MINUTES (3)
 
 worlds: setup ## simulated worlds, judged by a model, for MINUTES (10)
 	@exec tools/worlds $(MINUTES)
+
+storm: setup ## the built artefacts in every language on every bus, killed, suspended and cut off, for MINUTES (5)
+	@exec tools/storm $(MINUTES)
 
 lint: setup ## formatting, clippy, documentation, Java warnings, shell scripts
 	@exec tools/lint

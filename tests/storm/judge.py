@@ -24,6 +24,8 @@ class Life:
     is_second: bool = False
     # When its process was started.
     born: int = 0
+    # By how many misfortunes at once.
+    suspended: int = 0
 
 
 @dataclass(eq=False)
@@ -162,7 +164,7 @@ class Judge:
                     if is_stale:
                         self.finding("stale values", reader, tick, f"station {station} shows {stamp:#x}")
                     life, number = self.stamp(reader, tick, station, (stamp, level, whole, real), by_number, area)
-                    if number < newest.get((station, life), 0):
+                    if number < newest.get((station, life), 0) and not self.are_two_that_bring_back(1 - reader.end, tick.began):
                         self.finding("order", reader, tick, f"station {station}: {number} of life {life} after {newest[station, life]}")
                     newest[station, life] = number
                 if first not in (None, (life, number)):
@@ -193,6 +195,14 @@ class Judge:
         if (level, whole, real) != beside(stamp):
             self.finding("torn", reader, tick, f"station {station}: {(level, whole, real)} beside {stamp:#x}, which has {beside(stamp)}")
         return life.number, number
+
+    def are_two_that_bring_back(self, end, at):
+        """Whether two processes of the command bring back the same values: then one may be behind the other. What one has sent may
+        arrive after a cut."""
+        if self.plan.ends[end].program != "command":
+            return False
+        second = [life for life in self.lives if life.end == end and life.is_second]
+        return any(life.born <= at and (life.ended is None or at <= life.ended + 5 * SECOND) for life in second)
 
     def down_since(self, lives, at):
         """Since when all lives of an end are dead, suspended or cut off; None if one is not, or has come back a moment ago."""

@@ -97,7 +97,7 @@ class Line:
         self.plan, self.artefacts, self.folder = plan, artefacts, folder
         self.stalls = Stalls()
         self.findings, self.lives, self.story = [], [], []
-        self.processes = {}
+        self.processes, self.cuts, self.depth = {}, [], 0
         self.second = {}
         self.dispatcher = None
         shutil.rmtree(folder, ignore_errors=True)
@@ -158,7 +158,7 @@ class Line:
         life = of.pop(end, None)
         if life is None:
             return
-        self.resume(life)
+        self.resume(life, is_all=True)
         if is_killed:
             life.ended = time.monotonic_ns()
             life.process.kill()
@@ -181,24 +181,36 @@ class Line:
             self.findings.append(f"died: {ROLES[life.end]} life {life.number}, with {code}")
 
     def suspend(self, life):
+        """Misfortunes may overlap: a process goes on when the last of them is over."""
         life.process.signal(signal.SIGSTOP)
-        life.downs.append((time.monotonic_ns(), None))
+        if not life.suspended:
+            life.downs.append((time.monotonic_ns(), None))
+        life.suspended += 1
 
-    def resume(self, life):
-        if life.downs and life.downs[-1][1] is None and not getattr(life, "is_cut", False):
+    def resume(self, life, is_all=False):
+        life.suspended = 0 if is_all else max(0, life.suspended - 1)
+        if life.downs and life.downs[-1][1] is None and not life.suspended:
             life.downs[-1] = (life.downs[-1][0], time.monotonic_ns())
             life.process.signal(signal.SIGCONT)
+
+    def cut(self, is_cut):
+        self.depth += 1 if is_cut else -1
+        if is_cut and self.depth == 1:
+            self.network.cut(True)
+            self.cuts.append((time.monotonic_ns(), None))
+        elif not is_cut and not self.depth:
+            self.cuts[-1] = (self.cuts[-1][0], time.monotonic_ns())
+            self.network.cut(False)
 
     def begin(self, event):
         self.tell(f"begins: {event}")
         life = self.processes.get(event.end)
-        if event.what == "stopped" and life and not life.downs[-1:] == [(None, None)]:
+        if event.what == "stopped" and life:
             self.suspend(life)
         elif event.what in ("killed", "terminated"):
             self.over(event.end, event.what == "killed")
         elif event.what == "cut":
-            self.network.cut(True)
-            self.cuts = getattr(self, "cuts", []) + [[time.monotonic_ns(), None]]
+            self.cut(True)
         elif event.what == "dispatcher killed":
             self.dispatcher.kill()
         elif event.what == "dispatcher stopped":
@@ -211,10 +223,11 @@ class Line:
         if event.what == "stopped" and life:
             self.resume(life)
         elif event.what in ("killed", "terminated") and not life:
+            # A second one may have taken its port and its recording meanwhile.
+            self.over(event.end, True, self.second)
             self.start(event.end)
         elif event.what == "cut":
-            self.cuts[-1][1] = time.monotonic_ns()
-            self.network.cut(False)
+            self.cut(False)
         elif event.what == "dispatcher killed" and self.dispatcher.ended:
             self.start_dispatcher()
         elif event.what == "dispatcher stopped":
@@ -299,6 +312,13 @@ class Line:
             if (descriptors, threads) == before[:2] or time.monotonic() > until:
                 break
             time.sleep(0.2)
+        # Of a peer that ended while the network was cut nobody tells this end: its connection is there until it times out.
+        lost = sum(
+            any(begin <= (other.ended or 0) and (end is None or other.ended <= end) for begin, end in self.cuts)
+            for other in self.lives
+            if other.end != life.end
+        )
+        descriptors["socket:N"] = descriptors.get("socket:N", 0) - lost
         for what, now, then in (("descriptors", descriptors, before[0]), ("threads", threads, before[1])):
             more = {kind: (then.get(kind, 0), count) for kind, count in now.items() if count > then.get(kind, 0)}
             if more:
@@ -307,7 +327,7 @@ class Line:
             self.findings.append(f"leak: {ROLES[life.end]} life {life.number} has {memory} kB, before {before[2]}")
 
     def judged(self):
-        for begin, end in getattr(self, "cuts", []):
+        for begin, end in self.cuts:
             for life in self.lives:
                 if life.process.started <= (end or begin):
                     life.downs.append((begin, end))

@@ -12,7 +12,7 @@ DEATHS = {"killed", "terminated", "second", "cut", "stopped"}
 # The states of a line, in the words of the driver and of the command; what has to have befallen the line for it.
 STATE = r'^(?:driver "\w+" is|mirror:|plc:|\[[^]]* WARN +tickbus_fieldbus::link\] driver "\w+" is) '
 KNOWN = [
-    (STATE + r"(opening|running): (opening the line|listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
+    (STATE + r"(opening|running): (opening the line|beginning to listen on|listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
     (STATE + r"running: serving ", ALWAYS),
     (STATE + r"(stale|opening|failed): nothing has come from ", SILENT),
     (STATE + r"(opening|failed): the peer left: (the dispatcher at )?\S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
@@ -28,18 +28,25 @@ KNOWN = [
     (r'driver "\w+": \S+ was turned away, since one client is served at a time', DEATHS),
     (STATE + r"(opening|failed): the link failed: \S+ has been silent for \S+ \S+ takes its place", DEATHS),
     (STATE + r"(opening|failed|stale): the link failed: unit \d+ of \S+, asked to .*, did not answer within ", SILENT),
-    (r'^(\[[^]]* WARN [^]]*\] )?driver "\w+": \S+ writes what \S+ wrote less than ', DEATHS),
+    (r'^(\[[^]]* WARN [^]]*\] )?driver "\w+": .+ writes what .+ wrote less than ', DEATHS),
     (STATE + r"opening: refused: unit \d+ of \S+ refused to write .* \(server device busy\)", DEATHS),
     (STATE + r"failed: refused: \S+ refuses writing .* access is not allowed \(code 0x03\)", DEATHS),
     # OPC UA, and the dispatcher.
     (STATE + r"(opening: asking|opening: opening a session with|running: in session with) ", ALWAYS),
     (STATE + r"(failed|opening): the peer left: the (server|last client) closed (the|its) session", ALWAYS),
+    # Its server ends in the middle of a greeting.
+    (STATE + r"failed: the protocol was broken: \S+ does not answer as an OPC UA server \(BadConnectionClosed", DEATHS),
     (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
     (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
     (STATE + r"failed: refused: the dispatcher has another client ", DEATHS | DISPATCHER),
+    # A second writer, which was refused, cannot leave its fail-safe values behind; nor can one that is cut off.
+    (r"closes, and the peer has not confirmed the fail-safe values within ", DEATHS | DISPATCHER),
     # Recordings.
     (r"the recording ended with tick \d+ of the file: No space left on device", {"small disk"}),
-    (r": process \d+ records to this file, or replays it; name another file", {"second"}),
+    (r": (process \d+|another process) records to this file, or replays it; name another file", {"second"}),
+    # What Python and FMPy print of it.
+    (r"^(Traceback \(most recent call last\):|  File .*|    .*)$", {"second"}),
+    (r"the server does not take the value of \"\w+\" \(BadUserAccessDenied", DEATHS),
     (r"^  correct the lines named in the message; `tickbus check FILE`", {"second"}),
     (r"^\tat (tickbus\.Tickbus|End\.main)", {"second"}),
     # What the command prints in the end.

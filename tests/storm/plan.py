@@ -161,8 +161,8 @@ def fieldbus(plan, end, address):
         if not serves:
             lines += [f'write_to = "tickbus {ROLES[1 - end]}"']
     elif plan.bus == "opcua" and serves:
-        lines += ['kind = "opcua-server"', 'security = "None"', "anonymous = true"]
-        lines += [f"writers = {plan.writers}"] if plan.writers else []
+        # Clients write what has changed: of two of them each would leave the other one's values beside its own.
+        lines += ['kind = "opcua-server"', 'security = "None"', "anonymous = true", "writers = 1"]
     elif plan.bus == "opcua":
         lines = [f'kind = "opcua-client"\nurl = "opc.tcp://{address}"\nsecurity = "None"']
         lines += [f'write_to = "urn:tickbus:{ROLES[1 - end]} tickbus"']

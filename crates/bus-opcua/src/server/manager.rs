@@ -296,24 +296,31 @@ impl InMemoryNodeManagerImpl for Signals {
         self.admits(context)?;
         let (writers, session) = (&self.own.writers, context.session_id);
         writers.begin(session, || Visitor::of(context));
-        let mut second = None;
         let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
         let mut space = address_space.write();
         let now = date((self.own.wall)());
-        for node in nodes_to_write {
-            let (index, bits) = match self.judge(&space, node.value()) {
+        let judged: Vec<_> = nodes_to_write
+            .iter()
+            .map(|node| self.judge(&space, node.value()))
+            .collect();
+        let indices = judged.iter().flatten().map(|&(index, _)| index);
+        let refused = writers.refuses(session, indices);
+        let is_refused = refused.is_some();
+        let mut second = refused;
+        for (node, judged) in nodes_to_write.iter_mut().zip(judged) {
+            let (index, bits) = match judged {
                 Ok(judged) => judged,
                 Err(status) => {
                     node.set_status(status);
                     continue;
                 }
             };
+            if is_refused {
+                node.set_status(StatusCode::BadUserAccessDenied);
+                continue;
+            }
             if let Some(other) = writers.write(session, index) {
                 second.get_or_insert(other);
-                if writers.is_single {
-                    node.set_status(StatusCode::BadUserAccessDenied);
-                    continue;
-                }
             }
             node.set_status(StatusCode::Good);
             let written = &node.value().value;

@@ -288,18 +288,21 @@ impl Service<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), cycle);
         let mut news = Vec::new();
+        let mut was_late = false;
         while !stop.is_stopped() {
             let now = clock.now();
-            port.look_at_line(now);
+            let is_late = port.look_at_line(now);
             started.inbox.take(&mut news);
-            if !news.is_empty() {
-                // The tasks may have read a part only.
+            if !news.is_empty() || is_late && !was_late {
+                // The tasks may have read a part only, and nothing at all if this look comes right after a suspension.
                 port.look_leaves_some();
             }
+            was_late = is_late;
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
-            if pace.take(now) {
+            // Signs of life that waited are as old as all else that did.
+            if pace.take(now) || is_late {
                 self.look(port, now);
                 if self.image.left_behind() >= WORN && started.is_alone(reactor) {
                     return Ok(Served::Worn);

@@ -35,10 +35,10 @@ impl Looks {
         (self.last, self.kept_since, self.is_unfinished) = (Some(now), None, false);
     }
 
-    /// The bus looks at its line at `now`.
-    pub(super) fn look(&mut self, now: Nanos) {
+    /// The bus looks at its line at `now`. Returns whether what it finds may have waited since an earlier look.
+    pub(super) fn look(&mut self, now: Nanos) -> bool {
         let Some(last) = &mut self.last else {
-            return;
+            return false;
         };
         let last = std::mem::replace(last, now);
         if !std::mem::take(&mut self.is_unfinished) {
@@ -48,6 +48,7 @@ impl Looks {
         if now - last > self.rest() + self.rest() {
             self.kept_since.get_or_insert(last);
         }
+        self.kept_since.is_some()
     }
 
     /// This look has not found everything: the next one finds what may have waited as long.
@@ -114,9 +115,9 @@ mod tests {
     #[test]
     fn what_a_late_look_finds_may_have_come_right_after_the_one_before() {
         let mut looks = looks();
-        looks.look(at(1051));
+        assert!(looks.look(at(1051)), "too late");
         assert_eq!(looks.arrival(at(1051)), at(1000));
-        looks.look(at(1052));
+        assert!(!looks.look(at(1052)), "in time");
         assert_eq!(looks.arrival(at(1052)), at(1052));
     }
 

@@ -40,7 +40,7 @@ pub(crate) struct End {
     halves: bool,
     next_pulse: i64,
     plan: Plan,
-    end: usize,
+    which: usize,
     tape: Option<Tape>,
     injector: Injector,
 }
@@ -146,7 +146,7 @@ impl End {
         }
         Ok(Self {
             plan: plan.clone(),
-            end,
+            which: end,
             tape,
             injector,
             writes,
@@ -167,7 +167,7 @@ impl End {
             self.next_pulse = time + pulses.0;
         }
         let injected = self.injector.before(tick, &mut self.driver);
-        let given = self.plan.features.times[self.end].at(tick);
+        let given = self.plan.features.times[self.which].at(tick);
         let found = if self.halves {
             let found = self.driver.receive(given.map(Nanos), &mut self.slots);
             let shown = self.shown();
@@ -216,7 +216,10 @@ impl End {
             if Stamp::of(stamp).tick != tick || !is_own || !numbers {
                 return Err(Broken {
                     promise: "own values",
-                    what: format!("tick {tick} of end {} finds others than it wrote", self.end),
+                    what: format!(
+                        "tick {tick} of end {} finds others than it wrote",
+                        self.which
+                    ),
                 });
             }
         }
@@ -235,7 +238,7 @@ impl End {
             self.slots[places.stamp] = Slot::from_unsigned(stamp);
             self.slots[places.pulse] = Slot::from_real(f64::from(is_pulse));
             self.slots[places.level] = Slot::from_real(f64::from(level(stamp)));
-            let typed = self.plan.features.beside(['Q', 'I'][1 - self.end]);
+            let typed = self.plan.features.beside(['Q', 'I'][1 - self.which]);
             for (place, typed) in places.typed.iter().zip(typed) {
                 self.slots[*place] = Slot(typed.written(stamp));
             }
@@ -260,7 +263,7 @@ impl End {
 
     /// The signals beside the stamps that it writes.
     fn beside(&self) -> &[Typed] {
-        self.plan.features.beside(['Q', 'I'][1 - self.end])
+        self.plan.features.beside(['Q', 'I'][1 - self.which])
     }
 
     fn shown(&self) -> Vec<Shown> {
@@ -298,7 +301,7 @@ impl End {
     pub(crate) fn close(self) -> Result<(), Broken> {
         self.driver.close();
         match &self.tape {
-            Some(tape) => tape.judge(&self.plan, self.end),
+            Some(tape) => tape.judge(&self.plan, self.which),
             None => Ok(()),
         }
     }

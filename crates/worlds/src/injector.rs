@@ -79,7 +79,7 @@ impl Injector {
         // Not in each tick, so that others have nothing to do but to exchange.
         self.has_asked = tick % 5 < 2 && self.watch.is_some();
         if let (true, Some(watch)) = (self.has_asked, &mut self.watch) {
-            watch.ask(tick % 10 == 0);
+            watch.ask(tick.is_multiple_of(10));
         }
         Ok(())
     }

@@ -5,6 +5,11 @@
 //! happen. [`Plan::run`] lets it happen, within a fraction of a millisecond, and returns the first promise that was broken. The
 //! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
 
+#![allow(
+    clippy::float_cmp,
+    reason = "values are compared with what was written, to the last bit"
+)]
+
 mod clock;
 mod config;
 mod disk;

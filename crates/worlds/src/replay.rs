@@ -11,7 +11,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::clock::SimulatedClock;
-use crate::judge::{Broken, Contents, FileRow, area_of};
+use crate::judge::{Broken, Contents, FileRow, area_of, is_count};
 use crate::plan::Plan;
 use crate::random::{Random, scramble};
 use crate::tape::Tape;
@@ -118,7 +118,7 @@ impl Original<'_> {
             let place = self.contents.names.iter().position(|known| known == name);
             let place = place.expect("the recording was judged");
             let seen = slots[index].0;
-            let expected = if name.ends_with(".edges") {
+            let expected = if is_count(name) {
                 let counts = rows[group.clone()].iter();
                 let counts = counts.map(|row| f64::from_bits(row.values[place]));
                 let count = counts.fold(0.0, |all, count| all + count);
@@ -126,7 +126,7 @@ impl Original<'_> {
             } else {
                 rows[last].values[place]
             };
-            let is_latched = name.starts_with("pulse") && !name.ends_with(".edges");
+            let is_latched = name.starts_with("pulse") && !is_count(name);
             if seen != expected && !(is_latched && is_shaped) {
                 return Err(format!("{name} is {seen:x}, and was {expected:x}"));
             }
@@ -211,7 +211,7 @@ impl Original<'_> {
         self.judge_end(&mut driver, &mut slots)?;
         driver.close();
         if is_whole && groups.len() == self.rows().len() {
-            self.judge_again(file, &again)?;
+            judge_again(file, &again)?;
         }
         Ok(())
     }
@@ -228,19 +228,6 @@ impl Original<'_> {
                 "behind its end it is {} of age {}",
                 found.code, found.age
             ));
-        }
-        Ok(())
-    }
-
-    /// The recording of a replay is the recording, but for the tick behind its end.
-    fn judge_again(&self, file: &Path, again: &Path) -> Result<(), Broken> {
-        let (one, other) = (fs::read(file), fs::read(again));
-        let (one, other) = (one.unwrap_or_default(), other.unwrap_or_default());
-        // A closed VCD file ends with a comment.
-        let text = String::from_utf8_lossy(&one);
-        let end = text.find("$comment end").unwrap_or(text.len());
-        if !other.starts_with(&one[..end]) {
-            return broken("the recording of a replay is another".to_owned());
         }
         Ok(())
     }
@@ -283,4 +270,17 @@ impl Original<'_> {
         driver.close();
         Ok(())
     }
+}
+
+/// The recording of a replay is the recording, but for the tick behind its end.
+fn judge_again(file: &Path, again: &Path) -> Result<(), Broken> {
+    let (one, other) = (fs::read(file), fs::read(again));
+    let (one, other) = (one.unwrap_or_default(), other.unwrap_or_default());
+    // A closed VCD file ends with a comment.
+    let text = String::from_utf8_lossy(&one);
+    let end = text.find("$comment end").unwrap_or(text.len());
+    if !other.starts_with(&one[..end]) {
+        return broken("the recording of a replay is another".to_owned());
+    }
+    Ok(())
 }

@@ -139,25 +139,27 @@ impl Typed {
             _ => format!("L{place}"),
         };
         let name = self.name(area, station);
-        let mut section = format!(
+        let section = format!(
             "[[signal]]\nname = \"{name}\"\naddress = \"%{area}{address}\"\ntype = \"{}\"\n",
             self.kind
         );
-        if self.bits > 8 {
-            section.push_str(&format!("order = \"{}\"\n", self.order));
-        }
-        if let Some([raw, other, value, behind]) = self.scale {
-            section.push_str(&format!(
-                "scale = {{ raw = [{raw}, {other}], value = [{value:?}, {behind:?}] }}\n"
-            ));
-        }
+        let order = if self.bits > 8 {
+            format!("order = \"{}\"\n", self.order)
+        } else {
+            String::new()
+        };
+        let scale = self
+            .scale
+            .map_or_else(String::new, |[raw, other, value, behind]| {
+                format!("scale = {{ raw = [{raw}, {other}], value = [{value:?}, {behind:?}] }}\n")
+            });
         let fail_safe = f64::from_bits(self.read(self.safe_bits()));
-        section.push_str(&match self.kind {
+        let fail_safe = match self.kind {
             "BOOL" => format!("fail_safe = {}", self.fail_safe == 1),
             _ if self.is_integer() => format!("fail_safe = {}", self.fail_safe),
             _ => format!("fail_safe = {fail_safe:?}"),
-        });
-        vec![section]
+        };
+        vec![section + &order + &scale + &fail_safe]
     }
 
     /// The bits of its fail-safe value.

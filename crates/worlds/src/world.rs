@@ -261,7 +261,7 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     state.tick.set(0);
     state.down_since.set(None);
     let mut driver = if plan.features.hosted == Some(end) {
-        Ticker::Hosted(hosted::open(shared, (end, process), life))
+        Ticker::Hosted(Box::new(hosted::open(shared, (end, process), life)))
     } else {
         match End::open(plan, end, &shared.link) {
             Ok(driver) => Ticker::Driven(Box::new(driver)),
@@ -311,14 +311,14 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
 /// What ticks an end.
 enum Ticker {
     Driven(Box<End>),
-    Hosted(Host),
+    Hosted(Box<Host>),
 }
 
 impl Ticker {
     fn close(self) -> Result<(), Broken> {
         match self {
             Self::Driven(driver) => driver.close(),
-            Self::Hosted(host) => hosted::close(host),
+            Self::Hosted(host) => hosted::close(*host),
         }
     }
 }
@@ -398,9 +398,12 @@ fn judge_tick(
     log::trace!("{}", line());
     let connected = scheduler::network(|network, _, _| network.last_connected(process));
     // A client connects and asks who answers though its line is down, and any request is a sign of life.
-    let heard = peer.down_since.get().map(|since| match plan.bus.asks() {
-        true => since.max(connected),
-        false => since,
+    let heard = peer.down_since.get().map(|since| {
+        if plan.bus.asks() {
+            since.max(connected)
+        } else {
+            since
+        }
     });
     let down = state.down_since.get().into_iter().chain(heard);
     let writer = peer.writer.borrow();

@@ -24,16 +24,25 @@ pub(crate) struct Contents {
     pub(crate) end: Option<String>,
 }
 
+/// Whether a column counts the edges of a signal.
+#[expect(
+    clippy::case_sensitive_file_extension_comparisons,
+    reason = "the name of a column"
+)]
+pub(crate) fn is_count(name: &str) -> bool {
+    name.ends_with(".edges")
+}
+
 /// The bits of a slot with a number as it is written: those of an integer where the name says so, or else of a double.
 fn bits(name: &str, text: &str) -> Result<u64, String> {
-    let wrong = |_| format!("\"{text}\" is no value of {name}");
+    let wrong = || format!("\"{text}\" is no value of {name}");
     if name.starts_with("stamp") || name.starts_with("u64") {
-        text.parse::<u64>().map_err(|_| wrong(()))
+        text.parse::<u64>().map_err(|_| wrong())
     } else if name.starts_with("i64") {
-        let signed = text.parse::<i64>().map_err(|_| wrong(()))?;
+        let signed = text.parse::<i64>().map_err(|_| wrong())?;
         Ok(signed.cast_unsigned())
     } else {
-        text.parse::<f64>().map(f64::to_bits).map_err(|_| wrong(()))
+        text.parse::<f64>().map(f64::to_bits).map_err(|_| wrong())
     }
 }
 
@@ -143,7 +152,6 @@ pub(crate) fn vcd(text: &str) -> Result<Contents, String> {
             [time] if time.starts_with('#') => {
                 row.time = time[1..].parse().map_err(|_| line.to_owned())?;
             }
-            [] | [_] if line.starts_with('$') => {}
             _ if line.starts_with('$') => {}
             [change] => {
                 let (value, id) = change.split_at(1);
@@ -181,7 +189,7 @@ pub(crate) fn vcd(text: &str) -> Result<Contents, String> {
                                 .parse::<f64>()
                                 .map(f64::to_bits)
                                 .map_err(|_| line.to_owned())?,
-                            _ if contents.names[*index].ends_with(".edges") => {
+                            _ if is_count(&contents.names[*index]) => {
                                 #[expect(clippy::cast_precision_loss, reason = "a small count")]
                                 let count = whole()? as f64;
                                 count.to_bits()

@@ -102,14 +102,13 @@ fn judge_rows(plan: &Plan, end: usize, tape: &Tape, contents: &Contents) -> Resu
             }
         }
         let least = before.map_or(0, |before| before.time);
-        let is_timely = match delivered.time {
-            Some(time) => row.time == time.max(least),
-            None => {
-                let first = &tape.rows[0];
-                let earliest = delivered.began - first.ended;
-                let latest = delivered.ended - first.began;
-                (earliest..=latest).contains(&row.time) && row.time >= least
-            }
+        let is_timely = if let Some(time) = delivered.time {
+            row.time == time.max(least)
+        } else {
+            let first = &tape.rows[0];
+            let earliest = delivered.began - first.ended;
+            let latest = delivered.ended - first.began;
+            (earliest..=latest).contains(&row.time) && row.time >= least
         };
         if !is_timely {
             return wrong(format!("time {} after {least}: {delivered:?}", row.time));

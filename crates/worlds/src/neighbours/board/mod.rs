@@ -69,7 +69,7 @@ struct Plan {
 
 impl Plan {
     fn draw(seed: Seed) -> Self {
-        let features = Random::new(scramble(seed.number)).number() & u64::from(seed.features);
+        let features = Random::new(scramble(seed.number)).number() & seed.features;
         Self { seed, features }
     }
 

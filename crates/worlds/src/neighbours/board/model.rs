@@ -197,7 +197,7 @@ impl Model {
         match wanted {
             Some(_) if is_promised && wanted == before => {}
             Some((value, is_forced)) => {
-                self.show(slot, channel, Value::Number(value), is_forced, false)
+                self.show(slot, channel, Value::Number(value), is_forced, false);
             }
             None => self.lose(slot, channel),
         }
@@ -568,10 +568,12 @@ impl Model {
     pub(super) fn connect(&mut self, one: Pin, other: Pin) {
         self.group += 1;
         let is_here = self.has(one) && self.has(other);
-        match is_here
-            .then(|| self.joint_of(one, other, &[]))
-            .unwrap_or(Err(404))
-        {
+        let joint = if is_here {
+            self.joint_of(one, other, &[])
+        } else {
+            Err(404)
+        };
+        match joint {
             Ok(joint) => self.change(Author::Operator, &[joint], &[]),
             Err(code) => self.replies.push(code),
         }

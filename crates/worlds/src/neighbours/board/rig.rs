@@ -26,7 +26,8 @@ const ASKED: u32 = 30;
 
 #[derive(Debug)]
 struct Seat {
-    seat: usize,
+    /// Its number in the dispatcher.
+    number: usize,
     /// What the client has sent, and the dispatcher has not taken: bytes, and what they mean at the end of a line.
     sent: VecDeque<(Vec<u8>, Request)>,
     heard: Vec<u8>,
@@ -37,6 +38,10 @@ struct Seat {
     pings: bool,
 }
 
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a choice of the plan"
+)]
 pub(super) struct Rig {
     dispatcher: Dispatcher,
     model: Model,
@@ -106,7 +111,7 @@ impl Rig {
             Step::Flood(..) => {}
             Step::Leave(slot) => {
                 if let Some(seat) = self.seats.remove(&slot) {
-                    self.dispatcher.gone(seat.seat);
+                    self.dispatcher.gone(seat.number);
                     self.model.gone(slot);
                 }
             }
@@ -193,7 +198,7 @@ impl Rig {
             self.model.connected(self.now, slot, seat, self.next_port);
             self.next_port += 1;
             let seat = Seat {
-                seat,
+                number: seat,
                 sent: VecDeque::new(),
                 heard: Vec::new(),
                 is_deaf: false,
@@ -211,9 +216,10 @@ impl Rig {
             request => request,
         };
         self.write(slot, request, random);
-        let most = match self.has_pieces && random.once_in(2) {
-            true => usize::try_from(random.below(60)).expect("small"),
-            false => usize::MAX,
+        let most = if self.has_pieces && random.once_in(2) {
+            usize::try_from(random.below(60)).expect("small")
+        } else {
+            usize::MAX
         };
         self.deliver(slot, most);
     }
@@ -232,7 +238,7 @@ impl Rig {
         let Some(seat) = self.seats.get_mut(&slot) else {
             return;
         };
-        if !self.dispatcher.wants_bytes(seat.seat) || seat.sent.is_empty() {
+        if !self.dispatcher.wants_bytes(seat.number) || seat.sent.is_empty() {
             return;
         }
         let (mut bytes, mut requests) = (Vec::new(), Vec::new());
@@ -252,7 +258,7 @@ impl Rig {
             }
         }
         seat.may_have_waited |= asks_list;
-        let seat = seat.seat;
+        let seat = seat.number;
         self.dispatcher.arrived(self.nanos(), seat, &bytes);
         for request in requests {
             self.model.arrived(self.now, slot, request);
@@ -266,7 +272,7 @@ impl Rig {
             self.save();
             let mut is_at_rest = self.dispatcher.deadline() > self.nanos();
             while let Some(seat) = self.dispatcher.next_touched() {
-                let slot = self.seats.iter().find(|(_, it)| it.seat == seat);
+                let slot = self.seats.iter().find(|(_, it)| it.number == seat);
                 if let Some((slot, _)) = slot {
                     self.pump(*slot);
                     is_at_rest = false;
@@ -313,7 +319,7 @@ impl Rig {
         for slot in slots {
             let seat = self.seats.get_mut(&slot).expect("here");
             if seat.sent.is_empty()
-                && self.dispatcher.wants_bytes(seat.seat)
+                && self.dispatcher.wants_bytes(seat.number)
                 && self.model.identity(slot).is_some()
             {
                 seat.sent.push_back((b"\n".to_vec(), Request::Nothing));
@@ -328,15 +334,15 @@ impl Rig {
             return;
         };
         while !seat.is_deaf {
-            let bytes = self.dispatcher.to_write(seat.seat).to_vec();
+            let bytes = self.dispatcher.to_write(seat.number).to_vec();
             if bytes.is_empty() {
                 break;
             }
-            self.dispatcher.wrote(seat.seat, bytes.len());
+            self.dispatcher.wrote(seat.number, bytes.len());
             seat.heard.extend(bytes);
         }
-        if self.dispatcher.is_closing(seat.seat) {
-            self.dispatcher.gone(seat.seat);
+        if self.dispatcher.is_closing(seat.number) {
+            self.dispatcher.gone(seat.number);
             self.model.gone(slot);
             self.seats.remove(&slot);
         }
@@ -347,10 +353,10 @@ impl Rig {
         let Some(seat) = self.seats.get_mut(&slot) else {
             return;
         };
-        let bytes = self.dispatcher.to_write(seat.seat);
+        let bytes = self.dispatcher.to_write(seat.number);
         let taken = bytes[..count.min(bytes.len())].to_vec();
         if !taken.is_empty() {
-            self.dispatcher.wrote(seat.seat, taken.len());
+            self.dispatcher.wrote(seat.number, taken.len());
             seat.heard.extend(taken);
         }
     }

@@ -19,9 +19,9 @@ import chance
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
-OUT = ROOT / "target" / "mutants"
+OUT = Path(os.environ.get("MUTANTS_OUT", ROOT / "target" / "mutants"))
 TREE = OUT / "tree"
-BUILT = Path(os.environ.get("MUTANTS_TARGET", OUT / "target"))
+BUILT = OUT / "target"
 PROFILE = ["--profile", "bench", "--config", "tests/profile.toml", "--config", "profile.bench.opt-level=1"]
 SWITCH = """
 /// Whether this run is that of the mutation with this number.

@@ -2,8 +2,9 @@
 
 use std::io::{self, Read, Write};
 use std::net::{self, Shutdown, SocketAddr};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::time::{SimulatedListener, SimulatedStream, Simulation};
+use crate::time::{Interest, Nanos, SimulatedListener, SimulatedStream, Simulation};
 
 /// A TCP connection.
 #[derive(Debug)]
@@ -12,6 +13,15 @@ pub enum TcpStream {
     Os(net::TcpStream),
     /// Of a simulation.
     Simulated(Box<dyn SimulatedStream>),
+}
+
+/// A TCP connection whose calls block, for some time at most.
+#[derive(Debug)]
+pub struct BlockingStream {
+    stream: TcpStream,
+    /// How long a read and a write of a simulated one block.
+    limits: (Nanos, Nanos),
+    blocks: AtomicBool,
 }
 
 /// A listening TCP socket.
@@ -84,6 +94,24 @@ impl TcpStream {
             Self::Os(stream) => stream.take_error(),
             Self::Simulated(stream) => stream.take_error(),
         }
+    }
+
+    /// Lets reads block for up to `read`, and writes for up to `write`, or as long as it takes.
+    ///
+    /// # Errors
+    ///
+    /// As of [`std::net::TcpStream::set_read_timeout`].
+    pub fn block(self, read: Nanos, write: Option<Nanos>) -> io::Result<BlockingStream> {
+        if let Some(stream) = self.os() {
+            stream.set_nonblocking(false)?;
+            stream.set_read_timeout(Some(read.to_duration()))?;
+            stream.set_write_timeout(write.map(Nanos::to_duration))?;
+        }
+        Ok(BlockingStream {
+            stream: self,
+            limits: (read, write.unwrap_or(Nanos::MAX)),
+            blocks: AtomicBool::new(true),
+        })
     }
 
     /// Never to block; a simulated one never does.
@@ -159,6 +187,58 @@ impl Write for TcpStream {
 
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
+    }
+}
+
+impl BlockingStream {
+    /// The connection itself, to be waited for.
+    pub const fn stream(&self) -> &TcpStream {
+        &self.stream
+    }
+
+    /// Lets no call block any more.
+    ///
+    /// # Errors
+    ///
+    /// As of [`std::net::TcpStream::set_nonblocking`].
+    pub fn never_block(&self) -> io::Result<()> {
+        self.blocks.store(false, Ordering::Relaxed);
+        self.stream.set_nonblocking()
+    }
+
+    /// The system waits within its calls; a simulation before them.
+    fn wait(&self, interest: Interest, limit: Nanos) {
+        if let TcpStream::Simulated(stream) = &self.stream
+            && self.blocks.load(Ordering::Relaxed)
+        {
+            stream.wait(interest, limit);
+        }
+    }
+}
+
+impl Read for &BlockingStream {
+    #[inline]
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.wait(Interest::Read, self.limits.0);
+        (&self.stream).read(buffer)
+    }
+}
+
+impl Write for &BlockingStream {
+    #[inline]
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.wait(Interest::Write, self.limits.1);
+        (&self.stream).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+impl HalfClose for BlockingStream {
+    fn shutdown_write(&self) -> io::Result<()> {
+        self.stream.shutdown_write()
     }
 }
 

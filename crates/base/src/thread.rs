@@ -52,12 +52,22 @@ impl Thread {
 
     /// Waits for its end; after `limit` it is left behind with everything it uses. Returns whether it has ended.
     pub fn join_within(self, clock: &dyn Clock, limit: Nanos) -> bool {
-        let has_ended = wait_for(clock, &self.ended, limit);
-        if has_ended && let Some(handle) = self.handle {
+        let has_ended = self.ends_within(clock, limit);
+        if has_ended {
             // A panic was reported where it happened.
-            let _ = handle.join();
+            self.join();
         }
         has_ended
+    }
+
+    /// Waits for its end; returns whether that came within `limit`.
+    pub fn ends_within(&self, clock: &dyn Clock, limit: Nanos) -> bool {
+        wait_for(clock, &self.ended, limit)
+    }
+
+    /// Waits for its end without a limit; returns false if it panicked.
+    pub fn join(self) -> bool {
+        self.handle.is_none_or(|handle| handle.join().is_ok())
     }
 }
 

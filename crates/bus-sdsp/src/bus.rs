@@ -1,7 +1,9 @@
 //! The bus: a client of a run, ticked by its simulation.
 
+use std::sync::Arc;
+
 use tickbus_base::Mistake;
-use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, BusSetup, Cause, Lead, Port, Receipt, Stepped};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time as sdsp;
@@ -18,6 +20,7 @@ const MOST_STEPS: i64 = 100_000;
 pub struct Sdsp {
     meeting: Meeting,
     timeout: Nanos,
+    clock: Arc<dyn Clock>,
     declaration: Declaration,
     stop: Stop,
     values: Values,
@@ -45,9 +48,16 @@ impl Sdsp {
         let declaration = options.declaration(setup, &writes, &reads)?;
         let (_, area) = setup.role.areas();
         let stations = setup.table.stations.iter();
+        // Others are waited for in real time, also by a driver whose clock stands still until it is set.
+        let clock = if setup.clock.passes_alone() {
+            Arc::clone(setup.clock)
+        } else {
+            Monotonic::shared()
+        };
         Ok(Self {
             meeting: options.meeting.clone(),
             timeout: options.timeout,
+            clock,
             stop: setup
                 .hosted
                 .map(|hosted| hosted.stop.clone())
@@ -76,7 +86,7 @@ impl Sdsp {
                 self.meeting
             ));
             let mut run = Run::join(
-                (&self.meeting, self.timeout),
+                (&self.meeting, self.timeout, &self.clock),
                 &self.declaration,
                 &values.types,
                 &values.slots,

@@ -1,6 +1,8 @@
 //! This client's part in a run: from step to step.
 
-use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use std::sync::Arc;
+
+use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::client::{Asked, Client, Connection};
 use tickbus_virtual_time::{Cause, Declaration, Ended, Meeting, Outcome, Step};
@@ -41,14 +43,14 @@ impl Run {
     /// Joins the run of the server at `meeting`, waits until it starts, and sends the initial values. A server that is
     /// not there is waited for.
     pub(super) fn join(
-        (meeting, timeout): (&Meeting, Nanos),
+        (meeting, timeout, clock): (&Meeting, Nanos, &Arc<dyn Clock>),
         declaration: &Declaration,
         types: &[DataType],
         initial: &[u64],
         stop: &Stop,
     ) -> Result<Self, End> {
         let mut run = Self {
-            connection: connect(meeting, timeout, declaration, stop)?,
+            connection: connect((meeting, clock), timeout, declaration, stop)?,
             timeout,
             interval: Nanos::ZERO,
             is_over: false,
@@ -134,24 +136,23 @@ impl Drop for Run {
     }
 }
 
-/// Connects with the server at `meeting` as soon as that is there, and joins.
+/// Connects with the server at `meeting` as soon as that is there, and joins. Times are those of the clock.
 ///
 /// # Errors
 ///
 /// It does not appear within `timeout`, or the declaration breaks a rule.
 pub fn connect(
-    meeting: &Meeting,
+    (meeting, clock): (&Meeting, &Arc<dyn Clock>),
     timeout: Nanos,
     declaration: &Declaration,
     stop: &Stop,
 ) -> Result<Connection, Ended> {
-    let clock = Monotonic::shared();
     let end = clock.now() + timeout;
     loop {
         let now = clock.now();
         let client = Client::new(declaration.clone())
             .map_err(|mistake| ended(Cause::Configuration, mistake.to_string()))?;
-        match meeting.connect(client, stop) {
+        match meeting.connect(client, clock, stop) {
             Err(ended) if ended.cause == Cause::Lost && now < end && !stop.is_stopped() => {
                 clock.wait_until((now + PAUSE).min(end), stop);
             }

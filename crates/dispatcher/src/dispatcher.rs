@@ -250,16 +250,24 @@ impl Dispatcher {
     /// The system has taken this many bytes for a client.
     pub fn wrote(&mut self, seat: usize, count: usize) {
         self.board.outbox(seat).wrote(count);
-        let may_go_on = self.may_answer(seat);
-        if may_go_on
+        let is_stuck = self
+            .session(seat)
+            .is_some_and(|session| session.progress == Progress::Stuck);
+        if is_stuck
+            && self.may_answer(seat)
+            && !self.is_owed_answer(seat)
             && let Some(session) = &mut self.sessions[seat]
-            && session.progress == Progress::Stuck
-            && !self.promised.iter().any(|it| it.author.is(seat))
-            && !self.waiting.iter().any(|it| it.author.is(seat))
         {
             session.progress = Progress::Going;
             self.resumable.push(seat);
         }
+    }
+
+    /// Whether a client waits for the disk, or for another dispatcher.
+    fn is_owed_answer(&self, seat: usize) -> bool {
+        let promised = self.promised.iter().map(|it| &it.author);
+        let waiting = self.waiting.iter().map(|it| &it.author);
+        promised.chain(waiting).any(|author| author.is(seat))
     }
 
     /// When [`tick`](Self::tick) has something to do even if nothing arrives.
@@ -310,13 +318,16 @@ impl Dispatcher {
                 continue;
             };
             promise = promise.min(alive);
-            if session.is_silent || session.progress == Progress::Stuck {
+            if session.is_silent {
                 continue;
             }
             let due = session.heard + alive;
             if now < due || is_late {
                 first = first.min(due);
-            } else {
+            } else if self.is_owed_answer(seat) {
+                // Its lines are not read. Once they are, it has its time again.
+                first = first.min(now + alive);
+            } else if let Some(session) = &mut self.sessions[seat] {
                 session.is_silent = true;
                 self.board.fall_silent(seat);
             }
@@ -359,13 +370,16 @@ impl Dispatcher {
         let mut at = 0;
         let mut counts = self.board.device(seat).map(|device| device.counts);
         while at < bytes.len() {
-            let is_skipping = match &self.sessions[seat] {
+            // The first line of a client that was silent is looked at alone: it restores the values of all its outputs.
+            let (is_skipping, is_silent) = match &self.sessions[seat] {
                 Some(session) if session.progress == Progress::Closing => return bytes.len(),
-                Some(session) if session.progress == Progress::Going => session.is_skipping,
+                Some(session) if session.progress == Progress::Going => {
+                    (session.is_skipping, session.is_silent)
+                }
                 _ => break,
             };
             let rest = &bytes[at..];
-            let quick = counts.filter(|_| !is_skipping);
+            let quick = counts.filter(|_| !is_skipping && !is_silent);
             let quick = quick.map_or(0, |counts| self.quick_lines(seat, rest, counts));
             let Some(session) = &mut self.sessions[seat] else {
                 break;
@@ -405,6 +419,7 @@ impl Dispatcher {
             self.heard(now, seat);
             self.board.traffic.lines += 1;
             if was_skipping {
+                self.speak_again(now, seat);
                 continue;
             }
             if begins_like_browser(rest) {
@@ -412,6 +427,7 @@ impl Dispatcher {
                 return bytes.len();
             }
             if end >= LONGEST_LINE {
+                self.speak_again(now, seat);
                 self.refuse_length(seat);
                 continue;
             }
@@ -419,18 +435,25 @@ impl Dispatcher {
             if let Err(refusal) = self.obey(now, seat, line.strip_suffix(b"\r").unwrap_or(line)) {
                 self.refuse(seat, &refusal);
             }
+            self.speak_again(now, seat);
             counts = self.board.device(seat).map(|device| device.counts);
         }
         at
     }
 
-    /// A line of a client has come. If it was silent, its outputs have values again.
+    /// A line of a client has come.
     #[inline]
     fn heard(&mut self, now: Nanos, seat: usize) {
+        if let Some(session) = &mut self.sessions[seat] {
+            session.heard = now;
+        }
+    }
+
+    /// If a client was silent, its outputs have values again.
+    fn speak_again(&mut self, now: Nanos, seat: usize) {
         let Some(session) = &mut self.sessions[seat] else {
             return;
         };
-        session.heard = now;
         if std::mem::take(&mut session.is_silent) {
             self.next_look = self
                 .next_look
@@ -465,7 +488,12 @@ impl Dispatcher {
 
     /// Carries a line out.
     fn obey(&mut self, now: Nanos, seat: usize, line: &[u8]) -> Result<(), Refusal> {
-        let line = grammar::parse(line)?;
+        let line = grammar::parse(line);
+        // New values count before those of the time when it fell silent: these would be shown for a moment.
+        if !matches!(line, Ok(Line::Values(_))) {
+            self.speak_again(now, seat);
+        }
+        let line = line?;
         let is_plugged = self.board.device(seat).is_some();
         let may_come_first = matches!(
             line,

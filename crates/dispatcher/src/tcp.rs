@@ -2,11 +2,12 @@
 
 use std::fmt;
 use std::io::{self, Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::SocketAddr;
 use std::thread;
 
+use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet, Ready, peer_silence};
-use tickbus_base::time::{Clock, Nanos, Stop};
+use tickbus_base::time::{Clock, Nanos, Simulation, Stop};
 use tickbus_fieldbus::tcp::{
     Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare, watch_peer,
 };
@@ -76,7 +77,16 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let (socket, address) = bind(address)?;
+        Self::bind_in(address, None)
+    }
+
+    /// As [`bind`](Self::bind), on the network of `simulation` if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
+        let (socket, address) = bind(address, simulation)?;
         let post = None;
         Ok(Self {
             socket,
@@ -295,7 +305,7 @@ impl Host<'_, '_> {
             else {
                 continue;
             };
-            match peer_silence(&connection.stream) {
+            match connection.stream.os().and_then(peer_silence) {
                 Some(silence) if silence >= SILENCE => {
                     self.drop_client(seat);
                     continue;
@@ -405,7 +415,7 @@ impl Host<'_, '_> {
                 }
             };
             // If it broke at once, it will come again.
-            if prepare(&stream, PATIENCE).is_err() || watch_peer(&stream).is_err() {
+            if prepare(stream.os(), PATIENCE).is_err() || watch_peer(stream.os()).is_err() {
                 continue;
             }
             let seat = match self.dispatcher.connected(now, peer) {

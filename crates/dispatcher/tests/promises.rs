@@ -66,6 +66,69 @@ fn a_client_that_breaks_its_promise_to_speak_is_lost_until_it_speaks() {
     }
 }
 
+#[test]
+fn after_a_silence_new_values_come_alone_and_no_pulse_is_swallowed() {
+    // As most write it, and as some do.
+    for line in ["P Q1=5", "p  q1 = 5"] {
+        let mut lab = Lab::new();
+        let logo = lab.join("VR LOGO I02 V=3");
+        let pump = lab.join("VP PUMP Q02 V=2 ALIVE=500ms");
+        lab.say(logo, "CONNECT I1:PUMP:Q1 I2:PUMP:Q2");
+        lab.say(pump, "P Q1=24 Q2=1");
+        lab.hear(logo);
+        lab.wait(Nanos::from_millis(600));
+        assert_eq!(lab.hear(logo), ["P I1=? I2=?"]);
+        lab.send(pump, format!("{line}\nP Q1=6\n").as_bytes());
+        assert_eq!(lab.hear(logo), ["P I1=5 I2=1", "P I1=6"], "{line}");
+    }
+}
+
+#[test]
+fn a_client_that_waited_for_the_disk_is_watched_again() {
+    let mut lab = Lab::new();
+    let logo = lab.join("VR LOGO I01 V=3");
+    let pump = lab.join("VP PUMP Q01 V=2 ALIVE=500ms");
+    lab.say(logo, "CONNECT I1:PUMP:Q1");
+    lab.say(pump, "P Q1=24");
+    assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24"]);
+    lab.wait(Nanos::from_millis(499));
+    // It waits for its answer when the times of all clients are looked at.
+    let dispatcher = &mut lab.dispatcher;
+    dispatcher.arrived(lab.now, pump, b"DISCONNECT Q1\nCONNECT Q1:LOGO:I1\n");
+    dispatcher.saving();
+    lab.now += Nanos::from_millis(2);
+    dispatcher.tick(lab.now);
+    dispatcher.saved(&Ok(()));
+    lab.settle();
+    lab.settle();
+    assert_eq!(lab.hear(pump), ["OK DISCONNECT", "OK CONNECT"]);
+    assert_eq!(lab.hear(logo), ["P I1=?", "P I1=24"]);
+    lab.say(pump, "PING");
+    lab.wait(Nanos::from_millis(510));
+    lab.wait(Nanos::from_millis(60));
+    assert_eq!(lab.hear(logo), ["P I1=?"]);
+}
+
+#[test]
+fn a_client_that_reads_no_answers_keeps_no_promise_either() {
+    let mut lab = Lab::new();
+    let logo = lab.join("VR LOGO I01 V=3");
+    let pump = lab.join("VP PUMP Q01 V=2 ALIVE=500ms");
+    lab.say(logo, "CONNECT I1:PUMP:Q1");
+    lab.say(pump, "P Q1=24");
+    assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24"]);
+    lab.say(pump, &"PING\n".repeat(8000));
+    assert!(
+        !lab.dispatcher.wants_bytes(pump),
+        "its answers have no room"
+    );
+    lab.wait(Nanos::from_millis(510));
+    lab.wait(Nanos::from_millis(60));
+    assert_eq!(lab.hear(logo), ["P I1=?"]);
+    lab.hear(pump);
+    assert_eq!(lab.hear(logo), ["P I1=24"]);
+}
+
 fn to_strings(lines: &[&str]) -> Vec<String> {
     lines.iter().map(|line| (*line).to_owned()).collect()
 }

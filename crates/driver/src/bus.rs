@@ -52,6 +52,7 @@ pub(super) fn open(
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
         events: config.events,
+        clock,
         hosted,
     };
     let bus = config.bus.open(&setup).map_err(|error| {

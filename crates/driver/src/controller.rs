@@ -92,7 +92,7 @@ impl Host {
             program,
             interval,
             has_watchdog,
-            tape: ScanRecorder::start(config, role, is_stepped)?,
+            tape: ScanRecorder::start(config, role, is_stepped, &clock)?,
         };
         let thread = match bus {
             Bus::Free(bus) => HostThread::start(hosted, &title, config, role, bus, clock),

@@ -248,7 +248,7 @@ impl Gateway {
     ///
     /// The run was broken off, or the server did not appear within the time-out.
     pub fn take_part(&mut self, meeting: &Meeting) -> Result<Outcome, Ended> {
-        let connection = connect(meeting, self.timeout, &self.declaration, &self.stop)?;
+        let connection = connect((meeting, &self.clock), self.timeout, &self.declaration, &self.stop)?;
         connection.run(self)
     }
 

@@ -43,6 +43,7 @@ impl Driver {
             &slots,
             Some(tx),
             matches!(bus, OpenBus::Stepped(_)),
+            &clock,
         )?;
         let simulation_time = Manual::new();
         let clock = match &bus {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, Plan, Slot};
 use tickbus_record::{Columns, Recorder, RecorderCounters, Rows, When};
@@ -16,6 +16,7 @@ pub(super) fn recorder(
     slots: &SlotMap,
     sent: Option<Area>,
     lossless: bool,
+    clock: &Arc<dyn Clock>,
 ) -> Result<Option<Recorder>, DriverError> {
     let wanted = config.record.as_ref();
     let Some(options) = wanted.filter(|options| options.when == When::Always) else {
@@ -31,7 +32,7 @@ pub(super) fn recorder(
         Some(area) => Rows::sending(columns, &config.table, area),
         None => columns.into(),
     };
-    let recorder = Recorder::start(options, config.folder(), rows, lossless)?;
+    let recorder = Recorder::start(options, config.folder(), rows, lossless, clock)?;
     Ok(Some(recorder))
 }
 
@@ -53,10 +54,11 @@ impl ScanRecorder {
         config: &Config,
         role: Role,
         lossless: bool,
+        clock: &Arc<dyn Clock>,
     ) -> Result<Option<Self>, DriverError> {
         let map = SlotMap::new(&config.table, role);
         let (writes, reads) = role.areas();
-        let recorder = recorder(config, &map, None, lossless)?;
+        let recorder = recorder(config, &map, None, lossless, clock)?;
         Ok(recorder.map(|recorder| Self {
             recorder,
             reads: Plan::new(&config.table, 0, reads),

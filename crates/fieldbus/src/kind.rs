@@ -2,10 +2,11 @@
 //! others ask of a bus before it runs.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use tickbus_axis::Axis;
 use tickbus_base::Mistake;
-use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_image::signal::{Signal, SignalTable};
 
@@ -32,6 +33,8 @@ pub struct BusSetup<'a> {
     pub max_age: Nanos,
     /// What is reported as events.
     pub events: Events,
+    /// The driver's clock, for what a stepped bus waits for in real time.
+    pub clock: &'a Arc<dyn Clock>,
     /// The program that runs at this end by itself; `None` for a simulation, which ticks.
     pub hosted: Option<Hosted<'a>>,
 }

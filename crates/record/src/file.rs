@@ -2,6 +2,10 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use tickbus_base::time::Clock;
 
 /// The destination of a recording.
 pub(super) trait Target: Write + Send {
@@ -13,6 +17,32 @@ impl Target for File {
     fn cut(&mut self, length: u64) -> io::Result<()> {
         self.set_len(length)?;
         self.seek(SeekFrom::Start(length)).map(drop)
+    }
+}
+
+/// A file in a simulation, whose disk may be full.
+pub(super) struct SimulatedFile {
+    pub(super) file: File,
+    pub(super) path: PathBuf,
+    pub(super) clock: Arc<dyn Clock>,
+}
+
+impl Write for SimulatedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self.clock.simulation() {
+            Some(simulation) => simulation.write(&self.file, &self.path, bytes),
+            None => self.file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Target for SimulatedFile {
+    fn cut(&mut self, length: u64) -> io::Result<()> {
+        self.file.cut(length)
     }
 }
 

@@ -3,26 +3,24 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError::Timeout};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
-use std::time::Duration;
 
 use super::columns::{Columns, Tick};
 use super::csv::CsvSink;
-use super::file::{Out, Target};
+use super::file::{Out, SimulatedFile, Target};
 use super::places::FileClaim;
 use super::rows::Rows;
 use super::sink::Sink;
 use super::vcd::VcdSink;
 use super::{Format, Options};
 use tickbus_base::statistics::Statistics;
-use tickbus_base::time::Nanos;
+use tickbus_base::thread::Thread;
+use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_image::signal::Slot;
 use tickbus_image::{RowReader, RowWriter, row_ring};
 
 /// How often the thread polls the ring. The tick makes no system calls, so that it cannot wake the thread.
-const LOOK: Duration = Duration::from_millis(5);
+const LOOK: Nanos = Nanos::from_millis(5);
 
 /// Every this many polls, everything is written to the file: a killed process loses at most a tenth of a
 /// second.
@@ -32,7 +30,7 @@ const LOOKS_PER_FLUSH: u32 = 20;
 const CHUNK: usize = 64 << 10;
 
 /// How long closing waits for a file that accepts no data.
-const CLOSE_TIMEOUT: Duration = Duration::from_secs(5);
+const CLOSE_TIMEOUT: Nanos = Nanos::from_secs(5);
 
 /// Words of a tick in the ring before the statuses of the stations: number, time, status.
 const HEAD: usize = 3;
@@ -98,6 +96,8 @@ struct Bell {
     work: Condvar,
     /// There is room in the ring, or there never will be.
     room: Condvar,
+    /// Wakes the recording thread of a simulation.
+    token: Stop,
 }
 
 #[derive(Debug, Default)]
@@ -115,6 +115,28 @@ impl Bell {
     fn ring(&self) {
         self.lock().rung = true;
         self.work.notify_one();
+        self.token.wake();
+    }
+
+    /// Ends the recording.
+    fn stop(&self) {
+        self.lock().stop = true;
+        self.work.notify_one();
+        self.token.stop();
+    }
+
+    /// Lets the recording thread wait until there is something to do, or for [`LOOK`]. That is real time, whatever the
+    /// driver's clock is, but in a simulation.
+    fn wait(&self, clock: &dyn Clock) {
+        if clock.simulation().is_some() {
+            clock.wait_until(clock.now() + LOOK, &self.token);
+        }
+        let mut state = self.lock();
+        if clock.simulation().is_none() && !state.stop && !state.rung {
+            let waited = self.work.wait_timeout(state, LOOK.to_duration());
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+        state.rung = false;
     }
 }
 
@@ -131,10 +153,10 @@ pub struct Recorder {
     lossless: bool,
     scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
-    pub(super) close_timeout: Duration,
-    /// Disconnected when the thread ends.
-    ended: Receiver<()>,
-    thread: Option<JoinHandle<()>>,
+    pub(super) close_timeout: Nanos,
+    clock: Arc<dyn Clock>,
+    /// `None` once it has ended.
+    thread: Option<Thread>,
 }
 
 /// Why a recording cannot start.
@@ -197,14 +219,23 @@ impl Recorder {
         folder: &Path,
         rows: Rows,
         lossless: bool,
+        clock: &Arc<dyn Clock>,
     ) -> Result<Self, RecorderError> {
         let path = folder.join(&options.file);
         let (file, place) = open(&path)?;
         let columns = &rows.columns;
         let words = HEAD + columns.stations.len() + columns.columns.len();
         let ticks = options.ticks(words);
-        let target = Box::new(file);
-        Self::over(target, options.format, rows, ticks, lossless, path, place)
+        let target: Box<dyn Target> = match clock.simulation() {
+            None => Box::new(file),
+            Some(_) => Box::new(SimulatedFile {
+                file,
+                path: path.clone(),
+                clock: Arc::clone(clock),
+            }),
+        };
+        let format = options.format;
+        Self::over(target, format, rows, ticks, lossless, (path, place), clock)
             .map_err(RecorderError::Thread)
     }
 
@@ -215,8 +246,8 @@ impl Recorder {
         rows: Rows,
         ticks: usize,
         lossless: bool,
-        path: PathBuf,
-        place: Option<FileClaim>,
+        (path, place): (PathBuf, Option<FileClaim>),
+        clock: &Arc<dyn Clock>,
     ) -> std::io::Result<Self> {
         let columns = &rows.columns;
         let head = HEAD + columns.stations.len();
@@ -227,8 +258,7 @@ impl Recorder {
             file: path,
             ..RecorderCounters::default()
         });
-        let (end, ended) = mpsc::channel::<()>();
-        let writing = Writing {
+        let mut writing = Writing {
             ring: reader,
             words: vec![0; head + slots].into(),
             tick: Tick::new(columns),
@@ -241,15 +271,9 @@ impl Recorder {
             scans: Arc::clone(&scans),
             bell: Arc::clone(&bell),
             place,
+            clock: Arc::clone(clock),
         };
-        let thread = std::thread::Builder::new()
-            .name("record".to_owned())
-            .spawn(move || {
-                let _end = end;
-                // Dropped before `_end`, so that the file is closed by the time the end is reported.
-                let mut writing = writing;
-                writing.run();
-            })?;
+        let thread = Thread::spawn(&**clock, "record", move || writing.run())?;
         Ok(Self {
             ring,
             head: Vec::with_capacity(head),
@@ -258,7 +282,7 @@ impl Recorder {
             scans,
             bell,
             close_timeout: CLOSE_TIMEOUT,
-            ended,
+            clock: Arc::clone(clock),
             thread: Some(thread),
         })
     }
@@ -302,9 +326,14 @@ impl Recorder {
     #[cold]
     fn wait_for_room(&mut self) {
         self.bell.ring();
+        let mut has_room = || !self.ring.is_full() || self.scans.ended.load(Ordering::Acquire);
+        if let Some(simulation) = self.clock.simulation() {
+            while !simulation.wait_for(LOOK, &mut has_room) {}
+            return;
+        }
         let mut state = self.bell.lock();
-        while self.ring.is_full() && !self.scans.ended.load(Ordering::Acquire) {
-            let waited = self.bell.room.wait_timeout(state, LOOK);
+        while !has_room() {
+            let waited = self.bell.room.wait_timeout(state, LOOK.to_duration());
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -317,15 +346,17 @@ impl Recorder {
 
 impl Drop for Recorder {
     fn drop(&mut self) {
-        self.bell.lock().stop = true;
-        self.bell.work.notify_one();
+        self.bell.stop();
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
         let written = || self.scans.ticks.load(Ordering::Relaxed);
         let mut before = written();
-        while self.ended.recv_timeout(self.close_timeout) == Err(Timeout) {
+        while !thread.ends_within(&*self.clock, self.close_timeout) {
             let ticks = written();
             if ticks == before {
                 log::error!(
-                    "{}: the file has taken nothing for {:?}, and the thread that records is left behind; the \
+                    "{}: the file has taken nothing for {}, and the thread that records is left behind; the \
                      recording may lack its end, see whether its disc answers",
                     self.scans.file.display(),
                     self.close_timeout
@@ -334,9 +365,7 @@ impl Drop for Recorder {
             }
             before = ticks;
         }
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
+        if !thread.join() {
             log::error!("{}: the recording panicked", self.scans.file.display());
         }
     }
@@ -358,6 +387,7 @@ struct Writing {
     scans: Arc<RecorderCounters>,
     bell: Arc<Bell>,
     place: Option<FileClaim>,
+    clock: Arc<dyn Clock>,
 }
 
 impl Writing {
@@ -395,12 +425,7 @@ impl Writing {
             if looks % LOOKS_PER_FLUSH == 0 {
                 self.out.flush()?;
             }
-            let mut state = self.bell.lock();
-            if !state.stop && !state.rung {
-                let waited = self.bell.work.wait_timeout(state, LOOK);
-                state = waited.unwrap_or_else(PoisonError::into_inner).0;
-            }
-            state.rung = false;
+            self.bell.wait(&*self.clock);
         }
         if !self.has_begun {
             // A run without a tick leaves the recording of an earlier one.

@@ -317,6 +317,10 @@ fn damage_is_told_with_its_place() {
     }
 }
 
+fn clock() -> std::sync::Arc<dyn tickbus_base::time::Clock> {
+    tickbus_base::time::Monotonic::shared()
+}
+
 /// Records ticks to a disk with `room` bytes; returns the recorder's statistics and the file.
 fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String, Vec<u8>, Columns) {
     let table = table(&[""]);
@@ -331,8 +335,8 @@ fn recorded(format: Format, room: usize, count: u64, lossless: bool) -> (String,
         columns.clone().into(),
         8,
         lossless,
-        path,
-        None,
+        (path, None),
+        &clock(),
     )
     .expect("a thread");
     let mut slots = Tick::new(&columns).values;
@@ -450,11 +454,11 @@ fn a_file_that_takes_nothing_does_not_keep_its_recorder_from_closing() {
         columns.clone().into(),
         8,
         false,
-        path,
-        None,
+        (path, None),
+        &clock(),
     )
     .expect("a thread");
-    recorder.close_timeout = std::time::Duration::from_millis(20);
+    recorder.close_timeout = Nanos::from_millis(20);
     let slots = Tick::new(&columns).values;
     recorder.record(1, Nanos(0), 0, std::iter::empty(), &slots);
     drop(recorder);
@@ -474,8 +478,8 @@ fn time_that_goes_back_is_recorded_as_standing_still() {
         columns.clone().into(),
         8,
         true,
-        "run".into(),
-        None,
+        ("run".into(), None),
+        &clock(),
     )
     .expect("a thread");
     let slots = Tick::new(&columns).values;

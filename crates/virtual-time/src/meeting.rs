@@ -1,8 +1,9 @@
 //! Where the clients of a run meet the server.
 
 use std::fmt;
+use std::sync::Arc;
 
-use tickbus_base::time::Stop;
+use tickbus_base::time::{Clock, Stop};
 use tickbus_base::toml_text::Value;
 use tickbus_fieldbus::tcp::Address;
 
@@ -32,14 +33,19 @@ impl Meeting {
         Some(name.to_owned())
     }
 
-    /// Joins the server there. When `stop` is stopped, the client leaves the run.
+    /// Joins the server there; over TCP, times are those of the clock. When `stop` is stopped, the client leaves the run.
     ///
     /// # Errors
     ///
     /// There is no server, or it has no seat free; or this system has no shared memory for clients.
-    pub fn connect(&self, client: Client, stop: &Stop) -> Result<Connection, Ended> {
+    pub fn connect(
+        &self,
+        client: Client,
+        clock: &Arc<dyn Clock>,
+        stop: &Stop,
+    ) -> Result<Connection, Ended> {
         match self {
-            Self::Tcp(address) => tcp::connect(address, client, stop),
+            Self::Tcp(address) => tcp::connect(address, client, clock, stop),
             #[cfg(unix)]
             Self::SharedMemory(name) => crate::shared_memory::connect(name, client, stop),
             #[cfg(not(unix))]

@@ -2,16 +2,21 @@
 
 mod common;
 
+use std::sync::Arc;
 use std::thread;
 
 use common::{client, mixer_settings, mixers, settings};
-use tickbus_base::time::{Monotonic, Nanos, Stop};
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::tcp::Address;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
     Cause, Controls, Ended, Hosting, Logic, Outcome, Participant, Settings, in_process, tcp,
 };
+
+fn clock() -> Arc<dyn Clock> {
+    Monotonic::shared()
+}
 
 /// A run over TCP, with a thread for each client; the answers of the server, and of the clients in their order.
 fn over_tcp(
@@ -394,7 +399,7 @@ fn a_client_that_goes_is_named_and_the_others_learn_it() {
         let joined = scope.spawn(|| tcp::join(&address, &mut good));
         scope.spawn(|| {
             let gone = tickbus_virtual_time::client::Client::new(gone).expect("it is right");
-            let mut gone = tcp::connect(&address, gone, &Stop::new()).expect("it listens");
+            let mut gone = tcp::connect(&address, gone, &clock(), &Stop::new()).expect("it listens");
             gone.wait(Nanos::MAX).expect("it starts");
             gone.answer(&[]);
             gone.wait(Nanos::MAX).expect("the first step");
@@ -443,7 +448,7 @@ fn a_client_waits_for_a_silent_server_no_longer_than_its_limit() {
     let address = Address::local(listener.local_addr().expect("it is bound").port());
     let client = client("one", 1, &[], &[], |_, _, _| Ok(())).declaration;
     let client = tickbus_virtual_time::client::Client::new(client).expect("it is right");
-    let mut client = tcp::connect(&address, client, &Stop::new()).expect("it listens");
+    let mut client = tcp::connect(&address, client, &clock(), &Stop::new()).expect("it listens");
     let ended = client
         .wait(Nanos::from_millis(120))
         .expect_err("nobody answers");
@@ -452,7 +457,7 @@ fn a_client_waits_for_a_silent_server_no_longer_than_its_limit() {
     stop.stop();
     let declaration = client.client().declaration().clone();
     let again = tickbus_virtual_time::client::Client::new(declaration).expect("it is right");
-    let mut again = tcp::connect(&address, again, &stop).expect("it listens");
+    let mut again = tcp::connect(&address, again, &clock(), &stop).expect("it listens");
     let ended = again.wait(Nanos::MAX).expect_err("it was stopped");
     assert_eq!(ended.cause, Cause::Stopped);
 }

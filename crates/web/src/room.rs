@@ -77,7 +77,7 @@ impl Room {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address, limits: Limits) -> io::Result<Self> {
-        let (listener, bound) = bind(address)?;
+        let (listener, bound) = bind(address, None)?;
         let host = if bound.ip().is_unspecified() {
             // Not an address to be opened.
             "localhost".to_owned()
@@ -85,7 +85,7 @@ impl Room {
             address.host.to_string()
         };
         Ok(Self {
-            listener,
+            listener: listener.into_os()?,
             address: bound,
             guard: Guard::new(&host)?,
             host,

@@ -1,7 +1,9 @@
 //! The clock of a simulated world, and the sockets that it has in the place of the system's.
 
+use std::fs::File;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -85,6 +87,11 @@ impl Simulation for SimulatedClock {
         let id = network(|network, random, now| network.connect(address, process, now, random));
         Ok(Box::new(Socket(id)))
     }
+
+    fn write(&self, file: &File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        let process = scheduler::process();
+        scheduler::disk(|disk, _| disk.write(process, file, path, bytes))
+    }
 }
 
 /// A listener or a connection of the network.
@@ -116,6 +123,14 @@ impl SimulatedStream for Socket {
     fn write(&self, bytes: &[u8]) -> io::Result<usize> {
         let times = scheduler::awake_since();
         network(|network, random, _| network.write(self.0, bytes, times, random))
+    }
+
+    fn wait(&self, interest: Interest, limit: Nanos) -> bool {
+        let sockets = [(0, self.0, interest)];
+        let mut ready = Vec::new();
+        let deadline = Nanos(scheduler::now().0.saturating_add(limit.0));
+        SimulatedClock.poll(&sockets, deadline, &Stop::new(), &mut ready);
+        !ready.is_empty()
     }
 
     fn shutdown_write(&self) -> io::Result<()> {

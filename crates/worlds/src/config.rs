@@ -4,7 +4,11 @@ use tickbus_base::time::Nanos;
 
 use crate::plan::{Bus, FAIL_SAFE, Plan, Watchdog};
 
-const ADDRESS: &str = "address = \"127.0.0.1:20030\"";
+/// The port of the world's line.
+pub(crate) const PORT: u16 = 20_030;
+
+/// The names of both ends at a dispatcher, and the lines that give them.
+pub(crate) const NAMES: [(&str, &str); 2] = [("D", "name = \"D\""), ("C", "name = \"C\"")];
 
 impl Plan {
     /// The driver.cfg of an end; `link` is the name of a loopback.
@@ -16,6 +20,15 @@ impl Plan {
         ];
         lines.extend(self.fieldbus(end, link));
         lines.extend(self.timing(end));
+        lines.extend(self.record_section(end));
+        lines.push(self.signal_sections(end));
+        lines.extend(self.fault_sections(end));
+        lines.join("\n")
+    }
+
+    /// The stations and their signals.
+    pub(crate) fn signal_sections(&self, end: usize) -> String {
+        let mut lines = Vec::new();
         for station in 0..self.stations {
             if self.stations > 1 {
                 lines.push(format!("[[station]]\nname = \"s{station}\""));
@@ -23,7 +36,7 @@ impl Plan {
         }
         for station in 0..self.stations {
             for area in ['Q', 'I'] {
-                lines.extend(self.signals(station, area));
+                lines.extend(self.signals(station, area, (area == 'Q') == (end == 0)));
             }
         }
         lines.join("\n")
@@ -40,18 +53,39 @@ impl Plan {
             (Bus::Modbus | Bus::ModbusRtu, false) => ("modbus-client", ""),
             (Bus::S7, true) => ("s7-server", ""),
             (Bus::S7, false) => ("s7-client", ""),
+            (Bus::Dispatcher, _) => ("dispatcher", NAMES[end].1),
         };
-        let mut lines = vec![format!("kind = \"{kind}\"\n{ADDRESS}\n{place}")];
+        let mut lines = vec![format!(
+            "kind = \"{kind}\"\naddress = \"127.0.0.1:{PORT}\"\n{place}"
+        )];
         match self.bus {
             Bus::SocketOnChange => lines.push("send = \"on-change\"".to_owned()),
             Bus::ModbusRtu => lines.push("framing = \"rtu\"".to_owned()),
             _ => {}
+        }
+        if self.laboratory.is_asked {
+            let cables = self
+                .cables()
+                .map(|(input, output)| format!("\"{input}:{}:{output}\"", NAMES[1 - end].0));
+            lines.push(format!(
+                "connect = [{}]",
+                cables.collect::<Vec<_>>().join(", ")
+            ));
         }
         if self.bus.asks() && !serves {
             let other = ["controller", "device"][end];
             lines.push(format!("write_to = \"tickbus {other}\""));
         }
         lines
+    }
+
+    /// Which input of an end belongs to which output of the other one, at a dispatcher.
+    pub(crate) fn cables(&self) -> impl Iterator<Item = (String, String)> {
+        let analog = if self.numbers { 3 } else { 1 };
+        let kinds = [("", 2 * self.stations), ("A", analog * self.stations)];
+        kinds.into_iter().flat_map(|(kind, count)| {
+            (1..=count).map(move |number| (format!("{kind}I{number}"), format!("{kind}Q{number}")))
+        })
     }
 
     /// What every bus has.
@@ -77,7 +111,7 @@ impl Plan {
     }
 
     /// The signals of a station in one direction.
-    fn signals(&self, station: usize, area: char) -> Vec<String> {
+    fn signals(&self, station: usize, area: char, reads: bool) -> Vec<String> {
         let of = if self.stations > 1 {
             format!("\nstation = \"s{station}\"")
         } else {
@@ -107,6 +141,10 @@ impl Plan {
             let real =
                 "type = \"REAL\"\nscale = { raw = [0, 100], value = [0.0, 50.0] }\nfail_safe = 2.5";
             lines.extend([signal("whole", "W10", whole), signal("real", "D12", real)]);
+        }
+        for typed in self.features.beside(area) {
+            let sections = typed.sections(area, station, reads).into_iter();
+            lines.extend(sections.map(|section| section + &of));
         }
         lines
     }

@@ -9,12 +9,15 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::clock::SimulatedClock;
-use crate::judge::{Shown, Stamp, level, real, whole};
+use crate::injector::Injector;
+use crate::judge::{Broken, Shown, Stamp, level, real, whole};
 use crate::plan::Plan;
 use crate::scheduler::now;
+use crate::tape::{Row, Tape};
+use crate::typed::Typed;
 
 /// The slots of a station in one direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Places {
     stamp: usize,
     pulse: usize,
@@ -22,6 +25,8 @@ struct Places {
     edges: Option<usize>,
     level: usize,
     numbers: Option<(usize, usize)>,
+    /// The signals beside the stamp.
+    typed: Vec<usize>,
 }
 
 /// An open driver.
@@ -33,6 +38,10 @@ pub(crate) struct End {
     reads: Vec<Places>,
     halves: bool,
     next_pulse: i64,
+    plan: Plan,
+    end: usize,
+    tape: Option<Tape>,
+    injector: Injector,
 }
 
 /// What a tick found.
@@ -42,40 +51,60 @@ pub(crate) struct Found {
     pub(crate) age: i64,
     pub(crate) sequence: u64,
     pub(crate) stations: Vec<Shown>,
+    /// What the end itself found.
+    pub(crate) broken: Option<Broken>,
 }
 
 /// How many files are known at a time: those of two ends, and of two worlds.
 const KNOWN: usize = 4;
 
 /// What a driver.cfg says. Several worlds have the same one, and reading it takes longer than a life of its driver.
-fn read(text: String) -> Config {
+fn read(path: &str, text: String) -> Config {
+    /// A file's path and text, and what it says.
+    type Known = (String, String, Config);
     thread_local! {
-        static READ: RefCell<VecDeque<(String, Config)>> = const { RefCell::new(VecDeque::new()) };
+        static READ: RefCell<VecDeque<Known>> = const { RefCell::new(VecDeque::new()) };
     }
     let known = READ.with_borrow(|files| {
-        let known = files.iter().find(|(known, _)| *known == text);
-        known.map(|(_, config)| config.clone())
+        let known = files
+            .iter()
+            .find(|known| known.0 == path && known.1 == text);
+        known.map(|known| known.2.clone())
     });
     known.unwrap_or_else(|| {
-        let config = Config::parse("driver.cfg", &text)
+        let config = Config::parse(path, &text)
             .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
         READ.with_borrow_mut(|files| {
             files.truncate(KNOWN - 1);
-            files.push_front((text, config.clone()));
+            files.push_front((path.to_owned(), text, config.clone()));
         });
         config
     })
 }
 
 impl End {
-    pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Self {
+    pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Result<Self, Broken> {
         let text = plan.driver_cfg(end, link);
-        let driver = Driver::open(read(text), SimulatedClock::shared())
+        let mut tape = Tape::begin(plan, end);
+        let folder = tape.as_ref().and_then(|tape| tape.path.parent());
+        let path = folder.map_or("driver.cfg".into(), |folder| folder.join("driver.cfg"));
+        let path = path.to_str().expect("a plain path");
+        let config = read(path, text);
+        if let Some(tape) = &tape {
+            let open = || {
+                let refused = Driver::open(config.clone(), SimulatedClock::shared()).err();
+                refused.map(|why| why.to_string())
+            };
+            tape.judge_refusal(open)?;
+        }
+        let mut driver = Driver::open(config, SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));
         let slots = driver.initial_slots();
         let signals = &driver.config().table.signals;
         let place = |name: String| signals.iter().position(|signal| signal.name == name);
         let places = |area: char| {
+            let typed = plan.features.beside(area);
+            let reads = (area == 'Q') == (end == 0);
             let stations = 0..plan.stations;
             let places = stations.map(|station| {
                 let at = |name: &str| place(format!("{name}{area}{station}"));
@@ -86,6 +115,11 @@ impl End {
                     edges: driver.slots().edges[pulse],
                     level: at("level").expect("it is in the file"),
                     numbers: at("whole").zip(at("real")),
+                    typed: typed
+                        .iter()
+                        .flat_map(|typed| typed.names(area, station, reads))
+                        .map(|name| place(name).expect("it is in the file"))
+                        .collect(),
                 }
             });
             places.collect()
@@ -95,7 +129,24 @@ impl End {
         } else {
             (places('Q'), places('I'))
         };
-        Self {
+        if let Some(tape) = &mut tape {
+            tape.names = signals.iter().map(|signal| signal.name.clone()).collect();
+            let edges = driver.slots().edges.iter().zip(signals);
+            let mut edges: Vec<_> = edges
+                .filter_map(|(slot, signal)| Some(((*slot)?, format!("{}.edges", signal.name))))
+                .collect();
+            edges.sort();
+            tape.names.extend(edges.into_iter().map(|(_, name)| name));
+        }
+        let injector = Injector::new(plan, end, &mut driver);
+        if let Some(tape) = &tape {
+            tape.judge_lock(plan, end)?;
+        }
+        Ok(Self {
+            plan: plan.clone(),
+            end,
+            tape,
+            injector,
             writes,
             reads,
             driver,
@@ -103,7 +154,7 @@ impl End {
             area: 1 - end as u64,
             halves: plan.ends[end].halves,
             next_pulse: now().0 + plan.pulses.0,
-        }
+        })
     }
 
     /// One tick, the `tick`th of this `life`; returns what it found, and whether it wrote a pulse.
@@ -113,8 +164,10 @@ impl End {
         if is_pulse {
             self.next_pulse = time + pulses.0;
         }
+        let injected = self.injector.before(tick, &mut self.driver);
+        let given = self.plan.features.times[self.end].at(tick);
         let found = if self.halves {
-            let found = self.driver.receive(None, &mut self.slots);
+            let found = self.driver.receive(given.map(Nanos), &mut self.slots);
             let shown = self.shown();
             self.write(life, tick, is_pulse);
             let sent = self.driver.send(&mut self.slots);
@@ -122,7 +175,7 @@ impl End {
             (found, shown)
         } else {
             self.write(life, tick, is_pulse);
-            let found = self.driver.exchange(None, &mut self.slots);
+            let found = self.driver.exchange(given.map(Nanos), &mut self.slots);
             (found, self.shown())
         };
         let (exchange, stations) = found;
@@ -131,8 +184,41 @@ impl End {
             age: exchange.age.0,
             sequence: exchange.sequence,
             stations,
+            broken: injected
+                .and_then(|()| self.judge_own(tick, exchange.code))
+                .err(),
         };
+        let on_line = self.tape.as_ref().map(|_| self.on_line());
+        if let (Some(tape), Some(on_line)) = (&mut self.tape, on_line) {
+            tape.rows.push(Row {
+                began: time,
+                ended: now().0,
+                time: given,
+                code: found.code.code(),
+                values: self.slots.iter().map(|slot| slot.0).collect(),
+                on_line,
+            });
+        }
         (found, is_pulse)
+    }
+
+    /// What it wrote it finds again, and who looks sees what it has.
+    fn judge_own(&mut self, tick: u64, code: Code) -> Result<(), Broken> {
+        let slots = self.slots.clone();
+        for places in &self.writes {
+            let stamp = slots[places.stamp].unsigned();
+            let numbers = places.numbers.is_none_or(|(at, other)| {
+                slots[at].real() == f64::from(whole(stamp)) && slots[other].real() == real(stamp)
+            });
+            let is_own = slots[places.level].real() == f64::from(u8::from(level(stamp)));
+            if Stamp::of(stamp).tick != tick || !is_own || !numbers {
+                return Err(Broken {
+                    promise: "own values",
+                    what: format!("tick {tick} of end {} finds others than it wrote", self.end),
+                });
+            }
+        }
+        self.injector.behind(tick, code, &slots)
     }
 
     fn write(&mut self, life: u64, tick: u64, is_pulse: bool) {
@@ -147,11 +233,32 @@ impl End {
             self.slots[places.stamp] = Slot::from_unsigned(stamp);
             self.slots[places.pulse] = Slot::from_real(f64::from(is_pulse));
             self.slots[places.level] = Slot::from_real(f64::from(level(stamp)));
+            let typed = self.plan.features.beside(['Q', 'I'][1 - self.end]);
+            for (place, typed) in places.typed.iter().zip(typed) {
+                self.slots[*place] = Slot(typed.written(stamp));
+            }
             if let Some((whole_at, real_at)) = places.numbers {
                 self.slots[whole_at] = Slot::from_real(whole(stamp).into());
                 self.slots[real_at] = Slot::from_real(real(stamp));
             }
         }
+    }
+
+    /// The slots, with what this end sends as it is on the line.
+    fn on_line(&self) -> Vec<u64> {
+        let mut values: Vec<u64> = self.slots.iter().map(|slot| slot.0).collect();
+        for places in &self.writes {
+            let stamp = values[places.stamp];
+            for (place, typed) in places.typed.iter().zip(self.beside()) {
+                values[*place] = typed.shown(Some(stamp), false)[0];
+            }
+        }
+        values
+    }
+
+    /// The signals beside the stamps that it writes.
+    fn beside(&self) -> &[Typed] {
+        self.plan.features.beside(['Q', 'I'][1 - self.end])
     }
 
     fn shown(&self) -> Vec<Shown> {
@@ -169,12 +276,22 @@ impl End {
                 numbers: places
                     .numbers
                     .map(|(whole, half)| (real(whole), real(half))),
+                typed: places
+                    .typed
+                    .iter()
+                    .map(|place| self.slots[*place].0)
+                    .collect(),
             }
         });
         shown.collect()
     }
 
-    pub(crate) fn close(self) {
+    /// Closes the driver, and judges what it leaves behind.
+    pub(crate) fn close(self) -> Result<(), Broken> {
         self.driver.close();
+        match &self.tape {
+            Some(tape) => tape.judge(&self.plan, self.end),
+            None => Ok(()),
+        }
     }
 }

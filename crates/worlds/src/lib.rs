@@ -7,20 +7,31 @@
 
 mod clock;
 mod config;
+mod disk;
 mod end;
+mod faults;
+mod features;
+mod injector;
 mod judge;
+mod laboratory;
 mod network;
 mod pairs;
 mod plan;
 mod random;
+mod replay;
 mod scheduler;
 mod seed;
 mod shrink;
+mod tape;
+mod typed;
 mod world;
 
+pub use faults::{Effect, FaultPlan, Way};
+pub use features::{Features, RecordPlan, Times};
 pub use judge::Broken;
 pub use network::Conditions;
 pub use pairs::Pairs;
-pub use plan::{Bus, EndPlan, Event, Misfortune, Plan, Watchdog};
+pub use plan::{BETWEEN, Bus, EndPlan, Event, LaboratoryPlan, Misfortune, Plan, Watchdog};
 pub use scheduler::Habits;
 pub use seed::Seed;
+pub use typed::Typed;

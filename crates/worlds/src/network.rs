@@ -36,6 +36,8 @@ struct Piece {
     at: i64,
     /// Since when the sender had not waited when it sent them.
     sent: i64,
+    /// The sender's process.
+    from: usize,
     bytes: Vec<u8>,
     read: usize,
 }
@@ -47,6 +49,8 @@ pub(crate) struct Delivery {
     pub at: i64,
     /// When they were sent, or earlier.
     pub sent: i64,
+    /// The process that sent them.
+    pub from: usize,
 }
 
 #[derive(Debug)]
@@ -252,11 +256,6 @@ impl Network {
         self.cut_until = self.cut_until.max(now + span);
     }
 
-    /// Whether bytes are held up.
-    pub(crate) fn is_held(&self, now: i64) -> bool {
-        self.cut_until > now
-    }
-
     /// The system closes what a process that was killed has left.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
         self.listeners
@@ -360,6 +359,7 @@ impl Network {
                 log.push(Delivery {
                     at: piece.at,
                     sent: piece.sent,
+                    from: piece.from,
                 });
                 end.incoming.pop_front();
             }
@@ -393,7 +393,7 @@ impl Network {
         if end.connected > now {
             return Err(ErrorKind::WouldBlock.into());
         }
-        let (conditions, own, other) = (self.conditions, id, end.other);
+        let (conditions, own, other, from) = (self.conditions, id, end.other, end.process);
         let (least, most) = conditions.latency;
         let Some(room) = self
             .ends
@@ -430,6 +430,7 @@ impl Network {
             other.incoming.push_back(Piece {
                 at,
                 sent,
+                from,
                 bytes: piece.to_vec(),
                 read: 0,
             });

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::plan::{FEATURES, Plan};
+use crate::plan::{Plan, all_features};
 
 /// How many worlds had both features of a pair.
 #[derive(Clone, Debug, Default)]
@@ -27,8 +27,9 @@ impl Pairs {
     /// The pairs that could have met, and have not.
     pub fn strangers(&self) -> Vec<String> {
         let mut strangers = Vec::new();
-        for (index, one) in FEATURES.iter().enumerate() {
-            for other in &FEATURES[index + 1..] {
+        let features = all_features();
+        for (index, one) in features.iter().enumerate() {
+            for other in &features[index + 1..] {
                 if !self.0.contains_key(&ordered(one, other)) {
                     strangers.push(format!("{one} + {other}"));
                 }

@@ -2,6 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
+use crate::features::{self, Features};
 use crate::network::Conditions;
 use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
@@ -22,6 +23,8 @@ pub enum Bus {
     ModbusRtu,
     /// S7.
     S7,
+    /// Lines of values, which a dispatcher in a process of its own passes on.
+    Dispatcher,
 }
 
 impl Bus {
@@ -32,11 +35,14 @@ impl Bus {
 
     /// Whether one message carries several stations.
     fn has_stations(self) -> bool {
-        matches!(self, Self::Loopback | Self::Socket | Self::SocketOnChange)
+        matches!(
+            self,
+            Self::Loopback | Self::Socket | Self::SocketOnChange | Self::Dispatcher
+        )
     }
 }
 
-/// What befalls a world. Ends are 0, the device, and 1, the controller; spans say how long it lasts.
+/// What befalls a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], who stands between them; spans say how long it lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Misfortune {
     /// All threads of an end stand still.
@@ -52,6 +58,12 @@ pub enum Misfortune {
     /// The driver of an end closes, and opens again later.
     Close(usize, Nanos),
 }
+
+/// The dispatcher, where misfortunes name an end.
+pub const BETWEEN: usize = 2;
+
+/// What makes the numbers that came later others than those of the seed.
+const LATER: u64 = 0x6C61_7465_7200;
 
 /// When it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -88,6 +100,15 @@ pub struct EndPlan {
     pub holds_while_stale: bool,
 }
 
+/// What the dispatcher of a world does.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct LaboratoryPlan {
+    /// The ends ask for their connections; without that, they stand in its patch.
+    pub is_asked: bool,
+    /// `--hold`: an input that has lost its source keeps its value.
+    pub holds: bool,
+}
+
 /// A whole world.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -111,6 +132,8 @@ pub struct Plan {
     pub pulses: Nanos,
     /// A bit that is written beside the others, so that the frames have other sizes.
     pub numbers: bool,
+    /// What the dispatcher does, if there is one.
+    pub laboratory: LaboratoryPlan,
     /// Both ends.
     pub ends: [EndPlan; 2],
     /// What the scheduler does.
@@ -121,6 +144,8 @@ pub struct Plan {
     pub span: Nanos,
     /// What happens, in the order of time.
     pub events: Vec<Event>,
+    /// What both ends have besides.
+    pub features: Features,
 }
 
 impl EndPlan {
@@ -158,7 +183,11 @@ fn draw_habits(random: &mut Random, is: impl Fn(u32) -> bool, max_age: Nanos) ->
 fn draw_conditions(random: &mut Random, is: impl Fn(u32) -> bool, bus: Bus) -> Conditions {
     let slowest = random.of(&[20_000, 200_000, 3_000_000]);
     // An answer fits into what a system keeps for a connection.
-    let small = if bus.asks() { [600, 1_000] } else { [16, 100] };
+    let small = if bus.asks() || bus == Bus::Dispatcher {
+        [600, 1_000]
+    } else {
+        [16, 100]
+    };
     let (splits, capacity) = (random.of(&[2, 10]), random.of(&small));
     Conditions {
         latency: (1_000, slowest),
@@ -189,8 +218,15 @@ impl Plan {
         let max_age = cycle.times(random.within(3, 12));
         let max_age = Nanos(max_age.0.max(8_000_000));
         // Each world draws which misfortunes and habits exist at all.
-        let has = random.number() & u64::from(seed.features);
+        let has = random.number() & seed.features;
         let is = |bit: u32| has >> bit & 1 == 1;
+        // Buses that came later are drawn from numbers of their own: old seeds keep their meaning.
+        let later = &mut Random::new(scramble(seed.number ^ LATER));
+        let bus = if is(40) && is(43) {
+            Bus::Dispatcher
+        } else {
+            bus
+        };
         let many = usize::try_from(random.within(2, 3)).expect("small");
         let stations = if is(0) && bus.has_stations() { many } else { 1 };
         let ends = [
@@ -214,16 +250,25 @@ impl Plan {
             hold,
             pulses: Nanos::ZERO,
             numbers: is(13),
+            laboratory: LaboratoryPlan {
+                // Rarely: what was refused is asked for again after 5 s, and such a world takes long.
+                is_asked: bus == Bus::Dispatcher && is(41) && later.once_in(6),
+                holds: bus == Bus::Dispatcher && is(42),
+            },
             ends,
             habits,
             conditions,
             span,
             events: Vec::new(),
+            features: Features::draw(seed, (bus, stations), is(13), max_age.0),
         };
         plan.draw_events(random, is);
         if seed.turn > 0 {
             plan.turn();
         }
+        let between = plan.events_between(later, is);
+        plan.events.extend(between);
+        plan.events.sort_by_key(|event| event.at);
         let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
         let line = plan.round_trip() + plan.habits.late * 8;
         plan.pulses = Nanos((slowest.0 * 6 + hold.0 * 2 + line).max(max_age.0 / 2));
@@ -233,7 +278,7 @@ impl Plan {
     /// The same two drivers, and other habits, another network, other misfortunes.
     fn turn(&mut self) {
         let random = &mut Random::new(scramble(self.seed.chance()));
-        let has = random.number() & u64::from(self.seed.features);
+        let has = random.number() & self.seed.features;
         let is = |bit: u32| has >> bit & 1 == 1;
         self.habits = draw_habits(random, is, self.max_age);
         self.conditions = draw_conditions(random, is, self.bus);
@@ -255,9 +300,37 @@ impl Plan {
     /// The time that the network takes for a whole cycle at most, in ns.
     pub(crate) fn round_trip(&self) -> i64 {
         // A request is asked and answered before the next one, in as many pieces as the connection takes.
-        let ways = if self.bus.asks() { 12 } else { 4 };
-        let pieces = if self.conditions.capacity < 500 { 4 } else { 1 };
+        let ways = match self.bus {
+            Bus::Dispatcher => 8,
+            bus if bus.asks() => 12,
+            _ => 4,
+        };
+        let bytes = self.features.frame() * self.stations;
+        let pieces = match self.conditions.capacity {
+            capacity if capacity < 500 => (bytes / capacity + 1).max(4),
+            _ => 1,
+        };
+        let pieces = i64::try_from(pieces).expect("small");
         self.conditions.latency.1 * ways * pieces
+    }
+
+    /// What befalls who stands between the ends.
+    fn events_between(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Vec<Event> {
+        let mut events = Vec::new();
+        for index in 5..8 {
+            let at = Nanos(random.within(0, self.span.0));
+            let span = Nanos(random.within(1_000_000, self.max_age.0 * 4));
+            let what = match random.below(6) {
+                0 | 1 if is(6) => Misfortune::Suspend(BETWEEN, span),
+                2 if is(10) => Misfortune::Kill(BETWEEN, span),
+                3 if is(11) => Misfortune::Close(BETWEEN, span),
+                _ => continue,
+            };
+            if self.bus == Bus::Dispatcher && is(5) && self.seed.events >> index & 1 == 1 {
+                events.push(Event { at, what });
+            }
+        }
+        events
     }
 
     fn draw_event(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Option<Event> {
@@ -286,6 +359,7 @@ impl Plan {
             Bus::Modbus => "modbus",
             Bus::ModbusRtu => "modbus rtu",
             Bus::S7 => "s7",
+            Bus::Dispatcher => "dispatcher",
         }];
         let mut add = |is: bool, name| {
             if is {
@@ -295,6 +369,8 @@ impl Plan {
         add(self.stations > 1, "stations");
         add(self.controller_serves, "controller serves");
         add(self.hold > Nanos::ZERO, "hold");
+        add(self.laboratory.is_asked, "dispatcher asked");
+        add(self.laboratory.holds, "dispatcher holds");
         add(self.numbers, "numbers");
         add(self.ends.iter().any(|end| end.halves), "halves");
         add(
@@ -317,6 +393,9 @@ impl Plan {
         add(self.conditions.latency.1 > 1_000_000, "slow network");
         for event in &self.events {
             let name = match event.what {
+                Misfortune::Suspend(BETWEEN, _) => "dispatcher suspended",
+                Misfortune::Kill(BETWEEN, _) => "dispatcher killed",
+                Misfortune::Close(BETWEEN, _) => "dispatcher closed",
                 Misfortune::Suspend(..) => "suspended",
                 Misfortune::Pause(..) => "paused",
                 Misfortune::Hold(..) => "bytes held",
@@ -328,18 +407,24 @@ impl Plan {
                 features.push(name);
             }
         }
+        features.extend(self.features.names());
         features
     }
 }
 
 /// All features that a world can have, each of the buses one.
-pub(crate) const FEATURES: &[&str] = &[
+pub(crate) fn all_features() -> Vec<&'static str> {
+    [FEATURES, features::NAMES].concat()
+}
+
+const FEATURES: &[&str] = &[
     "loopback",
     "socket",
     "on change",
     "modbus",
     "modbus rtu",
     "s7",
+    "dispatcher",
     "stations",
     "controller serves",
     "hold",
@@ -361,6 +446,11 @@ pub(crate) const FEATURES: &[&str] = &[
     "reset",
     "killed",
     "closed",
+    "dispatcher asked",
+    "dispatcher holds",
+    "dispatcher suspended",
+    "dispatcher killed",
+    "dispatcher closed",
 ];
 
 /// The fail-safe value of stamps: of no life.

@@ -16,6 +16,7 @@ use corosensei::stack::DefaultStack;
 use corosensei::{Coroutine, CoroutineResult, Yielder};
 use tickbus_base::time::{Interest, Nanos, Stop};
 
+use crate::disk::Disk;
 use crate::network::Network;
 use crate::random::Random;
 
@@ -86,6 +87,7 @@ struct World {
     /// Threads run so far.
     turns: u64,
     network: Network,
+    disk: Disk,
     /// What was spawned since the last look.
     spawned: Vec<(usize, Box<dyn FnOnce()>)>,
     /// How many times more a thread may be starved.
@@ -150,6 +152,7 @@ pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> R
             current: None,
             turns: 0,
             network: Network::default(),
+            disk: Disk::default(),
             spawned: vec![(0, Box::new(main))],
             starvations: STARVED,
             is_over: false,
@@ -403,6 +406,11 @@ pub(crate) fn suspend_process(process: usize, span: Nanos) {
 /// Acts on the network.
 pub(crate) fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
     with(|world| act(&mut world.network, &mut world.random, world.now))
+}
+
+/// Acts on the disk.
+pub(crate) fn disk<R>(act: impl FnOnce(&mut Disk, i64) -> R) -> R {
+    with(|world| act(&mut world.disk, world.now))
 }
 
 /// The time in this world, as the running thread reads it: it may lose the processor right after that.

@@ -13,9 +13,11 @@ pub struct Seed {
     /// 0, or another fate for the same two drivers: reading two files costs as much as what happens to them.
     pub turn: u8,
     /// Which features may exist.
-    pub features: u16,
+    pub features: u64,
     /// Which of the misfortunes drawn happen.
     pub events: u8,
+    /// Which of the features that are drawn last may exist.
+    pub more: u32,
 }
 
 impl From<u64> for Seed {
@@ -23,8 +25,9 @@ impl From<u64> for Seed {
         Self {
             number,
             turn: 0,
-            features: u16::MAX,
+            features: u64::MAX,
             events: u8::MAX,
+            more: u32::MAX,
         }
     }
 }
@@ -53,7 +56,8 @@ impl Seed {
     }
 }
 
-/// As it is written in the corpus, and on the command line: `number`, `number/turn`, and with `:features:events` behind that.
+/// As it is written in the corpus, and on the command line: `number` or `number/turn`; with `:features:events` behind that, which
+/// has none of the features that are drawn last, or with `:features:events:more`.
 impl fmt::Display for Seed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
@@ -61,13 +65,18 @@ impl fmt::Display for Seed {
             turn,
             features,
             events,
+            more,
         } = self;
         write!(f, "{number}")?;
         if *turn > 0 {
             write!(f, "/{turn}")?;
         }
-        if (*features, *events) != (u16::MAX, u8::MAX) {
-            write!(f, ":{features:x}:{events:x}")?;
+        if (*features, *events, *more) == (u64::MAX, u8::MAX, u32::MAX) {
+            return Ok(());
+        }
+        write!(f, ":{features:x}:{events:x}")?;
+        if *more > 0 {
+            write!(f, ":{more:x}")?;
         }
         Ok(())
     }
@@ -84,14 +93,16 @@ impl FromStr for Seed {
             let mut seed = Self::from(number.parse::<u64>().ok()?);
             seed.turn = turn.parse().ok()?;
             if let Some(features) = parts.next() {
-                seed.features = u16::from_str_radix(features, 16).ok()?;
+                seed.features = u64::from_str_radix(features, 16).ok()?;
                 seed.events = u8::from_str_radix(parts.next()?, 16).ok()?;
+                let more = parts.next().unwrap_or("0");
+                seed.more = u32::from_str_radix(more, 16).ok()?;
             }
             parts.next().is_none().then_some(seed)
         };
         read().ok_or_else(|| {
             format!(
-                "\"{text}\" is no seed; write a number, as in 4711, number/turn, as in 4711/2, or number:features:events, as in 4711:3ff:5"
+                "\"{text}\" is no seed; write a number, as in 4711, number/turn, as in 4711/2, or either with :features:events or :features:events:more behind it, as in 4711:3ff:5"
             )
         })
     }
@@ -108,18 +119,24 @@ mod tests {
             turn: 0,
             features: 0x3FF,
             events: 5,
+            more: 0,
+        };
+        let more = Seed {
+            more: 0x10,
+            ..small
         };
         let turned = Seed { turn: 3, ..small };
         for (seed, text) in [
             (Seed::from(4711), "4711"),
             (small, "4711:3ff:5"),
+            (more, "4711:3ff:5:10"),
             (turned, "4711/3:3ff:5"),
             (Seed::from(4711).next(), "4711/1"),
         ] {
             assert_eq!(seed.to_string(), text);
             assert_eq!(text.parse(), Ok(seed));
         }
-        for wrong in ["", "x", "1:2", "1:2:3:4", "-1", "1/", "1/256", "1/2/3"] {
+        for wrong in ["", "x", "1:2", "1:2:3:4:5", "-1", "1/", "1/256", "1/2/3"] {
             assert!(wrong.parse::<Seed>().is_err(), "{wrong}");
         }
     }

@@ -15,9 +15,18 @@ impl Seed {
                 .is_err_and(|Broken { promise: other, .. }| other == promise)
         };
         let mut smallest = self;
-        for bit in 0..u16::BITS {
+        for bit in 0..u64::BITS {
             let fewer = Self {
                 features: smallest.features & !(1 << bit),
+                ..smallest
+            };
+            if is_broken(fewer) {
+                smallest = fewer;
+            }
+        }
+        for bit in 0..u32::BITS {
+            let fewer = Self {
+                more: smallest.more & !(1 << bit),
                 ..smallest
             };
             if is_broken(fewer) {

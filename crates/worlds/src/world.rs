@@ -1,15 +1,19 @@
 //! A world as it happens.
 
+mod hosted;
+
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 
 use tickbus_base::time::Nanos;
-use tickbus_driver::Code;
+use tickbus_driver::{Code, Host};
 
-use crate::end::End;
+use crate::end::{End, Found};
+use crate::faults::FaultPlan;
 use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
-use crate::plan::{Bus, Misfortune, Plan, Watchdog};
+use crate::laboratory::{self, Laboratory};
+use crate::plan::{BETWEEN, Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
 use crate::scheduler::{self, Stuck};
 
@@ -37,12 +41,18 @@ struct EndState {
     is_finished: Cell<bool>,
     writer: RefCell<Writer>,
     reader: RefCell<Reader>,
+    tick: Cell<u64>,
+    /// How long the next scan of its program is to take.
+    stall: Cell<Nanos>,
+    /// Since when its line is down on purpose.
+    down_since: Cell<Option<i64>>,
 }
 
 struct Shared {
     plan: Plan,
     link: String,
     ends: [EndState; 2],
+    laboratory: Rc<Laboratory>,
     broken: RefCell<Option<Broken>>,
     /// When the controller had closed for good.
     controller_left: Cell<Option<i64>>,
@@ -95,6 +105,7 @@ impl Plan {
             plan: self.clone(),
             link: format!("{leaked} of {thread:?}"),
             ends: Default::default(),
+            laboratory: Rc::default(),
             broken: RefCell::default(),
             controller_left: Cell::default(),
             trace,
@@ -103,7 +114,9 @@ impl Plan {
             let shared = Rc::clone(&shared);
             move || fate(&shared)
         };
+        hosted::enter(&shared);
         let result = scheduler::run(scramble(self.seed.chance() ^ 1), self.habits, main);
+        hosted::leave();
         let is_broken = result.is_err() || shared.broken.borrow().is_some();
         LEAKED.set(leaked + u64::from(is_broken));
         if let Some(broken) = shared.broken.borrow_mut().take() {
@@ -124,6 +137,9 @@ fn fate(shared: &Rc<Shared>) {
     let plan = &shared.plan;
     scheduler::network(|network, _, _| network.conditions = plan.conditions);
     let began = scheduler::now();
+    if plan.bus == Bus::Dispatcher {
+        shared.laboratory.begin(plan);
+    }
     for end in 0..2 {
         begin(shared, end, 1);
     }
@@ -132,7 +148,13 @@ fn fate(shared: &Rc<Shared>) {
         scheduler::sleep(at - scheduler::now());
         befall(shared, event.what);
     }
-    scheduler::sleep(began + plan.span - scheduler::now());
+    // What a cable holds back comes, however long after that.
+    let holds = plan.events.iter().map(|event| match event.what {
+        Misfortune::Hold(span) => event.at + span,
+        _ => Nanos::ZERO,
+    });
+    let over = holds.fold(plan.span, Nanos::max);
+    scheduler::sleep(began + over - scheduler::now());
     recover(shared);
     let ended = scheduler::now();
     for end in [1, 0] {
@@ -154,12 +176,16 @@ fn fate(shared: &Rc<Shared>) {
             scheduler::sleep(plan.max_age);
         }
     }
+    if plan.bus == Bus::Dispatcher {
+        shared.check(shared.laboratory.end());
+    }
     judge_pulses(shared, ended);
 }
 
 fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
     let process = scheduler::new_process();
     shared.ends[end].process.set(process);
+    shared.laboratory.joins(end, process);
     let shared = Rc::clone(shared);
     scheduler::spawn(process, move || live(&shared, end, life, process));
 }
@@ -167,6 +193,9 @@ fn begin(shared: &Rc<Shared>, end: usize, life: u64) {
 fn befall(shared: &Rc<Shared>, what: Misfortune) {
     let order = |end: usize, order| shared.ends[end].orders.borrow_mut().push_back(order);
     match what {
+        Misfortune::Suspend(BETWEEN, _)
+        | Misfortune::Kill(BETWEEN, _)
+        | Misfortune::Close(BETWEEN, _) => shared.laboratory.befall(&shared.plan, what),
         Misfortune::Suspend(end, span) => {
             // Both ends of a loopback are one process.
             let both = shared.plan.bus == Bus::Loopback;
@@ -186,6 +215,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
             // What the process does from now on reaches nobody.
             let process = shared.ends[end].process.get();
             scheduler::network(|network, _, now| network.kill(process, now));
+            scheduler::disk(|disk, now| disk.kill(process, now));
             order(end, Order::Kill(span));
         }
     }
@@ -193,6 +223,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
 
 /// Without further misfortunes both ends have each other's newest values soon.
 fn recover(shared: &Shared) {
+    let plan = &shared.plan;
     let limit = scheduler::now() + PATIENCE;
     loop {
         scheduler::sleep(shared.plan.max_age);
@@ -205,10 +236,10 @@ fn recover(shared: &Shared) {
         });
         let [one, other] = judged;
         let judged = one.and(other);
-        // What is held up would arrive after the farewell that is judged next.
-        let is_held = scheduler::network(|network, _, now| network.is_held(now));
-        let is_whole =
-            judged.is_ok() && !is_held && shared.ends.iter().all(|end| end.is_open.get());
+        let is_over = |end: usize| plan.has_no_more_faults(end, shared.ends[end].tick.get());
+        let is_whole = judged.is_ok()
+            && shared.ends.iter().all(|end| end.is_open.get())
+            && [0, 1].into_iter().all(is_over);
         if is_whole {
             return;
         }
@@ -226,24 +257,36 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let mut random = Random::new(scramble(
         plan.seed.chance() ^ scramble(life << 8 | end as u64),
     ));
-    let mut driver = End::open(plan, end, &shared.link);
     state.reader.borrow_mut().begin(plan.stations);
+    state.tick.set(0);
+    state.down_since.set(None);
+    let mut driver = if plan.features.hosted == Some(end) {
+        Ticker::Hosted(hosted::open(shared, (end, process), life))
+    } else {
+        match End::open(plan, end, &shared.link) {
+            Ok(driver) => Ticker::Driven(Box::new(driver)),
+            Err(broken) => return shared.fail(broken),
+        }
+    };
     state.is_open.set(true);
     let mut tick = 0;
     loop {
         let order = state.orders.borrow_mut().pop_front();
         match order {
             None => {}
-            Some(Order::Pause(span)) => scheduler::sleep(span),
+            Some(Order::Pause(span)) => match driver {
+                Ticker::Driven(_) => scheduler::sleep(span),
+                Ticker::Hosted(_) => state.stall.set(span),
+            },
             Some(Order::Finish) => {
-                driver.close();
+                shared.check(driver.close());
                 state.is_finished.set(true);
                 return;
             }
             Some(Order::Close(span) | Order::Kill(span)) => {
                 state.is_open.set(false);
                 let asked = scheduler::now();
-                driver.close();
+                shared.check(driver.close());
                 let took = scheduler::now() - asked;
                 if took > LONGEST_CLOSE {
                     shared.fail(Broken {
@@ -256,10 +299,27 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
                 return;
             }
         }
-        tick += 1;
-        one_tick(shared, (end, process), &mut driver, (life, tick));
+        if let Ticker::Driven(driver) = &mut driver {
+            tick += 1;
+            one_tick(shared, (end, process), driver, (life, tick));
+        }
         let period = plan.ends[end].period.0;
         scheduler::sleep(Nanos(random.within(period / 2, period + period / 2)));
+    }
+}
+
+/// What ticks an end.
+enum Ticker {
+    Driven(Box<End>),
+    Hosted(Host),
+}
+
+impl Ticker {
+    fn close(self) -> Result<(), Broken> {
+        match self {
+            Self::Driven(driver) => driver.close(),
+            Self::Hosted(host) => hosted::close(host),
+        }
     }
 }
 
@@ -270,7 +330,7 @@ fn one_tick(
     (life, tick): (u64, u64),
 ) {
     let plan = &shared.plan;
-    let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
+    let state = &shared.ends[end];
     let began = scheduler::now().0;
     state.writer.borrow_mut().begin(life, tick);
     let (found, is_pulse) = driver.tick(life, tick, plan.pulses);
@@ -281,6 +341,35 @@ fn one_tick(
         if is_pulse {
             writer.pulses.push(began);
         }
+    }
+    judge_tick(
+        shared,
+        (end, process),
+        (life, tick),
+        (began, is_pulse),
+        found,
+    );
+}
+
+/// Judges what a tick found.
+fn judge_tick(
+    shared: &Shared,
+    (end, process): (usize, usize),
+    (life, tick): (u64, u64),
+    (began, is_pulse): (i64, bool),
+    mut found: Found,
+) {
+    let plan = &shared.plan;
+    let (state, peer) = (&shared.ends[end], &shared.ends[1 - end]);
+    if let Some(broken) = found.broken.take() {
+        return shared.fail(broken);
+    }
+    state.tick.set(tick);
+    let down_since = state.down_since.get().unwrap_or(began);
+    let is_down = plan.is_down(end, tick);
+    state.down_since.set(is_down.then_some(down_since));
+    if plan.is_disturbed(end, tick) {
+        state.reader.borrow_mut().stale.push(began);
     }
     if found.code.code() < 0 {
         shared.fail(Broken {
@@ -309,20 +398,30 @@ fn one_tick(
     log::trace!("{}", line());
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
-        let deliveries = network.deliveries.entry(process).or_default();
+        let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
+        let heard = (end, began - found.age);
+        let known = shared.laboratory.known(plan, network, heard, deliveries);
         let seen = Seen {
             began,
+            tick,
             is_stale: found.code == Code::Stale,
             is_fresh: found.code == Code::Fresh,
             age: found.age,
             sequence: found.sequence,
             stations: &found.stations,
             deliveries,
+            known,
         };
         let mut reader = state.reader.borrow_mut();
         reader.judge(plan, end as u64, &writer, &seen)?;
+        if let Some(known) = known.filter(|_| plan.bus == Bus::Dispatcher) {
+            laboratory::judge_silence(plan, known, &seen)?;
+        }
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
+        }
+        for since in [state, peer].iter().filter_map(|end| end.down_since.get()) {
+            Reader::judge_down(plan, since, &seen)?;
         }
         match shared.controller_left.get() {
             Some(left) if end == 0 => Reader::judge_farewell(plan, left, &seen),
@@ -363,8 +462,10 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
             let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
             // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
-            let interrupts =
-                watchdog(plan, 1 - end).is_some() || end == 0 && !plan.ends[1].holds_while_stale;
+            let interrupts = plan.features.faults.iter().any(FaultPlan::is_of_line)
+                || watchdog(plan, 1 - end).is_some()
+                || plan.bus == Bus::Dispatcher
+                || end == 0 && !plan.ends[1].holds_while_stale;
             if seen > written && !plan.bus.asks() && !interrupts {
                 shared.fail(Broken {
                     promise: "edges",

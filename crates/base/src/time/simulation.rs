@@ -5,8 +5,10 @@
 //! one, and through the operating system where it has none. No product has one.
 
 use std::fmt;
-use std::io;
+use std::fs::File;
+use std::io::{self, Write as _};
 use std::net::SocketAddr;
+use std::path::Path;
 
 use super::{Nanos, Stop};
 
@@ -64,6 +66,16 @@ pub trait Simulation {
     ///
     /// The failure is known at once.
     fn connect(&self, address: SocketAddr) -> io::Result<Box<dyn SimulatedStream>>;
+
+    /// Writes to a file, as [`std::io::Write::write`]: the disk may be full, and a process that was killed writes nothing.
+    ///
+    /// # Errors
+    ///
+    /// As of a file of the operating system.
+    fn write(&self, mut file: &File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
+        let _ = path;
+        file.write(bytes)
+    }
 }
 
 /// A socket of a [`Simulation`].
@@ -104,6 +116,9 @@ pub trait SimulatedStream: SimulatedSocket {
     ///
     /// As of a socket of the operating system.
     fn write(&self, bytes: &[u8]) -> io::Result<usize>;
+
+    /// Waits until it is ready, or for `limit`; returns whether it is.
+    fn wait(&self, interest: Interest, limit: Nanos) -> bool;
 
     /// Closes the sending direction.
     ///

@@ -113,14 +113,17 @@ impl<'a> Connection<'a> {
         port.tell("pdu", &length.to_string());
         port.running(&format!("connected with {}, {line}", self.peer));
         // Before the first cycle: the memory of a CPU in STOP must not be taken for its outputs.
-        self.ask_state(now);
+        self.ask_state(now, port);
     }
 
     /// Asks for the operating state if that is due, between two cycles.
-    fn ask_state(&mut self, now: Nanos) {
+    fn ask_state(&mut self, now: Nanos, port: &mut Port) {
         if self.session.is_idle() && self.state.is_some_and(|due| due <= now) {
             self.state = Some(now + STATE);
-            self.session.ask_state(now);
+            // A server takes any question for a sign of life, and none passes a line that is down.
+            if port.is_up(now) {
+                self.session.ask_state(now);
+            }
         }
     }
 
@@ -299,7 +302,7 @@ impl Caller for Connection<'_> {
             return Ok(());
         }
         // Before the cycle, or an overloaded line would never get to it.
-        self.ask_state(now);
+        self.ask_state(now, port);
         if self.pace.take(now) {
             self.cycle(now, port)?;
         }

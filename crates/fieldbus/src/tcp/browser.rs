@@ -100,7 +100,10 @@ mod tests {
             let known = (1..).find(|count| begins_like_browser(&whole[..*count]));
             let known = known.expect("it is known at some byte");
             for count in 1..known {
-                assert!(may_become_browser(&whole[..count]), "{count} bytes of {whole:02x?}");
+                assert!(
+                    may_become_browser(&whole[..count]),
+                    "{count} bytes of {whole:02x?}"
+                );
             }
         }
         assert!(!may_become_browser(b"P Q1=24\n"));

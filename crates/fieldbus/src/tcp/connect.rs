@@ -9,7 +9,7 @@ use socket2::{Domain, Protocol, Socket, Type};
 use crate::{BusError, Port};
 use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet};
-use tickbus_base::time::{Nanos, Stop};
+use tickbus_base::time::{Nanos, Simulation, Stop};
 
 use super::resolve::resolve;
 use super::{Address, no_wait, prepare};
@@ -44,6 +44,26 @@ pub fn connect(
         BusError::Link(format!("the connection with {peer} broke at once: {error}"))
     })?;
     Ok(Some((stream, peer)))
+}
+
+/// As [`reach`], on the network of `simulation` if there is one.
+///
+/// # Errors
+///
+/// As there.
+pub fn reach_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<TcpStream> {
+    let Some(simulation) = simulation else {
+        return reach(address).map(TcpStream::from);
+    };
+    let mut addresses = address.to_string().to_socket_addrs()?;
+    let stream = simulation.connect(addresses.next().ok_or(ErrorKind::NotFound)?)?;
+    if !stream.wait(Interest::Write, PATIENCE) {
+        return Err(ErrorKind::TimedOut.into());
+    }
+    match stream.take_error()? {
+        Some(error) => Err(error),
+        None => Ok(TcpStream::Simulated(stream)),
+    }
 }
 
 /// Connects for a client that has no [`Port`]; blocks for a few seconds per address of the host.

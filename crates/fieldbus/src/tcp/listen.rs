@@ -1,11 +1,11 @@
 //! Listening for connections.
 
 use std::io::{self, ErrorKind};
-use std::net::{self, SocketAddr};
+use std::net::{SocketAddr, ToSocketAddrs as _};
 
 use crate::{BusError, Port};
 use tickbus_base::net::TcpListener;
-use tickbus_base::time::Stop;
+use tickbus_base::time::{Simulation, Stop};
 
 use super::Address;
 use super::resolve::resolve;
@@ -47,15 +47,18 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
-/// Listens on `address` at once, without blocking, for a server that has no [`Port`]; returns what was bound. Port 0 lets the
-/// system choose one.
+/// Listens on `address` at once, without blocking, for a server that has no [`Port`], on the network of `simulation` if there is
+/// one; returns what was bound. Port 0 lets the system choose one.
 ///
 /// # Errors
 ///
 /// The host is unknown, or the address cannot be listened on.
-pub fn bind(address: &Address) -> io::Result<(net::TcpListener, SocketAddr)> {
-    let listener = net::TcpListener::bind(address.to_string())?;
-    listener.set_nonblocking(true)?;
+pub fn bind(
+    address: &Address,
+    simulation: Option<&dyn Simulation>,
+) -> io::Result<(TcpListener, SocketAddr)> {
+    let addresses: Vec<SocketAddr> = address.to_string().to_socket_addrs()?.collect();
+    let listener = TcpListener::bind(&addresses, simulation)?;
     let bound = listener.local_addr()?;
     Ok((listener, bound))
 }

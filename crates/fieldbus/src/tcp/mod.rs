@@ -16,7 +16,7 @@ use super::BusError;
 
 pub use address::{Address, Host};
 pub use browser::{IS_BROWSER, begins_like_browser, may_become_browser};
-pub use connect::{connect, reach};
+pub use connect::{connect, reach, reach_in};
 pub use dial::{Call, Caller, Stream, dial};
 pub use dialler::Dialler;
 pub use listen::{bind, is_of_the_client, listen, not_accepted};

@@ -61,12 +61,15 @@ pub fn prepare<'a>(stream: impl Into<Option<&'a TcpStream>>, patience: Nanos) ->
 
 /// Replaces the patience of [`prepare`] for a peer that need not read: the system asks its computer every second whether the
 /// connection is still there, and ends it after two questions without an answer. While data are on their way it does not ask;
-/// [`peer_silence`](tickbus_base::os::peer_silence) tells of those.
+/// [`peer_silence`](tickbus_base::os::peer_silence) tells of those. `None`, of a simulation, does so anyway.
 ///
 /// # Errors
 ///
 /// The system refuses one of these settings.
-pub fn watch_peer(stream: &TcpStream) -> io::Result<()> {
+pub fn watch_peer<'a>(stream: impl Into<Option<&'a TcpStream>>) -> io::Result<()> {
+    let Some(stream) = stream.into() else {
+        return Ok(());
+    };
     let socket = SockRef::from(stream);
     // A limit would count for a peer as well that is there and does not read.
     #[cfg(any(target_os = "linux", target_os = "android"))]

@@ -1,10 +1,11 @@
 //! The client: it blocks while it waits for the server.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::TcpStream;
+use std::sync::Arc;
 
-use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, prepare, reach};
+use tickbus_base::net::BlockingStream;
+use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
+use tickbus_fieldbus::tcp::{Address, prepare, reach_in};
 
 use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, silent};
@@ -23,16 +24,22 @@ const PATIENCE: Nanos = Nanos::from_secs(10);
 /// There is no server, it refuses this client, or the run was broken off.
 pub fn join(address: &Address, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
     let client = client_of(participant)?;
-    connect(address, client, &Stop::new())?.run(participant)
+    let clock = Monotonic::shared() as _;
+    connect(address, client, &clock, &Stop::new())?.run(participant)
 }
 
-/// Connects with the server at `address`, and joins. When `stop` is stopped, the client leaves the run.
+/// Connects with the server at `address`, and joins. Times are those of the clock. When `stop` is stopped, the client leaves the run.
 ///
 /// # Errors
 ///
 /// There is no server.
-pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connection, Ended> {
-    let stream = open(address).map_err(|error| {
+pub fn connect(
+    address: &Address,
+    client: Client,
+    clock: &Arc<dyn Clock>,
+    stop: &Stop,
+) -> Result<Connection, Ended> {
+    let stream = open(address, &**clock).map_err(|error| {
         let reason = format!(
             "no server can be reached at {address} ({error}); start it first, or correct the address"
         );
@@ -40,6 +47,7 @@ pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connect
     })?;
     let line = TcpLine {
         stream,
+        clock: Arc::clone(clock),
         stop: stop.clone(),
         buffer: vec![0; 4096],
         start: 0,
@@ -48,17 +56,16 @@ pub fn connect(address: &Address, client: Client, stop: &Stop) -> Result<Connect
     Ok(Connection::join(client, line))
 }
 
-fn open(address: &Address) -> io::Result<TcpStream> {
-    let stream = reach(address)?;
-    prepare(&stream, PATIENCE)?;
-    stream.set_nonblocking(false)?;
-    stream.set_read_timeout(Some(LOOK.to_duration()))?;
-    Ok(stream)
+fn open(address: &Address, clock: &dyn Clock) -> io::Result<BlockingStream> {
+    let stream = reach_in(address, clock.simulation())?;
+    prepare(stream.os(), PATIENCE)?;
+    stream.block(LOOK, None)
 }
 
 #[derive(Debug)]
 struct TcpLine {
-    stream: TcpStream,
+    stream: BlockingStream,
+    clock: Arc<dyn Clock>,
     stop: Stop,
     buffer: Vec<u8>,
     start: usize,
@@ -72,7 +79,7 @@ fn lost(what: impl std::fmt::Display) -> Ended {
 impl Line for TcpLine {
     fn send(&mut self, frame: &[u8]) {
         // If this fails, the server may have said why before: its last words are read next, or that it is lost.
-        let _ = self.stream.write_all(frame);
+        let _ = (&self.stream).write_all(frame);
     }
 
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
@@ -96,14 +103,14 @@ impl Line for TcpLine {
             if self.end == self.buffer.len() {
                 self.buffer.resize(2 * self.end, 0);
             }
-            match self.stream.read(&mut self.buffer[self.end..]) {
+            match (&self.stream).read(&mut self.buffer[self.end..]) {
                 Ok(0) => return Err(lost("it closed the connection")),
                 Ok(count) => self.end += count,
                 Err(error) if is_later(&error) => {
                     if self.stop.is_stopped() {
                         return Err(Ended::before(Cause::Stopped, "this client was stopped"));
                     }
-                    let now = Monotonic::shared().now();
+                    let now = self.clock.now();
                     if now >= *until.get_or_insert(now + limit - LOOK) {
                         return Err(silent(limit));
                     }

@@ -1,8 +1,8 @@
 //! The server's end of one connection.
 
 use std::io::{self, Read as _, Write as _};
-use std::net::TcpStream;
 
+use tickbus_base::net::{BlockingStream, TcpStream};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser, close_gracefully, prepare};
 
@@ -20,7 +20,7 @@ const BUFFER: usize = 4096;
 /// an answer by one call, without asking first whether it is there.
 #[derive(Debug)]
 pub(super) struct Connection {
-    pub(super) stream: TcpStream,
+    stream: BlockingStream,
     buffer: Vec<u8>,
     /// What has arrived and was not taken yet.
     start: usize,
@@ -41,18 +41,20 @@ pub(super) enum Arrived {
 impl Connection {
     /// A connection whose peer may leave sent data unacknowledged for `patience`.
     pub(super) fn new(stream: TcpStream, patience: Nanos) -> io::Result<Self> {
-        prepare(&stream, patience)?;
-        stream.set_nonblocking(false)?;
-        stream.set_read_timeout(Some(BLOCKED.to_duration()))?;
-        stream.set_write_timeout(Some(BLOCKED.to_duration()))?;
+        prepare(stream.os(), patience)?;
         Ok(Self {
-            stream,
+            stream: stream.block(BLOCKED, Some(BLOCKED))?,
             buffer: vec![0; BUFFER],
             start: 0,
             end: 0,
             out: Vec::with_capacity(BUFFER),
             written: 0,
         })
+    }
+
+    /// What the server waits for.
+    pub(super) const fn stream(&self) -> &TcpStream {
+        self.stream.stream()
     }
 
     /// Reads once.
@@ -67,7 +69,7 @@ impl Connection {
             // Frames have a limit, so this ends; and it takes as many bytes of the peer as of ours.
             self.buffer.resize(2 * self.end, 0);
         }
-        match self.stream.read(&mut self.buffer[self.end..]) {
+        match (&self.stream).read(&mut self.buffer[self.end..]) {
             Ok(0) => Arrived::Gone("it closed the connection".to_owned()),
             Ok(count) => {
                 self.end += count;
@@ -103,7 +105,7 @@ impl Connection {
     /// Writes what is left.
     pub(super) fn write(&mut self) -> io::Result<()> {
         while self.is_blocked() {
-            match self.stream.write(&self.out[self.written..]) {
+            match (&self.stream).write(&self.out[self.written..]) {
                 Ok(0) => return Err(io::ErrorKind::WriteZero.into()),
                 Ok(count) => self.written += count,
                 Err(error) if is_later(&error) => return Ok(()),
@@ -123,7 +125,7 @@ impl Connection {
     /// Makes reads and writes return at once from now on.
     pub(super) fn never_block(&self) {
         // If this fails, the connection has failed, and will say so.
-        let _ = self.stream.set_nonblocking(true);
+        let _ = self.stream.never_block();
     }
 }
 

@@ -1,10 +1,11 @@
 //! The server: one thread for all connections.
 
 use std::io;
-use std::net::{SocketAddr, TcpListener};
+use std::net::SocketAddr;
 
+use tickbus_base::net::TcpListener;
 use tickbus_base::os::{Interest, PollSet};
-use tickbus_base::time::Nanos;
+use tickbus_base::time::{Nanos, Simulation};
 use tickbus_fieldbus::tcp::{Address, bind, is_of_the_client};
 
 use super::connection::{Arrived, BLOCKED, Connection};
@@ -48,7 +49,16 @@ impl Listener {
     ///
     /// The host is unknown, or the address cannot be listened on.
     pub fn bind(address: &Address) -> io::Result<Self> {
-        let (listener, address) = bind(address)?;
+        Self::bind_in(address, None)
+    }
+
+    /// As [`bind`](Self::bind), on the network of `simulation` if there is one.
+    ///
+    /// # Errors
+    ///
+    /// As there.
+    pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
+        let (listener, address) = bind(address, simulation)?;
         Ok(Self { listener, address })
     }
 
@@ -301,7 +311,7 @@ impl Host<'_, '_, '_> {
                 continue;
             };
             let seat = self.server.connected(now);
-            self.set.add(seat, &connection.stream, Interest::Read)?;
+            self.set.add(seat, connection.stream(), Interest::Read)?;
             if seat >= self.connections.len() {
                 self.connections.resize_with(seat + 1, || None);
             }
@@ -313,7 +323,7 @@ impl Host<'_, '_, '_> {
     /// The connection at `seat` is gone.
     fn lose(&mut self, seat: usize, reason: &str) {
         if let Some(connection) = self.connections[seat].take() {
-            self.set.remove(seat, &connection.stream);
+            self.set.remove(seat, connection.stream());
             self.server.lost(seat, reason);
         }
     }
@@ -321,7 +331,7 @@ impl Host<'_, '_, '_> {
     /// The connection at `seat` has got its last message, or will have.
     fn leave(&mut self, seat: usize, now: Nanos) {
         if let Some(connection) = self.connections[seat].take() {
-            self.set.remove(seat, &connection.stream);
+            self.set.remove(seat, connection.stream());
             if connection.is_blocked() {
                 self.leaving.push((connection, now + FAREWELL));
             }

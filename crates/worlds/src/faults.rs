@@ -1,0 +1,362 @@
+//! Injected faults and forced signals: which are active in which tick of an end, and what they make of values.
+
+use tickbus_base::time::Nanos;
+
+use crate::judge::{Stamp, level, real, whole};
+use crate::plan::Plan;
+use crate::random::Random;
+
+/// A signal beside each stamp that faults bend: its name, and its fail-safe value.
+const SIGNALS: [(&str, f64); 3] = [("level", 0.0), ("whole", -7.0), ("real", 2.5)];
+
+/// What a fault does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Effect {
+    /// The signal of this index and area stays at a value, or where it is.
+    Stuck(usize, char, Option<f64>),
+    /// A BOOL is the other way round.
+    Invert(char),
+    /// Something is added.
+    Offset(usize, char, f64),
+    /// Something up to that is added or taken away.
+    Noise(usize, char, f64),
+    /// A BOOL is inverted now and then.
+    Flicker(char),
+    /// What comes in is held back.
+    Delay(Nanos),
+    /// What goes out is.
+    SlowAnswers(Nanos),
+    /// Frames are lost, of `direction`.
+    Drop(&'static str),
+    /// Frames come twice.
+    Duplicate(&'static str),
+    /// Nothing goes out or comes in.
+    LinkDown,
+}
+
+/// How it is injected, and ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Way {
+    /// By a section in driver.cfg, with `tick` and `ticks`.
+    File,
+    /// While the driver ticks, with `ticks`.
+    Injected,
+    /// The same, and ended by a call.
+    Ended,
+    /// By somebody who watches, as the live page does: a stuck signal.
+    Forced,
+}
+
+/// A fault of an end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FaultPlan {
+    /// Where.
+    pub end: usize,
+    /// What it does.
+    pub effect: Effect,
+    /// How it comes about.
+    pub way: Way,
+    /// Its first tick in each life of the driver.
+    pub first: u64,
+    /// How many ticks it lasts.
+    pub ticks: u64,
+}
+
+/// Whether a fault is active in a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Activity {
+    No,
+    /// The tick may have learnt of it already, or not yet.
+    Maybe,
+    Yes,
+}
+
+/// The least and the greatest value that may be shown.
+pub(crate) type Span = (f64, f64);
+
+impl FaultPlan {
+    /// Some faults: of signals, of the line, and forced signals, as far as they may be.
+    pub(crate) fn draw(random: &mut Random, numbers: bool, max_age: i64) -> Vec<Self> {
+        let count = random.within(1, 4);
+        let mut used = Vec::new();
+        let mut faults = Vec::new();
+        for _ in 0..count {
+            let end = usize::try_from(random.below(2)).expect("small");
+            let signal = usize::try_from(random.below(if numbers { 3 } else { 1 })).expect("small");
+            let area = random.of(&['I', 'Q']);
+            let by: f64 = random.of(&[-40.0, 0.5, 30_000.0]);
+            let direction = random.of(&["in", "out", "both"]);
+            let stuck = random.once_in(2).then_some([1.0, 77.0, -1.5][signal]);
+            let held = Nanos(random.within(1_000_000, max_age * 2));
+            let way = random.of(&[Way::File, Way::Injected, Way::Ended, Way::Forced]);
+            let effect = match (way, random.below(10)) {
+                (Way::Forced, _) => Effect::Stuck(signal, area, stuck.or(Some(0.0))),
+                (_, 0 | 1) => Effect::Stuck(signal, area, stuck),
+                (_, 2) if signal == 0 => Effect::Flicker(area),
+                (_, 2) => Effect::Noise(signal, area, by.abs()),
+                (_, 3) if signal == 0 => Effect::Invert(area),
+                (_, 3) => Effect::Offset(signal, area, by),
+                (_, 4) => Effect::Delay(held),
+                (_, 5) => Effect::SlowAnswers(held),
+                (_, 6) => Effect::Drop(direction),
+                (_, 7) => Effect::Duplicate(direction),
+                _ => Effect::LinkDown,
+            };
+            let fault = Self {
+                end,
+                effect,
+                way,
+                first: random.below(60) + 1,
+                ticks: random.below(60) + 1,
+            };
+            // Two faults of one signal at one end would act one after the other.
+            let place = (end, fault.signal());
+            if place.1.is_none() || !used.contains(&place) {
+                used.push(place);
+                faults.push(fault);
+            }
+        }
+        faults
+    }
+
+    /// The signal that it bends: its index and area.
+    pub(crate) fn signal(&self) -> Option<(usize, char)> {
+        match self.effect {
+            Effect::Stuck(signal, area, _)
+            | Effect::Offset(signal, area, _)
+            | Effect::Noise(signal, area, _) => Some((signal, area)),
+            Effect::Invert(area) | Effect::Flicker(area) => Some((0, area)),
+            _ => None,
+        }
+    }
+
+    /// The name of the signal that it bends: that of station 0.
+    pub(crate) fn signal_name(&self) -> Option<String> {
+        let (signal, area) = self.signal()?;
+        Some(format!("{}{area}0", SIGNALS[signal].0))
+    }
+
+    /// How long it holds frames back.
+    fn held(&self) -> i64 {
+        match self.effect {
+            Effect::Delay(by) | Effect::SlowAnswers(by) => by.0,
+            _ => 0,
+        }
+    }
+
+    /// Whether it is one of the line.
+    pub(crate) fn is_of_line(&self) -> bool {
+        self.signal().is_none()
+    }
+
+    /// Whether it is active in a tick of its end.
+    pub(crate) fn activity(&self, tick: u64) -> Activity {
+        let over = self.first + self.ticks;
+        // A tick takes over at its end what is ordered from outside, so that the next one is the first that knows.
+        let is_forced = self.way == Way::Forced;
+        if is_forced && (tick == self.first || tick == over) {
+            return Activity::Maybe;
+        }
+        if (self.first..over).contains(&tick) {
+            Activity::Yes
+        } else {
+            Activity::No
+        }
+    }
+
+    /// Whether it has nothing more to do from a tick on.
+    pub(crate) fn is_over(&self, tick: u64) -> bool {
+        tick > self.first + self.ticks
+    }
+
+    /// Its section, without the keys that say when.
+    pub(crate) fn section(&self) -> String {
+        let name = self.signal_name().unwrap_or_default();
+        match self.effect {
+            Effect::Stuck(0, _, Some(value)) => format!(
+                "kind = \"stuck\"\nsignal = \"{name}\"\nvalue = {}\n",
+                value == 1.0
+            ),
+            Effect::Stuck(_, _, Some(value)) => {
+                format!("kind = \"stuck\"\nsignal = \"{name}\"\nvalue = {value}\n")
+            }
+            Effect::Stuck(_, _, None) => format!("kind = \"stuck\"\nsignal = \"{name}\"\n"),
+            Effect::Invert(_) => format!("kind = \"invert\"\nsignal = \"{name}\"\n"),
+            Effect::Offset(_, _, by) => {
+                format!("kind = \"offset\"\nsignal = \"{name}\"\nby = {by}\n")
+            }
+            Effect::Noise(_, _, by) => {
+                format!("kind = \"noise\"\nsignal = \"{name}\"\namplitude = {by}\n")
+            }
+            Effect::Flicker(_) => {
+                format!("kind = \"noise\"\nsignal = \"{name}\"\nchance = 0.5\n")
+            }
+            Effect::Delay(by) => format!("kind = \"delay\"\nby = \"{by}\"\n"),
+            Effect::SlowAnswers(by) => format!("kind = \"slow-answers\"\nby = \"{by}\"\n"),
+            Effect::Drop(direction) => {
+                format!("kind = \"drop\"\nchance = 0.3\ndirection = \"{direction}\"\n")
+            }
+            Effect::Duplicate(direction) => {
+                format!("kind = \"duplicate\"\nchance = 0.3\ndirection = \"{direction}\"\n")
+            }
+            Effect::LinkDown => "kind = \"link-down\"\n".to_owned(),
+        }
+    }
+
+    /// What it makes of a value; `was` are the values where it may have begun.
+    fn bend(&self, (least, most): Span, was: &[f64]) -> Vec<Span> {
+        match self.effect {
+            Effect::Stuck(_, _, Some(value)) => vec![(value, value)],
+            Effect::Stuck(_, _, None) => was.iter().map(|value| (*value, *value)).collect(),
+            Effect::Invert(_) => vec![(1.0 - most, 1.0 - least)],
+            Effect::Offset(_, _, by) => vec![(least + by, most + by)],
+            Effect::Noise(_, _, by) => vec![(least - by, most + by)],
+            Effect::Flicker(_) => vec![(0.0, 0.0), (1.0, 1.0)],
+            _ => vec![(least, most)],
+        }
+    }
+}
+
+/// The values beside a stamp, or the fail-safe ones.
+pub(crate) fn values(stamp: Option<u64>) -> [f64; 3] {
+    match stamp {
+        None => SIGNALS.map(|(_, fail_safe)| fail_safe),
+        Some(stamp) => [
+            f64::from(u8::from(level(stamp))),
+            whole(stamp).into(),
+            real(stamp),
+        ],
+    }
+}
+
+/// What the codec makes of a signal's value: an INT is rounded and saturated; a REAL may lose its last digits.
+fn on_line(signal: usize, (least, most): Span) -> Span {
+    match signal {
+        0 => (least, most),
+        1 => {
+            let int = |value: f64| {
+                value
+                    .round()
+                    .clamp(f64::from(i16::MIN), f64::from(i16::MAX))
+            };
+            (int(least), int(most))
+        }
+        _ if least < most => (least - 0.01, most + 0.01),
+        _ => (least, most),
+    }
+}
+
+/// What the end that reads a station may be shown of the signals beside a stamp, in `tick` of its own: `held` is what was
+/// shown when its own faults began.
+pub(crate) fn expected(
+    plan: &Plan,
+    (area, station): (char, usize),
+    stamp: Option<u64>,
+    tick: u64,
+    held: impl Fn(usize, usize) -> Vec<f64>,
+) -> [Vec<Span>; 3] {
+    let reader = usize::from(area == 'I');
+    let mut all = values(stamp).map(|value| vec![(value, value)]);
+    let faults = plan.features.faults.iter().enumerate();
+    // Those of the end that writes come first, whichever is the first in the list.
+    let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
+    for (index, fault) in others.into_iter().chain(own) {
+        let Some((signal, of)) = fault.signal() else {
+            continue;
+        };
+        if of != area || station > 0 {
+            continue;
+        }
+        let spans = &mut all[signal];
+        let (at, was) = if fault.end == reader {
+            (Some(tick), held(index, signal))
+        } else {
+            // The end that writes sends fail-safe values without faults.
+            let written = stamp.map(Stamp::of);
+            let at = written.map(|stamp| stamp.tick);
+            let first = |tick| {
+                let stamp = written.filter(|_| tick > 0);
+                let begun = stamp.map(|stamp| Stamp { tick, ..stamp }.number());
+                values(begun)[signal]
+            };
+            let was = vec![first(fault.first), first(fault.first - 1)];
+            (at, was)
+        };
+        let activity = at.map_or(Activity::No, |tick| fault.activity(tick));
+        let bent: Vec<Span> = spans
+            .iter()
+            .flat_map(|span| fault.bend(*span, &was))
+            .map(|span| {
+                if fault.end == reader {
+                    span
+                } else {
+                    on_line(signal, span)
+                }
+            })
+            .collect();
+        match activity {
+            Activity::No => {}
+            Activity::Maybe => spans.extend(bent),
+            Activity::Yes => *spans = bent,
+        }
+    }
+    all
+}
+
+impl Plan {
+    /// The faults that are written into the driver.cfg of an end.
+    pub(crate) fn fault_sections(&self, end: usize) -> Vec<String> {
+        let faults = self.features.faults.iter();
+        let faults = faults.filter(|fault| fault.end == end && fault.way == Way::File);
+        let sections = faults.map(|fault| {
+            format!(
+                "[[fault]]\n{}tick = {}\nticks = {}",
+                fault.section(),
+                fault.first,
+                fault.ticks
+            )
+        });
+        sections.collect()
+    }
+
+    /// How long faults of the line may hold back what counts as young.
+    pub(crate) fn held_by_faults(&self) -> i64 {
+        let faults = self.features.faults.iter();
+        let held = faults.map(|fault| match fault.effect {
+            // Frames are lost, or take the place of the next, by chance: of a server the peer has old values meanwhile.
+            Effect::Duplicate(_) | Effect::Drop(_) => self.cycle.0 * 20,
+            _ => fault.held(),
+        });
+        held.sum()
+    }
+
+    /// How old values may become besides: slow answers wait for a pulse that nobody has read, for a second at most, and for as
+    /// long as it is held.
+    pub(crate) fn waits_for_pulses(&self) -> i64 {
+        let faults = self.features.faults.iter();
+        let slow = faults.filter(|fault| matches!(fault.effect, Effect::SlowAnswers(_)));
+        i64::try_from(slow.count()).expect("few") * (1_000_000_000 + self.hold.0)
+    }
+
+    /// Whether the line of an end is down in a tick.
+    pub(crate) fn is_down(&self, end: usize, tick: u64) -> bool {
+        self.features.faults.iter().any(|fault| {
+            fault.end == end
+                && fault.effect == Effect::LinkDown
+                && fault.activity(tick) == Activity::Yes
+        })
+    }
+
+    /// Whether a fault of the line is active at an end.
+    pub(crate) fn is_disturbed(&self, end: usize, tick: u64) -> bool {
+        self.features.faults.iter().any(|fault| {
+            fault.end == end && fault.is_of_line() && fault.activity(tick) != Activity::No
+        })
+    }
+
+    /// Whether all faults of an end are over, from a tick on.
+    pub(crate) fn has_no_more_faults(&self, end: usize, tick: u64) -> bool {
+        let mut faults = self.features.faults.iter();
+        faults.all(|fault| fault.end != end || fault.is_over(tick))
+    }
+}

@@ -1,0 +1,243 @@
+//! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
+
+use crate::faults::{Effect, FaultPlan, Way};
+use crate::plan::Bus;
+use crate::random::{Random, scramble};
+use crate::seed::Seed;
+use crate::typed::Typed;
+
+/// The simulation time that an end hands in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Times {
+    /// None.
+    Clock,
+    /// That many nanoseconds more in each tick.
+    Steps(i64),
+    /// The same, but every so often a tick is as early as one before.
+    Back(i64),
+}
+
+/// The table `[record]` of an end.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordPlan {
+    /// CSV, and not VCD.
+    pub is_csv: bool,
+    /// The key `ring`.
+    pub ring: Option<u64>,
+    /// How long the file may become.
+    pub disk: Option<u64>,
+    /// Others want the same file.
+    pub is_contended: bool,
+    /// The file is cut somewhere after a kill, as by a power failure.
+    pub is_torn: bool,
+}
+
+/// What both ends have besides.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Features {
+    /// The recording of each end.
+    pub recordings: [Option<RecordPlan>; 2],
+    /// The simulation time of each end.
+    pub times: [Times; 2],
+    /// Recordings are replayed: by exchanges of the same kind, and by ticks at other times.
+    pub replays: bool,
+    /// What is beside the stamps: of what the device reads, and of what the controller reads.
+    pub typed: [Vec<Typed>; 2],
+    /// Injected faults, and forced signals.
+    pub faults: Vec<FaultPlan>,
+    /// Somebody looks at an end.
+    pub watched: [bool; 2],
+    /// An end is a PLC program that tickbus scans.
+    pub hosted: Option<usize>,
+}
+
+impl Features {
+    /// The features of a seed.
+    pub(crate) fn draw(
+        seed: Seed,
+        (bus, stations): (Bus, usize),
+        numbers: bool,
+        max_age: i64,
+    ) -> Self {
+        // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
+        let (first, has_gaps) = match bus {
+            Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
+            _ => (16, true),
+        };
+        let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
+        // Of each of them a quarter of all worlds has some.
+        let has = random.number() & random.number() & u64::from(seed.more);
+        // A dispatcher has a station for all that it carries, and no room beside it.
+        let has = if bus == Bus::Dispatcher { 0 } else { has };
+        let is = |bit: u32| has >> bit & 1 == 1;
+        let recordings = [0, 1].map(|end| {
+            let plan = RecordPlan {
+                is_csv: random.once_in(2),
+                ring: random.once_in(3).then(|| random.of(&[1, 4, 16, 64])),
+                disk: random
+                    .once_in(3)
+                    .then(|| random.below(30_000))
+                    .filter(|_| is(2)),
+                is_contended: is(3) && random.once_in(2),
+                is_torn: is(4) && random.once_in(2),
+            };
+            is(end).then_some(plan)
+        });
+        let times = [5, 6].map(|bit| {
+            let step = random.of(&[1, 1_000, 999_999, 10_000_000]);
+            let times = random.of(&[Times::Steps(step), Times::Back(step)]);
+            if is(bit) { times } else { Times::Clock }
+        });
+        let typed = [8, 9].map(|bit| {
+            let typed = Typed::draw(random, first, has_gaps);
+            if is(bit) { typed } else { Vec::new() }
+        });
+        let faults = FaultPlan::draw(random, numbers, max_age).into_iter();
+        let faults = faults.filter(|fault| match fault.way {
+            Way::Forced => is(11),
+            _ if fault.is_of_line() => is(12),
+            _ => is(10),
+        });
+        let mut features = Self {
+            hosted: None,
+            faults: faults.collect(),
+            watched: [13, 14].map(is),
+            typed,
+            recordings,
+            times,
+            replays: is(7),
+        };
+        let hosted = usize::try_from(random.below(2)).expect("small");
+        if is(15) && stations == 1 {
+            features.host(hosted);
+        }
+        features
+    }
+
+    /// Makes an end a program: it has no recording, hands in no time, and its faults are those of its driver.cfg.
+    fn host(&mut self, end: usize) {
+        self.hosted = Some(end);
+        self.recordings[end] = None;
+        self.watched[end] = false;
+        self.faults
+            .retain(|fault| fault.end != end || fault.way == Way::File);
+    }
+
+    /// Their names.
+    pub(crate) fn names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        let mut add = |is: bool, name| {
+            if is {
+                names.push(name);
+            }
+        };
+        let any = |test: &dyn Fn(&RecordPlan) -> bool| {
+            self.recordings
+                .iter()
+                .any(|plan| plan.as_ref().is_some_and(test))
+        };
+        add(any(&|plan| plan.is_csv), "record csv");
+        add(any(&|plan| !plan.is_csv), "record vcd");
+        add(any(&|plan| plan.ring.is_some()), "small ring");
+        add(any(&|plan| plan.disk.is_some()), "full disk");
+        add(any(&|plan| plan.is_contended), "file in use");
+        add(any(&|plan| plan.is_torn), "torn file");
+        add(any(&|_| self.replays), "replay");
+        let has = |test: &dyn Fn(Times) -> bool| self.times.iter().any(|times| test(*times));
+        add(has(&|times| matches!(times, Times::Steps(_))), "own time");
+        add(
+            has(&|times| matches!(times, Times::Back(_))),
+            "time goes back",
+        );
+        let typed = |test: &dyn Fn(&Typed) -> bool| self.typed.iter().flatten().any(test);
+        add(typed(&|typed| typed.order != "ABCD"), "byte order");
+        add(typed(&|typed| typed.scale.is_some()), "scale");
+        add(typed(&|typed| typed.is_split), "bytes read");
+        for number in [8, 16, 32, 64] {
+            let name = match number {
+                8 => "8 bits",
+                16 => "16 bits",
+                32 => "32 bits",
+                _ => "64 bits",
+            };
+            add(typed(&|typed| typed.bits == number), name);
+        }
+        add(self.hosted == Some(0), "hosted device");
+        add(self.hosted == Some(1), "hosted controller");
+        add(self.watched.contains(&true), "watched");
+        for fault in &self.faults {
+            let name = match fault.effect {
+                _ if fault.way == Way::Forced => "forced",
+                Effect::Stuck(..) => "stuck",
+                Effect::Invert(_) => "inverted",
+                Effect::Offset(..) => "offset",
+                Effect::Noise(..) | Effect::Flicker(_) => "noise",
+                Effect::Delay(_) => "delay",
+                Effect::SlowAnswers(_) => "slow answers",
+                Effect::Drop(_) => "dropped frames",
+                Effect::Duplicate(_) => "duplicate",
+                Effect::LinkDown => "link down",
+            };
+            add(true, name);
+        }
+        names.sort_unstable();
+        names.dedup();
+        names
+    }
+
+    /// How many bytes a station has in one direction at most.
+    pub(crate) fn frame(&self) -> usize {
+        let typed = self.typed.iter().flatten();
+        typed.map(|typed| typed.place + 8).max().unwrap_or(16)
+    }
+
+    /// The signals beside the stamps in one direction.
+    pub(crate) fn beside(&self, area: char) -> &[Typed] {
+        &self.typed[usize::from(area == 'I')]
+    }
+}
+
+/// All of them.
+pub(crate) const NAMES: &[&str] = &[
+    "record csv",
+    "record vcd",
+    "small ring",
+    "full disk",
+    "file in use",
+    "torn file",
+    "replay",
+    "own time",
+    "time goes back",
+    "byte order",
+    "scale",
+    "bytes read",
+    "8 bits",
+    "16 bits",
+    "32 bits",
+    "64 bits",
+    "hosted device",
+    "hosted controller",
+    "watched",
+    "forced",
+    "stuck",
+    "inverted",
+    "offset",
+    "noise",
+    "delay",
+    "slow answers",
+    "dropped frames",
+    "duplicate",
+    "link down",
+];
+
+impl Times {
+    /// The time of a tick, from 1.
+    pub(crate) fn at(self, tick: u64) -> Option<i64> {
+        let tick = i64::try_from(tick).expect("small");
+        match self {
+            Self::Clock => None,
+            Self::Steps(step) => Some(step * tick),
+            Self::Back(step) => Some(step * if tick % 7 == 0 { tick - 3 } else { tick }),
+        }
+    }
+}

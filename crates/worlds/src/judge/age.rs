@@ -1,0 +1,93 @@
+//! Ages: never less than the true one, and nothing old is told to be young.
+
+use super::reader::Seen;
+use super::writer::Writer;
+use super::{Broken, Stamp, broken};
+use crate::plan::{Bus, Misfortune, Plan};
+use crate::scheduler::STARVED;
+
+/// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
+pub(crate) fn slack(plan: &Plan) -> i64 {
+    let cycles = plan.cycle.0 * 4;
+    let late = plan.habits.late * 6
+        + if plan.habits.preempts > 0 {
+            3_000_000
+        } else {
+            0
+        };
+    cycles + late + plan.round_trip() + plan.held_by_faults() + 1_000_000
+}
+
+/// How long what was taken to be sent may be on its way, beyond what the network takes.
+pub(crate) fn held(plan: &Plan) -> i64 {
+    let spans = plan.events.iter().map(|event| match event.what {
+        Misfortune::Hold(span) => span.0,
+        // A thread that has taken what to send may lose the processor before it sends that.
+        Misfortune::Suspend(_, span) if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
+        _ => 0,
+    });
+    spans.sum::<i64>() + plan.habits.starves * i64::from(STARVED)
+}
+
+/// The age that is told is at least the true one.
+pub(super) fn judge(plan: &Plan, seen: &Seen<'_>) -> Result<(), Broken> {
+    if seen.is_stale || plan.bus == Bus::Loopback {
+        return Ok(());
+    }
+    // A tick that loses the processor behind its look at the clock may see what came meanwhile: that is younger.
+    let Some(last) = seen.deliveries.last() else {
+        return broken("age", format!("{} ns, though nothing has come", seen.age));
+    };
+    // As docs/ARCHITECTURE.md has it: half of max_age, or 2 ms.
+    let allowed = (plan.max_age.0 / 2).max(2_000_000) + slack(plan);
+    let truth = seen.began - last.at;
+    if truth > seen.age + allowed {
+        return broken(
+            "age",
+            format!(
+                "told {} ns, and the last bytes came {truth} ns ago",
+                seen.age
+            ),
+        );
+    }
+    Ok(())
+}
+
+/// Old data as young: the peer had written something newer before it sent what made the age so small.
+pub(super) fn judge_young(
+    plan: &Plan,
+    writer: &Writer,
+    seen: &Seen<'_>,
+    (station, stamp): (usize, Stamp),
+) -> Result<(), Broken> {
+    let now = seen.began;
+    let Stamp { life, tick, .. } = stamp;
+    let slack =
+        slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
+    let heard = now - seen.age;
+    let sent = match plan.bus {
+        Bus::Loopback => Some(heard),
+        Bus::Dispatcher => seen.known.and_then(|known| known.until),
+        _ => {
+            let before = seen
+                .deliveries
+                .partition_point(|delivery| delivery.at <= heard - 1_000_000);
+            before
+                .checked_sub(1)
+                .map(|index| seen.deliveries[index].sent)
+        }
+    };
+    if let Some(sent) = sent
+        && let Some(least) = writer.newest_at(sent - slack)
+        && (life, tick) < least
+    {
+        broken(
+            "old as young",
+            format!(
+                "at {now} station {station} shows {stamp:?} with age {}; {least:?} was there when its peer sent",
+                seen.age
+            ),
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,71 @@
+//! Nothing is left on: a writer that stopped, and a controller that closed, leave fail-safe values.
+
+use super::age::{held, slack};
+use super::reader::{Reader, Seen};
+use super::writer::Writer;
+use super::{Broken, Stamp, broken};
+use crate::plan::{FAIL_SAFE, Plan};
+
+impl Reader {
+    /// While a writer does not tick, its watchdog trips: nothing of it may count any more.
+    pub(crate) fn judge_watchdog(
+        plan: &Plan,
+        limit: i64,
+        writer: &Writer,
+        seen: &Seen<'_>,
+    ) -> Result<(), Broken> {
+        let now = seen.began;
+        let Some(last) = writer.last_ended(now) else {
+            return Ok(());
+        };
+        // A dispatcher that holds the values of a source that is gone does as it was told.
+        let holds = plan.laboratory.holds && !plan.events.is_empty();
+        if holds
+            || writer.is_ticking()
+            || now - last
+                <= limit + plan.max_age.0 + slack(plan) + plan.waits_for_pulses() + held(plan)
+        {
+            return Ok(());
+        }
+        for (station, shown) in seen.stations.iter().enumerate() {
+            if shown.stamp != FAIL_SAFE {
+                broken(
+                    "left on",
+                    format!(
+                        "station {station} shows {:?}, {} ns after its writer's last tick",
+                        Stamp::of(shown.stamp),
+                        now - last
+                    ),
+                )?;
+            }
+        }
+        Ok(())
+    }
+
+    /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
+    pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
+        let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
+        if holds || seen.is_stale || seen.began <= left + slack(plan) + plan.waits_for_pulses() {
+            return Ok(());
+        }
+        match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
+            Some(shown) => broken(
+                "left on",
+                format!("{:?} after its controller closed", Stamp::of(shown.stamp)),
+            ),
+            None => Ok(()),
+        }
+    }
+
+    /// A line that is down on purpose, at either end, is stale soon.
+    pub(crate) fn judge_down(plan: &Plan, since: i64, seen: &Seen<'_>) -> Result<(), Broken> {
+        let limit = plan.max_age.0 + slack(plan) + held(plan);
+        if seen.is_stale || seen.began - since <= limit {
+            return Ok(());
+        }
+        broken(
+            "link down",
+            format!("not stale, {} ns after it went down", seen.began - since),
+        )
+    }
+}

@@ -1,0 +1,130 @@
+//! What one end sees, tick by tick: nothing torn across stations, and fresh only what is new.
+
+use std::collections::BTreeMap;
+
+use super::writer::Writer;
+use super::{Broken, Stamp, broken};
+use crate::faults::{self, FaultPlan};
+use crate::network::Delivery;
+use crate::plan::{Bus, FAIL_SAFE, Plan};
+
+/// What a station shows in one tick.
+#[derive(Clone, Debug)]
+pub(crate) struct Shown {
+    pub(crate) stamp: u64,
+    pub(crate) level: bool,
+    pub(crate) edges: u64,
+    pub(crate) numbers: Option<(f64, f64)>,
+    /// The slots of the signals beside the stamp.
+    pub(crate) typed: Vec<u64>,
+}
+
+/// A tick as its end got it.
+#[derive(Debug)]
+pub(crate) struct Seen<'a> {
+    pub(crate) began: i64,
+    /// The tick of the end that sees.
+    pub(crate) tick: u64,
+    pub(crate) is_stale: bool,
+    pub(crate) is_fresh: bool,
+    pub(crate) age: i64,
+    pub(crate) sequence: u64,
+    pub(crate) stations: &'a [Shown],
+    pub(crate) deliveries: &'a [Delivery],
+    /// Through a dispatcher.
+    pub(crate) known: Option<Known>,
+}
+
+/// What who stands between both ends knew of a writer when it sent what a reader has heard.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    /// When the writer had sent the newest of what has to be seen; `None` if there is nothing.
+    pub(crate) until: Option<i64>,
+    /// For how long nothing had come from the writer, in ns.
+    pub(crate) silent: i64,
+}
+
+/// What one end has seen.
+#[derive(Debug, Default)]
+pub(crate) struct Reader {
+    pub(super) newest: Vec<(u64, u64)>,
+    sequence: u64,
+    /// When rising edges were seen, per station.
+    pub(crate) edges: Vec<Vec<(i64, u64)>>,
+    /// When it was last not stale, and what it saw then.
+    pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
+    /// When it was first not stale.
+    pub(crate) first_valid: Option<i64>,
+    /// The times at which it was stale, or its line disturbed on purpose.
+    pub(crate) stale: Vec<i64>,
+    /// What the signals beside the stamp of station 0 were in the tick before.
+    pub(super) before: [f64; 3],
+    /// What was shown when faults of this end began, by their numbers.
+    pub(super) held: BTreeMap<usize, f64>,
+}
+
+impl Reader {
+    /// A new driver looks: it knows nothing of what the one before it saw.
+    pub(crate) fn begin(&mut self, stations: usize) {
+        self.newest = vec![(0, 0); stations];
+        self.before = faults::values(None);
+        self.held.clear();
+        self.sequence = 0;
+    }
+
+    /// Judges what a tick of the end that reads `area` shows of what `writer` wrote.
+    pub(crate) fn judge(
+        &mut self,
+        plan: &Plan,
+        area: u64,
+        writer: &Writer,
+        seen: &Seen<'_>,
+    ) -> Result<(), Broken> {
+        let now = seen.began;
+        // A client that got no answer may read again before it writes again.
+        let is_unwritten = plan.features.faults.iter().any(FaultPlan::is_of_line)
+            && seen.stations.iter().any(|shown| shown.stamp == FAIL_SAFE);
+        // Behind a dispatcher, a source that is lost leaves fail-safe values as well.
+        let is_lost = plan.bus == Bus::Dispatcher
+            && (seen.stations.iter()).all(|shown| shown.stamp == FAIL_SAFE);
+        if seen.is_stale || is_unwritten || is_lost {
+            self.stale.push(now);
+        }
+        if !seen.is_stale && seen.age > plan.max_age.0 {
+            broken("stale", format!("age {} ns, and not stale", seen.age))?;
+        }
+        if seen.is_fresh && seen.sequence <= self.sequence {
+            broken("fresh", "without a new cycle".to_owned())?;
+        }
+        if !seen.is_stale {
+            self.sequence = seen.sequence;
+        }
+        let mut first = None;
+        for (station, shown) in seen.stations.iter().enumerate() {
+            self.judge_station(plan, (area, station), writer, seen, shown)?;
+            let stamp = (shown.stamp != FAIL_SAFE).then(|| {
+                let Stamp { life, tick, .. } = Stamp::of(shown.stamp);
+                (life, tick)
+            });
+            // All of them travel in one message.
+            match first {
+                None => first = Some(stamp),
+                Some(first) if first != stamp => broken(
+                    "torn",
+                    format!("station 0 has {first:?}, station {station} {stamp:?}"),
+                )?,
+                Some(_) => {}
+            }
+            if shown.edges > 0 {
+                self.edges
+                    .resize(self.edges.len().max(station + 1), Vec::new());
+                self.edges[station].push((now, shown.edges));
+            }
+        }
+        if !seen.is_stale {
+            self.last_valid = Some((now, first.flatten()));
+            self.first_valid.get_or_insert(now);
+        }
+        super::age::judge(plan, seen)
+    }
+}

@@ -1,0 +1,139 @@
+//! What one station shows: nothing that nobody wrote, nothing torn, nothing after something newer, fail-safe values while stale.
+
+use super::reader::{Reader, Seen, Shown};
+use super::writer::Writer;
+use super::{Broken, Stamp, broken};
+use crate::faults::{self, Activity};
+use crate::plan::{FAIL_SAFE, Plan};
+
+impl Reader {
+    pub(super) fn judge_station(
+        &mut self,
+        plan: &Plan,
+        (area, station): (u64, usize),
+        writer: &Writer,
+        seen: &Seen<'_>,
+        shown: &Shown,
+    ) -> Result<(), Broken> {
+        if shown.stamp == FAIL_SAFE {
+            self.judge_beside(plan, (area, station), None, (seen.tick, shown))?;
+            judge_typed(plan, area, None, shown)?;
+            if seen.is_stale && shown.edges > 0 {
+                broken(
+                    "stale edges",
+                    format!("station {station} has {}", shown.edges),
+                )?;
+            }
+            return Ok(());
+        }
+        if seen.is_stale {
+            broken("stale values", format!("station {station} shows {shown:?}"))?;
+        }
+        let stamp = Stamp::of(shown.stamp);
+        let Stamp { life, tick, .. } = stamp;
+        if stamp.area != area || stamp.station != station as u64 || !writer.has_begun(life, tick) {
+            broken(
+                "invented",
+                format!("station {station} shows {stamp:?}, which nobody wrote"),
+            )?;
+        }
+        self.judge_beside(plan, (area, station), Some(shown.stamp), (seen.tick, shown))?;
+        judge_typed(plan, area, Some(shown.stamp), shown)?;
+        let newest = &mut self.newest[station];
+        if (life, tick) < *newest {
+            broken(
+                "order",
+                format!("station {station} shows {stamp:?} after {newest:?}"),
+            )?;
+        }
+        *newest = (life, tick);
+        super::age::judge_young(plan, writer, seen, (station, stamp))
+    }
+
+    /// The level and the numbers beside a stamp follow from it, but for what faults make of them.
+    fn judge_beside(
+        &mut self,
+        plan: &Plan,
+        (area, station): (u64, usize),
+        stamp: Option<u64>,
+        (tick, shown): (u64, &Shown),
+    ) -> Result<(), Broken> {
+        let letter = ['Q', 'I'][usize::from(area == 1)];
+        let truth = faults::values(stamp);
+        let was = |fault: usize, signal: usize| match self.held.get(&fault) {
+            Some(value) => vec![*value],
+            None => vec![self.before[signal], truth[signal]],
+        };
+        let spans = faults::expected(plan, (letter, station), stamp, tick, was);
+        let mut values = vec![f64::from(u8::from(shown.level))];
+        values.extend(
+            shown
+                .numbers
+                .into_iter()
+                .flat_map(|(whole, real)| [whole, real]),
+        );
+        // Connections that are asked for come one by one, and a signal without one has its fail-safe value.
+        let apart = plan.laboratory.is_asked.then(|| faults::values(None));
+        for (index, (value, spans)) in values.iter().zip(&spans).enumerate() {
+            let is_alone = apart.is_some_and(|apart| *value == apart[index]);
+            if is_alone
+                || spans
+                    .iter()
+                    .any(|(least, most)| (least..=most).contains(&value))
+            {
+                continue;
+            }
+            let promise = match stamp {
+                _ if !plan.features.faults.is_empty() => "faults",
+                None => "fail-safe",
+                Some(_) => "torn",
+            };
+            broken(
+                promise,
+                format!(
+                    "tick {tick}: station {station} shows {value} of {spans:?}: {shown:?} in the tick of {:?}",
+                    stamp.map(Stamp::of)
+                ),
+            )?;
+        }
+        if station == 0 {
+            self.hold(plan, area, tick, &values);
+        }
+        Ok(())
+    }
+
+    /// Remembers where signals are stuck.
+    fn hold(&mut self, plan: &Plan, area: u64, tick: u64, values: &[f64]) {
+        for (index, fault) in plan.features.faults.iter().enumerate() {
+            let Some((signal, letter)) = fault.signal() else {
+                continue;
+            };
+            if (letter == 'I') != (area == 1) || fault.end as u64 != area {
+                continue;
+            }
+            if fault.activity(tick) == Activity::Yes {
+                self.held.entry(index).or_insert(values[signal]);
+            } else {
+                self.held.remove(&index);
+            }
+        }
+        self.before[..values.len()].copy_from_slice(values);
+    }
+}
+
+/// The signals beside a stamp follow from it, whatever their types, orders and scales.
+fn judge_typed(plan: &Plan, area: u64, stamp: Option<u64>, shown: &Shown) -> Result<(), Broken> {
+    let letter = if area == 0 { 'Q' } else { 'I' };
+    let typed = plan.features.beside(letter).iter();
+    let expected: Vec<u64> = typed.flat_map(|typed| typed.shown(stamp, true)).collect();
+    if shown.typed != expected {
+        return broken(
+            "types",
+            format!(
+                "{:x?} are shown, and {expected:x?} were written",
+                shown.typed
+            ),
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,62 @@
+//! What one end has written, and when.
+
+/// A tick of a writer: its number, and when its call returned.
+#[derive(Clone, Copy, Debug)]
+struct Written {
+    life: u64,
+    tick: u64,
+    ended: i64,
+}
+
+/// What one end has written.
+#[derive(Debug, Default)]
+pub(crate) struct Writer {
+    written: Vec<Written>,
+    /// When pulses were written, to all stations at once.
+    pub(crate) pulses: Vec<i64>,
+}
+
+impl Writer {
+    /// A tick begins.
+    pub(crate) fn begin(&mut self, life: u64, tick: u64) {
+        self.written.push(Written {
+            life,
+            tick,
+            ended: i64::MAX,
+        });
+    }
+
+    /// It ends.
+    pub(crate) fn end(&mut self, now: i64) {
+        if let Some(written) = self.written.last_mut() {
+            written.ended = now;
+        }
+    }
+
+    /// The newest that was whole at a time.
+    pub(super) fn newest_at(&self, time: i64) -> Option<(u64, u64)> {
+        let after = self
+            .written
+            .partition_point(|written| written.ended <= time);
+        let written = self.written.get(after.checked_sub(1)?)?;
+        Some((written.life, written.tick))
+    }
+
+    pub(super) fn has_begun(&self, life: u64, tick: u64) -> bool {
+        let newest = self.written.last();
+        newest.is_some_and(|newest| (life, tick) <= (newest.life, newest.tick))
+    }
+
+    /// When its last tick before `now` ended.
+    pub(super) fn last_ended(&self, now: i64) -> Option<i64> {
+        let after = self.written.partition_point(|written| written.ended <= now);
+        Some(self.written.get(after.checked_sub(1)?)?.ended)
+    }
+
+    /// When the tick after the one that was written ended.
+    pub(super) fn is_ticking(&self) -> bool {
+        self.written
+            .last()
+            .is_some_and(|written| written.ended == i64::MAX)
+    }
+}

@@ -1,0 +1,196 @@
+//! The dispatcher between both ends: a process of its own, which misfortunes befall as well.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+use tickbus_base::time::{Clock as _, Nanos, Stop};
+use tickbus_dispatcher::tcp::{Hosting, Listener};
+use tickbus_dispatcher::{Dispatcher, LEAST_PROMISE, OnLoss, Patch, Pin, Settings};
+use tickbus_fieldbus::tcp::Address;
+
+use crate::clock::SimulatedClock;
+use crate::config::{NAMES, PORT};
+use crate::judge::{Broken, Known, Seen, Stamp, held, slack};
+use crate::network::{Delivery, Network};
+use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
+use crate::scheduler;
+
+/// A dispatcher that is to end has done so within this.
+const LONGEST_END: Nanos = Nanos::from_secs(2);
+
+/// The dispatcher of a world, from life to life.
+#[derive(Default)]
+pub(crate) struct Laboratory {
+    process: Cell<usize>,
+    /// The processes that each end has had.
+    clients: [RefCell<Vec<usize>>; 2],
+    stop: RefCell<Stop>,
+    is_running: Cell<bool>,
+    /// It was killed or closed, and another one follows.
+    is_ending: Cell<bool>,
+    /// No further one is to begin.
+    is_over: Cell<bool>,
+}
+
+impl Laboratory {
+    /// An end has begun a life as this process.
+    pub(crate) fn joins(&self, end: usize, process: usize) {
+        self.clients[end].borrow_mut().push(process);
+    }
+
+    /// Starts a dispatcher.
+    pub(crate) fn begin(self: &Rc<Self>, plan: &Plan) {
+        if self.is_over.get() {
+            return;
+        }
+        let process = scheduler::new_process();
+        let (stop, patch) = (Stop::new(), patch(plan));
+        let on_loss = if plan.laboratory.holds {
+            OnLoss::Hold
+        } else {
+            OnLoss::FailSafe
+        };
+        let settings = Settings {
+            on_loss,
+            ..Settings::default()
+        };
+        self.process.set(process);
+        self.is_running.set(true);
+        self.is_ending.set(false);
+        *self.stop.borrow_mut() = stop.clone();
+        let laboratory = Rc::clone(self);
+        scheduler::spawn(process, move || {
+            serve(settings, patch, &stop);
+            laboratory.is_running.set(false);
+        });
+    }
+
+    /// What befalls it; how long that lasts is in `what`.
+    pub(crate) fn befall(self: &Rc<Self>, plan: &Plan, what: Misfortune) {
+        if !self.is_running.get() || self.is_ending.get() {
+            return;
+        }
+        let process = self.process.get();
+        let span = match what {
+            Misfortune::Suspend(_, span) => return scheduler::suspend_process(process, span),
+            Misfortune::Kill(_, span) => {
+                scheduler::network(|network, _, now| network.kill(process, now));
+                span
+            }
+            Misfortune::Close(_, span) => span,
+            _ => return,
+        };
+        self.is_ending.set(true);
+        self.stop.borrow().stop();
+        let (laboratory, plan) = (Rc::clone(self), plan.clone());
+        scheduler::spawn(0, move || {
+            scheduler::sleep_until(|| !laboratory.is_running.get());
+            scheduler::sleep(span);
+            laboratory.begin(&plan);
+        });
+    }
+
+    /// Ends it.
+    ///
+    /// # Errors
+    ///
+    /// That takes too long.
+    pub(crate) fn end(&self) -> Result<(), Broken> {
+        self.is_over.set(true);
+        self.stop.borrow().stop();
+        let asked = scheduler::now();
+        scheduler::sleep_until(|| !self.is_running.get() || scheduler::now() - asked > LONGEST_END);
+        if self.is_running.get() {
+            return Err(Broken {
+                promise: "close",
+                what: format!("the dispatcher has not ended within {LONGEST_END}"),
+            });
+        }
+        Ok(())
+    }
+
+    /// What the dispatcher knew of the other end than `end` when it sent what `end` had heard by `heard`, and read as `deliveries`.
+    pub(crate) fn known(
+        &self,
+        plan: &Plan,
+        network: &Network,
+        (end, heard): (usize, i64),
+        deliveries: &[Delivery],
+    ) -> Option<Known> {
+        let before = deliveries.partition_point(|delivery| delivery.at <= heard - 1_000_000);
+        let answers = &deliveries[before.checked_sub(1)?..];
+        let writers = self.clients[1 - end].borrow();
+        // The newest that had come from the writer to the dispatcher of an answer, which may read while it writes that.
+        let newest = |answer: &Delivery, limit: i64| {
+            let arrived = network.deliveries.get(&answer.from)?.iter().rev();
+            let mut of_writer = arrived.filter(|delivery| writers.contains(&delivery.from));
+            of_writer.find(|delivery| delivery.at <= limit).copied()
+        };
+        let first = answers.first()?;
+        let limit = first.sent - slack(plan) - held(plan);
+        let silent = answers.iter().map(|answer| {
+            newest(answer, answer.at).map_or(i64::MAX, |delivery| answer.sent - delivery.at)
+        });
+        Some(Known {
+            until: newest(first, limit).map(|delivery| delivery.sent),
+            silent: silent.min()?,
+        })
+    }
+}
+
+/// A source that has been silent for longer than it promised is lost: nothing of it counts any more, unless the dispatcher holds.
+pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Result<(), Broken> {
+    // A dispatcher that was held up itself reads first what has come meanwhile.
+    let suspended = plan.events.iter().map(|event| match event.what {
+        Misfortune::Suspend(BETWEEN, span) => span.0,
+        _ => 0,
+    });
+    let promise = plan.max_age.max(LEAST_PROMISE).0;
+    let allowed = promise + promise / 2 + slack(plan) + held(plan) + suspended.sum::<i64>();
+    match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
+        Some(shown) if known.silent > allowed && !plan.laboratory.holds => Err(Broken {
+            promise: "left on",
+            what: format!(
+                "{:?}, when the dispatcher had not heard its writer for {} ns",
+                Stamp::of(shown.stamp),
+                known.silent
+            ),
+        }),
+        _ => Ok(()),
+    }
+}
+
+fn serve(settings: Settings, patch: Patch, stop: &Stop) {
+    let clock = SimulatedClock;
+    let listener = Listener::bind_in(&Address::local(PORT), clock.simulation());
+    let listener = listener.expect("nobody else listens there");
+    let mut dispatcher = Dispatcher::new(settings, patch);
+    let hosting = Hosting {
+        clock: &clock,
+        stop,
+        door: None,
+        patch_file: None,
+        news: &mut |news| log::info!("dispatcher: {news}"),
+    };
+    listener
+        .run(&mut dispatcher, hosting)
+        .expect("a simulation can wait");
+}
+
+/// Each output of an end is connected with the input of the same number of the other one, unless they ask for that.
+fn patch(plan: &Plan) -> Patch {
+    let mut patch = Patch::new();
+    if plan.laboratory.is_asked {
+        return patch;
+    }
+    for end in 0..2 {
+        for (input, output) in plan.cables() {
+            let pin = |client: usize, channel: &str| {
+                let text = format!("{}:{channel}", NAMES[client].0);
+                Pin::parse(&text).expect("a pin")
+            };
+            patch.connect(pin(1 - end, &input), pin(end, &output));
+        }
+    }
+    patch
+}

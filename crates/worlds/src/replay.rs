@@ -1,0 +1,286 @@
+//! Replays a recording, and judges what the ticks are shown: the same again, or, by ticks at other times, what docs/recording.md
+//! makes of it.
+
+use std::fs;
+use std::ops::Range;
+use std::path::Path;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::{Driver, DriverError};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Slot;
+
+use crate::clock::SimulatedClock;
+use crate::judge::{Broken, Contents, FileRow, area_of};
+use crate::plan::Plan;
+use crate::random::{Random, scramble};
+use crate::tape::Tape;
+
+/// The statuses of ticks.
+const FRESH: i32 = 0;
+const UNCHANGED: i32 = 1;
+const STALE: i32 = 2;
+
+/// A recording that is to be replayed.
+pub(crate) struct Original<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) end: usize,
+    pub(crate) tape: &'a Tape,
+    pub(crate) contents: &'a Contents,
+}
+
+fn broken<T>(what: String) -> Result<T, Broken> {
+    Err(Broken {
+        promise: "replay",
+        what,
+    })
+}
+
+/// Opens a driver that replays `file`, and records that to `again` if there is a name.
+pub(crate) fn open(
+    plan: &Plan,
+    end: usize,
+    file: &Path,
+    again: Option<&Path>,
+) -> Result<Driver, DriverError> {
+    let shown = file.display();
+    let again = again.map_or(String::new(), |again| {
+        format!("[record]\nfile = \"{}\"\n", again.display())
+    });
+    let role = ["device", "controller"][end];
+    let text = format!(
+        "[driver]\nid = 9\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"\nkind = \"loopback\"\nreplay = \"{shown}\"\n\
+         max_age = \"{}\"\n{again}{}",
+        plan.max_age,
+        plan.signal_sections(end)
+    );
+    let config = Config::parse("driver.cfg", &text)
+        .unwrap_or_else(|why| panic!("a replay that tickbus refuses:\n{why}\n{text}"));
+    Driver::open(config, SimulatedClock::shared())
+}
+
+impl Original<'_> {
+    fn rows(&self) -> &[FileRow] {
+        &self.contents.rows
+    }
+
+    /// The rows of one time each.
+    fn groups(&self) -> Vec<Range<usize>> {
+        let rows = self.rows();
+        let mut groups: Vec<Range<usize>> = Vec::new();
+        for index in 0..rows.len() {
+            match groups.last_mut() {
+                Some(group) if rows[group.start].time == rows[index].time => group.end += 1,
+                _ => groups.push(index..index + 1),
+            }
+        }
+        groups
+    }
+
+    /// The status that rows have together, on one tick.
+    fn status(&self, group: &Range<usize>) -> i32 {
+        let rows = &self.rows()[group.clone()];
+        let last = rows.last().expect("it has rows");
+        let of = |statuses: &dyn Fn(&FileRow) -> i32| match statuses(last) {
+            STALE => STALE,
+            _ if rows.iter().any(|row| statuses(row) == FRESH) => FRESH,
+            _ => UNCHANGED,
+        };
+        if last.stations.is_empty() {
+            return of(&|row| row.status);
+        }
+        let stations = 0..last.stations.len();
+        let all = stations.map(|station| of(&|row: &FileRow| row.stations[station]));
+        all.max().unwrap_or(FRESH)
+    }
+
+    /// Judges the slots of a tick on which these rows fall, if any, after the row `last`.
+    fn judge_slots(
+        &self,
+        slots: &[Slot],
+        (group, last): (&Range<usize>, usize),
+        shaped: &mut usize,
+    ) -> Result<(), String> {
+        let rows = self.rows();
+        // A level is shaped where the edges of several ticks are shown at once, and in the tick behind that. What is due in a
+        // stale tick is shown when data count again.
+        if group.len() > 1 {
+            *shaped = 2;
+        }
+        let is_shaped = *shaped > 0;
+        if rows[last].status != STALE {
+            *shaped = shaped.saturating_sub(1);
+        }
+        for (index, name) in self.tape.names.iter().enumerate() {
+            if area_of(name) == self.writes() {
+                continue;
+            }
+            let place = self.contents.names.iter().position(|known| known == name);
+            let place = place.expect("the recording was judged");
+            let seen = slots[index].0;
+            let expected = if name.ends_with(".edges") {
+                let counts = rows[group.clone()].iter();
+                let counts = counts.map(|row| f64::from_bits(row.values[place]));
+                let count = counts.fold(0.0, |all, count| all + count);
+                count.to_bits()
+            } else {
+                rows[last].values[place]
+            };
+            let is_latched = name.starts_with("pulse") && !name.ends_with(".edges");
+            if seen != expected && !(is_latched && is_shaped) {
+                return Err(format!("{name} is {seen:x}, and was {expected:x}"));
+            }
+        }
+        Ok(())
+    }
+
+    fn writes(&self) -> char {
+        ['I', 'Q'][self.end]
+    }
+
+    /// What this end wrote in a row, and nothing that it read.
+    fn written(&self, row: usize, slots: &mut [Slot]) {
+        let tick = usize::try_from(self.rows()[row].number).expect("small") - 1;
+        let values = &self.tape.rows[tick].values;
+        for ((slot, name), value) in slots.iter_mut().zip(&self.tape.names).zip(values) {
+            if area_of(name) == self.writes() {
+                *slot = Slot(*value);
+            }
+        }
+    }
+
+    /// By ticks at the recorded times, the same again.
+    pub(crate) fn judge_same(&self, file: &Path, is_whole: bool) -> Result<(), Broken> {
+        let again = file.with_file_name(if self.tape.plan.is_csv {
+            "again.csv"
+        } else {
+            "again.vcd"
+        });
+        let mut driver = match open(self.plan, self.end, file, Some(&again)) {
+            Ok(driver) => driver,
+            Err(why) => return broken(format!("a recording that does not open: {why}")),
+        };
+        let mut slots = driver.initial_slots();
+        let groups = self.groups();
+        let mut shaped = 0;
+        for group in &groups {
+            let row = &self.rows()[group.end - 1];
+            let time = Nanos(row.time);
+            let found = if self.plan.ends[self.end].halves {
+                let found = driver.receive(time, &mut slots);
+                self.written(group.end - 1, &mut slots);
+                driver.send(&mut slots);
+                found
+            } else {
+                self.written(group.end - 1, &mut slots);
+                driver.exchange(time, &mut slots)
+            };
+            let expected = self.status(group);
+            let number = row.number;
+            if found.code.code() != expected {
+                return broken(format!(
+                    "tick {number} is {}, and was {expected}",
+                    found.code
+                ));
+            }
+            if (found.age > self.plan.max_age) != (expected == STALE) {
+                return broken(format!("tick {number}, {expected}, has age {}", found.age));
+            }
+            if let Err(why) = self.judge_slots(&slots, (group, group.end - 1), &mut shaped) {
+                return broken(format!("tick {number}: {why}"));
+            }
+        }
+        let figures = driver.statistics();
+        let figure = |key: &str| {
+            let lines = figures.lines().filter_map(|line| line.split_once('='));
+            let mut values = lines.filter(|(known, _)| *known == key);
+            values
+                .next()
+                .and_then(|(_, value)| value.parse::<usize>().ok())
+        };
+        for (key, right) in [
+            ("replay.differences", 0),
+            ("replay.ticks", self.rows().len()),
+            ("replay.compared", groups.len()),
+            ("replay.ended", 1),
+        ] {
+            if figure(key) != Some(right) {
+                return broken(format!("{key} is {:?}, and should be {right}", figure(key)));
+            }
+        }
+        self.judge_end(&mut driver, &mut slots)?;
+        driver.close();
+        if is_whole && groups.len() == self.rows().len() {
+            self.judge_again(file, &again)?;
+        }
+        Ok(())
+    }
+
+    /// After its end, data become stale.
+    fn judge_end(&self, driver: &mut Driver, slots: &mut [Slot]) -> Result<(), Broken> {
+        let Some(last) = self.rows().last() else {
+            return Ok(());
+        };
+        let time = Nanos(last.time) + self.plan.max_age + Nanos(1);
+        let found = driver.exchange(time, slots);
+        if found.code.code() != STALE || found.age <= self.plan.max_age {
+            return broken(format!(
+                "behind its end it is {} of age {}",
+                found.code, found.age
+            ));
+        }
+        Ok(())
+    }
+
+    /// The recording of a replay is the recording, but for the tick behind its end.
+    fn judge_again(&self, file: &Path, again: &Path) -> Result<(), Broken> {
+        let (one, other) = (fs::read(file), fs::read(again));
+        let (one, other) = (one.unwrap_or_default(), other.unwrap_or_default());
+        // A closed VCD file ends with a comment.
+        let text = String::from_utf8_lossy(&one);
+        let end = text.find("$comment end").unwrap_or(text.len());
+        if !other.starts_with(&one[..end]) {
+            return broken("the recording of a replay is another".to_owned());
+        }
+        Ok(())
+    }
+
+    /// By ticks at other times: the last row that is due, the edges of all that have become due.
+    pub(crate) fn judge_other(&self, file: &Path) -> Result<(), Broken> {
+        let mut driver = match open(self.plan, self.end, file, None) {
+            Ok(driver) => driver,
+            Err(why) => return broken(format!("a recording that does not open: {why}")),
+        };
+        let random = &mut Random::new(scramble(self.plan.seed.number ^ 0x7265));
+        let mut slots = driver.initial_slots();
+        let rows = self.rows();
+        let span = rows[rows.len() - 1].time - rows[0].time;
+        let step = (span / i64::try_from(rows.len()).expect("small")).max(1);
+        let (mut time, mut next, mut shaped) = (rows[0].time, 0, 0);
+        while next < rows.len() {
+            let due = rows[next..].iter().take_while(|row| row.time <= time);
+            let group = next..next + due.count();
+            next = group.end;
+            let found = driver.exchange(Nanos(time), &mut slots);
+            let last = next - 1;
+            let expected = match group.is_empty() {
+                false => self.status(&group),
+                true if rows[last].status == STALE => STALE,
+                true => UNCHANGED,
+            };
+            let number = rows[last].number;
+            if found.code.code() != expected {
+                return broken(format!(
+                    "at {time}, after tick {number}, it is {}, and not {expected}",
+                    found.code
+                ));
+            }
+            if let Err(why) = self.judge_slots(&slots, (&group, last), &mut shaped) {
+                return broken(format!("at {time}, after tick {number}: {why}"));
+            }
+            time += random.within(1, step * 3);
+        }
+        driver.close();
+        Ok(())
+    }
+}

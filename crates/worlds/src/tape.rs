@@ -1,0 +1,149 @@
+//! What a driver delivered, tick by tick, as its recording should have it.
+
+use std::fs::File;
+use std::path::PathBuf;
+
+use tickbus_base::os::{Lock, lock_file};
+
+use crate::features::RecordPlan;
+use crate::judge::{Broken, judge_recording};
+use crate::plan::Plan;
+use crate::replay;
+use crate::scheduler;
+
+fn broken(what: String) -> Result<(), Broken> {
+    Err(Broken {
+        promise: "file",
+        what,
+    })
+}
+
+/// One tick.
+#[derive(Clone, Debug)]
+pub(crate) struct Row {
+    /// When its first call began and its last one ended.
+    pub(crate) began: i64,
+    pub(crate) ended: i64,
+    /// The simulation time that was handed in.
+    pub(crate) time: Option<i64>,
+    pub(crate) code: i32,
+    /// All slots behind it, as bits.
+    pub(crate) values: Vec<u64>,
+    /// The same, with what this end sends as it is on the line.
+    pub(crate) on_line: Vec<u64>,
+}
+
+/// The ticks of one life of an end, from its first.
+#[derive(Clone, Debug)]
+pub(crate) struct Tape {
+    /// The names of the slots: signals, and what counts edges.
+    pub(crate) names: Vec<String>,
+    pub(crate) rows: Vec<Row>,
+    pub(crate) plan: RecordPlan,
+    /// The file, and what it had before.
+    pub(crate) path: PathBuf,
+    pub(crate) before: Vec<u8>,
+}
+
+impl Plan {
+    /// The name of an end's recording.
+    pub(crate) fn recording(&self, end: usize) -> Option<String> {
+        let plan = self.features.recordings[end].as_ref()?;
+        let ending = if plan.is_csv { "csv" } else { "vcd" };
+        Some(format!("end {end}.{ending}"))
+    }
+
+    /// The lines of `[record]` in the driver.cfg of an end.
+    pub(crate) fn record_section(&self, end: usize) -> Vec<String> {
+        let (Some(file), Some(plan)) = (self.recording(end), &self.features.recordings[end]) else {
+            return Vec::new();
+        };
+        let ring = plan.ring.map(|ring| format!("ring = {ring}"));
+        let head = format!("[record]\nfile = \"{file}\"");
+        std::iter::once(head).chain(ring).collect()
+    }
+}
+
+impl Tape {
+    /// A driver of an end is about to be opened. `None` if it records nothing.
+    pub(crate) fn begin(plan: &Plan, end: usize) -> Option<Self> {
+        let file = plan.recording(end)?;
+        let plan = plan.features.recordings[end].clone()?;
+        let path = scheduler::disk(|disk, _| {
+            let path = disk.folder().join(file);
+            if let Some(limit) = plan.disk {
+                disk.limit(path.clone(), limit);
+            }
+            path
+        });
+        if plan.is_contended && !path.exists() {
+            // Something else, and longer.
+            std::fs::write(&path, "what was there before\n".repeat(2_000)).expect("a file");
+        }
+        let before = std::fs::read(&path).unwrap_or_default();
+        Some(Self {
+            names: Vec::new(),
+            rows: Vec::new(),
+            plan,
+            path,
+            before,
+        })
+    }
+
+    /// Another process records to the file: it is not touched, and the refusal says what would help.
+    pub(crate) fn judge_refusal(
+        &self,
+        open: impl FnOnce() -> Option<String>,
+    ) -> Result<(), Broken> {
+        if !self.plan.is_contended {
+            return Ok(());
+        }
+        let other = File::options().append(true).create(true).open(&self.path);
+        let other = other.expect("a file");
+        assert_eq!(
+            lock_file(&other, Lock::Exclusive).ok(),
+            Some(true),
+            "nobody has it"
+        );
+        let refusal = open();
+        let bytes = std::fs::read(&self.path).unwrap_or_default();
+        let shown = self.path.display().to_string();
+        match refusal {
+            Some(refusal)
+                if refusal.contains(&shown)
+                    && refusal.contains("name another file")
+                    && bytes == self.before =>
+            {
+                Ok(())
+            }
+            refusal => broken(format!(
+                "a file of another process: {refusal:?}, {} bytes of {}",
+                bytes.len(),
+                self.before.len()
+            )),
+        }
+    }
+
+    /// While a driver records, nobody else gets the file.
+    pub(crate) fn judge_lock(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
+        if !self.plan.is_contended {
+            return Ok(());
+        }
+        let other = File::open(&self.path).expect("it is there");
+        if lock_file(&other, Lock::Shared).ok() != Some(false) {
+            return broken("another process gets the file of a recording".to_owned());
+        }
+        match replay::open(plan, end, &self.path, None) {
+            Ok(_) => broken("a file that is recorded to is replayed".to_owned()),
+            Err(why) if why.to_string().contains(&self.path.display().to_string()) => Ok(()),
+            Err(why) => broken(format!("a refusal without a file: {why}")),
+        }
+    }
+
+    /// The driver has closed, or its process was killed.
+    pub(crate) fn judge(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
+        let process = scheduler::process();
+        let killed = scheduler::disk(|disk, _| disk.revive(process));
+        judge_recording(plan, end, self, killed)
+    }
+}

@@ -1,0 +1,336 @@
+//! Signals of every type, with byte orders and scales, whose values follow from the stamp beside them; and what docs/driver-cfg.md
+//! makes of such a value on its way.
+
+use crate::random::{Random, scramble};
+
+/// The types of signals, with their widths in bits.
+const TYPES: [(&str, u32); 15] = [
+    ("BOOL", 1),
+    ("BYTE", 8),
+    ("SINT", 8),
+    ("USINT", 8),
+    ("WORD", 16),
+    ("INT", 16),
+    ("UINT", 16),
+    ("DWORD", 32),
+    ("DINT", 32),
+    ("UDINT", 32),
+    ("REAL", 32),
+    ("LWORD", 64),
+    ("LINT", 64),
+    ("ULINT", 64),
+    ("LREAL", 64),
+];
+
+/// Two points of a scale: raw values, and what they stand for.
+type Points = [f64; 4];
+
+/// A signal beside the stamp.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Typed {
+    /// Its number, which is in its name.
+    pub number: usize,
+    /// Its type.
+    pub kind: &'static str,
+    /// How many bits that has.
+    pub bits: u32,
+    /// The key `order`.
+    pub order: &'static str,
+    /// The key `scale`.
+    pub scale: Option<Points>,
+    /// Its first byte.
+    pub place: usize,
+    /// Its raw fail-safe value.
+    pub fail_safe: i64,
+    /// The end that reads it has a USINT in place of each of its bytes.
+    pub is_split: bool,
+}
+
+impl Typed {
+    /// Some signals from a byte on, with gaps between them if these may be.
+    pub(crate) fn draw(random: &mut Random, first: usize, has_gaps: bool) -> Vec<Self> {
+        let mut place = first;
+        let count = usize::try_from(random.within(1, 5)).expect("small");
+        let typed = (0..count).map(|number| {
+            let (kind, bits) = random.of(&TYPES);
+            let order = random.of(&["ABCD", "DCBA", "CDAB", "BADC"]);
+            // Powers of two, so that nothing is rounded but raw values.
+            let (raw, value) = (random.of(&[0.0, 8.0, 32.0]), random.of(&[0.0, 8.0, -3.5]));
+            let gain = random.of(&[0.25, 2.0, -0.5, 64.0]);
+            let has_scale = random.once_in(2) && bits > 1 && (bits < 64 || kind == "LREAL");
+            let size = usize::try_from(bits.div_ceil(8)).expect("small");
+            let typed = Self {
+                number,
+                kind,
+                bits,
+                order: if bits > 8 { order } else { "ABCD" },
+                scale: has_scale.then_some([raw, raw + 64.0, value, value + 64.0 * gain]),
+                place,
+                fail_safe: random.within(0, if bits == 1 { 1 } else { 100 }),
+                is_split: random.once_in(3) && bits > 1,
+            };
+            place +=
+                size + usize::try_from(random.below(2)).expect("small") * usize::from(has_gaps);
+            typed
+        });
+        typed.collect()
+    }
+
+    fn is_signed(&self) -> bool {
+        matches!(self.kind, "SINT" | "INT" | "DINT" | "LINT")
+    }
+
+    fn is_float(&self) -> bool {
+        matches!(self.kind, "REAL" | "LREAL")
+    }
+
+    /// Whether its slot holds an integer, and no double.
+    fn is_integer(&self) -> bool {
+        self.bits == 64 && !self.is_float()
+    }
+
+    fn size(&self) -> usize {
+        usize::try_from(self.bits.div_ceil(8)).expect("small")
+    }
+
+    /// Its name, from which the readers of recordings know how its values are written.
+    fn name(&self, area: char, station: usize) -> String {
+        let how = match self.kind {
+            "LINT" => "i64",
+            _ if self.is_integer() => "u64",
+            _ => "f64",
+        };
+        format!("{how}x{}{area}{station}", self.number)
+    }
+
+    fn is_split_at(&self, reads: bool) -> bool {
+        self.is_split && reads
+    }
+
+    /// Its names at an end.
+    pub(crate) fn names(&self, area: char, station: usize, reads: bool) -> Vec<String> {
+        if !self.is_split_at(reads) {
+            return vec![self.name(area, station)];
+        }
+        let bytes = 0..self.size();
+        let names = bytes.map(|byte| format!("byte{byte}x{}{area}{station}", self.number));
+        names.collect()
+    }
+
+    /// Its sections in the driver.cfg of an end, without what they have of the station.
+    pub(crate) fn sections(&self, area: char, station: usize, reads: bool) -> Vec<String> {
+        let place = self.place;
+        if self.is_split_at(reads) {
+            let names = self.names(area, station, reads).into_iter();
+            let bytes = self.laid_out(self.safe_bits());
+            let sections = names.zip(bytes).enumerate().map(|(index, (name, byte))| {
+                let place = place + index;
+                format!(
+                    "[[signal]]\nname = \"{name}\"\naddress = \"%{area}B{place}\"\ntype = \"USINT\"\nfail_safe = {byte}"
+                )
+            });
+            return sections.collect();
+        }
+        let address = match self.bits {
+            1 => format!("X{place}.0"),
+            8 => format!("B{place}"),
+            16 => format!("W{place}"),
+            32 => format!("D{place}"),
+            _ => format!("L{place}"),
+        };
+        let name = self.name(area, station);
+        let mut section = format!(
+            "[[signal]]\nname = \"{name}\"\naddress = \"%{area}{address}\"\ntype = \"{}\"\n",
+            self.kind
+        );
+        if self.bits > 8 {
+            section.push_str(&format!("order = \"{}\"\n", self.order));
+        }
+        if let Some([raw, other, value, behind]) = self.scale {
+            section.push_str(&format!(
+                "scale = {{ raw = [{raw}, {other}], value = [{value:?}, {behind:?}] }}\n"
+            ));
+        }
+        let fail_safe = f64::from_bits(self.read(self.safe_bits()));
+        section.push_str(&match self.kind {
+            "BOOL" => format!("fail_safe = {}", self.fail_safe == 1),
+            _ if self.is_integer() => format!("fail_safe = {}", self.fail_safe),
+            _ => format!("fail_safe = {fail_safe:?}"),
+        });
+        vec![section]
+    }
+
+    /// The bits of its fail-safe value.
+    fn safe_bits(&self) -> u64 {
+        #[expect(clippy::cast_precision_loss, reason = "a small number")]
+        let half = self.fail_safe as f64 / 2.0;
+        match self.kind {
+            #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+            "REAL" => u64::from((half as f32).to_bits()),
+            "LREAL" => half.to_bits(),
+            _ => self.fail_safe.cast_unsigned(),
+        }
+    }
+
+    /// Gain and offset of its scale.
+    fn line(&self) -> (f64, f64) {
+        let [raw, other, value, behind] = self.scale.unwrap_or([0.0, 1.0, 0.0, 1.0]);
+        let gain = (behind - value) / (other - raw);
+        (gain, value - raw * gain)
+    }
+
+    /// The slot that a simulation writes in the tick of a stamp.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "numbers of all kinds are wanted"
+    )]
+    pub(crate) fn written(&self, stamp: u64) -> u64 {
+        let chance = scramble(stamp ^ (self.number as u64 + 1) << 56);
+        let (gain, offset) = self.line();
+        let wide = chance.cast_signed();
+        let value = match self.kind {
+            "BOOL" => (chance & 1) as f64,
+            _ if self.is_integer() => return chance,
+            _ if chance >> 60 == 0 => f64::NAN,
+            // What some floating-point numbers become is not of this shape.
+            "REAL" => f64::from(wide as i16) / 4.0 * gain + offset,
+            "LREAL" => f64::from(wide as i32) / 4.0 * gain + offset,
+            _ => {
+                // A little beyond both ends, and halves.
+                let span = 1_u64 << (self.bits + 1);
+                let raw =
+                    (chance % span) as f64 - (span / 2) as f64 + (chance >> 59 & 1) as f64 / 2.0;
+                raw * gain + offset
+            }
+        };
+        value.to_bits()
+    }
+
+    /// The bits that this slot has on the line.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "what is clamped fits, and a REAL is what it is"
+    )]
+    fn on_line(&self, slot: u64) -> u64 {
+        if self.is_integer() {
+            return slot;
+        }
+        let value = f64::from_bits(slot);
+        if value.is_nan() {
+            return self.safe_bits();
+        }
+        let (gain, offset) = self.line();
+        let raw = (value - offset) / gain;
+        match self.kind {
+            "BOOL" => u64::from(value != 0.0),
+            "REAL" => u64::from((raw as f32).to_bits()),
+            "LREAL" => raw.to_bits(),
+            _ => {
+                let half = if raw < 0.0 { -0.5 } else { 0.5 };
+                let whole = (raw + half).trunc() as i64;
+                let (least, most) = if self.is_signed() {
+                    (-(1_i64 << (self.bits - 1)), (1_i64 << (self.bits - 1)) - 1)
+                } else {
+                    (0, (1_i64 << self.bits) - 1)
+                };
+                whole.clamp(least, most).cast_unsigned() & (u64::MAX >> (64 - self.bits))
+            }
+        }
+    }
+
+    /// The slot that bits on the line become.
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "32 bits at most"
+    )]
+    fn read(&self, bits: u64) -> u64 {
+        if self.is_integer() {
+            return bits;
+        }
+        let unused = 64 - self.bits;
+        let raw = match self.kind {
+            "REAL" => f64::from(f32::from_bits(bits as u32)),
+            "LREAL" => f64::from_bits(bits),
+            _ if self.is_signed() => ((bits << unused).cast_signed() >> unused) as f64,
+            _ => bits as f64,
+        };
+        let (gain, offset) = self.line();
+        (raw * gain + offset).to_bits()
+    }
+
+    /// The bytes of bits on the line, in its order.
+    fn laid_out(&self, bits: u64) -> Vec<u8> {
+        let size = self.size();
+        self.ordered(bits.to_be_bytes()[8 - size..].to_vec())
+    }
+
+    /// Bytes from the greatest on, in its order; and the other way round, which is the same.
+    fn ordered(&self, big: Vec<u8>) -> Vec<u8> {
+        match self.order {
+            "DCBA" => big.into_iter().rev().collect(),
+            "CDAB" => big.chunks(2).rev().flatten().copied().collect(),
+            "BADC" => big
+                .chunks(2)
+                .flat_map(|word| word.iter().rev())
+                .copied()
+                .collect(),
+            _ => big,
+        }
+    }
+
+    /// The bytes of a tick with this stamp.
+    pub(crate) fn bytes(&self, stamp: u64) -> Vec<u8> {
+        self.laid_out(self.on_line(self.written(stamp)))
+    }
+
+    /// What bytes that begin with its own are, as an end is [shown](Self::shown) them.
+    pub(crate) fn taken(&self, bytes: &[u8], reads: bool) -> Vec<u64> {
+        let bytes = &bytes[..self.size()];
+        if self.is_split_at(reads) {
+            let bytes = bytes.iter();
+            return bytes.map(|byte| f64::from(*byte).to_bits()).collect();
+        }
+        let big = self.ordered(bytes.to_vec()).into_iter();
+        vec![self.read(big.fold(0, |bits, byte| bits << 8 | u64::from(byte)))]
+    }
+
+    /// What an end is shown of a tick with this stamp, or of fail-safe values.
+    pub(crate) fn shown(&self, stamp: Option<u64>, reads: bool) -> Vec<u64> {
+        let bits = stamp.map_or(self.safe_bits(), |stamp| self.on_line(self.written(stamp)));
+        if self.is_split_at(reads) {
+            let bytes = self.laid_out(bits).into_iter();
+            return bytes.map(|byte| f64::from(byte).to_bits()).collect();
+        }
+        vec![self.read(bits)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_as_the_docs_have_them() {
+        let mut typed = Typed {
+            number: 0,
+            kind: "DWORD",
+            bits: 32,
+            order: "ABCD",
+            scale: None,
+            place: 16,
+            fail_safe: 0,
+            is_split: true,
+        };
+        for (order, bytes) in [
+            ("ABCD", [1, 2, 3, 4]),
+            ("DCBA", [4, 3, 2, 1]),
+            ("CDAB", [3, 4, 1, 2]),
+            ("BADC", [2, 1, 4, 3]),
+        ] {
+            typed.order = order;
+            assert_eq!(typed.laid_out(0x0102_0304), bytes);
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! An end that is a PLC program, scanned by tickbus: it writes and reads frames, and no slots.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use tickbus_base::time::Nanos;
+use tickbus_driver::{Code, Host};
+use tickbus_driver_cfg::Config;
+use tickbus_plc::{Program, Scan};
+
+use super::{Shared, judge_tick};
+use crate::clock::SimulatedClock;
+use crate::end::Found;
+use crate::judge::{Broken, Shown, Stamp, level, real, whole};
+use crate::plan::{FAIL_SAFE, Plan};
+use crate::scheduler;
+
+thread_local! {
+    /// The world of this thread: a program is sent to the thread that scans it, which is the same one.
+    static HERE: RefCell<Option<Rc<Shared>>> = const { RefCell::new(None) };
+}
+
+/// A world begins.
+pub(super) fn enter(shared: &Rc<Shared>) {
+    HERE.with(|here| *here.borrow_mut() = Some(Rc::clone(shared)));
+}
+
+/// It has ended.
+pub(super) fn leave() {
+    HERE.with(|here| here.borrow_mut().take());
+}
+
+/// The program of an end.
+struct Stamped {
+    plan: Plan,
+    end: usize,
+    process: usize,
+    life: u64,
+    tick: u64,
+    next_pulse: i64,
+    /// The pulse that it read last.
+    had_pulse: bool,
+}
+
+/// Begins to scan an end's program.
+pub(super) fn open(shared: &Shared, (end, process): (usize, usize), life: u64) -> Host {
+    let plan = &shared.plan;
+    let text = plan.driver_cfg(end, &shared.link);
+    let config = Config::parse("driver.cfg", &text)
+        .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+    let program = Stamped {
+        plan: plan.clone(),
+        end,
+        process,
+        life,
+        tick: 0,
+        next_pulse: scheduler::now().0 + plan.pulses.0,
+        had_pulse: false,
+    };
+    let interval = plan.ends[end].period;
+    Host::open(
+        &config,
+        Box::new(program),
+        interval,
+        SimulatedClock::shared(),
+    )
+    .unwrap_or_else(|why| panic!("a program that is not scanned: {why}"))
+}
+
+/// Ends it.
+pub(super) fn close(host: Host) -> Result<(), Broken> {
+    match host.close() {
+        None => Ok(()),
+        Some(what) => Err(Broken {
+            promise: "close",
+            what,
+        }),
+    }
+}
+
+impl Stamped {
+    /// The area that it writes, or reads.
+    fn area(&self, writes: bool) -> char {
+        if (self.end == 0) == writes { 'I' } else { 'Q' }
+    }
+
+    fn write(&self, is_pulse: bool, frame: &mut [u8]) {
+        let stamp = Stamp {
+            life: self.life,
+            area: 1 - self.end as u64,
+            station: 0,
+            tick: self.tick,
+        };
+        let stamp = stamp.number();
+        frame[..8].copy_from_slice(&stamp.to_be_bytes());
+        frame[8] = u8::from(is_pulse) | u8::from(level(stamp)) << 1;
+        if self.plan.numbers {
+            frame[10..12].copy_from_slice(&whole(stamp).to_le_bytes());
+            #[expect(clippy::cast_possible_truncation, reason = "a small number")]
+            let raw = (real(stamp) * 2.0) as f32;
+            frame[12..16].copy_from_slice(&raw.to_be_bytes());
+        }
+        for typed in self.plan.features.beside(self.area(true)) {
+            let bytes = typed.bytes(stamp);
+            frame[typed.place..typed.place + bytes.len()].copy_from_slice(&bytes);
+        }
+    }
+
+    fn read(&mut self, frame: &[u8]) -> Shown {
+        let part = |place: usize| frame[place..place + 8].try_into().expect("eight bytes");
+        let has_pulse = frame[8] & 1 == 1;
+        let had_pulse = std::mem::replace(&mut self.had_pulse, has_pulse);
+        let numbers = self.plan.numbers.then(|| {
+            let whole = i16::from_le_bytes([frame[10], frame[11]]);
+            let raw = f32::from_be_bytes([frame[12], frame[13], frame[14], frame[15]]);
+            (f64::from(whole), f64::from(raw) / 2.0)
+        });
+        let typed = self.plan.features.beside(self.area(false)).iter();
+        Shown {
+            stamp: u64::from_be_bytes(part(0)),
+            level: frame[8] >> 1 & 1 == 1,
+            edges: u64::from(has_pulse && !had_pulse),
+            numbers,
+            typed: typed
+                .flat_map(|typed| typed.taken(&frame[typed.place..], true))
+                .collect(),
+        }
+    }
+
+    /// A program is told that its inputs do not count, and sees those that came last: they are judged as if it took fail-safe
+    /// values for them.
+    fn without_peer(&self) -> Shown {
+        let typed = self.plan.features.beside(self.area(false)).iter();
+        Shown {
+            stamp: FAIL_SAFE,
+            level: false,
+            edges: 0,
+            numbers: self.plan.numbers.then_some((-7.0, 2.5)),
+            typed: typed.flat_map(|typed| typed.shown(None, true)).collect(),
+        }
+    }
+}
+
+impl Program for Stamped {
+    fn name(&self) -> &'static str {
+        "stamped"
+    }
+
+    fn input_bytes(&self) -> usize {
+        0
+    }
+
+    fn output_bytes(&self) -> usize {
+        0
+    }
+
+    fn can_hang(&self) -> bool {
+        true
+    }
+
+    fn scan(&mut self, scan: &mut Scan<'_>) {
+        let Some(shared) = HERE.with(|here| here.borrow().clone()) else {
+            return;
+        };
+        let state = &shared.ends[self.end];
+        self.tick += 1;
+        let shown = self.read(scan.inputs);
+        let stall = state.stall.replace(Nanos::ZERO);
+        if stall > Nanos::ZERO {
+            scheduler::sleep(stall);
+        }
+        state.writer.borrow_mut().begin(self.life, self.tick);
+        let now = scan.now.0;
+        let is_pulse = now >= self.next_pulse;
+        if is_pulse {
+            self.next_pulse = now + self.plan.pulses.0;
+        }
+        self.write(is_pulse, scan.outputs);
+        {
+            let mut writer = state.writer.borrow_mut();
+            writer.end(scheduler::now().0);
+            if is_pulse {
+                writer.pulses.push(now);
+            }
+        }
+        // No age is told, but that it is below the limit.
+        let found = Found {
+            code: if scan.alive {
+                Code::Unchanged
+            } else {
+                Code::Stale
+            },
+            age: if scan.alive {
+                self.plan.max_age.0
+            } else {
+                i64::MAX
+            },
+            sequence: 0,
+            stations: vec![if scan.alive {
+                shown
+            } else {
+                self.without_peer()
+            }],
+            broken: None,
+        };
+        let (life, tick) = (self.life, self.tick);
+        judge_tick(
+            &shared,
+            (self.end, self.process),
+            (life, tick),
+            (now, is_pulse),
+            found,
+        );
+    }
+}

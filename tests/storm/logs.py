@@ -1,0 +1,51 @@
+"""The lines that the ends may log, and what causes each. Any other line is a finding."""
+
+import re
+
+# What makes an end silent for its peer.
+SILENT = {"stopped", "killed", "terminated", "cut", "second", "paused", "stalled", "dispatcher killed", "dispatcher stopped"}
+DISPATCHER = {"dispatcher killed", "dispatcher stopped"}
+# Lines end in disorder when one of them ends, which happens in every line of the storm.
+ALWAYS = set()
+DEATHS = {"killed", "terminated", "second", "cut", "stopped"}
+
+# The states of a line, in the words of the driver and of the command; what has to have befallen the line for it.
+STATE = r'^(?:driver "\w+" is|mirror:|plc:|\[[^]]* WARN +tickbus_fieldbus::link\] driver "\w+" is) '
+KNOWN = [
+    (STATE + r"(opening|running): (listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
+    (STATE + r"running: serving ", ALWAYS),
+    (STATE + r"(stale|opening|failed): nothing has come from ", SILENT),
+    (STATE + r"(opening|failed): the peer left: \S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
+    (STATE + r"failed: the link failed: cannot connect to \S+ \(Connection refused", ALWAYS),
+    (STATE + r"failed: the link failed: cannot connect to \S+ \((Network is unreachable|No route to host|.*timed out)", {"cut"}),
+    (STATE + r"(opening|failed): the link failed: \S+ has been silent for ", SILENT),
+    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection timed out|No route|Network is)", {"cut"}),
+    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection reset|Broken pipe)", DEATHS),
+    # A newcomer is turned away while another one is served, and a server that is not the only one gets no port.
+    (STATE + r"(opening|failed): the peer left: \S+ closed the connection( before it had sent anything)?; if it serves", DEATHS),
+    (STATE + r"failed: .*Address already in use", {"second"}),
+    (r'^(\[[^]]* WARN [^]]*\] )?driver "\w+": \S+ writes what \S+ wrote less than ', DEATHS),
+    (STATE + r"opening: refused: unit \d+ of \S+ refused to write .* \(server device busy\)", DEATHS),
+    (STATE + r"failed: refused: \S+ refuses writing .* access is not allowed \(code 0x03\)", DEATHS),
+    # OPC UA, and the dispatcher.
+    (STATE + r"(failed|opening): the peer left: the (server|last client) closed (the|its) session", ALWAYS),
+    (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
+    (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
+    # Recordings.
+    (r"the recording ended with tick \d+ of the file: No space left on device", {"small disk"}),
+    (r": process \d+ records to this file, or replays it; name another file", {"second"}),
+    (r"^  correct the lines named in the message; `tickbus check FILE`", {"second"}),
+    (r"^\tat (tickbus\.Tickbus|End\.main)", {"second"}),
+    # What the command prints in the end.
+    (r"^(mirror|plc): ok ", ALWAYS),
+]
+
+
+def unexplained(text, befallen):
+    """The lines of a log that nothing explains."""
+    found = []
+    for line in text.splitlines():
+        causes = [causes for pattern, causes in KNOWN if re.search(pattern, line)]
+        if line.strip() and not any(not each or befallen & each for each in causes):
+            found.append(line)
+    return found

@@ -41,6 +41,8 @@ pub(super) fn listen(
 ) -> Result<(), BusError> {
     let mut lines = ConnectionStates::new(places.iter().map(|place| place.name.clone()));
     let mut servers = Vec::new();
+    // From then on the system lets clients connect, and what they send may wait.
+    let since = port.clock().now();
     for (line, place) in places.into_iter().enumerate() {
         let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
             return Ok(());
@@ -67,7 +69,7 @@ pub(super) fn listen(
         lines.opening(server.line, &server.waiting, port);
     }
     let mut set = PollSet::new(stop);
-    port.begin_to_look(port.clock().now());
+    port.begin_to_look(since);
     while !stop.is_stopped() {
         turn(&mut servers, &mut lines, &mut set, port)?;
     }

@@ -80,6 +80,8 @@ pub fn serve<S: Service>(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
+    // From then on the system lets clients connect, and what they send may wait.
+    let since = port.clock().now();
     let Some((listener, bound)) = listen(address, port, stop)? else {
         return Ok(());
     };
@@ -101,7 +103,7 @@ pub fn serve<S: Service>(
     assert!(limit <= BUFFER, "a telegram fits into one read");
     port.opening(&server.waiting);
     server.listen(true).map_err(|error| no_wait(&error))?;
-    port.begin_to_look(port.clock().now());
+    port.begin_to_look(since);
     while !stop.is_stopped() {
         server.turn(port)?;
     }

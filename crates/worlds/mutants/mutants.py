@@ -5,6 +5,7 @@ lets the unit tests of the crate judge each of them before the worlds do.
 """
 
 import argparse
+import functools
 import json
 import os
 import shutil
@@ -19,9 +20,9 @@ import chance
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
-OUT = ROOT / "target" / "mutants"
+OUT = Path(os.environ.get("MUTANTS_OUT", ROOT / "target" / "mutants"))
 TREE = OUT / "tree"
-BUILT = Path(os.environ.get("MUTANTS_TARGET", OUT / "target"))
+BUILT = OUT / "target"
 PROFILE = ["--profile", "bench", "--config", "tests/profile.toml", "--config", "profile.bench.opt-level=1"]
 SWITCH = """
 /// Whether this run is that of the mutation with this number.
@@ -71,35 +72,44 @@ def put_back(mutants, texts):
 
 
 def worlds(number, seconds):
-    """How long worlds take to find a mutation, and by which promise."""
-    environment = dict(os.environ, TICKBUS_MUTANT=str(number))
+    """How long worlds take to find a mutation, by which promise, and in which of them."""
     binary = BUILT / "release" / "worlds"
     begun = time.monotonic()
     process = subprocess.Popen(
-        [binary, "100000", str(seconds)], env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+        [binary, "100000", str(seconds)], env=chosen(number), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
     # A mutation may let a thread go on for ever, in which no world ends.
     patience = threading.Timer(seconds + 60, process.kill)
     patience.start()
-    found, seed, last = None, "", ""
+    promise, took, last = None, 0.0, ""
     for line in process.stdout:
         last = line
-        if found is None and not line.startswith(("pairs", "worlds=")):
-            found = line.split(":")[0]
-            took = time.monotonic() - begun
         if line.startswith("  seed"):
             seed = line.split(";")[0].split()[1]
-            break
+            # What tickbus does without the mutation, too, the mutation has not done.
+            if is_whole(binary, seed):
+                patience.cancel()
+                process.kill()
+                process.wait()
+                return took, promise, seed
+            print(f"mutants: {seed} breaks a promise without any mutation", flush=True)
+        elif not line.startswith((" ", "pairs", "worlds=")):
+            promise, took = line.split(":")[0], time.monotonic() - begun
     is_late = not patience.is_alive()
     patience.cancel()
-    if found is not None:
-        process.kill()
-        process.wait()
-        return took, found, seed
     took = time.monotonic() - begun
-    if process.wait() != 0:
+    if process.wait() not in (0, 1):
         return took, "hangs" if is_late else "panics", ""
     return took, None, last.split()[0]
+
+
+def chosen(number):
+    return dict(os.environ, TICKBUS_MUTANT=str(number))
+
+
+@functools.cache
+def is_whole(binary, seed):
+    return subprocess.run([binary, seed], env=chosen(0), capture_output=True, check=False).returncode == 0
 
 
 def known(names, seconds):
@@ -185,7 +195,7 @@ def changed(files, changes):
 
 
 def unit_tests(binary, crate, number):
-    environment = dict(os.environ, TICKBUS_MUTANT=str(number))
+    environment = chosen(number)
     try:
         done = subprocess.run(
             [binary, "-q"], cwd=TREE / "crates" / crate, env=environment, capture_output=True, timeout=120, check=False

@@ -15,7 +15,7 @@ mod writer;
 
 use std::fmt;
 
-pub(crate) use self::age::{held, slack};
+pub(crate) use self::age::{held, promise, slack};
 pub(crate) use self::files::{Contents, FileRow, area_of};
 pub(crate) use self::reader::{Known, Reader, Seen, Shown};
 pub(crate) use self::recording::judge_recording;

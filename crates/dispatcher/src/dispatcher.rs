@@ -4,6 +4,7 @@ mod laboratory;
 mod operator;
 mod requests;
 mod saving;
+mod silence;
 
 use std::net::SocketAddr;
 
@@ -47,9 +48,9 @@ impl Default for Settings {
 
 /// The dispatcher. Each connection has a seat, a number that is used again when it is free.
 ///
-/// After calls that take `now`, and after [`saved`](Self::saved) and [`gone`](Self::gone), first save the patch if
-/// [`unsaved`](Self::unsaved) returns one; then, for each seat from [`next_touched`](Self::next_touched), send the bytes of
-/// [`to_write`](Self::to_write).
+/// Calls that take `now` come between [`woke`](Self::woke) and [`tick`](Self::tick). After them, and after
+/// [`saved`](Self::saved) and [`gone`](Self::gone), first save the patch if [`unsaved`](Self::unsaved) returns one; then, for
+/// each seat from [`next_touched`](Self::next_touched), send the bytes of [`to_write`](Self::to_write).
 #[derive(Debug)]
 pub struct Dispatcher {
     settings: Settings,
@@ -69,6 +70,8 @@ pub struct Dispatcher {
     next_look: Nanos,
     /// The shortest time within which a client has promised a line, or a longer one.
     promise: Nanos,
+    /// This process was held up: what is read until the next [`tick`](Self::tick) may have waited for long.
+    is_catching_up: bool,
     /// The other dispatchers of the laboratory, if there can be any.
     federation: Option<Box<Federation>>,
     /// Who waits for answers of other dispatchers.
@@ -149,6 +152,7 @@ impl Dispatcher {
             saving: 0,
             next_look: Nanos::MAX,
             promise: Nanos::MAX,
+            is_catching_up: false,
             federation: None,
             waiting: Vec::new(),
         }
@@ -279,68 +283,6 @@ impl Dispatcher {
         }
     }
 
-    /// Goes on with clients that had to wait, and disconnects those that have been silent for too long.
-    pub fn tick(&mut self, now: Nanos) {
-        for seat in std::mem::take(&mut self.resumable) {
-            if let Some(session) = &mut self.sessions[seat] {
-                // It was not read from.
-                session.heard = now;
-                let due = session.alive.map_or(Nanos::MAX, |alive| now + alive);
-                self.next_look = self.next_look.min(due);
-            }
-            self.arrived(now, seat, &[]);
-        }
-        self.beat(now);
-        if now < self.next_look {
-            return;
-        }
-        let idle = self.settings.idle;
-        // If this process was held up, lines of clients may wait that were not read yet.
-        let is_late = now - self.next_look > Nanos(self.promise.0 / 2);
-        let (mut first, mut promise) = (Nanos::MAX, Nanos::MAX);
-        for seat in 0..self.sessions.len() {
-            let Some(session) = self.sessions[seat]
-                .as_mut()
-                .filter(|it| it.progress != Progress::Closing)
-            else {
-                continue;
-            };
-            if now - session.heard >= idle {
-                session.progress = Progress::Closing;
-                let refusal = Code::TimeOut.because(format_args!(
-                    "nothing was heard for {idle}; send PING when there is nothing else to send"
-                ));
-                self.refuse(seat, &refusal);
-                continue;
-            }
-            first = first.min(session.heard + idle);
-            let Some(alive) = session.alive else {
-                continue;
-            };
-            promise = promise.min(alive);
-            if session.is_silent {
-                continue;
-            }
-            let due = session.heard + alive;
-            if now < due || is_late {
-                first = first.min(due);
-            } else if self.is_owed_answer(seat) {
-                // Its lines are not read. Once they are, it has its time again.
-                first = first.min(now + alive);
-            } else if let Some(session) = &mut self.sessions[seat] {
-                session.is_silent = true;
-                self.board.fall_silent(seat);
-            }
-        }
-        self.promise = promise;
-        // With many clients there is always one whose time comes next; they are looked at together.
-        let soonest = now + Nanos((idle.0 / 600).min(promise.0 / 10));
-        self.next_look = first.max(soonest);
-        if first == Nanos::MAX {
-            self.next_look = Nanos::MAX;
-        }
-    }
-
     /// Bytes have arrived from a client, in any pieces.
     pub fn arrived(&mut self, now: Nanos, seat: usize, bytes: &[u8]) {
         let Some(session) = &mut self.sessions[seat] else {
@@ -446,19 +388,6 @@ impl Dispatcher {
     fn heard(&mut self, now: Nanos, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.heard = now;
-        }
-    }
-
-    /// If a client was silent, its outputs have values again.
-    fn speak_again(&mut self, now: Nanos, seat: usize) {
-        let Some(session) = &mut self.sessions[seat] else {
-            return;
-        };
-        if std::mem::take(&mut session.is_silent) {
-            self.next_look = self
-                .next_look
-                .min(now + session.alive.unwrap_or(Nanos::MAX));
-            self.board.speak_again(seat);
         }
     }
 

@@ -202,6 +202,7 @@ impl Host<'_, '_> {
         let deadline = self.dispatcher.deadline().min(accept).min(self.next_look);
         self.set.wait(self.hosting.clock, deadline)?;
         let now = self.hosting.clock.now();
+        self.dispatcher.woke(now);
         self.ready.clear();
         self.ready.extend_from_slice(self.set.ready());
         for at in 0..self.ready.len() {

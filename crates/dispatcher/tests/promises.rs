@@ -222,3 +222,22 @@ fn a_client_that_breaks_its_promise_is_lost_on_other_hosts_too() {
     hosts.ask(0, pump, "PING");
     assert_eq!(hosts.hear(1, logo), ["P I1=24"]);
 }
+
+#[test]
+fn lines_that_waited_for_a_dispatcher_that_was_held_up_are_no_sign_of_life() {
+    let mut lab = Lab::new();
+    let logo = lab.join("VR LOGO I01 V=3");
+    let pump = lab.join("VP PUMP Q01 ALIVE=500ms");
+    lab.say(logo, "CONNECT I1:PUMP:Q1");
+    lab.say(pump, "P Q1=24");
+    assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24"]);
+    for (held_up, heard) in [(900, &["P I1=12"][..]), (1100, &["P I1=?"][..])] {
+        lab.now += Nanos::from_millis(held_up);
+        lab.dispatcher.woke(lab.now);
+        lab.say(pump, "P Q1=12");
+        lab.settle();
+        assert_eq!(lab.hear(logo), heard, "after {held_up} ms");
+    }
+    lab.say(pump, "PING");
+    assert_eq!(lab.hear(logo), ["P I1=12"]);
+}

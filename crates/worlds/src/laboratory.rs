@@ -5,12 +5,12 @@ use std::rc::Rc;
 
 use tickbus_base::time::{Clock as _, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, LEAST_PROMISE, OnLoss, Patch, Pin, Settings};
+use tickbus_dispatcher::{Dispatcher, OnLoss, Patch, Pin, Settings};
 use tickbus_fieldbus::tcp::Address;
 
 use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
-use crate::judge::{Broken, Known, Seen, Stamp, held, slack};
+use crate::judge::{Broken, Known, Seen, Stamp, held, promise, slack};
 use crate::network::{Delivery, Network};
 use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
@@ -140,13 +140,7 @@ impl Laboratory {
 
 /// A source that has been silent for longer than it promised is lost: nothing of it counts any more, unless the dispatcher holds.
 pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Result<(), Broken> {
-    // A dispatcher that was held up itself reads first what has come meanwhile.
-    let suspended = plan.events.iter().map(|event| match event.what {
-        Misfortune::Suspend(BETWEEN, span) => span.0,
-        _ => 0,
-    });
-    let promise = plan.max_age.max(LEAST_PROMISE).0;
-    let allowed = promise + promise / 2 + slack(plan) + held(plan) + suspended.sum::<i64>();
+    let allowed = promise(plan) * 2 + slack(plan) + held(plan);
     match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
         Some(shown) if known.silent > allowed && !plan.laboratory.holds => Err(Broken {
             promise: "left on",

@@ -410,7 +410,10 @@ fn judge_tick(
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
         let heard = (end, began - found.age);
-        let known = shared.laboratory.known(plan, network, heard, deliveries);
+        // Stale data are judged by themselves.
+        let known = (found.code != Code::Stale)
+            .then(|| shared.laboratory.known(plan, network, heard, deliveries))
+            .flatten();
         let seen = Seen {
             began,
             tick,

@@ -1,9 +1,11 @@
 //! Ages: never less than the true one, and nothing old is told to be young.
 
+use tickbus_dispatcher::LEAST_PROMISE;
+
 use super::reader::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::{Bus, Misfortune, Plan};
+use crate::plan::{BETWEEN, Bus, Event, Misfortune, Plan};
 use crate::scheduler::STARVED;
 
 /// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
@@ -18,10 +20,26 @@ pub(crate) fn slack(plan: &Plan) -> i64 {
     cycles + late + plan.round_trip() + plan.held_by_faults() + 1_000_000
 }
 
+/// How long lines may have waited for a dispatcher that is suspended, and count: up to twice the time within which one was promised.
+pub(super) fn relayed(plan: &Plan) -> i64 {
+    let is_suspended = |event: &Event| matches!(event.what, Misfortune::Suspend(BETWEEN, _));
+    if plan.events.iter().any(is_suspended) {
+        promise(plan) * 2
+    } else {
+        0
+    }
+}
+
+/// Within what an end promises a dispatcher a line, in ns.
+pub(crate) fn promise(plan: &Plan) -> i64 {
+    plan.max_age.max(LEAST_PROMISE).0
+}
+
 /// How long what was taken to be sent may be on its way, beyond what the network takes.
 pub(crate) fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold(span) => span.0,
+        Misfortune::Suspend(BETWEEN, _) => 0,
         // A thread that has taken what to send may lose the processor before it sends that.
         Misfortune::Suspend(_, span) if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
         _ => 0,

@@ -1,10 +1,10 @@
 //! Nothing is left on: a writer that stopped, and a controller that closed, leave fail-safe values.
 
-use super::age::{held, slack};
+use super::age::{held, relayed, slack};
 use super::reader::{Reader, Seen};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::{FAIL_SAFE, Plan};
+use crate::plan::{Bus, FAIL_SAFE, Plan};
 
 impl Reader {
     /// While a writer does not tick, its watchdog trips: nothing of it may count any more.
@@ -23,7 +23,12 @@ impl Reader {
         if holds
             || writer.is_ticking()
             || now - last
-                <= limit + plan.max_age.0 + slack(plan) + plan.waits_for_pulses() + held(plan)
+                <= limit
+                    + plan.max_age.0
+                    + slack(plan)
+                    + plan.waits_for_pulses()
+                    + held(plan)
+                    + relayed(plan)
         {
             return Ok(());
         }
@@ -45,7 +50,13 @@ impl Reader {
     /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
     pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
         let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
-        if holds || seen.is_stale || seen.began <= left + slack(plan) + plan.waits_for_pulses() {
+        let through = if plan.bus == Bus::Dispatcher {
+            held(plan) + relayed(plan)
+        } else {
+            0
+        };
+        let soon = slack(plan) + plan.waits_for_pulses() + through;
+        if holds || seen.is_stale || seen.began <= left + soon {
             return Ok(());
         }
         match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {

@@ -1,0 +1,105 @@
+//! Clients that say nothing for too long, and clients whose lines have waited for too long.
+
+use tickbus_base::time::Nanos;
+
+use super::{Code, Dispatcher, Progress};
+
+impl Dispatcher {
+    /// A thread that serves has waited, and reads next what has arrived.
+    ///
+    /// If it was held up for longer than a client has promised a line, that client's lines may have waited as long. They are no sign of
+    /// life: its outputs are cut off before they are read, and restored by its first line after [`tick`](Self::tick).
+    pub fn woke(&mut self, now: Nanos) {
+        let late = now - self.next_look;
+        if late <= self.promise {
+            return;
+        }
+        self.is_catching_up = true;
+        for seat in 0..self.sessions.len() {
+            let Some(session) = &mut self.sessions[seat] else {
+                continue;
+            };
+            let is_overdue = session.alive.is_some_and(|alive| late > alive);
+            if is_overdue && session.progress != Progress::Closing && !session.is_silent {
+                session.is_silent = true;
+                self.board.fall_silent(seat);
+            }
+        }
+    }
+
+    /// Goes on with clients that had to wait, and disconnects those that have been silent for too long.
+    pub fn tick(&mut self, now: Nanos) {
+        for seat in std::mem::take(&mut self.resumable) {
+            if let Some(session) = &mut self.sessions[seat] {
+                // It was not read from.
+                session.heard = now;
+                let due = session.alive.map_or(Nanos::MAX, |alive| now + alive);
+                self.next_look = self.next_look.min(due);
+            }
+            self.arrived(now, seat, &[]);
+        }
+        self.is_catching_up = false;
+        self.beat(now);
+        if now < self.next_look {
+            return;
+        }
+        let idle = self.settings.idle;
+        // If this process was held up, lines of clients may wait that were not read yet.
+        let is_late = now - self.next_look > Nanos(self.promise.0 / 2);
+        let (mut first, mut promise) = (Nanos::MAX, Nanos::MAX);
+        for seat in 0..self.sessions.len() {
+            let Some(session) = self.sessions[seat]
+                .as_mut()
+                .filter(|it| it.progress != Progress::Closing)
+            else {
+                continue;
+            };
+            if now - session.heard >= idle {
+                session.progress = Progress::Closing;
+                let refusal = Code::TimeOut.because(format_args!(
+                    "nothing was heard for {idle}; send PING when there is nothing else to send"
+                ));
+                self.refuse(seat, &refusal);
+                continue;
+            }
+            first = first.min(session.heard + idle);
+            let Some(alive) = session.alive else {
+                continue;
+            };
+            promise = promise.min(alive);
+            if session.is_silent {
+                continue;
+            }
+            let due = session.heard + alive;
+            if now < due || is_late {
+                first = first.min(due);
+            } else if self.is_owed_answer(seat) {
+                // Its lines are not read. Once they are, it has its time again.
+                first = first.min(now + alive);
+            } else if let Some(session) = &mut self.sessions[seat] {
+                session.is_silent = true;
+                self.board.fall_silent(seat);
+            }
+        }
+        self.promise = promise;
+        // With many clients there is always one whose time comes next; they are looked at together.
+        let soonest = now + Nanos((idle.0 / 600).min(promise.0 / 10));
+        self.next_look = first.max(soonest);
+        if first == Nanos::MAX {
+            self.next_look = Nanos::MAX;
+        }
+    }
+
+    /// If a client was silent, its outputs have values again.
+    pub(super) fn speak_again(&mut self, now: Nanos, seat: usize) {
+        let Some(session) = &mut self.sessions[seat] else {
+            return;
+        };
+        if !self.is_catching_up && std::mem::take(&mut session.is_silent) {
+            self.next_look = self
+                .next_look
+                .min(now + session.alive.unwrap_or(Nanos::MAX));
+            self.board.speak_again(seat);
+        }
+    }
+}

@@ -16,13 +16,8 @@ mod writer;
 
 use std::fmt;
 
-<<<<<<< HEAD
-pub(crate) use self::age::{held, slack};
-pub(crate) use self::files::{Contents, FileRow, area_of, is_count};
-=======
 pub(crate) use self::age::{held, promise, slack};
-pub(crate) use self::files::{Contents, FileRow, area_of};
->>>>>>> h-buses
+pub(crate) use self::files::{Contents, FileRow, area_of, is_count};
 pub(crate) use self::reader::{Known, Reader, Seen, Shown};
 pub(crate) use self::recording::judge_recording;
 pub(crate) use self::stamp::{Stamp, level, real, whole};

@@ -159,7 +159,7 @@ impl Typed {
             _ if self.is_integer() => format!("fail_safe = {}", self.fail_safe),
             _ => format!("fail_safe = {fail_safe:?}"),
         };
-        vec![section + &order + &scale + &fail_safe]
+        vec![[section, order, scale, fail_safe].concat()]
     }
 
     /// The bits of its fail-safe value.

@@ -173,7 +173,7 @@ impl Plan {
         }
         for typed in self.features.beside(area) {
             let sections = typed.sections(area, station, reads).into_iter();
-            lines.extend(sections.map(|section| section + &of));
+            lines.extend(sections.map(|section| section + of.as_str()));
         }
         lines
     }

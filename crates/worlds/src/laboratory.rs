@@ -12,7 +12,7 @@ use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
 use crate::judge::{Broken, Known, Seen, Stamp, held, promise, slack};
 use crate::network::{Delivery, Network};
-use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
+use crate::plan::{FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
 
 /// A dispatcher that is to end has done so within this.

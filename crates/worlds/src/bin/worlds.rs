@@ -1,7 +1,7 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
 //! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
-//! prints one number for all that happens in so many worlds, the same on every machine. With the name of a neighbour before the
-//! first two, such as `worlds board SEED`, the same of that.
+//! prints one number for all that happens in so many worlds, the same on every machine. `worlds unsettled FIRST SECONDS` has
+//! worlds with all features, those too that fresh ones do not have yet. With the name of a neighbour before the first two, such as `worlds board SEED`, the same of that.
 
 use std::process::ExitCode;
 
@@ -37,7 +37,13 @@ fn main() -> ExitCode {
             Err(why) => usage(&why),
         },
         [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
-            (Ok(first), Ok(seconds)) => many(first, Nanos::from_secs(seconds.into())),
+            (Ok(first), Ok(seconds)) => many(Seed::from(first), Nanos::from_secs(seconds.into())),
+            _ => usage("FIRST and SECONDS are whole numbers"),
+        },
+        ["unsettled", first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
+            (Ok(first), Ok(seconds)) => {
+                many(Seed::unsettled(first), Nanos::from_secs(seconds.into()))
+            }
             _ => usage("FIRST and SECONDS are whole numbers"),
         },
         ["traces", first, count] => match (first.parse::<u64>(), count.parse::<u32>()) {
@@ -50,7 +56,7 @@ fn main() -> ExitCode {
 
 fn usage(why: &str) -> ExitCode {
     eprintln!(
-        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds traces FIRST COUNT"
+        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds unsettled FIRST SECONDS\n       worlds traces FIRST COUNT"
     );
     ExitCode::from(2)
 }
@@ -90,12 +96,12 @@ fn traces(first: u64, count: u32) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn many(first: u64, limit: Nanos) -> ExitCode {
+fn many(first: Seed, limit: Nanos) -> ExitCode {
     let clock = Monotonic::shared();
     let begun = clock.now();
     let (mut worlds, mut failed) = (0_u64, 0);
     let mut pairs = Pairs::default();
-    let mut next = Seed::from(first);
+    let mut next = first;
     while clock.now() - begun < limit {
         let seed = next;
         next = seed.next();
@@ -119,7 +125,8 @@ fn many(first: u64, limit: Nanos) -> ExitCode {
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
     let rate = worlds as f64 / seconds;
     println!(
-        "worlds={worlds} failed={failed} first={first} per_second={rate:.0} pairs={}",
+        "worlds={worlds} failed={failed} first={} per_second={rate:.0} pairs={}",
+        first.number,
         pairs.met()
     );
     if failed > 0 {

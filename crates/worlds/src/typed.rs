@@ -166,6 +166,9 @@ impl Typed {
     fn safe_bits(&self) -> u64 {
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
         let half = self.fail_safe as f64 / 2.0;
+        // A zero has the sign of the gain that it was divided by.
+        let is_negative_zero = half == 0.0 && self.line().0 < 0.0;
+        let half = if is_negative_zero { -0.0 } else { half };
         match self.kind {
             #[expect(clippy::cast_possible_truncation, reason = "a small number")]
             "REAL" => u64::from((half as f32).to_bits()),

@@ -266,6 +266,11 @@ impl Plan {
         if seed.turn > 0 {
             plan.turn();
         }
+        if plan.features.typed.iter().any(|typed| !typed.is_empty()) {
+            // Of long frames, buffers of a few bytes would carry less than what is made in a cycle.
+            let bytes = plan.features.frame() * plan.stations;
+            plan.conditions.capacity = plan.conditions.capacity.max(bytes);
+        }
         let between = plan.events_between(later, is);
         plan.events.extend(between);
         plan.events.sort_by_key(|event| event.at);

@@ -97,7 +97,7 @@ mod tests {
             assert!(!begins_like_browser(record), "{record:02x?}");
         }
         for whole in [hello.as_slice(), allocate] {
-            let known = (1..).find(|count| begins_like_browser(&whole[..*count]));
+            let known = (1..=whole.len()).find(|count| begins_like_browser(&whole[..*count]));
             let known = known.expect("it is known at some byte");
             for count in 1..known {
                 assert!(

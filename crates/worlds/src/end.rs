@@ -8,11 +8,13 @@ use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
+use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::injector::Injector;
-use crate::judge::{Broken, Shown, Stamp, level, real, whole};
+use crate::judge::Shown;
 use crate::plan::Plan;
 use crate::scheduler::now;
+use crate::stamp::{Stamp, level, real, whole};
 use crate::tape::{Row, Tape};
 use crate::typed::Typed;
 

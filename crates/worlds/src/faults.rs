@@ -2,9 +2,8 @@
 
 use tickbus_base::time::Nanos;
 
-use crate::judge::{Stamp, level, real, whole};
-use crate::plan::Plan;
 use crate::random::Random;
+use crate::stamp::{Stamp, level, real, whole};
 
 /// A signal beside each stamp that faults bend: its name, and its fail-safe value.
 const SIGNALS: [(&str, f64); 3] = [("level", 0.0), ("whole", -7.0), ("real", 2.5)];
@@ -137,7 +136,7 @@ impl FaultPlan {
     }
 
     /// How long it holds frames back.
-    fn held(&self) -> i64 {
+    pub(crate) fn held(&self) -> i64 {
         match self.effect {
             Effect::Delay(by) | Effect::SlowAnswers(by) => by.0,
             _ => 0,
@@ -249,7 +248,7 @@ fn on_line(signal: usize, (least, most): Span) -> Span {
 /// What the end that reads a station may be shown of the signals beside a stamp, in `tick` of its own: `held` is what was
 /// shown when its own faults began.
 pub(crate) fn expected(
-    plan: &Plan,
+    faults: &[FaultPlan],
     (area, station): (char, usize),
     stamp: Option<u64>,
     tick: u64,
@@ -257,7 +256,7 @@ pub(crate) fn expected(
 ) -> [Vec<Span>; 3] {
     let reader = usize::from(area == 'I');
     let mut all = values(stamp).map(|value| vec![(value, value)]);
-    let faults = plan.features.faults.iter().enumerate();
+    let faults = faults.iter().enumerate();
     // Those of the end that writes come first, whichever is the first in the list.
     let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
     for (index, fault) in others.into_iter().chain(own) {
@@ -301,62 +300,4 @@ pub(crate) fn expected(
         }
     }
     all
-}
-
-impl Plan {
-    /// The faults that are written into the driver.cfg of an end.
-    pub(crate) fn fault_sections(&self, end: usize) -> Vec<String> {
-        let faults = self.features.faults.iter();
-        let faults = faults.filter(|fault| fault.end == end && fault.way == Way::File);
-        let sections = faults.map(|fault| {
-            format!(
-                "[[fault]]\n{}tick = {}\nticks = {}",
-                fault.section(),
-                fault.first,
-                fault.ticks
-            )
-        });
-        sections.collect()
-    }
-
-    /// How long faults of the line may hold back what counts as young.
-    pub(crate) fn held_by_faults(&self) -> i64 {
-        let faults = self.features.faults.iter();
-        let held = faults.map(|fault| match fault.effect {
-            // Frames are lost, or take the place of the next, by chance: of a server the peer has old values meanwhile.
-            Effect::Duplicate(_) | Effect::Drop(_) => self.cycle.0 * 20,
-            _ => fault.held(),
-        });
-        held.sum()
-    }
-
-    /// How old values may become besides: slow answers wait for a pulse that nobody has read, for a second at most, and for as
-    /// long as it is held.
-    pub(crate) fn waits_for_pulses(&self) -> i64 {
-        let faults = self.features.faults.iter();
-        let slow = faults.filter(|fault| matches!(fault.effect, Effect::SlowAnswers(_)));
-        i64::try_from(slow.count()).expect("few") * (1_000_000_000 + self.hold.0)
-    }
-
-    /// Whether the line of an end is down in a tick.
-    pub(crate) fn is_down(&self, end: usize, tick: u64) -> bool {
-        self.features.faults.iter().any(|fault| {
-            fault.end == end
-                && fault.effect == Effect::LinkDown
-                && fault.activity(tick) == Activity::Yes
-        })
-    }
-
-    /// Whether a fault of the line is active at an end.
-    pub(crate) fn is_disturbed(&self, end: usize, tick: u64) -> bool {
-        self.features.faults.iter().any(|fault| {
-            fault.end == end && fault.is_of_line() && fault.activity(tick) != Activity::No
-        })
-    }
-
-    /// Whether all faults of an end are over, from a tick on.
-    pub(crate) fn has_no_more_faults(&self, end: usize, tick: u64) -> bool {
-        let mut faults = self.features.faults.iter();
-        faults.all(|fault| fault.end != end || fault.is_over(tick))
-    }
 }

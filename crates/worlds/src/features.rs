@@ -1,7 +1,7 @@
 //! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
 
+use crate::bus::Bus;
 use crate::faults::{Effect, FaultPlan, Way};
-use crate::plan::Bus;
 use crate::random::{Random, scramble};
 use crate::seed::Seed;
 use crate::typed::Typed;

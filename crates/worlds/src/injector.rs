@@ -3,8 +3,8 @@
 use tickbus_driver::{Code, Driver, Watch};
 use tickbus_image::signal::Slot;
 
+use crate::broken::Broken;
 use crate::faults::{Effect, FaultPlan, Way};
-use crate::judge::Broken;
 use crate::plan::Plan;
 
 /// Who interferes with a driver.

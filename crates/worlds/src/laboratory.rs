@@ -8,12 +8,14 @@ use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, OnLoss, Patch, Pin, Settings};
 use tickbus_fieldbus::tcp::Address;
 
+use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
-use crate::judge::{Broken, Known, Seen, Stamp, held, promise, slack};
+use crate::judge::{Known, Seen, held, promise, slack};
 use crate::network::{Delivery, Network};
 use crate::plan::{FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
+use crate::stamp::Stamp;
 
 /// A dispatcher that is to end has done so within this.
 const LONGEST_END: Nanos = Nanos::from_secs(2);

@@ -10,12 +10,15 @@
     reason = "values are compared with what was written, to the last bit"
 )]
 
+mod broken;
+mod bus;
 mod clock;
 mod config;
 mod disk;
 mod end;
 mod faults;
 mod features;
+mod files;
 mod injector;
 mod judge;
 mod laboratory;
@@ -24,17 +27,19 @@ mod network;
 mod pairs;
 mod plan;
 mod random;
+mod recording;
 mod replay;
 mod scheduler;
 mod seed;
 mod shrink;
+mod stamp;
 mod tape;
 mod typed;
 mod world;
 
+pub use broken::Broken;
 pub use faults::{Effect, FaultPlan, Way};
 pub use features::{Features, RecordPlan, Times};
-pub use judge::Broken;
 pub use neighbours::Neighbour;
 pub use network::Conditions;
 pub use pairs::Pairs;

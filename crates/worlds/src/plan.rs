@@ -1,46 +1,15 @@
 //! What a world consists of, drawn from its seed.
 
+mod faults;
+
 use tickbus_base::time::Nanos;
 
+pub use crate::bus::Bus;
 use crate::features::{self, Features};
 use crate::network::Conditions;
 use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
 use crate::seed::Seed;
-
-/// The line between the two ends.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Bus {
-    /// By link name, in one process.
-    Loopback,
-    /// Records in each cycle.
-    Socket,
-    /// Records when something has changed.
-    SocketOnChange,
-    /// Modbus TCP.
-    Modbus,
-    /// Modbus RTU over TCP.
-    ModbusRtu,
-    /// S7.
-    S7,
-    /// Lines of values, which a dispatcher in a process of its own passes on.
-    Dispatcher,
-}
-
-impl Bus {
-    /// Whether one end asks and the other answers.
-    pub(crate) fn asks(self) -> bool {
-        matches!(self, Self::Modbus | Self::ModbusRtu | Self::S7)
-    }
-
-    /// Whether one message carries several stations.
-    fn has_stations(self) -> bool {
-        matches!(
-            self,
-            Self::Loopback | Self::Socket | Self::SocketOnChange | Self::Dispatcher
-        )
-    }
-}
 
 /// What befalls a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], who stands between them; spans say how long it lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

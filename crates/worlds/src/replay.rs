@@ -10,8 +10,9 @@ use tickbus_driver::{Driver, DriverError};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
+use crate::broken::Broken;
 use crate::clock::SimulatedClock;
-use crate::judge::{Broken, Contents, FileRow, area_of, is_count};
+use crate::files::{Contents, FileRow, area_of, is_count};
 use crate::plan::Plan;
 use crate::random::{Random, scramble};
 use crate::tape::Tape;

@@ -1,6 +1,6 @@
 //! How a world that broke a promise is made smaller.
 
-use crate::judge::Broken;
+use crate::broken::Broken;
 use crate::plan::Plan;
 use crate::seed::Seed;
 

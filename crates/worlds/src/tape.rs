@@ -5,10 +5,9 @@ use std::path::PathBuf;
 
 use tickbus_base::os::{Lock, lock_file};
 
+use crate::broken::Broken;
 use crate::features::RecordPlan;
-use crate::judge::{Broken, judge_recording};
 use crate::plan::Plan;
-use crate::replay;
 use crate::scheduler;
 
 fn broken(what: String) -> Result<(), Broken> {
@@ -122,28 +121,5 @@ impl Tape {
                 self.before.len()
             )),
         }
-    }
-
-    /// While a driver records, nobody else gets the file.
-    pub(crate) fn judge_lock(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
-        if !self.plan.is_contended {
-            return Ok(());
-        }
-        let other = File::open(&self.path).expect("it is there");
-        if lock_file(&other, Lock::Shared).ok() != Some(false) {
-            return broken("another process gets the file of a recording".to_owned());
-        }
-        match replay::open(plan, end, &self.path, None) {
-            Ok(_) => broken("a file that is recorded to is replayed".to_owned()),
-            Err(why) if why.to_string().contains(&self.path.display().to_string()) => Ok(()),
-            Err(why) => broken(format!("a refusal without a file: {why}")),
-        }
-    }
-
-    /// The driver has closed, or its process was killed.
-    pub(crate) fn judge(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
-        let process = scheduler::process();
-        let killed = scheduler::disk(|disk, _| disk.revive(process));
-        judge_recording(plan, end, self, killed)
     }
 }

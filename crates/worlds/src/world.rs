@@ -9,13 +9,15 @@ use std::rc::Rc;
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Host};
 
+use crate::broken::Broken;
 use crate::end::{End, Found};
 use crate::faults::FaultPlan;
-use crate::judge::{Broken, Reader, Seen, Stamp, Writer};
+use crate::judge::{Reader, Seen, Writer};
 use crate::laboratory::{self, Laboratory};
 use crate::plan::{BETWEEN, Bus, Misfortune, Plan, Watchdog};
 use crate::random::{Random, scramble};
 use crate::scheduler::{self, Stuck};
+use crate::stamp::Stamp;
 
 /// After its last misfortune a world is whole again within this: an attempt to connect that was begun while the cable was
 /// pulled may take 5 s to fail.

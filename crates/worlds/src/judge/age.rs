@@ -2,7 +2,7 @@
 
 use tickbus_dispatcher::LEAST_PROMISE;
 
-use super::reader::Seen;
+use super::seen::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::plan::{BETWEEN, Bus, Event, Misfortune, Plan};

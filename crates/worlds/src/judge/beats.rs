@@ -1,7 +1,8 @@
 //! Signs of life: a heartbeat counts up as its end ticks, and an end that watches one does not take a frozen peer for alive.
 
 use super::age::{held, slack};
-use super::reader::{Reader, Seen};
+use super::reader::Reader;
+use super::seen::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::plan::Plan;

@@ -1,7 +1,8 @@
 //! Nothing is left on: a writer that stopped, and a controller that closed, leave fail-safe values.
 
 use super::age::{held, relayed, slack};
-use super::reader::{Reader, Seen};
+use super::reader::Reader;
+use super::seen::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::plan::{Bus, FAIL_SAFE, Plan};

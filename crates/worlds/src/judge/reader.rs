@@ -2,49 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use super::seen::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::faults::{self, FaultPlan};
-use crate::network::Delivery;
 use crate::plan::{Bus, FAIL_SAFE, Plan};
-
-/// What a station shows in one tick.
-#[derive(Clone, Debug)]
-pub(crate) struct Shown {
-    pub(crate) stamp: u64,
-    pub(crate) level: bool,
-    pub(crate) edges: u64,
-    pub(crate) numbers: Option<(f64, f64)>,
-    /// The slots of the signals beside the stamp.
-    pub(crate) typed: Vec<u64>,
-    /// The heartbeat of station 0, if there is one.
-    pub(crate) beat: Option<u8>,
-}
-
-/// A tick as its end got it.
-#[derive(Debug)]
-pub(crate) struct Seen<'a> {
-    pub(crate) began: i64,
-    /// The tick of the end that sees.
-    pub(crate) tick: u64,
-    pub(crate) is_stale: bool,
-    pub(crate) is_fresh: bool,
-    pub(crate) age: i64,
-    pub(crate) sequence: u64,
-    pub(crate) stations: &'a [Shown],
-    pub(crate) deliveries: &'a [Delivery],
-    /// Through a dispatcher.
-    pub(crate) known: Option<Known>,
-}
-
-/// What who stands between both ends knew of a writer when it sent what a reader has heard.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Known {
-    /// When the writer had sent the newest of what has to be seen; `None` if there is nothing.
-    pub(crate) until: Option<i64>,
-    /// For how long nothing had come from the writer, in ns.
-    pub(crate) silent: i64,
-}
 
 /// What one end has seen.
 #[derive(Debug, Default)]

@@ -1,6 +1,7 @@
 //! What one station shows: nothing that nobody wrote, nothing torn, nothing after something newer, fail-safe values while stale.
 
-use super::reader::{Reader, Seen, Shown};
+use super::reader::Reader;
+use super::seen::{Seen, Shown};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
 use crate::faults::{self, Activity};
@@ -66,7 +67,7 @@ impl Reader {
             Some(value) => vec![*value],
             None => vec![self.before[signal], truth[signal]],
         };
-        let spans = faults::expected(plan, (letter, station), stamp, tick, was);
+        let spans = faults::expected(&plan.features.faults, (letter, station), stamp, tick, was);
         let mut values = vec![f64::from(u8::from(shown.level))];
         values.extend(
             shown

@@ -5,7 +5,7 @@ mod board;
 use std::fmt;
 use std::str::FromStr;
 
-use crate::judge::Broken;
+use crate::broken::Broken;
 use crate::seed::Seed;
 
 /// What is judged beside worlds.

@@ -9,11 +9,13 @@ use tickbus_driver_cfg::Config;
 use tickbus_plc::{Program, Scan};
 
 use super::{Shared, judge_tick};
+use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::end::Found;
-use crate::judge::{Broken, Shown, Stamp, level, real, whole};
+use crate::judge::Shown;
 use crate::plan::{FAIL_SAFE, Plan};
 use crate::scheduler;
+use crate::stamp::{Stamp, level, real, whole};
 
 thread_local! {
     /// The world of this thread: a program is sent to the thread that scans it, which is the same one.

@@ -5,7 +5,7 @@ mod model;
 mod rig;
 mod words;
 
-use crate::judge::Broken;
+use crate::broken::Broken;
 use crate::random::{Random, scramble};
 use crate::seed::Seed;
 

@@ -10,7 +10,7 @@ use tickbus_dispatcher::{
     Channel, Dispatcher, OnLoss, Order, Patch, Pin as BoardPin, Reply, Settings,
 };
 
-use crate::judge::Broken;
+use crate::broken::Broken;
 use crate::random::Random;
 
 use super::model::{Heard, Model, channel_line};

@@ -1,13 +1,15 @@
 //! A recording is what was delivered, tick by tick: all of it in order, or the beginning of it.
 
-use std::fs;
+use std::fs::{self, File};
 
-use super::files::{Contents, FileRow, csv, vcd};
-use super::{Broken, broken};
+use tickbus_base::os::{Lock, lock_file};
+
+use crate::broken::{Broken, broken};
+use crate::files::{Contents, FileRow, csv, vcd};
 use crate::plan::{Misfortune, Plan};
 use crate::random::{Random, scramble};
-use crate::replay::Original;
-use crate::scheduler::STARVED;
+use crate::replay::{self, Original};
+use crate::scheduler::{self, STARVED};
 use crate::tape::Tape;
 
 /// Ticks in a ring that has no key.
@@ -16,8 +18,36 @@ const RING: usize = 4_096;
 /// A line of a file is shorter than that, with what closes the recording behind it.
 const LONGEST: u64 = 4_000;
 
+impl Tape {
+    /// While a driver records, nobody else gets the file.
+    pub(crate) fn judge_lock(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
+        if !self.plan.is_contended {
+            return Ok(());
+        }
+        let other = File::open(&self.path).expect("it is there");
+        if lock_file(&other, Lock::Shared).ok() != Some(false) {
+            return broken(
+                "file",
+                "another process gets the file of a recording".to_owned(),
+            );
+        }
+        match replay::open(plan, end, &self.path, None) {
+            Ok(_) => broken("file", "a file that is recorded to is replayed".to_owned()),
+            Err(why) if why.to_string().contains(&self.path.display().to_string()) => Ok(()),
+            Err(why) => broken("file", format!("a refusal without a file: {why}")),
+        }
+    }
+
+    /// The driver has closed, or its process was killed.
+    pub(crate) fn judge(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
+        let process = scheduler::process();
+        let killed = scheduler::disk(|disk, _| disk.revive(process));
+        judge_recording(plan, end, self, killed)
+    }
+}
+
 /// Judges the recording of a life that has ended, by being `killed` at a time.
-pub(crate) fn judge_recording(
+fn judge_recording(
     plan: &Plan,
     end: usize,
     tape: &Tape,

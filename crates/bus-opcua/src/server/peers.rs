@@ -1,6 +1,6 @@
 //! The clients that supply the image, and whether they are still there.
 
-use std::time::Instant;
+use std::time::Duration;
 
 use super::visitor::Visitor;
 
@@ -14,8 +14,8 @@ pub(super) struct Peers(Vec<Peer>);
 
 struct Peer {
     visitor: Visitor,
-    /// When its session was due to expire, as of the last look.
-    deadline: Option<Instant>,
+    /// How far its session was postponed, as of the last look.
+    postponed: Option<Duration>,
     /// The stations that it supplies.
     stations: Vec<usize>,
 }
@@ -40,10 +40,10 @@ impl Peers {
     ) -> Option<&str> {
         let known = self.0.iter().position(|peer| peer.visitor.id == visitor.id);
         let at = known.unwrap_or_else(|| {
-            let deadline = (visitor.deadline)();
+            let postponed = (visitor.postponed)();
             self.0.push(Peer {
                 visitor,
-                deadline,
+                postponed,
                 stations: Vec::new(),
             });
             self.0.len() - 1
@@ -62,11 +62,11 @@ impl Peers {
     pub(super) fn look(&mut self, mut alive: impl FnMut(usize)) -> Seen {
         let before = self.0.len();
         self.0.retain_mut(|peer| {
-            let deadline = (peer.visitor.deadline)();
-            if deadline.is_some() && deadline != std::mem::replace(&mut peer.deadline, deadline) {
+            let now = (peer.visitor.postponed)();
+            if now.is_some() && now != std::mem::replace(&mut peer.postponed, now) {
                 peer.stations.iter().for_each(|station| alive(*station));
             }
-            deadline.is_some()
+            now.is_some()
         });
         match self.0.len() {
             now if now == before => Seen::Same,

@@ -1,7 +1,7 @@
 //! A client's session, as the bus knows it.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::Duration;
 
 use opcua::server::node_manager::RequestContext;
 
@@ -11,14 +11,14 @@ pub(super) struct Visitor {
     pub(super) id: u32,
     /// The client's name, or else the session's.
     pub(super) name: String,
-    /// When the session will expire, which every request postpones; `None` if it is over.
-    pub(super) deadline: Box<dyn Fn() -> Option<Instant> + Send>,
+    /// By how much the session will expire later than when this was made, as every request postpones that; `None` if it is over.
+    pub(super) postponed: Box<dyn Fn() -> Option<Duration> + Send>,
 }
 
 impl Visitor {
     /// Whether its session lasts.
     pub(super) fn is_there(&self) -> bool {
-        (self.deadline)().is_some()
+        (self.postponed)().is_some()
     }
 
     /// The session that makes a request.
@@ -35,13 +35,15 @@ impl Visitor {
         } else {
             application
         };
+        let first = read.deadline();
         drop(read);
         Self {
             id: context.session_id,
             name,
-            deadline: Box::new(move || {
+            postponed: Box::new(move || {
                 let session = session.read();
-                session.is_activated().then(|| session.deadline())
+                let deadline = session.is_activated().then(|| session.deadline())?;
+                Some(deadline.saturating_duration_since(first))
             }),
         }
     }

@@ -3,6 +3,7 @@
 use tickbus_base::time::Nanos;
 
 use super::{Code, Dispatcher, Progress};
+use crate::board::OnLoss;
 
 impl Dispatcher {
     /// A thread that serves has waited, and reads next what has arrived.
@@ -11,7 +12,8 @@ impl Dispatcher {
     /// life: its outputs are cut off before they are read, and restored by its first line after [`tick`](Self::tick).
     pub fn woke(&mut self, now: Nanos) {
         let late = now - self.next_look;
-        if late <= self.promise {
+        // Where inputs keep their values, nobody would be told, and have values that are older still.
+        if late <= self.promise || self.settings.on_loss == OnLoss::Hold {
             return;
         }
         self.is_catching_up = true;

@@ -218,7 +218,7 @@ impl Server<'_> {
                 return;
             }
         };
-        if let Some((call, served)) = &mut self.served {
+        if let Some((_, served)) = &self.served {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();
                 if stream.set_nonblocking().is_ok() {
@@ -227,7 +227,6 @@ impl Server<'_> {
                 turn_away(peer, served, port);
                 return;
             };
-            call.condemn();
             let error = BusError::Link(format!(
                 "{} has been silent for {}",
                 served.peer(),

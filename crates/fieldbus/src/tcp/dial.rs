@@ -137,8 +137,8 @@ pub fn dial(
 }
 
 /// A connection with one peer: transfers bytes between a stream and a [`Caller`]. It is closed properly when
-/// dropped, or broken if the peer may still get what is no longer meant: after a time-out, or at an
-/// [end](Self::end) without the last values.
+/// dropped, or broken if the peer may still get what is no longer meant: at an [end](Self::end) without the
+/// last values.
 #[derive(Debug)]
 pub struct Call<S: Stream> {
     stream: S,
@@ -208,11 +208,6 @@ impl<S: Stream> Call<S> {
         self.is_condemned |= port.leaves_old_values();
     }
 
-    /// What the peer has not got yet must not reach it any more.
-    pub fn condemn(&mut self) {
-        self.is_condemned = true;
-    }
-
     /// The stream to wait for.
     pub fn stream(&self) -> &S {
         &self.stream
@@ -234,18 +229,6 @@ impl<S: Stream> Call<S> {
     ///
     /// Why the connection has ended.
     pub fn turn(
-        &mut self,
-        readable: bool,
-        caller: &mut impl Caller,
-        port: &mut Port,
-    ) -> Result<(), BusError> {
-        let turned = self.try_turn(readable, caller, port);
-        // On a new connection newer values would overtake those that wait for the cable.
-        self.is_condemned |= matches!(turned, Err(BusError::Link(_)));
-        turned
-    }
-
-    fn try_turn(
         &mut self,
         readable: bool,
         caller: &mut impl Caller,

@@ -479,10 +479,7 @@ impl<S: Service> Server<'_, S> {
             return;
         };
         self.set.remove(place, &client.stream);
-        match error {
-            BusError::Link(_) => close_by_reset(&client.stream),
-            _ => close_gracefully(&client.stream),
-        }
+        close_gracefully(&client.stream);
         if !matches!(error, BusError::Left(_)) {
             port.count("clients.dropped");
         }

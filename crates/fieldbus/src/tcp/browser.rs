@@ -49,9 +49,25 @@ fn is_stun(bytes: &[u8]) -> bool {
 /// A hello of TLS and a message of STUN may have a line feed among their first bytes, so that a port that takes lines must not
 /// take such a line for one before the rest is there.
 pub fn may_become_browser(bytes: &[u8]) -> bool {
-    /// What [`is_tls_hello`] looks at, which is more than [`is_stun`] does.
-    const ENOUGH: usize = 10;
-    matches!(bytes, [0 | 1 | 0x16, ..]) && bytes.len() < ENOUGH
+    // Of a hello of TLS, what does not matter stands as `None`.
+    const HELLO: [Option<u8>; 10] = [
+        Some(0x16),
+        Some(3),
+        None,
+        None,
+        None,
+        Some(1),
+        Some(0),
+        None,
+        None,
+        Some(3),
+    ];
+    let is_hello = bytes.len() < HELLO.len()
+        && (bytes.iter().zip(HELLO)).all(|(byte, right)| right.is_none_or(|right| *byte == right));
+    let cookie = bytes.get(4..).unwrap_or_default();
+    let is_message =
+        matches!(bytes, [0 | 1, ..]) && bytes.len() < 8 && STUN_COOKIE.starts_with(cookie);
+    is_hello && !bytes.is_empty() || is_message
 }
 
 #[cfg(test)]
@@ -107,6 +123,8 @@ mod tests {
             }
         }
         assert!(!may_become_browser(b"P Q1=24\n"));
+        assert!(!may_become_browser(b"\0\x01~~\n"));
+        assert!(!may_become_browser(b""));
         assert!(!may_become_browser(&[0; 10]));
     }
 }

@@ -39,8 +39,13 @@ CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7"]
 
 def write_tree(texts):
     """The files that git knows, with these changes; those that are as they were keep their times, and are not compiled anew."""
-    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
-    for name in filter(None, names.decode().split("\0")):
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
+    names = set(filter(None, listed.decode().split("\0")))
+    for path in TREE.rglob("*.rs"):
+        # A module that has moved would be there twice.
+        if str(path.relative_to(TREE)) not in names:
+            path.unlink()
+    for name in sorted(names):
         source, target = ROOT / name, TREE / name
         if not source.is_file():
             continue

@@ -267,7 +267,7 @@ impl Dispatcher {
         }
     }
 
-    /// Whether a client waits for the disk, or for another dispatcher.
+    /// Whether a client gets no answer before the patch is saved, or before another dispatcher has answered.
     fn is_owed_answer(&self, seat: usize) -> bool {
         let promised = self.promised.iter().map(|it| &it.author);
         let waiting = self.waiting.iter().map(|it| &it.author);

@@ -92,7 +92,7 @@ fn a_client_that_waited_for_the_disk_is_watched_again() {
     lab.say(pump, "P Q1=24");
     assert_eq!(lab.hear(logo), ["OK CONNECT", "P I1=24"]);
     lab.wait(Nanos::from_millis(499));
-    // It waits for its answer when the times of all clients are looked at.
+    // The dispatcher checks the times of all clients while the pump still waits for its answer.
     let dispatcher = &mut lab.dispatcher;
     dispatcher.arrived(lab.now, pump, b"DISCONNECT Q1\nCONNECT Q1:LOGO:I1\n");
     dispatcher.saving();

@@ -133,8 +133,8 @@ impl Watch {
             .any(|fault| fault.id == id && fault.phase != Phase::Over)
     }
 
-    /// Holds the signal with this index to a value: a fault of the kind "stuck", called `forced: <its name>`. The next tick takes
-    /// it over at its end, so that the one after that is the first that shows it. Gives the fault's number.
+    /// Holds the signal with this index to a value: a fault of the kind "stuck", called `forced: <its name>`. The driver
+    /// reads it at the end of the next tick, so the tick after that is the first that shows it. Returns the fault's number.
     ///
     /// # Errors
     ///

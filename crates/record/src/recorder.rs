@@ -125,14 +125,16 @@ impl Bell {
         self.token.stop();
     }
 
-    /// Lets the recording thread wait until there is something to do, or for [`LOOK`]. That is real time, whatever the
-    /// driver's clock is, but in a simulation.
+    /// Lets the recording thread wait until there is something to do, or for [`LOOK`]. Outside a simulation that is real
+    /// time, also where the driver's clock stands still.
     fn wait(&self, clock: &dyn Clock) {
         if clock.simulation().is_some() {
             clock.wait_until(clock.now() + LOOK, &self.token);
+            self.lock().rung = false;
+            return;
         }
         let mut state = self.lock();
-        if clock.simulation().is_none() && !state.stop && !state.rung {
+        if !state.stop && !state.rung {
             let waited = self.work.wait_timeout(state, LOOK.to_duration());
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }

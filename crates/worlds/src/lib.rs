@@ -2,7 +2,7 @@
 //! by values that say themselves when they were written.
 //!
 //! [`Plan::draw`] draws a world from a seed: which bus, which keys of driver.cfg, which misfortunes exist at all, and when they
-//! happen. [`Plan::run`] lets it happen, within a fraction of a millisecond, and returns the first promise that was broken. The
+//! happen. [`Plan::run`] lets it happen, within some milliseconds, and returns the first promise that was broken. The
 //! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
 
 #![allow(

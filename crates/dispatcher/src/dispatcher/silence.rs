@@ -33,7 +33,7 @@ impl Dispatcher {
     pub fn tick(&mut self, now: Nanos) {
         for seat in std::mem::take(&mut self.resumable) {
             if let Some(session) = &mut self.sessions[seat] {
-                // It was not read from.
+                // The dispatcher read nothing from it, so its silence does not count.
                 session.heard = now;
                 let due = session.alive.map_or(Nanos::MAX, |alive| now + alive);
                 self.next_look = self.next_look.min(due);

@@ -75,7 +75,7 @@ struct Taker {
     missing: u32,
     /// Whether its write guard lets anything through.
     may_write: bool,
-    /// Whether a frame with the last values was made for it.
+    /// Whether the bus has made a frame with the last values for it.
     is_offered: bool,
 }
 
@@ -184,8 +184,8 @@ impl Port {
         }
     }
 
-    /// Whether the driver closes with values under way to a peer that the fail-safe values do not follow: what the peer has not
-    /// got yet must not reach it later.
+    /// Whether the driver closes and a station's older values may still be under way, but no frame with the fail-safe values
+    /// follows them. The bus then has to stop those older values from reaching the peer.
     pub fn leaves_old_values(&self) -> bool {
         self.image.ending.as_ref().is_some_and(|ending| {
             let mut takers = ending.stations.iter();
@@ -295,7 +295,7 @@ mod tests {
         assert!(!port.leaves_old_values(), "they are meant");
         farewell.begin();
         assert!(port.leaves_old_values());
-        // It follows the old ones, whether or not the peer confirms it in time.
+        // This frame follows the older values, even if the peer confirms it too late.
         send(&mut port, 0);
         assert!(!port.leaves_old_values());
     }

@@ -117,7 +117,7 @@ impl Incoming {
             && (delay == 0 || came + delay <= now)
         {
             self.held.pop_front();
-            // It came when it was due, however late the port looks; and after what came before.
+            // A frame counts from when it was due, even if the port looks later, but never from before the frame ahead of it.
             let due = (came + delay).max(self.released);
             (self.released, self.heard, self.byte) = (due, Some(due), byte);
         }

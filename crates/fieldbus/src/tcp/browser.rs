@@ -30,13 +30,33 @@ pub fn begins_like_browser(bytes: &[u8]) -> bool {
     REQUESTS.iter().any(|it| bytes.starts_with(it)) || is_tls_hello(bytes) || is_stun(bytes)
 }
 
+/// How a handshake record with a `ClientHello` begins; versions and lengths stand as `None`.
+const HELLO: [Option<u8>; 10] = [
+    Some(0x16),
+    Some(3),
+    None,
+    None,
+    None,
+    Some(1),
+    Some(0),
+    None,
+    None,
+    Some(3),
+];
+
+/// Whether the bytes, or as many as a beginning has, are those of a hello.
+fn fits_hello(bytes: &[u8]) -> bool {
+    let mut pairs = bytes.iter().zip(HELLO);
+    pairs.all(|(byte, right)| right.is_none_or(|right| *byte == right))
+}
+
 /// A handshake record that holds one `ClientHello` and nothing else.
 fn is_tls_hello(bytes: &[u8]) -> bool {
-    let &[0x16, 3, _, high, low, 1, 0, hello_high, hello_low, 3, ..] = bytes else {
+    let &[_, _, _, high, low, _, _, hello_high, hello_low, _, ..] = bytes else {
         return false;
     };
     let record = u16::from_be_bytes([high, low]);
-    record.checked_sub(4) == Some(u16::from_be_bytes([hello_high, hello_low]))
+    fits_hello(bytes) && record.checked_sub(4) == Some(u16::from_be_bytes([hello_high, hello_low]))
 }
 
 /// The types that browsers send begin with 0 or 1: the methods of STUN and TURN (RFC 8489, RFC 8656) and the class.
@@ -49,25 +69,11 @@ fn is_stun(bytes: &[u8]) -> bool {
 /// A hello of TLS and a message of STUN may have a line feed among their first bytes, so that a port that takes lines must not
 /// take such a line for one before the rest is there.
 pub fn may_become_browser(bytes: &[u8]) -> bool {
-    // Of a hello of TLS, what does not matter stands as `None`.
-    const HELLO: [Option<u8>; 10] = [
-        Some(0x16),
-        Some(3),
-        None,
-        None,
-        None,
-        Some(1),
-        Some(0),
-        None,
-        None,
-        Some(3),
-    ];
-    let is_hello = bytes.len() < HELLO.len()
-        && (bytes.iter().zip(HELLO)).all(|(byte, right)| right.is_none_or(|right| *byte == right));
     let cookie = bytes.get(4..).unwrap_or_default();
+    let is_hello = bytes.len() < HELLO.len() && fits_hello(bytes);
     let is_message =
         matches!(bytes, [0 | 1, ..]) && bytes.len() < 8 && STUN_COOKIE.starts_with(cookie);
-    is_hello && !bytes.is_empty() || is_message
+    !bytes.is_empty() && (is_hello || is_message)
 }
 
 #[cfg(test)]

@@ -10,7 +10,6 @@ use tickbus_base::os::{Interest, PollSet, Pollable};
 use tickbus_base::os::{LinkedTerminal, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::stream::linger_not;
 use super::{Address, close_by_reset, close_gracefully, connect, is_for_later, no_wait};
 
 /// At most this many bytes are read at once.
@@ -75,8 +74,10 @@ pub trait Stream: Read + Write + Pollable {
     /// It is about to be dropped.
     fn close(&mut self) {}
 
-    /// It is about to be dropped with what the peer has not got yet.
-    fn close_by_reset(&mut self) {}
+    /// It is about to be dropped, and with it what the peer has not got yet. A stream that cannot do that is closed.
+    fn close_by_reset(&mut self) {
+        self.close();
+    }
 }
 
 impl Stream for TcpStream {
@@ -92,10 +93,6 @@ impl Stream for TcpStream {
 impl Stream for net::TcpStream {
     fn close(&mut self) {
         close_gracefully(self);
-    }
-
-    fn close_by_reset(&mut self) {
-        linger_not(self);
     }
 }
 
@@ -147,8 +144,8 @@ pub struct Call<S: Stream> {
     blocked: bool,
     /// When connecting began, until the first look: what the peer has sent may wait since then.
     since: Option<Nanos>,
-    /// Whether nothing that the peer has not got yet may reach it.
-    is_condemned: bool,
+    /// Whether what the peer has not got yet must not reach it any more.
+    ends_by_reset: bool,
 }
 
 impl<S: Stream> Call<S> {
@@ -159,7 +156,7 @@ impl<S: Stream> Call<S> {
             buffer: vec![0; BUFFER].into(),
             blocked: false,
             since: None,
-            is_condemned: false,
+            ends_by_reset: false,
         }
     }
 
@@ -203,9 +200,9 @@ impl<S: Stream> Call<S> {
         Ok(())
     }
 
-    /// Its owner ends it although nothing has failed.
+    /// The driver closes, so that the connection ends although nothing has failed.
     pub fn end(&mut self, port: &Port) {
-        self.is_condemned |= port.leaves_old_values();
+        self.ends_by_reset = port.leaves_old_values();
     }
 
     /// The stream to wait for.
@@ -310,7 +307,7 @@ impl<S: Stream> Call<S> {
 
 impl<S: Stream> Drop for Call<S> {
     fn drop(&mut self) {
-        if self.is_condemned {
+        if self.ends_by_reset {
             self.stream.close_by_reset();
         } else {
             self.stream.close();

@@ -37,15 +37,12 @@ where
 /// program has ended, and they would count there when the cable is back.
 pub fn close_by_reset(stream: &TcpStream) {
     match stream {
-        TcpStream::Os(stream) => linger_not(stream),
+        TcpStream::Os(stream) => {
+            // If this fails, the connection has failed already.
+            let _ = SockRef::from(stream).set_linger(Some(Duration::ZERO));
+        }
         TcpStream::Simulated(stream) => stream.close_by_reset(),
     }
-}
-
-/// As [`close_by_reset`], of a socket of the system.
-pub(super) fn linger_not(stream: &net::TcpStream) {
-    // If this fails, the connection has failed already.
-    let _ = SockRef::from(stream).set_linger(Some(Duration::ZERO));
 }
 
 /// Whether the call has not failed, but has to be repeated when the socket is ready.

@@ -9,6 +9,7 @@ import collections
 import json
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -20,6 +21,8 @@ from machine import has_namespaces
 from plan import BUSES, PROGRAMS, draw
 
 ROOT = Path(__file__).resolve().parents[2]
+
+ENDINGS = (signal.SIGINT, signal.SIGTERM)
 
 
 def options():
@@ -57,10 +60,22 @@ def command(given, seed):
 
 
 def storm(given):
+    running = {}
+    try:
+        return storm_on(given, running)
+    finally:
+        # Each line takes its network, its disk and its processes with it.
+        for process in running.values():
+            process.terminate()
+        for process in running.values():
+            process.wait()
+
+
+def storm_on(given, running):
     print(f"storm: seed {given.seed}, {given.minutes:g} min, {given.jobs} lines at a time; kept: {given.out}")
     met, findings, totals = collections.Counter(), [], collections.Counter()
     began = minute = time.monotonic()
-    running, number = {}, 0
+    number = 0
     while True:
         passed = time.monotonic() - began
         while len(running) < given.jobs and passed < given.minutes * 60:
@@ -102,12 +117,21 @@ def table(met):
     """Which ends have met which buses and misfortunes, in lines."""
     columns = sorted({column for _, column in met})
     rows = sorted({row for row, _ in met})
-    print("".ljust(18) + " ".join(column[:11].rjust(11) for column in columns))
+    print("".ljust(18) + " ".join(columns))
     for row in rows:
-        print(row.ljust(18) + " ".join(str(met[row, column] or "-").rjust(11) for column in columns))
+        print(row.ljust(18) + " ".join(str(met[row, column] or "-").rjust(len(column)) for column in columns))
+
+
+def end(number, _):
+    """Ends the storm; what it has begun is taken back, and a second signal does not disturb that."""
+    for ending in ENDINGS:
+        signal.signal(ending, signal.SIG_IGN)
+    sys.exit(128 + number)
 
 
 def main():
+    for ending in ENDINGS:
+        signal.signal(ending, end)
     given = options()
     given.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:

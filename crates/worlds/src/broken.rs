@@ -18,6 +18,6 @@ impl fmt::Display for Broken {
 }
 
 /// Says that a promise was broken.
-pub(crate) fn broken(promise: &'static str, what: String) -> Result<(), Broken> {
+pub(crate) fn broken<T>(promise: &'static str, what: String) -> Result<T, Broken> {
     Err(Broken { promise, what })
 }

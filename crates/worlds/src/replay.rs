@@ -10,7 +10,7 @@ use tickbus_driver::{Driver, DriverError};
 use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
-use crate::broken::Broken;
+use crate::broken::{Broken, broken};
 use crate::clock::SimulatedClock;
 use crate::files::{Contents, FileRow, area_of, is_count};
 use crate::plan::Plan;
@@ -28,13 +28,6 @@ pub(crate) struct Original<'a> {
     pub(crate) end: usize,
     pub(crate) tape: &'a Tape,
     pub(crate) contents: &'a Contents,
-}
-
-fn broken<T>(what: String) -> Result<T, Broken> {
-    Err(Broken {
-        promise: "replay",
-        what,
-    })
 }
 
 /// Opens a driver that replays `file`, and records that to `again` if there is a name.
@@ -159,7 +152,7 @@ impl Original<'_> {
         });
         let mut driver = match open(self.plan, self.end, file, Some(&again)) {
             Ok(driver) => driver,
-            Err(why) => return broken(format!("a recording that does not open: {why}")),
+            Err(why) => return broken("replay", format!("a recording that does not open: {why}")),
         };
         let mut slots = driver.initial_slots();
         let groups = self.groups();
@@ -179,16 +172,19 @@ impl Original<'_> {
             let expected = self.status(group);
             let number = row.number;
             if found.code.code() != expected {
-                return broken(format!(
-                    "tick {number} is {}, and was {expected}",
-                    found.code
-                ));
+                return broken(
+                    "replay",
+                    format!("tick {number} is {}, and was {expected}", found.code),
+                );
             }
             if (found.age > self.plan.max_age) != (expected == STALE) {
-                return broken(format!("tick {number}, {expected}, has age {}", found.age));
+                return broken(
+                    "replay",
+                    format!("tick {number}, {expected}, has age {}", found.age),
+                );
             }
             if let Err(why) = self.judge_slots(&slots, (group, group.end - 1), &mut shaped) {
-                return broken(format!("tick {number}: {why}"));
+                return broken("replay", format!("tick {number}: {why}"));
             }
         }
         let figures = driver.statistics();
@@ -206,7 +202,10 @@ impl Original<'_> {
             ("replay.ended", 1),
         ] {
             if figure(key) != Some(right) {
-                return broken(format!("{key} is {:?}, and should be {right}", figure(key)));
+                return broken(
+                    "replay",
+                    format!("{key} is {:?}, and should be {right}", figure(key)),
+                );
             }
         }
         self.judge_end(&mut driver, &mut slots)?;
@@ -225,10 +224,10 @@ impl Original<'_> {
         let time = Nanos(last.time) + self.plan.max_age + Nanos(1);
         let found = driver.exchange(time, slots);
         if found.code.code() != STALE || found.age <= self.plan.max_age {
-            return broken(format!(
-                "behind its end it is {} of age {}",
-                found.code, found.age
-            ));
+            return broken(
+                "replay",
+                format!("behind its end it is {} of age {}", found.code, found.age),
+            );
         }
         Ok(())
     }
@@ -237,7 +236,7 @@ impl Original<'_> {
     pub(crate) fn judge_other(&self, file: &Path) -> Result<(), Broken> {
         let mut driver = match open(self.plan, self.end, file, None) {
             Ok(driver) => driver,
-            Err(why) => return broken(format!("a recording that does not open: {why}")),
+            Err(why) => return broken("replay", format!("a recording that does not open: {why}")),
         };
         let random = &mut Random::new(scramble(self.plan.seed.number ^ 0x7265));
         let mut slots = driver.initial_slots();
@@ -258,13 +257,16 @@ impl Original<'_> {
             };
             let number = rows[last].number;
             if found.code.code() != expected {
-                return broken(format!(
-                    "at {time}, after tick {number}, it is {}, and not {expected}",
-                    found.code
-                ));
+                return broken(
+                    "replay",
+                    format!(
+                        "at {time}, after tick {number}, it is {}, and not {expected}",
+                        found.code
+                    ),
+                );
             }
             if let Err(why) = self.judge_slots(&slots, (&group, last), &mut shaped) {
-                return broken(format!("at {time}, after tick {number}: {why}"));
+                return broken("replay", format!("at {time}, after tick {number}: {why}"));
             }
             time += random.within(1, step * 3);
         }
@@ -281,7 +283,7 @@ fn judge_again(file: &Path, again: &Path) -> Result<(), Broken> {
     let text = String::from_utf8_lossy(&one);
     let end = text.find("$comment end").unwrap_or(text.len());
     if !other.starts_with(&one[..end]) {
-        return broken("the recording of a replay is another".to_owned());
+        return broken("replay", "the recording of a replay is another".to_owned());
     }
     Ok(())
 }

@@ -5,17 +5,10 @@ use std::path::PathBuf;
 
 use tickbus_base::os::{Lock, lock_file};
 
-use crate::broken::Broken;
+use crate::broken::{Broken, broken};
 use crate::features::RecordPlan;
 use crate::plan::Plan;
 use crate::scheduler;
-
-fn broken(what: String) -> Result<(), Broken> {
-    Err(Broken {
-        promise: "file",
-        what,
-    })
-}
 
 /// One tick.
 #[derive(Clone, Debug)]
@@ -115,11 +108,14 @@ impl Tape {
             {
                 Ok(())
             }
-            refusal => broken(format!(
-                "a file of another process: {refusal:?}, {} bytes of {}",
-                bytes.len(),
-                self.before.len()
-            )),
+            refusal => broken(
+                "file",
+                format!(
+                    "a file of another process: {refusal:?}, {} bytes of {}",
+                    bytes.len(),
+                    self.before.len()
+                ),
+            ),
         }
     }
 }

@@ -13,6 +13,7 @@ mod url;
 mod application;
 #[cfg(feature = "opcua")]
 mod client;
+mod looks;
 #[cfg(feature = "opcua")]
 mod pki;
 #[cfg(feature = "opcua")]

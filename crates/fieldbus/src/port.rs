@@ -219,9 +219,9 @@ impl Port {
 
     /// The bus looks at `now`, and then hands in what it has found. If the look comes long after it was promised, since the
     /// process was suspended or the processors were busy, that may have waited all the time: it counts as having come
-    /// right after the look before. Returns whether it does.
-    pub fn look_at_line(&mut self, now: Nanos) -> bool {
-        self.looks.look(now)
+    /// right after the look before.
+    pub fn look_at_line(&mut self, now: Nanos) {
+        self.looks.look(now);
     }
 
     /// This look leaves some of what waits to the next one.

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use opcua::client::Session;
 use opcua::types::NodeId;
 
+use crate::looks::TaskLooks;
 use crate::pki::meaning;
 use crate::reactor::{Inbox, Reactor};
 use tickbus_base::time::{Nanos, Pace, Stop};
@@ -43,18 +44,14 @@ impl ClientSession<'_> {
     pub(super) fn serve(mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), self.cycle);
-        let mut news = Vec::new();
+        let (mut news, mut looks) = (Vec::new(), TaskLooks::new());
         port.begin_to_look(clock.now());
         // The trouble with values as last reported; `None` for none.
         let mut said = None;
         while !stop.is_stopped() {
             let now = clock.now();
-            port.look_at_line(now);
+            looks.look(port, now);
             self.inbox.take(&mut news);
-            if !news.is_empty() {
-                // The tasks may have read a part only.
-                port.look_leaves_some();
-            }
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }

@@ -24,6 +24,7 @@ use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Events, Free, Port, Rarely, Role, tcp};
 use tickbus_image::signal::SignalTable;
 
+use super::looks::TaskLooks;
 use super::pki::Pki;
 use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
@@ -288,21 +289,16 @@ impl Service<'_> {
         let clock = Arc::clone(port.clock());
         let mut pace = Pace::new(clock.now(), cycle);
         let mut news = Vec::new();
-        let mut was_late = false;
+        let mut looks = TaskLooks::new();
         while !stop.is_stopped() {
             let now = clock.now();
-            let is_late = port.look_at_line(now);
+            let has_waited = looks.look(port, now);
             started.inbox.take(&mut news);
-            if !news.is_empty() || is_late && !was_late {
-                // The tasks may have read a part only, and nothing at all if this look comes right after a suspension.
-                port.look_leaves_some();
-            }
-            was_late = is_late;
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
             // Signs of life that waited are as old as all else that did.
-            if pace.take(now) || is_late {
+            if pace.take(now) || has_waited {
                 self.look(port, now);
                 if self.image.left_behind() >= WORN && started.is_alone(reactor) {
                     return Ok(Served::Worn);

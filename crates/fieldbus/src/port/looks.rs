@@ -35,10 +35,10 @@ impl Looks {
         (self.last, self.kept_since, self.is_unfinished) = (Some(now), None, false);
     }
 
-    /// The bus looks at its line at `now`. Returns whether what it finds may have waited since an earlier look.
-    pub(super) fn look(&mut self, now: Nanos) -> bool {
+    /// The bus looks at its line at `now`.
+    pub(super) fn look(&mut self, now: Nanos) {
         let Some(last) = &mut self.last else {
-            return false;
+            return;
         };
         let last = std::mem::replace(last, now);
         if !std::mem::take(&mut self.is_unfinished) {
@@ -48,7 +48,6 @@ impl Looks {
         if now - last > self.rest() + self.rest() {
             self.kept_since.get_or_insert(last);
         }
-        self.kept_since.is_some()
     }
 
     /// This look has not found everything: the next one finds what may have waited as long.
@@ -115,9 +114,9 @@ mod tests {
     #[test]
     fn what_a_late_look_finds_may_have_come_right_after_the_one_before() {
         let mut looks = looks();
-        assert!(looks.look(at(1051)), "too late");
+        looks.look(at(1051));
         assert_eq!(looks.arrival(at(1051)), at(1000));
-        assert!(!looks.look(at(1052)), "in time");
+        looks.look(at(1052));
         assert_eq!(looks.arrival(at(1052)), at(1052));
     }
 

@@ -69,7 +69,8 @@ impl Unit {
                 scan_counters.place(station, writes),
                 scan_counters.place(station, reads),
             ),
-            inputs: Inputs::new(frame(config, station, reads)),
+            // Until something comes: a peer that has said that it lives may have said nothing else yet.
+            inputs: Inputs::new(fail_safe_frame(&config.table, station, reads)),
             fail_safe: (role == Role::Device).then(|| FailSafe::new(config, station, reads)),
             outputs_before: outputs.clone(),
             outputs,
@@ -474,6 +475,10 @@ mod tests {
         let seen = Arc::default();
         let program = Box::new(Seen(Arc::clone(&seen)));
         let (mut cpu, mut bus) = half(program, &config, Role::Device);
+        // Its PLC lives, and has written nothing yet.
+        bus.touch(0, Nanos::from_millis(5));
+        bus.hand_over();
+        cpu.scan(Nanos::from_millis(5), true);
         bus.received(0, Nanos::from_millis(10), &[170, 171], true);
         bus.hand_over();
         cpu.scan(Nanos::from_millis(10), true);
@@ -482,7 +487,7 @@ mod tests {
         bus.hand_over();
         cpu.scan(Nanos::from_secs(61), true);
         let seen = seen.lock().expect("no panic").clone();
-        assert_eq!(seen, [[170, 171], [7, 171], [170, 171]]);
+        assert_eq!(seen, [[7, 0], [170, 171], [7, 171], [170, 171]]);
     }
 
     #[test]

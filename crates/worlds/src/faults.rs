@@ -2,6 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
+use crate::features::Features;
 use crate::random::Random;
 use crate::stamp::{Stamp, level, real, whole};
 
@@ -206,13 +207,22 @@ impl FaultPlan {
     fn bend(&self, (least, most): Span, was: &[f64]) -> Vec<Span> {
         match self.effect {
             Effect::Stuck(_, _, Some(value)) => vec![(value, value)],
-            Effect::Stuck(_, _, None) => was.iter().map(|value| (*value, *value)).collect(),
+            Effect::Stuck(_, _, None) => was.iter().map(|value| known(*value)).collect(),
             Effect::Invert(_) => vec![(1.0 - most, 1.0 - least)],
             Effect::Offset(_, _, by) => vec![(least + by, most + by)],
             Effect::Noise(_, _, by) => vec![(least - by, most + by)],
             Effect::Flicker(_) => vec![(0.0, 0.0), (1.0, 1.0)],
             _ => vec![(least, most)],
         }
+    }
+}
+
+/// A value that was seen, or any if it was not.
+fn known(value: f64) -> Span {
+    if value.is_nan() {
+        (f64::NEG_INFINITY, f64::INFINITY)
+    } else {
+        (value, value)
     }
 }
 
@@ -246,9 +256,9 @@ fn on_line(signal: usize, (least, most): Span) -> Span {
 }
 
 /// What the end that reads a station may be shown of the signals beside a stamp, in `tick` of its own: `held` is what was
-/// shown when its own faults began.
+/// shown when its own faults began, NaN where that was not seen.
 pub(crate) fn expected(
-    faults: &[FaultPlan],
+    features: &Features,
     (area, station): (char, usize),
     stamp: Option<u64>,
     tick: u64,
@@ -256,7 +266,9 @@ pub(crate) fn expected(
 ) -> [Vec<Span>; 3] {
     let reader = usize::from(area == 'I');
     let mut all = values(stamp).map(|value| vec![(value, value)]);
-    let faults = faults.iter().enumerate();
+    let faults = features.faults.iter().enumerate();
+    // A program reads bytes, and its faults bend these.
+    let reads_bytes = features.hosted == Some(reader);
     // Those of the end that writes come first, whichever is the first in the list.
     let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
     for (index, fault) in others.into_iter().chain(own) {
@@ -286,7 +298,7 @@ pub(crate) fn expected(
             .iter()
             .flat_map(|span| fault.bend(*span, &was))
             .map(|span| {
-                if fault.end == reader {
+                if fault.end == reader && !reads_bytes {
                     span
                 } else {
                     on_line(signal, span)

@@ -35,8 +35,8 @@ impl From<u64> for Seed {
 /// The features of worlds that break promises for reasons that are not known yet: a dispatcher.
 const UNSETTLED: u64 = 1 << 40;
 
-/// The same of those that are drawn last: faults of the line, hosted programs, heartbeats and keep-alives.
-const UNSETTLED_MORE: u32 = 1 << 12 | 1 << 15 | 1 << 16 | 1 << 17;
+/// The same of those that are drawn last: faults of the line.
+const UNSETTLED_MORE: u32 = 1 << 12;
 
 impl Seed {
     /// How many turns a number has, where many worlds are run.

@@ -368,8 +368,10 @@ fn judge_tick(
     }
     state.tick.set(tick);
     let down_since = state.down_since.get().unwrap_or(began);
-    let is_down = plan.is_down(end, tick);
-    state.down_since.set(is_down.then_some(down_since));
+    let down_since = plan.is_down(end, tick).then_some(down_since);
+    // The next tick ends that when it begins, and is judged later.
+    let is_down_next = plan.is_down(end, tick + 1);
+    state.down_since.set(down_since.filter(|_| is_down_next));
     if plan.is_disturbed(end, tick) {
         state.reader.borrow_mut().stale.push(began);
     }
@@ -407,7 +409,7 @@ fn judge_tick(
             since
         }
     });
-    let down = state.down_since.get().into_iter().chain(heard);
+    let down = down_since.into_iter().chain(heard);
     let writer = peer.writer.borrow();
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
@@ -435,7 +437,7 @@ fn judge_tick(
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
-        Reader::judge_frozen(plan, 1 - end, &writer, &seen)?;
+        reader.judge_frozen(plan, 1 - end, &writer, &seen)?;
         for since in down {
             Reader::judge_down(plan, since, &seen)?;
         }

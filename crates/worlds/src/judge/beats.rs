@@ -2,10 +2,10 @@
 
 use super::age::{held, slack};
 use super::reader::Reader;
-use super::seen::Seen;
+use super::seen::{Seen, Shown};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::Plan;
+use crate::plan::{FAIL_SAFE, Plan};
 
 impl Reader {
     /// Judges the heartbeat that is shown with a stamp.
@@ -46,8 +46,10 @@ impl Reader {
         )
     }
 
-    /// A writer that does not tick does not beat: who watches that is stale.
+    /// A writer that does not tick does not beat: who watches that is stale. When fail-safe values take the place of those of a
+    /// tick, or give it back, the heartbeat is another one as well: that is a change. The first frame is one, too.
     pub(crate) fn judge_frozen(
+        &mut self,
         plan: &Plan,
         end: usize,
         writer: &Writer,
@@ -56,15 +58,29 @@ impl Reader {
         let Some((every, Some(within))) = plan.beat(end) else {
             return Ok(());
         };
+        if seen.is_stale {
+            return Ok(());
+        }
+        let is_fail_safe = seen.stations.iter().all(|shown| shown.stamp == FAIL_SAFE);
+        if self.was_fail_safe.replace(is_fail_safe) != Some(is_fail_safe) {
+            self.replaced = seen.began;
+        }
+        // A tick that loses the processor behind its look at the clock may see what was written meanwhile.
+        let is_new = |shown: &Shown| {
+            shown.stamp != FAIL_SAFE && writer.wrote_after(seen.began, Stamp::of(shown.stamp))
+        };
+        let Some(last) = writer.last_ended(seen.began) else {
+            return Ok(());
+        };
+        let frozen = seen.began - last.max(self.replaced);
         let limit =
             (within + every + plan.max_age).0 + slack(plan) + plan.waits_for_pulses() + held(plan);
-        let frozen = writer.last_ended(seen.began).map(|last| seen.began - last);
-        match frozen {
-            Some(frozen) if !writer.is_ticking() && !seen.is_stale && frozen > limit => broken(
-                "frozen",
-                format!("not stale, {frozen} ns after the last tick of its peer"),
-            ),
-            _ => Ok(()),
+        if frozen <= limit || writer.is_ticking() || seen.stations.iter().any(is_new) {
+            return Ok(());
         }
+        broken(
+            "frozen",
+            format!("not stale, {frozen} ns after the last tick of its peer"),
+        )
     }
 }

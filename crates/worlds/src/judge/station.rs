@@ -18,6 +18,11 @@ impl Reader {
     ) -> Result<(), Broken> {
         // Of several stations one may have its sources, and another none yet.
         let is_other = plan.laboratory.is_asked && plan.stations > 1;
+        if seen.is_stale && plan.features.hosted.map(|end| end as u64) == Some(area) {
+            // What its inputs are meanwhile nobody has promised. Where a signal has got stuck then is known when they count again.
+            self.hold(plan, area, seen.tick, &[f64::NAN; 3]);
+            return Ok(());
+        }
         if shown.stamp == FAIL_SAFE {
             self.judge_beside(plan, (area, station), None, (seen.tick, shown))?;
             judge_typed(plan, area, None, shown)?;
@@ -69,7 +74,7 @@ impl Reader {
             Some(value) => vec![*value],
             None => vec![self.before[signal], truth[signal]],
         };
-        let spans = faults::expected(&plan.features.faults, (letter, station), stamp, tick, was);
+        let spans = faults::expected(&plan.features, (letter, station), stamp, tick, was);
         let mut values = vec![f64::from(u8::from(shown.level))];
         values.extend(
             shown
@@ -117,7 +122,10 @@ impl Reader {
                 continue;
             }
             if fault.activity(tick) == Activity::Yes {
-                self.held.entry(index).or_insert(values[signal]);
+                let held = self.held.entry(index).or_insert(values[signal]);
+                if held.is_nan() {
+                    *held = values[signal];
+                }
             } else {
                 self.held.remove(&index);
             }

@@ -1,5 +1,7 @@
 //! What one end has written, and when.
 
+use crate::stamp::Stamp;
+
 /// A tick of a writer: its number, and when its call returned.
 #[derive(Clone, Copy, Debug)]
 struct Written {
@@ -40,6 +42,11 @@ impl Writer {
             .partition_point(|written| written.ended <= time);
         let written = self.written.get(after.checked_sub(1)?)?;
         Some((written.life, written.tick))
+    }
+
+    /// Whether a stamp was not whole yet at a time.
+    pub(super) fn wrote_after(&self, time: i64, Stamp { life, tick, .. }: Stamp) -> bool {
+        Some((life, tick)) > self.newest_at(time)
     }
 
     /// When the ticks of a life from one to another ended.

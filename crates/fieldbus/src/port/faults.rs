@@ -18,6 +18,8 @@ pub(super) struct FaultLayer {
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
+    /// Whether what is being handed in together has had its look at the faults: all of it has the same fate.
+    has_looked: bool,
     /// A frame per station, for handing in what was held back.
     frames: Vec<Box<[u8]>>,
     /// While a fault holds the line down: the bus's own report of the line.
@@ -55,8 +57,17 @@ impl FaultLayer {
         }
     }
 
+    /// What is handed in from now on belongs together.
+    #[inline]
+    pub(super) fn begin_together(&mut self) {
+        self.has_looked = false;
+    }
+
     #[cold]
     fn attend_to_faults(&mut self, now: Nanos, port: &mut ImagePort) {
+        if std::mem::replace(&mut self.has_looked, port.is_held) && port.is_held {
+            return;
+        }
         self.look(now, port);
         let Some(line) = &mut self.line else {
             return;

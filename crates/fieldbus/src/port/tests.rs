@@ -69,6 +69,13 @@ impl Rig {
     }
 
     fn inject(&mut self, effect: LineEffect) -> u32 {
+        let id = self.add(effect);
+        self.begin_tick();
+        id
+    }
+
+    /// A fault that begins with the next tick.
+    fn add(&mut self, effect: LineEffect) -> u32 {
         let fault = Fault {
             name: "x".to_owned(),
             effect: Effect::Line(effect),
@@ -82,9 +89,7 @@ impl Rig {
             writes: Area::Input,
             edges: &[],
         };
-        let id = self.faults.add(&fault, slots).expect("there is room");
-        self.begin_tick();
-        id
+        self.faults.add(&fault, slots).expect("there is room")
     }
 
     fn end(&mut self, id: u32) {
@@ -100,6 +105,28 @@ impl Rig {
         };
         self.faults.begin_tick(moment, &mut []);
     }
+}
+
+#[test]
+fn a_fault_that_begins_while_stations_are_handed_in_together_meets_none_of_them() {
+    let mut rig = Rig::new();
+    rig.add(LineEffect::LinkDown);
+    let begun = TickTime {
+        time: Nanos::ZERO,
+        tick: 1,
+    };
+    rig.port.together(|port| {
+        port.received(0, Nanos(1), &[1]);
+        rig.faults.begin_tick(begun, &mut []);
+        port.received(1, Nanos(1), &[1]);
+    });
+    rig.tick.update();
+    assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
+    for station in 0..STATIONS {
+        rig.port.received(station, Nanos(2), &[2]);
+    }
+    rig.tick.update();
+    assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
 }
 
 /// What came for one station: frames that are held back, with the times of their arrival, and what the tick has.

@@ -171,6 +171,11 @@ impl LineFaults {
         self.is_diagnosis_new |= self.diagnoses.len() > diagnoses;
         self.diagnoses.truncate(diagnoses);
         self.sum = sum;
+        if sum.down {
+            for wire in &mut self.stations {
+                wire.out.is_behind = true;
+            }
+        }
         self.active.clear();
         for fault in &self.faults {
             if fault.cell.phase() == Phase::Active {
@@ -225,6 +230,8 @@ impl LineFaults {
                 LineEffect::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
                 _ => None,
             });
+            // What went out before the link was down is no frame of the cycle before this one.
+            self.repeats &= !self.stations[station].out.is_behind;
             if self.repeats {
                 self.board.duplicated.fetch_add(1, Ordering::Relaxed);
             }
@@ -249,6 +256,7 @@ impl LineFaults {
         let slow = self.sum.slow;
         let out = &mut self.stations[station].out;
         if out.is_through(slow) {
+            out.catches_up(now);
             out.newest.copy_from_slice(image);
             out.current.copy_from_slice(image);
             out.given = Given::Image;

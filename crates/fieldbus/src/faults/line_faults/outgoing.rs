@@ -27,6 +27,10 @@ pub(super) struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
+    /// The link was down, and nothing of the image has been taken since: its bytes have waited long enough.
+    pub(super) is_behind: bool,
+    /// When something was taken last. After a pause of more than [`PATIENCE`], as after a request that was lost, the same holds.
+    taken: Option<Nanos>,
     /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
     overtaken: usize,
     /// The origin of the bytes that the bus was given: decides who is told that they were sent.
@@ -55,6 +59,8 @@ impl Outgoing {
             reads: false,
             held_up: None,
             waiting: None,
+            is_behind: false,
+            taken: None,
             overtaken: 0,
             given: Given::Image,
         }
@@ -65,6 +71,12 @@ impl Outgoing {
         slow == Nanos::ZERO
             && self.waiting.as_ref().is_none_or(Ring::is_empty)
             && !(self.given == Given::Held && self.has_unseen(&self.current))
+    }
+
+    /// The image is taken at `now`: whether its bytes have waited for the line, and not for a fault.
+    pub(super) fn catches_up(&mut self, now: Nanos) -> bool {
+        let before = self.taken.replace(now);
+        std::mem::take(&mut self.is_behind) || before.is_some_and(|it| now - it > PATIENCE)
     }
 
     /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
@@ -108,6 +120,7 @@ impl Outgoing {
     pub(super) fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
         let mut hurried = false;
         self.given = Given::Held;
+        let was_behind = self.catches_up(now);
         if *image != *self.newest {
             self.newest.copy_from_slice(image);
             if self.waiting.as_ref().is_some_and(Ring::is_full) {
@@ -115,7 +128,7 @@ impl Outgoing {
                 self.advance();
             }
             if let Some(ring) = &mut self.waiting {
-                ring.push(now, image);
+                ring.push(if was_behind { now - slow } else { now }, image);
             }
         }
         while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {

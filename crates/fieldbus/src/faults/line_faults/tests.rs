@@ -166,6 +166,30 @@ fn slow_answers_send_what_was_true_before() {
 }
 
 #[test]
+fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeated() {
+    let mut rig = Rig::new();
+    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    assert_eq!(rig.send(0, [0, 1], true).0, [0, 0]);
+    assert_eq!(rig.send(20, [0, 2], true).0, [0, 1]);
+    let down = rig.add(LineEffect::LinkDown, 1);
+    rig.end(down);
+    assert_eq!(rig.send(1_000, [0, 50], true).0, [0, 50]);
+    assert_eq!(rig.send(1_001, [0, 51], true).0, [0, 50]);
+    assert_eq!(rig.send(1_021, [0, 52], true).0, [0, 51]);
+    let later = 1_022 + PATIENCE.0;
+    assert_eq!(rig.send(later, [0, 80], true).0, [0, 80]);
+    assert_eq!(rig.send(later + 1, [0, 81], true).0, [0, 80]);
+
+    let mut rig = Rig::new();
+    rig.add(LineEffect::Duplicate(1.0, Direction::Out), 1);
+    rig.send(0, [0, 1], true);
+    let down = rig.add(LineEffect::LinkDown, 1);
+    rig.end(down);
+    assert_eq!(rig.send(1_000, [0, 50], true).0, [0, 50]);
+    assert_eq!(rig.send(1_001, [0, 51], true).0, [0, 50], "twice again");
+}
+
+#[test]
 fn a_pulse_that_waits_is_sent_though_its_fault_ends_and_values_are_true_at_once() {
     let mut rig = Rig::new();
     let slow = rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);

@@ -145,11 +145,9 @@ impl Original<'_> {
 
     /// By ticks at the recorded times, the same again.
     pub(crate) fn judge_same(&self, file: &Path, is_whole: bool) -> Result<(), Broken> {
-        let again = file.with_file_name(if self.tape.plan.is_csv {
-            "again.csv"
-        } else {
-            "again.vcd"
-        });
+        // The other end may be judged meanwhile.
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let again = file.with_file_name(format!("again {name}"));
         let mut driver = match open(self.plan, self.end, file, Some(&again)) {
             Ok(driver) => driver,
             Err(why) => return broken("replay", format!("a recording that does not open: {why}")),

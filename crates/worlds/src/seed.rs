@@ -27,16 +27,13 @@ impl From<u64> for Seed {
             turn: 0,
             features: !UNSETTLED,
             events: u8::MAX,
-            more: !UNSETTLED_MORE,
+            more: u32::MAX,
         }
     }
 }
 
 /// The features of worlds that break promises for reasons that are not known yet: a dispatcher.
 const UNSETTLED: u64 = 1 << 40;
-
-/// The same of those that are drawn last: faults of the line.
-const UNSETTLED_MORE: u32 = 1 << 12;
 
 impl Seed {
     /// How many turns a number has, where many worlds are run.
@@ -46,7 +43,6 @@ impl Seed {
     pub fn unsettled(number: u64) -> Self {
         Self {
             features: u64::MAX,
-            more: u32::MAX,
             ..Self::from(number)
         }
     }

@@ -481,8 +481,14 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
             let edges = reader.edges.get(station).map_or(&[][..], |edges| edges);
             let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
-            // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost.
-            let interrupts = plan.features.faults.iter().any(FaultPlan::is_of_line)
+            // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost, and one that a
+            // new driver finds on.
+            let begins_anew = plan.events.iter().any(|event| match event.what {
+                Misfortune::Kill(which, _) | Misfortune::Close(which, _) => which == end,
+                _ => false,
+            });
+            let interrupts = begins_anew
+                || plan.features.faults.iter().any(FaultPlan::is_of_line)
                 || watchdog(plan, 1 - end).is_some()
                 || plan.bus == Bus::Dispatcher
                 || end == 0 && !plan.ends[1].holds_while_stale;

@@ -77,10 +77,9 @@ impl BusThread {
             return;
         };
         let link = self.status.link();
-        if !farewell.is_due() || link.cause == Cause::Injected {
+        if link.cause == Cause::Injected || !farewell.begin() {
             return;
         }
-        farewell.begin();
         self.stop.wake();
         let limit = self.status.max_age().min(LONGEST_FAREWELL);
         if !farewell.wait(&*self.clock, limit) {

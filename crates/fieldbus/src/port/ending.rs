@@ -36,6 +36,8 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
+    /// Whether somebody waits until the peers have the last values.
+    is_awaited: AtomicBool,
     /// Something was sent since the line was opened.
     is_used: AtomicBool,
 }
@@ -43,12 +45,16 @@ struct Shared {
 impl Farewell {
     /// Whether a peer may have got anything by this line.
     pub fn is_due(&self) -> bool {
-        self.shared.is_used.load(Ordering::Relaxed)
+        self.shared.is_used.load(Ordering::SeqCst)
     }
 
-    /// From now on every station sends its fail-safe values.
-    pub fn begin(&self) {
-        self.shared.begun.store(true, Ordering::Relaxed);
+    /// From now on every station sends its fail-safe values. Returns whether the farewell [is due](Self::is_due): if not, no
+    /// peer has got anything yet, and who reads from now on gets these values.
+    pub fn begin(&self) -> bool {
+        self.shared.begun.store(true, Ordering::SeqCst);
+        let is_due = self.is_due();
+        self.shared.is_awaited.store(is_due, Ordering::Relaxed);
+        is_due
     }
 
     /// Waits until the peers of all stations have these values, or the line has ended; at most for `limit`. Returns
@@ -106,7 +112,7 @@ impl Ending {
 
     /// A cycle begins.
     fn look(&mut self) {
-        self.is_begun = self.shared.begun.load(Ordering::Relaxed);
+        self.is_begun = self.shared.begun.load(Ordering::SeqCst);
     }
 
     pub(super) fn is_begun(&self) -> bool {
@@ -117,8 +123,8 @@ impl Ending {
     pub(super) fn is_used(&mut self, station: usize) {
         let taker = &mut self.stations[station];
         taker.is_offered |= self.is_begun;
-        if taker.is_owed() {
-            self.shared.is_used.store(true, Ordering::Relaxed);
+        if taker.is_owed() && !self.shared.is_used.load(Ordering::Relaxed) {
+            self.shared.is_used.store(true, Ordering::SeqCst);
         }
     }
 
@@ -189,7 +195,7 @@ impl Port {
     pub fn leaves_old_values(&self) -> bool {
         self.image.ending.as_ref().is_some_and(|ending| {
             let mut takers = ending.stations.iter();
-            ending.shared.begun.load(Ordering::Relaxed)
+            ending.shared.is_awaited.load(Ordering::Relaxed)
                 && takers.any(|taker| taker.is_owed() && !taker.is_offered)
         })
     }
@@ -277,8 +283,7 @@ mod tests {
         let farewell = port.farewell(1);
         port.set_may_write(0..1, false);
         send(&mut port, 1);
-        assert!(farewell.is_due(), "the second one takes values");
-        farewell.begin();
+        assert!(farewell.begin(), "the second one takes values");
         assert!(
             !farewell.wait(&*Manual::new(), Nanos::ZERO),
             "it has not got the last ones"
@@ -293,11 +298,22 @@ mod tests {
         let farewell = port.farewell(2);
         send(&mut port, 0);
         assert!(!port.leaves_old_values(), "they are meant");
-        farewell.begin();
+        assert!(farewell.begin());
         assert!(port.leaves_old_values());
         // This frame follows the older values, even if the peer confirms it too late.
         send(&mut port, 0);
         assert!(!port.leaves_old_values());
+    }
+
+    #[test]
+    fn who_reads_first_when_a_driver_closes_gets_the_last_values() {
+        let mut port = port(&[1]);
+        let farewell = port.farewell(1);
+        assert!(!farewell.begin(), "nobody has got anything");
+        assert!(!port.leaves_old_values());
+        let frames = port.take(0..1, Nanos::ZERO);
+        drop(frames);
+        assert!(port.is_ending());
     }
 
     #[test]

@@ -289,7 +289,7 @@ fn a_peer_has_the_last_values_when_no_fault_keeps_them_from_it() {
         rig.tick.write(Nanos(0), |_, bytes| bytes[0] = 2);
         assert_eq!(send(&mut rig, 0), [2, 2]);
         let fault = rig.inject(effect);
-        farewell.begin();
+        assert!(farewell.begin());
         assert_eq!(send(&mut rig, 1), [2, 2], "{effect:?}");
         assert!(!farewell.wait(&*Manual::new(), Nanos::ZERO), "{effect:?}");
         rig.end(fault);

@@ -172,9 +172,7 @@ impl LineFaults {
         self.diagnoses.truncate(diagnoses);
         self.sum = sum;
         if sum.down {
-            for wire in &mut self.stations {
-                wire.out.is_behind = true;
-            }
+            self.carries_nothing();
         }
         self.active.clear();
         for fault in &self.faults {
@@ -184,6 +182,13 @@ impl LineFaults {
                 }
                 fault.cell.write_title(&mut self.active);
             }
+        }
+    }
+
+    /// Nothing has gone out for a while: what went out before is not of the cycle before the next one.
+    pub fn carries_nothing(&mut self) {
+        for wire in &mut self.stations {
+            wire.out.is_behind = true;
         }
     }
 
@@ -230,7 +235,6 @@ impl LineFaults {
                 LineEffect::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
                 _ => None,
             });
-            // What went out before the link was down is no frame of the cycle before this one.
             self.repeats &= !self.stations[station].out.is_behind;
             if self.repeats {
                 self.board.duplicated.fetch_add(1, Ordering::Relaxed);

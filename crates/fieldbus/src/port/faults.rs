@@ -240,6 +240,11 @@ impl FaultLayer {
 
     /// The bus reports this of its line: kept while a fault hides it.
     pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
+        if let Some(line) = &mut self.line
+            && report.state == LinkState::Opening
+        {
+            line.carries_nothing();
+        }
         let (Some(beneath), Some(line)) = (&mut self.beneath, &self.line) else {
             port.enter(now, report);
             return;

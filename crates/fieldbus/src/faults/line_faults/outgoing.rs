@@ -27,7 +27,8 @@ pub(super) struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
-    /// The link was down, and nothing of the image has been taken since: its bytes have waited long enough.
+    /// The link was down or the line has opened anew, and nothing of the image has been taken since: its bytes have waited long
+    /// enough.
     pub(super) is_behind: bool,
     /// When something was taken last. After a pause of more than [`PATIENCE`], as after a request that was lost, the same holds.
     taken: Option<Nanos>,

@@ -41,6 +41,8 @@ struct Piece {
     sent: i64,
     /// The sender's process.
     from: usize,
+    /// The end of what was to be sent with them.
+    is_last: bool,
     bytes: Vec<u8>,
     read: usize,
 }
@@ -54,6 +56,8 @@ pub(crate) struct Delivery {
     pub sent: i64,
     /// The process that sent them.
     pub from: usize,
+    /// They are the last ones of what it wanted to send then; before that, nobody can know what it is.
+    pub is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -388,6 +392,7 @@ impl Network {
                     at: piece.at,
                     sent: piece.sent,
                     from: piece.from,
+                    is_whole: piece.is_last,
                 });
                 end.incoming.pop_front();
             }
@@ -455,10 +460,12 @@ impl Network {
                 .max(last)
                 .max(other.held_until);
             let (piece, further) = rest.split_at(length);
+            let is_last = further.is_empty() && count == bytes.len();
             other.incoming.push_back(Piece {
                 at,
                 sent,
                 from,
+                is_last,
                 bytes: piece.to_vec(),
                 read: 0,
             });

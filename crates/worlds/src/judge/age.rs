@@ -90,9 +90,11 @@ pub(super) fn judge_young(
             let before = seen
                 .deliveries
                 .partition_point(|delivery| delivery.at <= heard - 1_000_000);
-            before
-                .checked_sub(1)
-                .map(|index| seen.deliveries[index].sent)
+            // The beginning of a message that has not come whole makes nothing young.
+            let whole = seen.deliveries[..before]
+                .iter()
+                .rfind(|delivery| delivery.is_whole);
+            whole.map(|delivery| delivery.sent)
         }
     };
     if let Some(sent) = sent

@@ -145,11 +145,9 @@ impl Original<'_> {
 
     /// By ticks at the recorded times, the same again.
     pub(crate) fn judge_same(&self, file: &Path, is_whole: bool) -> Result<(), Broken> {
-        let again = file.with_file_name(if self.tape.plan.is_csv {
-            "again.csv"
-        } else {
-            "again.vcd"
-        });
+        // Both ends may be at it at the same time.
+        let kind = if self.tape.plan.is_csv { "csv" } else { "vcd" };
+        let again = file.with_file_name(format!("again {}.{kind}", self.end));
         let mut driver = match open(self.plan, self.end, file, Some(&again)) {
             Ok(driver) => driver,
             Err(why) => return broken("replay", format!("a recording that does not open: {why}")),

@@ -85,7 +85,7 @@ pub(super) fn judge_young(
     let heard = now - seen.age;
     let sent = match plan.bus {
         Bus::Loopback => Some(heard),
-        Bus::Dispatcher => seen.known.and_then(|known| known.until),
+        Bus::Dispatcher => None,
         _ => {
             let before = seen
                 .deliveries
@@ -97,8 +97,11 @@ pub(super) fn judge_young(
             whole.map(|delivery| delivery.sent)
         }
     };
-    if let Some(sent) = sent
-        && let Some(least) = writer.newest_at(sent - slack)
+    let least = match plan.bus {
+        Bus::Dispatcher => seen.known.and_then(|known| known.least),
+        _ => sent.and_then(|sent| writer.newest_at(sent - slack)),
+    };
+    if let Some(least) = least
         && (life, tick) < least
     {
         broken(

@@ -25,17 +25,15 @@ impl From<u64> for Seed {
         Self {
             number,
             turn: 0,
-            features: !UNSETTLED,
+            features: u64::MAX,
             events: u8::MAX,
             more: !UNSETTLED_MORE,
         }
     }
 }
 
-/// The features of worlds that break promises for reasons that are not known yet: a dispatcher.
-const UNSETTLED: u64 = 1 << 40;
-
-/// The same of those that are drawn last: faults of the line, hosted programs, heartbeats and keep-alives.
+/// The features of worlds that break promises for reasons that are not known yet, of those that are drawn last: faults of the line, hosted
+/// programs, heartbeats and keep-alives.
 const UNSETTLED_MORE: u32 = 1 << 12 | 1 << 15 | 1 << 16 | 1 << 17;
 
 impl Seed {
@@ -45,7 +43,6 @@ impl Seed {
     /// With all features, those too whose worlds break promises for reasons that are not known yet.
     pub fn unsettled(number: u64) -> Self {
         Self {
-            features: u64::MAX,
             more: u32::MAX,
             ..Self::from(number)
         }

@@ -265,6 +265,12 @@ impl Network {
                     piece.at = piece.at.max(end.held_until);
                 }
             }
+            // The end of a connection does not overtake its last bytes.
+            for ended in [&mut end.fin, &mut end.reset].into_iter().flatten() {
+                if *ended > now {
+                    *ended = (*ended).max(end.held_until);
+                }
+            }
         }
         self.cut_until = self.cut_until.max(now + span);
     }
@@ -433,9 +439,10 @@ impl Network {
             .get(&other)
             .map(|other| other.room(conditions.capacity))
         else {
-            // The other end is closed: its computer says so.
+            // The other end is closed: its computer says so, and not before what it sent earlier has come.
             let end = self.ends.get_mut(&own).expect("it was just there");
-            end.reset.get_or_insert(now + most);
+            let told = (now + most).max(end.held_until);
+            end.reset.get_or_insert(told);
             return Ok(bytes.len());
         };
         let count = bytes.len().min(room);

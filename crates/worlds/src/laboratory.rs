@@ -11,7 +11,7 @@ use tickbus_fieldbus::tcp::Address;
 use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
-use crate::judge::{Known, Seen, held, promise, slack};
+use crate::judge::{Known, Seen, Writer, held, promise, slack};
 use crate::network::{Delivery, Network};
 use crate::plan::{FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
@@ -111,30 +111,43 @@ impl Laboratory {
         Ok(())
     }
 
-    /// What the dispatcher knew of the other end than `end` when it sent what `end` had heard by `heard`, and read as `deliveries`.
+    /// What the dispatcher knew of the other end than `end`, which is `writer`, when it sent what `end` had heard by `heard`, and
+    /// read as `deliveries`.
     pub(crate) fn known(
         &self,
         plan: &Plan,
-        network: &Network,
+        (network, writer): (&Network, &Writer),
         (end, heard): (usize, i64),
         deliveries: &[Delivery],
     ) -> Option<Known> {
         let before = deliveries.partition_point(|delivery| delivery.at <= heard - 1_000_000);
         let answers = &deliveries[before.checked_sub(1)?..];
         let writers = self.clients[1 - end].borrow();
-        // The newest that had come from the writer to the dispatcher of an answer, which may read while it writes that.
-        let newest = |answer: &Delivery, limit: i64| {
-            let arrived = network.deliveries.get(&answer.from)?.iter().rev();
-            let mut of_writer = arrived.filter(|delivery| writers.contains(&delivery.from));
-            of_writer.find(|delivery| delivery.at <= limit).copied()
+        // What had come from the writer to the dispatcher of an answer, the newest first.
+        let arrived = |answer: &Delivery, limit: i64| {
+            let all = network.deliveries.get(&answer.from);
+            let all = all.map_or(&[][..], |all| all).iter().rev();
+            all.filter(move |delivery| delivery.at <= limit)
+                .filter_map(|delivery| {
+                    let life = writers.iter().position(|from| *from == delivery.from)?;
+                    Some((*delivery, life as u64 + 1))
+                })
         };
         let first = answers.first()?;
         let limit = first.sent - slack(plan) - held(plan);
         let silent = answers.iter().map(|answer| {
-            newest(answer, answer.at).map_or(i64::MAX, |delivery| answer.sent - delivery.at)
+            // It may read while it writes that.
+            let newest = arrived(answer, answer.at).next();
+            newest.map_or(i64::MAX, |(delivery, _)| answer.sent - delivery.at)
+        });
+        // What a life says is no sign that the last ticks of the life before it have come: that may have closed without a
+        // further cycle, and a dispatcher that holds has its values on.
+        let mut least = arrived(first, limit).filter_map(|(delivery, life)| {
+            let written = delivery.sent - slack(plan) - plan.waits_for_pulses();
+            writer.newest_at(written).filter(|newest| newest.0 == life)
         });
         Some(Known {
-            until: newest(first, limit).map(|delivery| delivery.sent),
+            least: least.next(),
             silent: silent.min()?,
         })
     }

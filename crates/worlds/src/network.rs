@@ -41,6 +41,8 @@ struct Piece {
     sent: i64,
     /// The sender's process.
     from: usize,
+    /// The end of what was to be sent with them.
+    is_last: bool,
     bytes: Vec<u8>,
     read: usize,
 }
@@ -54,6 +56,8 @@ pub(crate) struct Delivery {
     pub sent: i64,
     /// The process that sent them.
     pub from: usize,
+    /// They are the last ones of what it wanted to send then; before that, nobody can know what it is.
+    pub is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -261,6 +265,12 @@ impl Network {
                     piece.at = piece.at.max(end.held_until);
                 }
             }
+            // The end of a connection does not overtake its last bytes.
+            for ended in [&mut end.fin, &mut end.reset].into_iter().flatten() {
+                if *ended > now {
+                    *ended = (*ended).max(end.held_until);
+                }
+            }
         }
         self.cut_until = self.cut_until.max(now + span);
     }
@@ -388,6 +398,7 @@ impl Network {
                     at: piece.at,
                     sent: piece.sent,
                     from: piece.from,
+                    is_whole: piece.is_last,
                 });
                 end.incoming.pop_front();
             }
@@ -428,9 +439,10 @@ impl Network {
             .get(&other)
             .map(|other| other.room(conditions.capacity))
         else {
-            // The other end is closed: its computer says so.
+            // The other end is closed: its computer says so, and not before what it sent earlier has come.
             let end = self.ends.get_mut(&own).expect("it was just there");
-            end.reset.get_or_insert(now + most);
+            let told = (now + most).max(end.held_until);
+            end.reset.get_or_insert(told);
             return Ok(bytes.len());
         };
         let count = bytes.len().min(room);
@@ -455,10 +467,12 @@ impl Network {
                 .max(last)
                 .max(other.held_until);
             let (piece, further) = rest.split_at(length);
+            let is_last = further.is_empty() && count == bytes.len();
             other.incoming.push_back(Piece {
                 at,
                 sent,
                 from,
+                is_last,
                 bytes: piece.to_vec(),
                 read: 0,
             });

@@ -226,12 +226,8 @@ fn judge_torn(plan: &Plan, end: usize, tape: &Tape, text: &str) -> Result<(), Br
     let random = &mut Random::new(scramble(plan.seed.number ^ 0x746F));
     let cut = random.below(text.len() as u64 + 1);
     let text = &text[..usize::try_from(cut).expect("short")];
-    let name = if tape.plan.is_csv {
-        "torn.csv"
-    } else {
-        "torn.vcd"
-    };
-    let torn = tape.path.with_file_name(name);
+    let kind = if tape.plan.is_csv { "csv" } else { "vcd" };
+    let torn = tape.path.with_file_name(format!("torn {end}.{kind}"));
     fs::write(&torn, text).expect("a file");
     let read = if tape.plan.is_csv { csv } else { vcd };
     let contents = read(text).map_err(|why| Broken {

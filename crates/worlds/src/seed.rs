@@ -25,27 +25,16 @@ impl From<u64> for Seed {
         Self {
             number,
             turn: 0,
-            features: !UNSETTLED,
+            features: u64::MAX,
             events: u8::MAX,
             more: u32::MAX,
         }
     }
 }
 
-/// The features of worlds that break promises for reasons that are not known yet: a dispatcher.
-const UNSETTLED: u64 = 1 << 40;
-
 impl Seed {
     /// How many turns a number has, where many worlds are run.
     pub const TURNS: u8 = 8;
-
-    /// With all features, those too whose worlds break promises for reasons that are not known yet.
-    pub fn unsettled(number: u64) -> Self {
-        Self {
-            features: u64::MAX,
-            ..Self::from(number)
-        }
-    }
 
     /// The seed after this one, where many are run.
     #[must_use]

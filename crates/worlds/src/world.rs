@@ -416,7 +416,11 @@ fn judge_tick(
         let heard = (end, began - found.age);
         // Stale data are judged by themselves.
         let known = (found.code != Code::Stale)
-            .then(|| shared.laboratory.known(plan, network, heard, deliveries))
+            .then(|| {
+                shared
+                    .laboratory
+                    .known(plan, (network, &writer), heard, deliveries)
+            })
             .flatten();
         let seen = Seen {
             began,

@@ -200,10 +200,14 @@ impl End {
             self.met = true;
             return true;
         }
-        // Frames that the previous other end did not take are outdated for the next one.
-        line.lanes[lane(self.role)].waiting.fill(false);
-        self.offered = None;
+        // What the previous other end had taken is done, and its pulses are not for the next one; what it did not take is outdated.
+        let waiting = &mut line.lanes[lane(self.role)].waiting;
+        let is_taken = !waiting.contains(&true);
+        waiting.fill(false);
         drop(line);
+        if let Some(receipt) = self.offered.take().filter(|_| is_taken) {
+            port.sent(&receipt);
+        }
         if std::mem::take(&mut self.met) && !self.is_private {
             let left = BusError::Left("the other end of the link was closed".to_owned());
             port.lost(&left, "waiting for the next");

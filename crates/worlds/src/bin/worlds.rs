@@ -1,7 +1,7 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
 //! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
-//! prints one number for all that happens in so many worlds, the same on every machine. `worlds unsettled FIRST SECONDS` has
-//! worlds with all features, those too that fresh ones do not have yet. With the name of a neighbour before the first two, such as `worlds board SEED`, the same of that.
+//! prints one number for all that happens in so many worlds, the same on every machine. A FIRST
+//! with masks, such as `4711:3ff:ff`, has no other features than these. With the name of a neighbour before the first two, such as `worlds board SEED`, the same of that.
 
 use std::process::ExitCode;
 
@@ -36,15 +36,9 @@ fn main() -> ExitCode {
             Ok(seed) => one(seed),
             Err(why) => usage(&why),
         },
-        [first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
-            (Ok(first), Ok(seconds)) => many(Seed::from(first), Nanos::from_secs(seconds.into())),
-            _ => usage("FIRST and SECONDS are whole numbers"),
-        },
-        ["unsettled", first, seconds] => match (first.parse::<u64>(), seconds.parse::<u32>()) {
-            (Ok(first), Ok(seconds)) => {
-                many(Seed::unsettled(first), Nanos::from_secs(seconds.into()))
-            }
-            _ => usage("FIRST and SECONDS are whole numbers"),
+        [first, seconds] => match (first.parse(), seconds.parse::<u32>()) {
+            (Ok(first), Ok(seconds)) => many(first, Nanos::from_secs(seconds.into())),
+            _ => usage("FIRST is a seed, and SECONDS a whole number"),
         },
         ["traces", first, count] => match (first.parse::<u64>(), count.parse::<u32>()) {
             (Ok(first), Ok(count)) => traces(first, count),
@@ -56,7 +50,7 @@ fn main() -> ExitCode {
 
 fn usage(why: &str) -> ExitCode {
     eprintln!(
-        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds unsettled FIRST SECONDS\n       worlds traces FIRST COUNT"
+        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds traces FIRST COUNT"
     );
     ExitCode::from(2)
 }

@@ -85,18 +85,23 @@ pub(super) fn judge_young(
     let heard = now - seen.age;
     let sent = match plan.bus {
         Bus::Loopback => Some(heard),
-        Bus::Dispatcher => seen.known.and_then(|known| known.until),
+        Bus::Dispatcher => None,
         _ => {
             let before = seen
                 .deliveries
                 .partition_point(|delivery| delivery.at <= heard - 1_000_000);
-            before
-                .checked_sub(1)
-                .map(|index| seen.deliveries[index].sent)
+            // The beginning of a message that has not come whole makes nothing young.
+            let whole = seen.deliveries[..before]
+                .iter()
+                .rfind(|delivery| delivery.is_whole);
+            whole.map(|delivery| delivery.sent)
         }
     };
-    if let Some(sent) = sent
-        && let Some(least) = writer.newest_at(sent - slack)
+    let least = match plan.bus {
+        Bus::Dispatcher => seen.known.and_then(|known| known.least),
+        _ => sent.and_then(|sent| writer.newest_at(sent - slack)),
+    };
+    if let Some(least) = least
         && (life, tick) < least
     {
         broken(

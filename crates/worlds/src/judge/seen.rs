@@ -34,8 +34,8 @@ pub(crate) struct Seen<'a> {
 /// What who stands between both ends knew of a writer when it sent what a reader has heard.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
-    /// When the writer had sent the newest of what has to be seen; `None` if there is nothing.
-    pub(crate) until: Option<i64>,
+    /// The oldest that may be seen, as life and tick; `None` if anything may.
+    pub(crate) least: Option<(u64, u64)>,
     /// For how long nothing had come from the writer, in ns.
     pub(crate) silent: i64,
 }

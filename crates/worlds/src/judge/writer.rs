@@ -36,7 +36,7 @@ impl Writer {
     }
 
     /// The newest that was whole at a time.
-    pub(super) fn newest_at(&self, time: i64) -> Option<(u64, u64)> {
+    pub(crate) fn newest_at(&self, time: i64) -> Option<(u64, u64)> {
         let after = self
             .written
             .partition_point(|written| written.ended <= time);

@@ -1,6 +1,8 @@
-//! The neighbours of the drivers, each against a model from the same seeds: so far the dispatcher's board.
+//! The neighbours of the drivers, each against a model from the same seeds: the dispatcher's board, and a run on virtual
+//! time.
 
 mod board;
+mod lockstep;
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,17 +15,20 @@ use crate::seed::Seed;
 pub enum Neighbour {
     /// The dispatcher, its clients and their lines.
     Board,
+    /// A server of virtual time, and both ends in lock-step.
+    Lockstep,
 }
 
 impl Neighbour {
     /// All of them.
-    pub const ALL: [Self; 1] = [Self::Board];
+    pub const ALL: [Self; 2] = [Self::Board, Self::Lockstep];
 
     /// Its name, as in the corpus.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Board => "board",
+            Self::Lockstep => "lockstep",
         }
     }
 
@@ -35,6 +40,7 @@ impl Neighbour {
     pub fn run(self, seed: Seed, trace: &mut Vec<String>) -> Result<(), Broken> {
         match self {
             Self::Board => board::run(seed, trace),
+            Self::Lockstep => lockstep::run(seed, trace),
         }
     }
 
@@ -60,6 +66,6 @@ impl FromStr for Neighbour {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut all = Self::ALL.into_iter();
         all.find(|it| it.name() == text)
-            .ok_or_else(|| format!("\"{text}\" is no neighbour; write board"))
+            .ok_or_else(|| format!("\"{text}\" is no neighbour; write board or lockstep"))
     }
 }

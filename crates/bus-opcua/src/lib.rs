@@ -13,6 +13,7 @@ mod url;
 mod application;
 #[cfg(feature = "opcua")]
 mod client;
+#[cfg(feature = "opcua")]
 mod looks;
 #[cfg(feature = "opcua")]
 mod pki;

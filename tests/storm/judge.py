@@ -259,7 +259,7 @@ class Judge:
         if life is None or self.plan.ends[1 - reader.end].program == "command":
             return
         slack = self.slack(tick.began - 2 * SECOND, tick.began) + self.plan.max_age
-        if life.closed and life.end == CONTROLLER and tick.began > life.ended + slack:
+        if life.closed and life.end == CONTROLLER and tick.began > self.arrived(life, tick) + slack:
             self.finding("left on", reader, tick, f"life {life.number} closed {tick.began - life.ended} ns ago")
         watchdog = self.plan.watchdog(life.end)
         last = bisect_right(self.ended[life], tick.began) - 1
@@ -269,6 +269,12 @@ class Judge:
         is_ticking = last + 1 < len(life.ticks) and life.ticks[last + 1].began <= tick.began
         if not is_ticking and silent > watchdog + slack + self.allowed():
             self.finding("left on", reader, tick, f"life {life.number} has not ticked for {silent} ns")
+
+    @staticmethod
+    def arrived(life, tick):
+        """When all that a life had sent has come: TCP sends again what went into a cut network, after up to as long as that was cut."""
+        cuts = [(begin, end or tick.began) for begin, end in life.downs]
+        return max([life.ended, *(2 * end - begin for begin, end in cuts if begin <= life.ended < end)])
 
     def edges(self, reader, writers, seen):
         """A reader never sees more edges than were written while it was there, or just before."""

@@ -173,7 +173,7 @@ class Line:
         if not is_over:
             self.findings.append(f"close: {ROLES[life.end]} life {life.number} still runs 8 s after SIGTERM")
             life.process.kill()
-        elif life.is_second and life.program != "c" and (was is not None or life.process.child.returncode in (1, 3)):
+        elif life.is_second and (was is not None or life.process.child.returncode in (1, 3)):
             # It was refused, and ended with an error; what it logs is judged.
             pass
         elif was is not None or life.process.child.returncode not in (0, -15, 143):

@@ -14,6 +14,7 @@ STATE = r'^(?:driver "\w+" is|mirror:|plc:|\[[^]]* WARN +tickbus_fieldbus::link\
 KNOWN = [
     (STATE + r"(opening|running): (opening the line|beginning to listen on|listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
     (STATE + r"running: serving ", ALWAYS),
+    (STATE + r"opening: \S+ has connected; waiting for its first (record|telegram)", ALWAYS),
     (STATE + r"(stale|opening|failed): nothing has come from ", SILENT),
     (STATE + r"(opening|failed): the peer left: (the dispatcher at )?\S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \(Connection refused", ALWAYS),

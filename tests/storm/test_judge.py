@@ -76,6 +76,11 @@ class TheJudge(unittest.TestCase):
         for tick in self.device.ticks[700:]:
             tick.stations = [stamped(2, 0, 700, 0)]
         self.assertIn("left on", self.found())
+        # Its last words may have waited in a network that was cut when it closed, and no longer.
+        ended = self.controller.ended
+        for after, is_found in ((6 * SECOND, False), (SECOND, True)):
+            self.controller.downs = [(ended - SECOND, ended + after)]
+            self.assertEqual("left on" in self.found(), is_found, after)
 
     def test_pulses_that_are_lost_and_invented_are_found(self):
         well = copy.deepcopy(self.device.ticks)

@@ -2,7 +2,6 @@
 
 use tickbus_base::time::Nanos;
 
-use crate::features::Features;
 use crate::random::Random;
 use crate::stamp::{Stamp, level, real, whole};
 
@@ -258,7 +257,7 @@ fn on_line(signal: usize, (least, most): Span) -> Span {
 /// What the end that reads a station may be shown of the signals beside a stamp, in `tick` of its own: `held` is what was
 /// shown when its own faults began, NaN where that was not seen.
 pub(crate) fn expected(
-    features: &Features,
+    (faults, hosted): (&[FaultPlan], Option<usize>),
     (area, station): (char, usize),
     stamp: Option<u64>,
     tick: u64,
@@ -266,9 +265,9 @@ pub(crate) fn expected(
 ) -> [Vec<Span>; 3] {
     let reader = usize::from(area == 'I');
     let mut all = values(stamp).map(|value| vec![(value, value)]);
-    let faults = features.faults.iter().enumerate();
+    let faults = faults.iter().enumerate();
     // A program reads bytes, and its faults bend these.
-    let reads_bytes = features.hosted == Some(reader);
+    let reads_bytes = hosted == Some(reader);
     // Those of the end that writes come first, whichever is the first in the list.
     let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
     for (index, fault) in others.into_iter().chain(own) {

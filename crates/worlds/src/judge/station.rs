@@ -74,7 +74,8 @@ impl Reader {
             Some(value) => vec![*value],
             None => vec![self.before[signal], truth[signal]],
         };
-        let spans = faults::expected(&plan.features, (letter, station), stamp, tick, was);
+        let bends = (&plan.features.faults[..], plan.features.hosted);
+        let spans = faults::expected(bends, (letter, station), stamp, tick, was);
         let mut values = vec![f64::from(u8::from(shown.level))];
         values.extend(
             shown

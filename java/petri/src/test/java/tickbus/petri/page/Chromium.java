@@ -39,19 +39,32 @@ final class Chromium implements AutoCloseable {
         return false;
     }
 
+    /** The port that chromedriver tells, or {@code null} if it ends before. */
+    private static String portOf(Process driver) throws IOException {
+        var lines = new BufferedReader(new InputStreamReader(driver.getInputStream(), StandardCharsets.UTF_8));
+        Pattern started = Pattern.compile("started successfully on port (\\d+)");
+        for (String line = lines.readLine(); line != null; line = lines.readLine()) {
+            Matcher found = started.matcher(line);
+            if (found.find()) {
+                return found.group(1);
+            }
+        }
+        return null;
+    }
+
     /** Starts a browser with a window of this many CSS pixels; {@code folder} holds whatever it leaves. */
     Chromium(int width, int height, Path folder) throws IOException, InterruptedException {
         ProcessBuilder builder = new ProcessBuilder("chromedriver", "--port=0").redirectError(ProcessBuilder.Redirect.DISCARD);
         builder.environment().put("TMPDIR", folder.toString());
-        driver = builder.start();
-        var lines = new BufferedReader(new InputStreamReader(driver.getInputStream(), StandardCharsets.UTF_8));
-        Pattern started = Pattern.compile("started successfully on port (\\d+)");
-        String port = null;
-        for (String line = lines.readLine(); port == null && line != null; line = port == null ? lines.readLine() : line) {
-            Matcher found = started.matcher(line);
-            port = found.find() ? found.group(1) : null;
+        Process started = builder.start();
+        String port = portOf(started);
+        // It looks for a port that is free for IPv4, and ends where IPv6 has another program on it by then.
+        for (int attempt = 1; port == null && attempt < 5; attempt++) {
+            started = builder.start();
+            port = portOf(started);
         }
         assertTrue(port != null, "chromedriver tells its port");
+        driver = started;
         String answer = call("POST", "http://127.0.0.1:" + port + "/session", "{\"capabilities\":{\"alwaysMatch\":{"
             + "\"goog:chromeOptions\":{\"args\":[\"--headless=new\",\"--no-sandbox\",\"--disable-dev-shm-usage\","
             + "\"--force-device-scale-factor=1\",\"--window-size=" + width + "," + height + "\"]},"

@@ -36,7 +36,7 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
-    /// Whether somebody waits until the peers have the last values.
+    /// The driver closes, and waits until its peers have the last values.
     is_awaited: AtomicBool,
     /// Something was sent since the line was opened.
     is_used: AtomicBool,

@@ -18,7 +18,7 @@ pub(super) struct FaultLayer {
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
-    /// Whether what is being handed in together has had its look at the faults: all of it has the same fate.
+    /// The board was read for the message that the bus is handing in: the same faults act on all of its frames.
     has_looked: bool,
     /// A frame per station, for handing in what was held back.
     frames: Vec<Box<[u8]>>,
@@ -57,10 +57,10 @@ impl FaultLayer {
         }
     }
 
-    /// What is handed in from now on belongs together.
+    /// The bus begins to hand in the frames of one message. Without faults now, none acts on any of them.
     #[inline]
     pub(super) fn begin_together(&mut self) {
-        self.has_looked = false;
+        self.has_looked = !self.any();
     }
 
     #[cold]

@@ -129,6 +129,24 @@ fn a_fault_that_begins_while_stations_are_handed_in_together_meets_none_of_them(
     assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
 }
 
+#[test]
+fn a_fault_that_is_injected_and_begins_while_stations_are_handed_in_together_meets_none_of_them() {
+    let mut rig = Rig::new();
+    let mut port = std::mem::replace(&mut rig.port, Rig::new().port);
+    port.together(|port| {
+        port.received(0, Nanos(1), &[1]);
+        rig.inject(LineEffect::LinkDown);
+        port.received(1, Nanos(1), &[1]);
+    });
+    rig.tick.update();
+    assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
+    for station in 0..STATIONS {
+        port.received(station, Nanos(2), &[2]);
+    }
+    rig.tick.update();
+    assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
+}
+
 /// What came for one station: frames that are held back, with the times of their arrival, and what the tick has.
 #[derive(Default)]
 struct Incoming {

@@ -173,11 +173,11 @@ class Line:
         if not is_over:
             self.findings.append(f"close: {ROLES[life.end]} life {life.number} still runs 8 s after SIGTERM")
             life.process.kill()
-        elif life.is_second and (was is not None or life.process.child.returncode in (1, 3)):
-            # It was refused, and ended with an error; what it logs is judged.
-            pass
-        elif was is not None or life.process.child.returncode not in (0, -15, 143):
-            code = life.process.child.returncode if was is None else was
+            return
+        code = life.process.child.returncode
+        # A second one may have been refused, and have ended with an error; what it logs is judged.
+        is_refused = life.is_second and code in (1, 3)
+        if not is_refused and (was is not None or code not in (0, -15, 143)):
             self.findings.append(f"died: {ROLES[life.end]} life {life.number}, with {code}")
 
     def suspend(self, life):

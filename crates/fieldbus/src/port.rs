@@ -240,8 +240,8 @@ impl Port {
     }
 
     /// Hands in what belongs together: the frames of all stations that one message of the peer carries, its signs of
-    /// life. A tick sees all that `hand_in` hands in, or nothing of it; an injected fault that begins or ends meanwhile, no
-    /// part of it meets.
+    /// life. A tick sees all that `hand_in` hands in, or nothing of it. An injected fault that begins or ends meanwhile
+    /// changes nothing of it.
     pub fn together<R>(&mut self, hand_in: impl FnOnce(&mut Self) -> R) -> R {
         let is_part = std::mem::replace(&mut self.image.is_held, true);
         if !is_part {

@@ -18,6 +18,9 @@ const RING: usize = 4_096;
 /// A line of a file is shorter than that, with what closes the recording behind it.
 const LONGEST: u64 = 4_000;
 
+/// What a signal adds to the head of a file, which a file without ticks lacks as well.
+const DECLARED: u64 = 120;
+
 impl Tape {
     /// While a driver records, nobody else gets the file.
     pub(crate) fn judge_lock(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
@@ -160,15 +163,17 @@ fn judge_extent(
     let last = contents.rows.last().map_or(0, |row| row.number);
     let is_all = last == tape.rows.len() as u64 || tape.plan.ring.is_some();
     if let Some(limit) = tape.plan.disk {
+        let head = if last == 0 { DECLARED } else { 0 };
+        let longest = LONGEST + head * tape.names.len() as u64;
         if length > limit && tape.before.len() as u64 <= limit {
             return Err(format!("{length} bytes on a disk with {limit}"));
         }
-        if length + LONGEST < limit && !is_all && killed.is_none() {
+        if length + longest < limit && !is_all && killed.is_none() {
             return Err(format!(
                 "it ends with tick {last}, and the disk has {limit} bytes"
             ));
         }
-        if length + LONGEST >= limit {
+        if length + longest >= limit {
             return Ok(());
         }
     }

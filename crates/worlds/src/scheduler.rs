@@ -403,6 +403,11 @@ pub(crate) fn suspend_process(process: usize, span: Nanos) {
     });
 }
 
+/// Until when a process is suspended, or was the last time.
+pub(crate) fn suspended_until(process: usize) -> Nanos {
+    with(|world| Nanos(world.processes[process].suspended_until))
+}
+
 /// Acts on the network.
 pub(crate) fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
     with(|world| act(&mut world.network, &mut world.random, world.now))

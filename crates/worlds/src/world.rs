@@ -56,7 +56,7 @@ struct Shared {
     ends: [EndState; 2],
     laboratory: Rc<Laboratory>,
     broken: RefCell<Option<Broken>>,
-    /// When the controller had closed for good.
+    /// When the controller had closed for good, and its device could know that.
     controller_left: Cell<Option<i64>>,
     /// What was found, if anybody wants it.
     trace: Option<Rc<RefCell<String>>>,
@@ -174,7 +174,15 @@ fn fate(shared: &Rc<Shared>) {
             });
         }
         if end == 1 {
-            shared.controller_left.set(Some(scheduler::now().0));
+            // A device that was suspended meanwhile has confirmed nothing: it keeps the last values until nothing has come for
+            // `max_age`.
+            let until = scheduler::suspended_until(shared.ends[0].process.get());
+            let left = if until > asked {
+                scheduler::now().max(until) + plan.max_age
+            } else {
+                scheduler::now()
+            };
+            shared.controller_left.set(Some(left.0));
             scheduler::sleep(plan.max_age);
         }
     }

@@ -185,7 +185,7 @@ impl LineFaults {
         }
     }
 
-    /// Nothing has gone out for a while: what went out before is not of the cycle before the next one.
+    /// The line is interrupted: the next cycle neither repeats nor delays what the bus sent before.
     pub fn carries_nothing(&mut self) {
         for wire in &mut self.stations {
             wire.out.is_behind = true;

@@ -200,7 +200,8 @@ impl End {
             self.met = true;
             return true;
         }
-        // What the previous other end had taken is done, and its pulses are not for the next one; what it did not take is outdated.
+        // A frame that the previous other end took is confirmed, so that the next one does not see its pulses again; a frame that
+        // it did not take is outdated.
         let waiting = &mut line.lanes[lane(self.role)].waiting;
         let is_taken = !waiting.contains(&true);
         waiting.fill(false);

@@ -1,7 +1,8 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
 //! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
-//! prints one number for all that happens in so many worlds, the same on every machine. A FIRST
-//! with masks, such as `4711:3ff:ff`, has no other features than these. With the name of a neighbour before the first two, such as `worlds board SEED`, the same of that.
+//! prints one number for all that happens in so many worlds, the same on every machine. FIRST may be a
+//! seed with masks, such as `4711:3ff:ff`: the worlds then have no features beside those of the masks. The name of a neighbour before
+//! the first two, as in `worlds board SEED`, runs that neighbour.
 
 use std::process::ExitCode;
 
@@ -38,7 +39,8 @@ fn main() -> ExitCode {
         },
         [first, seconds] => match (first.parse(), seconds.parse::<u32>()) {
             (Ok(first), Ok(seconds)) => many(first, Nanos::from_secs(seconds.into())),
-            _ => usage("FIRST is a seed, and SECONDS a whole number"),
+            (Err(why), _) => usage(&why),
+            _ => usage("SECONDS is a whole number"),
         },
         ["traces", first, count] => match (first.parse::<u64>(), count.parse::<u32>()) {
             (Ok(first), Ok(count)) => traces(first, count),
@@ -50,7 +52,7 @@ fn main() -> ExitCode {
 
 fn usage(why: &str) -> ExitCode {
     eprintln!(
-        "worlds: {why}\nusage: worlds [board] SEED\n       worlds [board] FIRST SECONDS\n       worlds traces FIRST COUNT"
+        "worlds: {why}\nusage: worlds [board|lockstep] SEED\n       worlds [board|lockstep] FIRST SECONDS\n       worlds traces FIRST COUNT"
     );
     ExitCode::from(2)
 }

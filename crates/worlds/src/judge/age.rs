@@ -83,9 +83,9 @@ pub(super) fn judge_young(
     let slack =
         slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
-    let sent = match plan.bus {
-        Bus::Loopback => Some(heard),
-        Bus::Dispatcher => None,
+    let least = match plan.bus {
+        Bus::Loopback => writer.newest_at(heard - slack),
+        Bus::Dispatcher => seen.known.and_then(|known| known.least),
         _ => {
             let before = seen
                 .deliveries
@@ -94,12 +94,8 @@ pub(super) fn judge_young(
             let whole = seen.deliveries[..before]
                 .iter()
                 .rfind(|delivery| delivery.is_whole);
-            whole.map(|delivery| delivery.sent)
+            whole.and_then(|delivery| writer.newest_at(delivery.sent - slack))
         }
-    };
-    let least = match plan.bus {
-        Bus::Dispatcher => seen.known.and_then(|known| known.least),
-        _ => sent.and_then(|sent| writer.newest_at(sent - slack)),
     };
     if let Some(least) = least
         && (life, tick) < least

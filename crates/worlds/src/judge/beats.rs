@@ -46,8 +46,8 @@ impl Reader {
         )
     }
 
-    /// A writer that does not tick does not beat: who watches that is stale. When fail-safe values take the place of those of a
-    /// tick, or give it back, the heartbeat is another one as well: that is a change. The first frame is one, too.
+    /// The heartbeat of a writer that does not tick stands still, and the end that watches it becomes stale. The first frame is
+    /// a change of the heartbeat, and so is fail-safe values in place of a tick's values, or the other way round.
     pub(crate) fn judge_frozen(
         &mut self,
         plan: &Plan,
@@ -62,9 +62,8 @@ impl Reader {
             return Ok(());
         }
         let is_fail_safe = seen.stations.iter().all(|shown| shown.stamp == FAIL_SAFE);
-        if self.was_fail_safe.replace(is_fail_safe) != Some(is_fail_safe) {
-            self.replaced = seen.began;
-        }
+        let same = self.kind.filter(|kind| kind.0 == is_fail_safe);
+        let (_, replaced) = *self.kind.insert(same.unwrap_or((is_fail_safe, seen.began)));
         // A tick that loses the processor behind its look at the clock may see what was written meanwhile.
         let is_new = |shown: &Shown| {
             shown.stamp != FAIL_SAFE && writer.wrote_after(seen.began, Stamp::of(shown.stamp))
@@ -72,7 +71,7 @@ impl Reader {
         let Some(last) = writer.last_ended(seen.began) else {
             return Ok(());
         };
-        let frozen = seen.began - last.max(self.replaced);
+        let frozen = seen.began - last.max(replaced);
         let limit =
             (within + every + plan.max_age).0 + slack(plan) + plan.waits_for_pulses() + held(plan);
         if frozen <= limit || writer.is_ticking() || seen.stations.iter().any(is_new) {

@@ -5,7 +5,7 @@ use super::reader::Reader;
 use super::seen::Seen;
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::{Bus, FAIL_SAFE, Misfortune, Plan};
+use crate::plan::{Bus, FAIL_SAFE, Plan};
 
 impl Reader {
     /// While a writer does not tick, its watchdog trips: nothing of it may count any more.
@@ -52,18 +52,12 @@ impl Reader {
     /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
     pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
         let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
-        // A device that was suspended confirms nothing: it has the last values until nothing has come for `max_age`.
-        let spans = plan.events.iter().map(|event| match event.what {
-            Misfortune::Suspend(0, span) => span.0 + plan.max_age.0,
-            _ => 0,
-        });
-        let unconfirmed = spans.max().unwrap_or_default();
         let through = if plan.bus == Bus::Dispatcher {
             held(plan) + relayed(plan)
         } else {
             0
         };
-        let soon = slack(plan) + plan.waits_for_pulses() + through + unconfirmed;
+        let soon = slack(plan) + plan.waits_for_pulses() + through;
         if holds || seen.is_stale || seen.began <= left + soon {
             return Ok(());
         }

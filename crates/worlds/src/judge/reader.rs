@@ -27,9 +27,8 @@ pub(crate) struct Reader {
     pub(super) held: BTreeMap<usize, f64>,
     /// The heartbeat that was shown last, and with which stamp.
     pub(super) beat: Option<(Stamp, u8)>,
-    /// Whether fail-safe values were shown last and counted, and since when.
-    pub(super) was_fail_safe: Option<bool>,
-    pub(super) replaced: i64,
+    /// The last tick that counted showed fail-safe values, or those of its peer's ticks; and since when ticks have shown that.
+    pub(super) kind: Option<(bool, i64)>,
 }
 
 impl Reader {
@@ -39,7 +38,7 @@ impl Reader {
         self.before = faults::values(None);
         self.held.clear();
         self.beat = None;
-        self.was_fail_safe = None;
+        self.kind = None;
         self.sequence = 0;
     }
 

@@ -65,7 +65,11 @@ impl FromStr for Neighbour {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let mut all = Self::ALL.into_iter();
-        all.find(|it| it.name() == text)
-            .ok_or_else(|| format!("\"{text}\" is no neighbour; write board or lockstep"))
+        all.find(|it| it.name() == text).ok_or_else(|| {
+            format!(
+                "\"{text}\" is no neighbour; write {}",
+                Self::ALL.map(Self::name).join(" or ")
+            )
+        })
     }
 }

@@ -27,10 +27,10 @@ pub(super) struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
-    /// The link was down or the line has opened anew, and nothing of the image has been taken since: its bytes have waited long
-    /// enough.
+    /// The link was down or the bus has opened the line again, and the bus has taken no image since. `slow-answers` does not hold
+    /// back the next image: the outage has delayed it already.
     pub(super) is_behind: bool,
-    /// When something was taken last. After a pause of more than [`PATIENCE`], as after a request that was lost, the same holds.
+    /// When the bus took an image last. After a pause of more than [`PATIENCE`], such as after a lost request, the same holds.
     taken: Option<Nanos>,
     /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
     overtaken: usize,
@@ -74,7 +74,7 @@ impl Outgoing {
             && !(self.given == Given::Held && self.has_unseen(&self.current))
     }
 
-    /// The image is taken at `now`: whether its bytes have waited for the line, and not for a fault.
+    /// The bus takes the image at `now`. Returns whether the line has delayed it, so that no fault has to.
     pub(super) fn catches_up(&mut self, now: Nanos) -> bool {
         let before = self.taken.replace(now);
         std::mem::take(&mut self.is_behind) || before.is_some_and(|it| now - it > PATIENCE)

@@ -74,9 +74,11 @@ impl Shared {
         self.trace.borrow_mut().push(what);
     }
 
-    fn fail(&self, broken: Broken) {
-        self.broken.borrow_mut().get_or_insert(broken);
-        scheduler::stop();
+    fn check(&self, judged: Result<(), Broken>) {
+        if let Err(broken) = judged {
+            self.broken.borrow_mut().get_or_insert(broken);
+            scheduler::stop();
+        }
     }
 }
 
@@ -160,16 +162,16 @@ fn fate(shared: &Rc<Shared>) {
         befall(shared, *what);
     }
     if !await_all(shared) {
-        // Who waits for a client that is gone does so for any time; whoever can be told is told.
+        // A server waits without limit for a client that is gone, so somebody has to stop the run.
         if course.has(is_end) {
             shared.controls.send(Control::Stop);
         }
         if !await_all(shared) {
             let done = shared.is_done.each_ref().map(Cell::get);
-            shared.fail(Broken {
-                promise: "liveness",
-                what: format!("the run has not ended: machine, PLC, server are done: {done:?}"),
-            });
+            shared.check(broken(
+                "liveness",
+                format!("the run has not ended: machine, PLC, server are done: {done:?}"),
+            ));
         }
     }
 }

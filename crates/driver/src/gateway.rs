@@ -462,6 +462,10 @@ mod tests {
 
     fn config(role: &str) -> Config {
         let mut text = format!("{LINE}role = \"{role}\"\n");
+        if role == "controller" {
+            // A real PLC holds its answer; this one is not to begin again at 0 when its own data become stale.
+            text.push_str("while_stale = \"hold\"\n");
+        }
         for (name, address) in SIGNALS {
             let lines = [
                 format!("name = \"{name}\""),

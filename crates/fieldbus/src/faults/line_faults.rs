@@ -79,13 +79,18 @@ pub struct Shape {
 }
 
 impl LineFaults {
-    /// The line to stations of these shapes, without any fault.
-    pub fn new(board: Arc<FaultBoard>, stations: impl Iterator<Item = Shape>) -> Self {
+    /// The line to stations of these shapes, without any fault. The bus took an image last at `taken`; `None` if it has not
+    /// since it opened the line.
+    pub fn new(
+        board: Arc<FaultBoard>,
+        stations: impl Iterator<Item = Shape>,
+        taken: Option<Nanos>,
+    ) -> Self {
         let wire = |shape: Shape| Wire {
             dead: false,
             came: true,
             went: true,
-            out: Outgoing::new(shape.last_sent, shape.latched),
+            out: Outgoing::new(shape.last_sent, shape.latched, taken),
             waiting: None,
             released: Nanos(i64::MIN),
             rx_len: shape.rx_len,

@@ -18,6 +18,8 @@ pub(super) struct FaultLayer {
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
+    /// When the bus took an image last since it opened the line, while there was no line fault: the first one begins there.
+    taken: Option<Nanos>,
     /// The board was read for the message that the bus is handing in: the same faults act on all of its frames.
     has_looked: bool,
     /// A frame per station, for handing in what was held back.
@@ -89,12 +91,12 @@ impl FaultLayer {
             return;
         }
         self.seen = news;
-        let (image, status) = (&port.image, &port.status);
+        let (image, status, taken) = (&port.image, &port.status, self.taken);
         self.board.tell(status.driver());
         for fault in self.board.take_line_faults() {
             let line = self.line.get_or_insert_with(|| {
                 let shapes = (0..image.stations()).map(|station| shape(image, station));
-                Box::new(LineFaults::new(Arc::clone(&self.board), shapes))
+                Box::new(LineFaults::new(Arc::clone(&self.board), shapes, taken))
             });
             line.adopt(fault);
             let sizes = (0..image.stations()).map(|station| image.rx_len(station));
@@ -135,6 +137,7 @@ impl FaultLayer {
         port: &'a mut ImagePort,
     ) -> &'a [u8] {
         let Some(line) = &mut self.line else {
+            self.taken = Some(now);
             return port.outgoing(station, now);
         };
         let repeats = line.repeats(station);
@@ -240,10 +243,11 @@ impl FaultLayer {
 
     /// The bus reports this of its line: kept while a fault hides it.
     pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
-        if let Some(line) = &mut self.line
-            && report.state == LinkState::Opening
-        {
-            line.carries_nothing();
+        if report.state == LinkState::Opening {
+            self.taken = None;
+            if let Some(line) = &mut self.line {
+                line.carries_nothing();
+            }
         }
         let (Some(beneath), Some(line)) = (&mut self.beneath, &self.line) else {
             port.enter(now, report);

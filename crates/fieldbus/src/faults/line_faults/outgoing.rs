@@ -49,8 +49,8 @@ pub(super) enum Given {
 }
 
 impl Outgoing {
-    /// Of a station that sent `last_sent` last.
-    pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>) -> Self {
+    /// Of a station that sent `last_sent` last, and that the bus took at `taken`, unless it has opened the line since.
+    pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>, taken: Option<Nanos>) -> Self {
         Self {
             latched,
             newest: last_sent.clone(),
@@ -60,8 +60,8 @@ impl Outgoing {
             reads: false,
             held_up: None,
             waiting: None,
-            is_behind: false,
-            taken: None,
+            is_behind: taken.is_none(),
+            taken,
             overtaken: 0,
             given: Given::Image,
         }

@@ -20,6 +20,10 @@ impl Rig {
     }
 
     fn of_stations(count: usize) -> Self {
+        Self::taken(count, Some(Nanos::ZERO))
+    }
+
+    fn taken(count: usize, taken: Option<Nanos>) -> Self {
         let board = Arc::<FaultBoard>::default();
         let shape = Shape {
             last_sent: Box::new([0, 0]),
@@ -28,7 +32,7 @@ impl Rig {
         };
         Self {
             faults: Faults::new(Arc::clone(&board)),
-            wires: LineFaults::new(Arc::clone(&board), std::iter::repeat_n(shape, count)),
+            wires: LineFaults::new(Arc::clone(&board), std::iter::repeat_n(shape, count), taken),
             board,
             tick: 0,
         }
@@ -187,6 +191,18 @@ fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeat
     rig.end(down);
     assert_eq!(rig.send(1_000, [0, 50], true).0, [0, 50]);
     assert_eq!(rig.send(1_001, [0, 51], true).0, [0, 50], "twice again");
+}
+
+#[test]
+fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_that_is_old() {
+    let first = |taken| {
+        let mut rig = Rig::taken(1, taken);
+        rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+        rig.send(2 * PATIENCE.0, [0, 9], true).0
+    };
+    assert_eq!(first(None), [0, 9]);
+    assert_eq!(first(Some(Nanos::ZERO)), [0, 9]);
+    assert_eq!(first(Some(PATIENCE)), [0, 0]);
 }
 
 #[test]

@@ -111,12 +111,13 @@ impl Laboratory {
         Ok(())
     }
 
-    /// What the dispatcher knew of the other end than `end`, which is `writer`, when it sent what `end` had heard by `heard`, and
-    /// read as `deliveries`.
+    /// What the dispatcher knew of the other end than `end`, which is `writer` and was not stale in its lives since `valid_since`,
+    /// when it sent what `end` had heard by `heard`, and read as `deliveries`.
     pub(crate) fn known(
         &self,
         plan: &Plan,
-        (network, writer): (&Network, &Writer),
+        network: &Network,
+        (writer, valid_since): (&Writer, &[i64]),
         (end, heard): (usize, i64),
         deliveries: &[Delivery],
     ) -> Option<Known> {
@@ -142,7 +143,16 @@ impl Laboratory {
         });
         // What a life says is no sign that the last ticks of the life before it have come: that may have closed without a
         // further cycle, and a dispatcher that holds has its values on.
-        let mut least = arrived(first, limit).filter_map(|(delivery, life)| {
+        // Nor is what it says before it has been heard: that may ask to join, and be refused.
+        let has_joined = |at: i64, life: u64| {
+            let since = usize::try_from(life - 1)
+                .ok()
+                .and_then(|life| valid_since.get(life));
+            since.is_some_and(|since| *since <= at)
+        };
+        let joined =
+            arrived(first, limit).filter(|(delivery, life)| has_joined(delivery.sent, *life));
+        let mut least = joined.filter_map(|(delivery, life)| {
             let written = delivery.sent - slack(plan) - plan.waits_for_pulses();
             writer.newest_at(written).filter(|newest| newest.0 == life)
         });

@@ -419,6 +419,7 @@ fn judge_tick(
     });
     let down = down_since.into_iter().chain(heard);
     let writer = peer.writer.borrow();
+    let heard_since = &peer.reader.borrow().valid_since;
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
         let heard = (end, began - found.age);
@@ -427,7 +428,7 @@ fn judge_tick(
             .then(|| {
                 shared
                     .laboratory
-                    .known(plan, (network, &writer), heard, deliveries)
+                    .known(plan, network, (&writer, heard_since), heard, deliveries)
             })
             .flatten();
         let seen = Seen {
@@ -480,7 +481,7 @@ fn judge_pulses(shared: &Shared, ended: Nanos) {
     // From the first data on, if there were no misfortunes.
     let well_since = readers
         .iter()
-        .map(|reader| reader.first_valid.unwrap_or(i64::MAX))
+        .map(|reader| reader.valid_since.iter().copied().min().unwrap_or(i64::MAX))
         .max();
     let well_since = well_since
         .filter(|_| plan.events.is_empty() && plan.habits.starves == 0)

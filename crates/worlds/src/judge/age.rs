@@ -79,17 +79,21 @@ pub(super) fn judge_young(
     (station, stamp): (usize, Stamp),
 ) -> Result<(), Broken> {
     let now = seen.began;
-    let Stamp { life, tick, .. } = stamp;
+    let Stamp {
+        life, tick, area, ..
+    } = stamp;
     let slack =
         slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
+    // What a fault delays is told to have come that much later.
+    let arrived = heard - plan.delayed_at(usize::from(area == 1));
     let least = match plan.bus {
         Bus::Loopback => writer.newest_at(heard - slack),
         Bus::Dispatcher => seen.known.and_then(|known| known.least),
         _ => {
             let before = seen
                 .deliveries
-                .partition_point(|delivery| delivery.at <= heard - 1_000_000);
+                .partition_point(|delivery| delivery.at <= arrived - 1_000_000);
             // The beginning of a message that has not come whole makes nothing young.
             let whole = seen.deliveries[..before]
                 .iter()

@@ -5,7 +5,7 @@ use super::reader::Reader;
 use super::seen::{Seen, Shown};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::{FAIL_SAFE, Plan};
+use crate::plan::{FAIL_SAFE, Misfortune, Plan};
 
 impl Reader {
     /// Judges the heartbeat that is shown with a stamp.
@@ -72,8 +72,11 @@ impl Reader {
             return Ok(());
         };
         let frozen = seen.began - last.max(replaced);
-        let limit =
-            (within + every + plan.max_age).0 + slack(plan) + plan.waits_for_pulses() + held(plan);
+        let limit = (within + every + plan.max_age).0
+            + slack(plan)
+            + plan.waits_for_pulses()
+            + held(plan)
+            + suspended(plan, end);
         if frozen <= limit || writer.is_ticking() || seen.stations.iter().any(is_new) {
             return Ok(());
         }
@@ -82,4 +85,13 @@ impl Reader {
             format!("not stale, {frozen} ns after the last tick of its peer"),
         )
     }
+}
+
+/// For how long an end is suspended: what it wrote right before goes out right behind that.
+fn suspended(plan: &Plan, end: usize) -> i64 {
+    let spans = plan.events.iter().map(|event| match event.what {
+        Misfortune::Suspend(process, span) if process == end => span.0,
+        _ => 0,
+    });
+    spans.sum()
 }

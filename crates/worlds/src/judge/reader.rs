@@ -17,8 +17,8 @@ pub(crate) struct Reader {
     pub(crate) edges: Vec<Vec<(i64, u64)>>,
     /// When it was last not stale, and what it saw then.
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
-    /// When it was first not stale.
-    pub(crate) first_valid: Option<i64>,
+    /// When each of its lives was first not stale; [`i64::MAX`] if none was.
+    pub(crate) valid_since: Vec<i64>,
     /// The times at which it was stale, or its line disturbed on purpose.
     pub(crate) stale: Vec<i64>,
     /// What the signals beside the stamp of station 0 were in the tick before.
@@ -40,6 +40,7 @@ impl Reader {
         self.beat = None;
         self.kind = None;
         self.sequence = 0;
+        self.valid_since.push(i64::MAX);
     }
 
     /// Judges what a tick of the end that reads `area` shows of what `writer` wrote.
@@ -95,7 +96,8 @@ impl Reader {
         }
         if !seen.is_stale {
             self.last_valid = Some((now, first.flatten()));
-            self.first_valid.get_or_insert(now);
+            let since = self.valid_since.last_mut();
+            since.into_iter().for_each(|since| *since = now.min(*since));
         }
         super::age::judge(plan, seen)
     }

@@ -30,6 +30,17 @@ impl Plan {
         held.sum()
     }
 
+    /// How long faults may delay what an end receives.
+    pub(crate) fn delayed_at(&self, end: usize) -> i64 {
+        let faults = self.features.faults.iter();
+        let delays = faults.filter(|fault| fault.end == end);
+        let spans = delays.map(|fault| match fault.effect {
+            Effect::Delay(by) => by.0,
+            _ => 0,
+        });
+        spans.sum()
+    }
+
     /// How old values may become besides: slow answers wait for a pulse that nobody has read, for a second at most, and for as
     /// long as it is held.
     pub(crate) fn waits_for_pulses(&self) -> i64 {

@@ -235,7 +235,7 @@ impl Caller for ClientSession<'_> {
             Framing::Rtu { .. } => gone(peer, "it was closed"),
             _ if asked_identity => BusError::Left(format!(
                 "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
-                 not asked any more"
+                 not asked for some time"
             )),
             _ => BusError::Left(format!(
                 "{peer} closed the connection; if it serves one client at a time, end the other one"
@@ -457,7 +457,7 @@ impl ClientSession<'_> {
         }
         self.recovered(station);
         port.running(&format!("polling {}", self.peer));
-        if self.stations[station].wants_identity(now) && self.may_ask(station, port) {
+        if self.stations[station].wants_identity(now) && self.may_ask(station, now, port) {
             self.ask_identity(station, Identification::default(), 0, 0, now);
             return Ok(());
         }

@@ -19,6 +19,13 @@ const PAUSE: Nanos = Nanos::from_secs(1);
 /// before it counts as a device without one. In between it answers other requests, so it is there.
 const SILENCES: u8 = 2;
 
+/// How long until a device that seemed to have no identity is asked again, if `write_to` names another one: two connections
+/// may have broken by chance while it was asked. Doubled each time, since a device that hangs up loses its connection by that.
+const AGAIN: Nanos = Nanos::from_secs(10);
+
+/// How often that pause is doubled.
+const DOUBLINGS: u32 = 8;
+
 /// What is known about the identity of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
@@ -84,7 +91,7 @@ impl ClientSession<'_> {
             // A device that is busy or unreachable may report it later.
             Err(AnswerError::Refused(exception)) => {
                 if !exception.passes() {
-                    self.says_nothing(station, port);
+                    self.says_nothing(station, now, port);
                 }
                 return self.ask_later(station, now, port);
             }
@@ -94,17 +101,32 @@ impl ClientSession<'_> {
             }
         }
         self.stations[station].hang_ups = 0;
+        self.stations[station].presumed = 0;
         self.meet(station, &so_far, port);
         self.begin(station + 1, now, port)
     }
 
     /// The device did not answer the request for its identity, or failed to.
-    pub(super) fn says_nothing(&mut self, station: usize, port: &mut Port) {
+    pub(super) fn says_nothing(&mut self, station: usize, now: Nanos, port: &mut Port) {
         if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
             *silences += 1;
             if *silences >= SILENCES {
-                self.meet(station, &Identification::default(), port);
+                self.presume_none(station, now, port);
             }
+        }
+    }
+
+    /// The device seems to have no identity. If that keeps this end from writing, it is asked again later.
+    fn presume_none(&mut self, station: usize, now: Nanos, port: &mut Port) {
+        self.meet(station, &Identification::default(), port);
+        let guard = &self.guards[station];
+        if guard.names_one() && !guard.may_write() {
+            let station = &mut self.stations[station];
+            station.identity = Identity::Unknown {
+                silences: 0,
+                not_before: now + AGAIN.times(1 << station.presumed),
+            };
+            station.presumed = DOUBLINGS.min(station.presumed + 1);
         }
     }
 
@@ -133,7 +155,7 @@ impl ClientSession<'_> {
         port: &mut Port,
     ) -> Result<(), BusError> {
         if let Identity::Unknown { not_before, .. } = &mut self.stations[station].identity {
-            *not_before = now + PAUSE;
+            *not_before = (now + PAUSE).max(*not_before);
         }
         self.begin(station + 1, now, port)
     }
@@ -156,13 +178,13 @@ impl ClientSession<'_> {
     }
 
     /// Whether to ask a station for its identity. If it has closed the connection too often when asked, it
-    /// counts as having none, for this connection.
-    pub(super) fn may_ask(&mut self, station: usize, port: &mut Port) -> bool {
+    /// counts as having none.
+    pub(super) fn may_ask(&mut self, station: usize, now: Nanos, port: &mut Port) -> bool {
         if self.stations[station].hang_ups < SILENCES {
             return true;
         }
         self.stations[station].hang_ups = 0;
-        self.meet(station, &Identification::default(), port);
+        self.presume_none(station, now, port);
         false
     }
 

@@ -27,6 +27,8 @@ pub(in super::super) struct Station {
     pub(super) identity: Identity,
     /// How many connections in a row ended while the device was asked for its identity.
     pub(super) hang_ups: u8,
+    /// How many times in a row the device seemed to have no identity, though `write_to` names one.
+    pub(super) presumed: u32,
     pub(super) trouble: Trouble,
 }
 
@@ -50,6 +52,7 @@ impl Station {
             receives: vec![0; receives],
             identity: Identity::default(),
             hang_ups: 0,
+            presumed: 0,
             trouble: Trouble::default(),
         }
     }

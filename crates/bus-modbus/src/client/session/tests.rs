@@ -298,6 +298,27 @@ fn a_device_that_hangs_up_when_asked_who_it_is_is_not_asked_on_the_third_connect
 }
 
 #[test]
+fn a_device_whose_connections_broke_while_it_was_asked_who_it_is_is_asked_again_if_another_one_is_named()
+ {
+    let mut client = Client::new(1, &[register(5)], &[register(0)], Some("tickbus 7"));
+    for _ in 0..2 {
+        let mut line = client.connect(tcp());
+        line.read();
+        assert_eq!(line.asked(), WHO);
+        assert!(line.poll.hung_up());
+    }
+    let mut line = client.connect(tcp());
+    line.read();
+    line.read();
+    assert_eq!(line.statistic("writes").as_deref(), Some("blocked"));
+    line.now = line.now + Nanos::from_secs(10);
+    line.read();
+    line.introduce("7");
+    line.write_and_read();
+    assert_eq!(line.statistic("writes").as_deref(), Some("allowed"));
+}
+
+#[test]
 fn a_late_answer_to_something_else_does_not_make_a_device_nameless() {
     let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
     let mut line = client.connect(serial());

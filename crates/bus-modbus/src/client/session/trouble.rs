@@ -40,7 +40,7 @@ impl ClientSession<'_> {
         match asking.what {
             // The next answer may come from another device.
             Asked::Data(_) => self.doubt(station),
-            Asked::Identity { .. } => self.says_nothing(station, port),
+            Asked::Identity { .. } => self.says_nothing(station, now, port),
         }
         let within = self.timeout;
         self.miss(&format!("did not answer within {within}"), now, port)

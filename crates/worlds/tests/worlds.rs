@@ -9,7 +9,7 @@ use tickbus_base::toml_text::{Collector, read_text};
 use tickbus_worlds::{Pairs, Plan, Seed};
 
 /// How long fresh worlds are drawn, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
-const SECONDS: u32 = 10;
+const SECONDS: u32 = 30;
 
 #[track_caller]
 fn passes(seed: Seed) {

@@ -229,9 +229,9 @@ impl LineFaults {
         lost
     }
 
-    /// Whether the previous frames are sent again instead of new ones. Decided once for all stations of a
+    /// Whether the previous frames are sent again at `now` instead of new ones. Decided once for all stations of a
     /// cycle.
-    pub fn repeats(&mut self, station: usize) -> bool {
+    pub fn repeats(&mut self, station: usize, now: Nanos) -> bool {
         if std::mem::replace(&mut self.stations[station].went, true) {
             for (index, wire) in self.stations.iter_mut().enumerate() {
                 wire.went = index == station;
@@ -240,7 +240,7 @@ impl LineFaults {
                 LineEffect::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
                 _ => None,
             });
-            self.repeats &= !self.stations[station].out.is_behind;
+            self.repeats &= !self.stations[station].out.has_paused(now);
             if self.repeats {
                 self.board.duplicated.fetch_add(1, Ordering::Relaxed);
             }

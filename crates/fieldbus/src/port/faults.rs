@@ -140,7 +140,7 @@ impl FaultLayer {
             self.taken = Some(now);
             return port.outgoing(station, now);
         };
-        let repeats = line.repeats(station);
+        let repeats = line.repeats(station, now);
         if line.is_cut(station) {
             return line.frozen(station);
         }

@@ -76,8 +76,14 @@ impl Outgoing {
 
     /// The bus takes the image at `now`. Returns whether the line has delayed it, so that no fault has to.
     pub(super) fn catches_up(&mut self, now: Nanos) -> bool {
-        let before = self.taken.replace(now);
-        std::mem::take(&mut self.is_behind) || before.is_some_and(|it| now - it > PATIENCE)
+        let has_paused = self.has_paused(now);
+        (self.is_behind, self.taken) = (false, Some(now));
+        has_paused
+    }
+
+    /// Whether what the bus took last is of another connection, or older than [`PATIENCE`].
+    pub(super) fn has_paused(&self, now: Nanos) -> bool {
+        self.is_behind || self.taken.is_some_and(|taken| now - taken > PATIENCE)
     }
 
     /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.

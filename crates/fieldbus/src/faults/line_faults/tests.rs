@@ -77,7 +77,7 @@ impl Rig {
 
     /// One cycle of sending: the bytes sent, and whether the image may regard them as sent.
     fn send(&mut self, now: i64, image: [u8; 2], taken: bool) -> ([u8; 2], bool) {
-        let repeats = self.wires.repeats(0);
+        let repeats = self.wires.repeats(0, Nanos(now));
         let mut confirmed = !repeats && self.wires.takes(0, Nanos(now), &image);
         let out = self.wires.outgoing(0).try_into().expect("two bytes");
         if taken {
@@ -191,6 +191,12 @@ fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeat
     rig.end(down);
     assert_eq!(rig.send(1_000, [0, 50], true).0, [0, 50]);
     assert_eq!(rig.send(1_001, [0, 51], true).0, [0, 50], "twice again");
+    let later = 1_002 + PATIENCE.0;
+    assert_eq!(
+        rig.send(later, [0, 80], true).0,
+        [0, 80],
+        "not after a pause"
+    );
 }
 
 #[test]
@@ -317,10 +323,10 @@ fn a_station_whose_neighbour_is_silent_has_its_own_chances_and_keeps_nothing_of_
     rig.end(lost);
     assert_eq!(comes(&mut rig), Fate::Passes(1));
     let repeated = rig.add(LineEffect::Duplicate(1.0, Direction::Both), 1);
-    assert!(rig.wires.repeats(1));
+    assert!(rig.wires.repeats(1, Nanos::ZERO));
     assert_eq!(comes(&mut rig), Fate::Passes(2));
     rig.end(repeated);
-    assert!(!rig.wires.repeats(1));
+    assert!(!rig.wires.repeats(1, Nanos::ZERO));
     assert_eq!(comes(&mut rig), Fate::Passes(1));
 
     rig.add(LineEffect::Drop(0.25, Direction::In), 1);
@@ -338,7 +344,7 @@ fn the_stations_of_one_cycle_share_its_fate() {
         let fates = [0, 1, 2].map(|station| rig.wires.arrives(station, Nanos(now), &[1, 2]));
         assert!(fates.iter().all(|fate| *fate == fates[0]), "{fates:?}");
         lost += usize::from(fates[0] == Fate::Lost);
-        let repeats = [0, 1, 2].map(|station| rig.wires.repeats(station));
+        let repeats = [0, 1, 2].map(|station| rig.wires.repeats(station, Nanos::ZERO));
         assert!(repeats.iter().all(|one| *one == repeats[0]), "{repeats:?}");
         repeated += usize::from(repeats[0]);
     }

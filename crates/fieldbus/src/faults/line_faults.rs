@@ -60,6 +60,8 @@ struct Wire {
     came: bool,
     went: bool,
     out: Outgoing,
+    /// The frame that came last was lost, and the fault that did it is active.
+    has_lost: bool,
     /// Received frames that are held back.
     waiting: Option<Ring>,
     /// When the last of them came.
@@ -91,6 +93,7 @@ impl LineFaults {
             came: true,
             went: true,
             out: Outgoing::new(shape.last_sent, shape.latched, taken),
+            has_lost: false,
             waiting: None,
             released: Nanos(i64::MIN),
             rx_len: shape.rx_len,
@@ -143,6 +146,7 @@ impl LineFaults {
         for wire in &mut self.stations {
             (wire.dead, wire.came, wire.went) = (false, true, true);
         }
+        let mut loses = false;
         let mut diagnoses = 0;
         let mut report = |diagnosis, all: &mut Vec<Diagnosis>| {
             let is_new = all.get(diagnoses) != Some(&diagnosis);
@@ -168,7 +172,8 @@ impl LineFaults {
                     LineEffect::Diagnosis(own) => {
                         self.is_diagnosis_new |= report(own, &mut self.diagnoses);
                     }
-                    LineEffect::Drop(..) | LineEffect::Duplicate(..) => {}
+                    LineEffect::Drop(_, direction) => loses |= direction.comes_in(),
+                    LineEffect::Duplicate(..) => {}
                 }
             }
             phase != Phase::Over
@@ -176,6 +181,9 @@ impl LineFaults {
         self.is_diagnosis_new |= self.diagnoses.len() > diagnoses;
         self.diagnoses.truncate(diagnoses);
         self.sum = sum;
+        for wire in &mut self.stations {
+            wire.has_lost &= loses;
+        }
         if sum.down {
             self.carries_nothing();
         }
@@ -321,10 +329,12 @@ impl LineFaults {
         if self.is_cut(station) {
             return Fate::Lost;
         }
+        let wire = &mut self.stations[station];
+        wire.has_lost = self.fate == Fate::Lost;
         let Fate::Passes(times) = self.fate else {
             return self.fate;
         };
-        let Some(ring) = &mut self.stations[station].waiting else {
+        let Some(ring) = &mut wire.waiting else {
             return self.fate;
         };
         if self.sum.delay == Nanos::ZERO && ring.is_empty() {
@@ -384,10 +394,11 @@ impl LineFaults {
         Some(came)
     }
 
-    /// Whether received frames of the station are held back.
-    pub fn holds_back(&self, station: usize) -> bool {
-        let ring = self.stations[station].waiting.as_ref();
-        ring.is_some_and(|ring| !ring.is_empty())
+    /// Whether the newest frame of the station has not been delivered: it is held back, or was lost.
+    pub fn withholds(&self, station: usize) -> bool {
+        let wire = &self.stations[station];
+        let ring = wire.waiting.as_ref();
+        wire.has_lost || ring.is_some_and(|ring| !ring.is_empty())
     }
 
     /// When the next received frame is due; [`Nanos::MAX`] if none is held back.

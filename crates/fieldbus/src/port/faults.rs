@@ -201,8 +201,8 @@ impl FaultLayer {
     /// The peer of a station was alive.
     #[inline]
     pub(super) fn touch(&mut self, station: usize, now: Nanos, port: &mut ImagePort) {
-        // While frames are held back, the peer must not seem more alive than the data that have arrived.
-        let is_hidden = |line: &LineFaults| line.is_cut(station) || line.holds_back(station);
+        // While frames are held back or lost, the peer must not seem more alive than the data that have arrived.
+        let is_hidden = |line: &LineFaults| line.is_cut(station) || line.withholds(station);
         if !self.line.as_deref().is_some_and(is_hidden) {
             port.touch(station, now);
         }

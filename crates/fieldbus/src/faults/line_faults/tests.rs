@@ -118,7 +118,7 @@ fn a_delay_holds_frames_back_and_hands_all_in_when_it_ends() {
     let delay = rig.add(LineEffect::Delay(Nanos(20)), 1);
     assert_eq!(rig.receive(10, Some(2)), Vec::<u8>::new());
     assert_eq!(rig.wires.due(), Nanos(30));
-    assert!(rig.wires.holds_back(0));
+    assert!(rig.wires.withholds(0));
     assert_eq!(rig.receive(20, Some(3)), Vec::<u8>::new());
     assert_eq!(rig.receive(30, Some(4)), [2]);
     assert_eq!(rig.receive(41, None), [3]);
@@ -319,9 +319,11 @@ fn a_station_whose_neighbour_is_silent_has_its_own_chances_and_keeps_nothing_of_
     let lost = rig.add(LineEffect::Drop(1.0, Direction::In), 1);
     for _ in 0..10 {
         assert_eq!(comes(&mut rig), Fate::Lost);
+        assert!(rig.wires.withholds(1) && !rig.wires.withholds(0));
     }
     rig.end(lost);
     assert_eq!(comes(&mut rig), Fate::Passes(1));
+    assert!(!rig.wires.withholds(1), "nothing is left of the fault");
     let repeated = rig.add(LineEffect::Duplicate(1.0, Direction::Both), 1);
     assert!(rig.wires.repeats(1, Nanos::ZERO));
     assert_eq!(comes(&mut rig), Fate::Passes(2));

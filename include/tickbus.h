@@ -49,7 +49,7 @@
 extern "C" {
 #endif
 
-/* What functions return. 0 and above: done. README.md tells what each means; tb_last_error what to do. */
+/* What functions return. 0 and above: done. docs/status-codes.md explains each; tb_last_error says what to do. */
 enum tb_status {
     TB_FRESH = 0,             /* a new bus cycle has arrived since the last exchange */
     TB_UNCHANGED = 1,         /* the link lives, no new bus cycle since the last exchange */

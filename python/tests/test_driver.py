@@ -310,7 +310,7 @@ def test_events_are_told_one_by_one(tmp_path):
 def test_the_tank_of_the_manual_runs(tmp_path, monkeypatch):
     program = root("docs", "python.md").read_text().split("```python\n")[1].split("```")[0]
     config = root("README.md").read_text().split("```toml\n")[1].split("```")[0]
-    (tmp_path / "tank.cfg").write_text(config.replace('scan    = "10ms"', 'scan    = "10ms"\nmode    = "stepped"'))
+    (tmp_path / "tank.cfg").write_text(config.replace("[fieldbus]", '[fieldbus]\nmode    = "stepped"'))
     monkeypatch.chdir(tmp_path)
     found = {}
     exec(program, found)

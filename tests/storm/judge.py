@@ -241,8 +241,9 @@ class Judge:
         heard = tick.began - tick.age - self.allowed() - self.slack(tick.began - tick.age - 2 * SECOND, tick.began)
         if is_back or self.plan.bus == "dispatcher":
             heard -= self.plan.max_age + self.allowed()
-        # What its process could not send while it was suspended, killed or cut off.
-        spans = life.downs + [down for other in self.lives if other.end == reader.end for down in other.downs]
+        # What its process could not send while it was suspended, killed or cut off; or the one that sends back what it gets.
+        involved = [other for other in self.lives if is_back or other.end == reader.end]
+        spans = life.downs + [down for other in involved for down in other.downs]
         for begin, end in spans:
             if begin - SECOND <= tick.began and (end is None or heard <= end + SECOND):
                 heard = min(heard, begin - SECOND)

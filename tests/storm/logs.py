@@ -20,8 +20,8 @@ KNOWN = [
     (STATE + r"failed: the link failed: cannot connect to \S+ \(Connection refused", ALWAYS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \((Network is unreachable|No route to host|.*timed out)", {"cut"}),
     (STATE + r"(opening|failed): the link failed: \S+ has (been silent|not answered) for ", SILENT),
-    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection timed out|No route|Network is)", {"cut"}),
-    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke \((Connection reset|Broken pipe)", DEATHS),
+    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke (in the middle of a record: .* )?\((Connection timed out|No route|Network is)", {"cut"}),
+    (STATE + r"(opening|failed): the link failed: the connection with \S+ broke (in the middle of a record: .* )?\((Connection reset|Broken pipe)", DEATHS),
     # A newcomer is turned away while another one is served, and a server that is not the only one gets no port.
     (STATE + r"(opening|failed): the peer left: \S+ closed the connection( before it had sent anything)?; if it serves", DEATHS),
     (STATE + r"failed: .*Address already in use", {"second"}),

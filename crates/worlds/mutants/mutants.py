@@ -76,7 +76,14 @@ def put_back(mutants, texts):
         sys.exit("mutants: change mutants.toml as the code has changed:\n" + "\n".join(stale))
 
 
-def worlds(number, seconds):
+def by_worlds(number, seconds):
+    """How long fresh worlds take to find a mutation, by which promise, and in which of them; what only a rare one meets, those of
+    the corpus find, which make test runs as well."""
+    took, found, seed = fresh(number, seconds)
+    return (took, found, seed) if found else corpus(number)
+
+
+def fresh(number, seconds):
     """How long worlds take to find a mutation, by which promise, and in which of them."""
     binary = BUILT / "release" / "worlds"
     begun = time.monotonic()
@@ -108,6 +115,24 @@ def worlds(number, seconds):
     return took, None, last.split()[0]
 
 
+def corpus(number):
+    """As fresh(), by the worlds that broke a promise once."""
+    begun = time.monotonic()
+    seed = ""
+    for seed in (HERE.parent / "corpus.txt").read_text().splitlines():
+        if seed.startswith("#"):
+            continue
+        run = [BUILT / "release" / "worlds", seed]
+        try:
+            done = subprocess.run(run, env=chosen(number), capture_output=True, text=True, check=False, timeout=120)
+        except subprocess.TimeoutExpired:
+            return time.monotonic() - begun, "corpus: hangs", seed
+        if done.returncode:
+            promise = done.stdout.splitlines()[-1].split(": ")[1].split(" ", 2)[-1] if done.returncode == 1 else "panics"
+            return time.monotonic() - begun, f"corpus: {promise}", seed
+    return time.monotonic() - begun, None, seed
+
+
 def chosen(number):
     return dict(os.environ, TICKBUS_MUTANT=str(number))
 
@@ -126,7 +151,7 @@ def known(names, seconds):
     for number, mutant in enumerate(mutants, 1):
         if names and mutant["name"] not in names:
             continue
-        took, found, seed = worlds(number, seconds)
+        took, found, seed = by_worlds(number, seconds)
         print(f"{mutant['name']:22} {took:6.1f} s  {found or 'NOT FOUND':14} {seed}", flush=True)
         if not found:
             left.append(mutant["name"])
@@ -161,7 +186,7 @@ def by_chance(count, seconds):
         verdict, seed = unit_tests(tests[crate], crate, change["number"]), ""
         took = time.monotonic() - begun
         if not verdict:
-            took, verdict, seed = worlds(change["number"], seconds)
+            took, verdict, seed = by_worlds(change["number"], seconds)
         killed += bool(verdict)
         place = f"{change['file'].removeprefix('crates/')}:{change['line'] + 1}"
         print(f"{place}: {change['what'][:60]}\n    {took:6.1f} s  {verdict or 'LIVES'} {seed}", flush=True)

@@ -419,16 +419,20 @@ fn judge_tick(
     });
     let down = down_since.into_iter().chain(heard);
     let writer = peer.writer.borrow();
-    let heard_since = &peer.reader.borrow().valid_since;
+    let peer_reader = peer.reader.borrow();
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
         let heard = (end, began - found.age);
         // Stale data are judged by themselves.
         let known = (found.code != Code::Stale)
             .then(|| {
-                shared
-                    .laboratory
-                    .known(plan, network, (&writer, heard_since), heard, deliveries)
+                shared.laboratory.known(
+                    plan,
+                    network,
+                    (&writer, &peer_reader.valid_since),
+                    heard,
+                    deliveries,
+                )
             })
             .flatten();
         let seen = Seen {
@@ -451,6 +455,9 @@ fn judge_tick(
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
         reader.judge_frozen(plan, 1 - end, &writer, &seen)?;
+        if end == 0 {
+            Reader::judge_blind(plan, &peer_reader, connected, &seen)?;
+        }
         for since in down {
             Reader::judge_down(plan, since, &seen)?;
         }

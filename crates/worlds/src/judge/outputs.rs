@@ -70,6 +70,41 @@ impl Reader {
         }
     }
 
+    /// A controller that has heard nothing of its peer sends fail-safe values, unless it was to hold; its peer was `connected` then.
+    pub(crate) fn judge_blind(
+        plan: &Plan,
+        controller: &Self,
+        connected: i64,
+        seen: &Seen<'_>,
+    ) -> Result<(), Broken> {
+        let Some(blind) = &controller.blind else {
+            return Ok(());
+        };
+        let heard = seen.began - seen.age;
+        // One that is asked is no longer blind when it answers. Of a program that reads, nobody knows the age of what it reads.
+        let is_unknown = plan.bus.asks()
+            || plan.bus == Bus::Dispatcher
+            || plan.features.hosted == Some(0)
+            || heard > blind.last;
+        // Its first cycle finds everything stale, and sends what the program has.
+        let since = blind.since.max(connected);
+        let soon = plan.cycle.0 * 2 + slack(plan) + plan.waits_for_pulses() + held(plan);
+        if plan.ends[1].holds_while_stale || seen.is_stale || is_unknown || heard - since <= soon {
+            return Ok(());
+        }
+        match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
+            Some(shown) => broken(
+                "left on",
+                format!(
+                    "{:?}, {} ns after its controller has become stale",
+                    Stamp::of(shown.stamp),
+                    heard - since
+                ),
+            ),
+            None => Ok(()),
+        }
+    }
+
     /// A line that is down on purpose, at either end, is stale soon.
     pub(crate) fn judge_down(plan: &Plan, since: i64, seen: &Seen<'_>) -> Result<(), Broken> {
         let limit = plan.max_age.0 + slack(plan) + held(plan);

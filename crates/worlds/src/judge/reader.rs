@@ -8,6 +8,13 @@ use super::{Broken, Stamp, broken};
 use crate::faults::{self, FaultPlan};
 use crate::plan::{Bus, FAIL_SAFE, Plan};
 
+/// While ticks of an end were stale, without a gap in which it might not have been.
+#[derive(Debug)]
+pub(super) struct Blind {
+    pub(super) since: i64,
+    pub(super) last: i64,
+}
+
 /// What one end has seen.
 #[derive(Debug, Default)]
 pub(crate) struct Reader {
@@ -19,6 +26,8 @@ pub(crate) struct Reader {
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
     /// When each of its lives was first not stale; [`i64::MAX`] if none was.
     pub(crate) valid_since: Vec<i64>,
+    /// Since when it has been stale, up to its last tick.
+    pub(super) blind: Option<Blind>,
     /// The times at which it was stale, or its line disturbed on purpose.
     pub(crate) stale: Vec<i64>,
     /// What the signals beside the stamp of station 0 were in the tick before.
@@ -39,6 +48,7 @@ impl Reader {
         self.held.clear();
         self.beat = None;
         self.kind = None;
+        self.blind = None;
         self.sequence = 0;
         self.valid_since.push(i64::MAX);
     }
@@ -61,6 +71,14 @@ impl Reader {
         if seen.is_stale || is_unwritten || is_lost {
             self.stale.push(now);
         }
+        let before = self
+            .blind
+            .take()
+            .filter(|it| now - it.last <= plan.max_age.0);
+        self.blind = seen.is_stale.then(|| Blind {
+            since: before.map_or(now, |it| it.since),
+            last: now,
+        });
         if !seen.is_stale && seen.age > plan.max_age.0 {
             broken("stale", format!("age {} ns, and not stale", seen.age))?;
         }

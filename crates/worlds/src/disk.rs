@@ -1,16 +1,33 @@
-//! The disk of a simulated world: real files in a folder of the world's own, with as much room as the world gives them.
+//! The disk of a simulated world: real files in a folder, with as much room as the world gives them.
+//!
+//! The worlds of a thread use one folder in turn. Its path is the same for all of them, so two worlds with the same driver.cfg
+//! have the same text, and the text is parsed once.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
+/// Where files are kept in memory, on systems that have this.
+const IN_MEMORY: &str = "/dev/shm";
+
+thread_local! {
+    /// The folder of this thread's worlds; empty between two worlds.
+    static FOLDER: RefCell<Option<TempDir>> = const { RefCell::new(None) };
+}
+
+fn new_folder() -> TempDir {
+    let in_memory = tempfile::tempdir_in(IN_MEMORY);
+    in_memory.unwrap_or_else(|_| tempfile::tempdir().expect("a temporary folder"))
+}
+
 /// The disk of a world.
 #[derive(Debug, Default)]
 pub(crate) struct Disk {
-    folder: Option<TempDir>,
+    folder: Option<PathBuf>,
     /// How long files may become, by their paths.
     limits: BTreeMap<PathBuf, u64>,
     /// Processes that write no more, and since when.
@@ -18,11 +35,18 @@ pub(crate) struct Disk {
 }
 
 impl Disk {
-    /// Where the files of this world are; removed with it.
+    /// Where the files of this world are; they are removed with it.
     pub(crate) fn folder(&mut self) -> &Path {
-        self.folder
-            .get_or_insert_with(|| tempfile::tempdir().expect("a temporary folder"))
-            .path()
+        self.folder.get_or_insert_with(|| {
+            FOLDER.with_borrow_mut(|folder| folder.get_or_insert_with(new_folder).path().to_owned())
+        })
+    }
+
+    /// Gives up the folder: threads that never end may still use its files, so the next world gets another one.
+    pub(crate) fn abandon(&mut self) {
+        if self.folder.take().is_some() {
+            drop(FOLDER.take());
+        }
     }
 
     /// A file may become this long.
@@ -60,5 +84,22 @@ impl Disk {
             return Err(ErrorKind::StorageFull.into());
         }
         file.write(&bytes[..fits])
+    }
+}
+
+impl Drop for Disk {
+    fn drop(&mut self) {
+        let Some(folder) = self.folder.take() else {
+            return;
+        };
+        let empty = || {
+            for file in fs::read_dir(&folder)? {
+                fs::remove_file(file?.path())?;
+            }
+            io::Result::Ok(())
+        };
+        if empty().is_err() {
+            drop(FOLDER.take());
+        }
     }
 }

@@ -1,17 +1,14 @@
 //! One end of a world's line: its driver, and what ticks it.
 
-use std::cell::RefCell;
-use std::collections::VecDeque;
-
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Driver};
-use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::injector::Injector;
 use crate::judge::Shown;
+use crate::known;
 use crate::plan::Plan;
 use crate::scheduler::now;
 use crate::stamp::{Stamp, level, real, whole};
@@ -58,33 +55,6 @@ pub(crate) struct Found {
     pub(crate) broken: Option<Broken>,
 }
 
-/// How many files are known at a time: those of two ends, and of two worlds.
-const KNOWN: usize = 4;
-
-/// What a driver.cfg says. Several worlds have the same one, and reading it takes longer than a life of its driver.
-fn read(path: &str, text: String) -> Config {
-    /// A file's path and text, and what it says.
-    type Known = (String, String, Config);
-    thread_local! {
-        static READ: RefCell<VecDeque<Known>> = const { RefCell::new(VecDeque::new()) };
-    }
-    let known = READ.with_borrow(|files| {
-        let known = files
-            .iter()
-            .find(|known| known.0 == path && known.1 == text);
-        known.map(|known| known.2.clone())
-    });
-    known.unwrap_or_else(|| {
-        let config = Config::parse(path, &text)
-            .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
-        READ.with_borrow_mut(|files| {
-            files.truncate(KNOWN - 1);
-            files.push_front((path.to_owned(), text, config.clone()));
-        });
-        config
-    })
-}
-
 impl End {
     pub(crate) fn open(plan: &Plan, end: usize, link: &str) -> Result<Self, Broken> {
         let text = plan.driver_cfg(end, link);
@@ -92,7 +62,7 @@ impl End {
         let folder = tape.as_ref().and_then(|tape| tape.path.parent());
         let path = folder.map_or("driver.cfg".into(), |folder| folder.join("driver.cfg"));
         let path = path.to_str().expect("a plain path");
-        let config = read(path, text);
+        let config = known::parse(path, text);
         if let Some(tape) = &tape {
             let open = || {
                 let refused = Driver::open(config.clone(), SimulatedClock::shared()).err();
@@ -208,7 +178,7 @@ impl End {
 
     /// What it wrote it finds again, and who looks sees what it has.
     fn judge_own(&mut self, tick: u64, code: Code) -> Result<(), Broken> {
-        let slots = self.slots.clone();
+        let slots = &self.slots;
         for places in &self.writes {
             let stamp = slots[places.stamp].unsigned();
             let numbers = places.numbers.is_none_or(|(at, other)| {
@@ -225,7 +195,7 @@ impl End {
                 });
             }
         }
-        self.injector.behind(tick, code, &slots)
+        self.injector.behind(tick, code, slots)
     }
 
     fn write(&mut self, life: u64, tick: u64, is_pulse: bool) {

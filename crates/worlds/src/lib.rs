@@ -21,6 +21,7 @@ mod features;
 mod files;
 mod injector;
 mod judge;
+mod known;
 mod laboratory;
 mod neighbours;
 mod network;

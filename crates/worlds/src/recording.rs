@@ -1,6 +1,7 @@
 //! A recording is what was delivered, tick by tick: all of it in order, or the beginning of it.
 
 use std::fs::{self, File};
+use std::path::Path;
 
 use tickbus_base::os::{Lock, lock_file};
 
@@ -78,7 +79,7 @@ fn judge_recording(
     if let Err(why) = is_right {
         return broken("recording", what(why));
     }
-    judge_replay(plan, end, tape, &contents, killed.is_none())?;
+    judge_replay(plan, end, (tape, &tape.path), &contents, killed.is_none())?;
     if killed.is_some() && tape.plan.is_torn {
         return judge_torn(plan, end, tape, &text);
     }
@@ -204,26 +205,21 @@ fn judge_extent(
     Ok(())
 }
 
-/// What was recorded is replayed.
+/// What was recorded is replayed, from `file`.
 fn judge_replay(
     plan: &Plan,
     end: usize,
-    tape: &Tape,
+    (tape, file): (&Tape, &Path),
     contents: &Contents,
     is_closed: bool,
 ) -> Result<(), Broken> {
     if !plan.features.replays || contents.rows.is_empty() {
         return Ok(());
     }
-    let original = Original {
-        plan,
-        end,
-        tape,
-        contents,
-    };
+    let original = Original::new(plan, end, tape, contents);
     let has_gaps = contents.rows.last().is_some_and(|row| row.dropped > 0);
-    original.judge_same(&tape.path, is_closed && !has_gaps)?;
-    original.judge_other(&tape.path)
+    original.judge_same(file, is_closed && !has_gaps)?;
+    original.judge_other(file)
 }
 
 /// After a power failure the file may end anywhere, and is read up to its last whole tick.
@@ -239,14 +235,5 @@ fn judge_torn(plan: &Plan, end: usize, tape: &Tape, text: &str) -> Result<(), Br
         promise: "recording",
         what: format!("end {end}: {cut} bytes cannot be read: {why}"),
     })?;
-    judge_replay(
-        plan,
-        end,
-        &Tape {
-            path: torn,
-            ..tape.clone()
-        },
-        &contents,
-        false,
-    )
+    judge_replay(plan, end, (tape, &torn), &contents, false)
 }

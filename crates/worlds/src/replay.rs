@@ -7,12 +7,12 @@ use std::path::Path;
 
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Driver, DriverError};
-use tickbus_driver_cfg::Config;
 use tickbus_image::signal::Slot;
 
 use crate::broken::{Broken, broken};
 use crate::clock::SimulatedClock;
 use crate::files::{Contents, FileRow, area_of, is_count};
+use crate::known;
 use crate::plan::Plan;
 use crate::random::{Random, scramble};
 use crate::tape::Tape;
@@ -24,10 +24,21 @@ const STALE: i32 = 2;
 
 /// A recording that is to be replayed.
 pub(crate) struct Original<'a> {
-    pub(crate) plan: &'a Plan,
-    pub(crate) end: usize,
-    pub(crate) tape: &'a Tape,
-    pub(crate) contents: &'a Contents,
+    plan: &'a Plan,
+    end: usize,
+    tape: &'a Tape,
+    contents: &'a Contents,
+    /// The slots that the end reads.
+    reads: Vec<Column>,
+}
+
+/// A slot, and where a recording has it.
+struct Column {
+    slot: usize,
+    place: usize,
+    is_count: bool,
+    /// Rising edges of several ticks are shown in one.
+    is_latched: bool,
 }
 
 /// Opens a driver that replays `file`, and records that to `again` if there is a name.
@@ -48,9 +59,37 @@ pub(crate) fn open(
         plan.max_age,
         plan.signal_sections(end)
     );
-    let config = Config::parse("driver.cfg", &text)
-        .unwrap_or_else(|why| panic!("a replay that tickbus refuses:\n{why}\n{text}"));
-    Driver::open(config, SimulatedClock::shared())
+    Driver::open(known::parse("driver.cfg", text), SimulatedClock::shared())
+}
+
+impl<'a> Original<'a> {
+    pub(crate) fn new(plan: &'a Plan, end: usize, tape: &'a Tape, contents: &'a Contents) -> Self {
+        let own = writes(end);
+        let read = tape.names.iter().enumerate();
+        let read = read.filter(|(_, name)| area_of(name) != own);
+        let reads = read.map(|(slot, name)| {
+            let place = contents.names.iter().position(|known| known == name);
+            let is_count = is_count(name);
+            Column {
+                slot,
+                place: place.expect("the recording was judged"),
+                is_count,
+                is_latched: name.starts_with("pulse") && !is_count,
+            }
+        });
+        Self {
+            reads: reads.collect(),
+            plan,
+            end,
+            tape,
+            contents,
+        }
+    }
+}
+
+/// The area that an end writes.
+fn writes(end: usize) -> char {
+    ['I', 'Q'][end]
 }
 
 impl Original<'_> {
@@ -105,39 +144,31 @@ impl Original<'_> {
         if rows[last].status != STALE {
             *shaped = shaped.saturating_sub(1);
         }
-        for (index, name) in self.tape.names.iter().enumerate() {
-            if area_of(name) == self.writes() {
-                continue;
-            }
-            let place = self.contents.names.iter().position(|known| known == name);
-            let place = place.expect("the recording was judged");
-            let seen = slots[index].0;
-            let expected = if is_count(name) {
+        for column in &self.reads {
+            let seen = slots[column.slot].0;
+            let expected = if column.is_count {
                 let counts = rows[group.clone()].iter();
-                let counts = counts.map(|row| f64::from_bits(row.values[place]));
+                let counts = counts.map(|row| f64::from_bits(row.values[column.place]));
                 let count = counts.fold(0.0, |all, count| all + count);
                 count.to_bits()
             } else {
-                rows[last].values[place]
+                rows[last].values[column.place]
             };
-            let is_latched = name.starts_with("pulse") && !is_count(name);
-            if seen != expected && !(is_latched && is_shaped) {
+            if seen != expected && !(column.is_latched && is_shaped) {
+                let name = &self.tape.names[column.slot];
                 return Err(format!("{name} is {seen:x}, and was {expected:x}"));
             }
         }
         Ok(())
     }
 
-    fn writes(&self) -> char {
-        ['I', 'Q'][self.end]
-    }
-
     /// What this end wrote in a row, and nothing that it read.
     fn written(&self, row: usize, slots: &mut [Slot]) {
         let tick = usize::try_from(self.rows()[row].number).expect("small") - 1;
         let values = &self.tape.rows[tick].values;
+        let own = writes(self.end);
         for ((slot, name), value) in slots.iter_mut().zip(&self.tape.names).zip(values) {
-            if area_of(name) == self.writes() {
+            if area_of(name) == own {
                 *slot = Slot(*value);
             }
         }

@@ -80,6 +80,8 @@ struct World {
     random: Random,
     habits: Habits,
     tasks: Vec<Task>,
+    /// Which of them have not ended.
+    alive: Vec<usize>,
     /// Which of them can run; kept for the next turn.
     ready: Vec<usize>,
     processes: Vec<Process>,
@@ -147,6 +149,7 @@ pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> R
             random: Random::new(seed),
             habits,
             tasks: Vec::new(),
+            alive: Vec::new(),
             ready: Vec::new(),
             processes: vec![Process::default()],
             current: None,
@@ -175,6 +178,7 @@ impl Drop for Ending {
             if let Some(mut thread) = task.thread
                 && !thread.done()
             {
+                with(|world| world.disk.abandon());
                 // What it holds is leaked: its drops would wait in a world that has ended.
                 // SAFETY: nothing on its stack is reachable from elsewhere but by reference counts that never fall.
                 unsafe { thread.force_reset() };
@@ -208,11 +212,8 @@ fn run_all() -> Result<(), Stuck> {
             CoroutineResult::Yield(()) => with(|world| world.tasks[next].thread = Some(thread)),
             CoroutineResult::Return(()) => {
                 with(|world| {
-                    world.tasks[next].wait = Wait::Event {
-                        deadline: i64::MAX,
-                        stop: None,
-                        sockets: Vec::new(),
-                    };
+                    world.tasks[next].wait = Wait::Nothing;
+                    world.alive.retain(|alive| *alive != next);
                 });
                 STACKS.with(|stacks| stacks.borrow_mut().push(thread.into_stack()));
             }
@@ -232,6 +233,7 @@ fn begin_spawned() {
         });
         with(|world| {
             let now = world.now;
+            world.alive.push(index);
             world.tasks.push(Task {
                 thread: Some(thread),
                 yielder: std::ptr::null(),
@@ -264,13 +266,8 @@ impl World {
         loop {
             self.ready.clear();
             let mut soonest = i64::MAX;
-            let mut is_any = false;
-            for index in 0..self.tasks.len() {
+            for &index in &self.alive {
                 let task = &mut self.tasks[index];
-                if task.thread.is_none() {
-                    continue;
-                }
-                is_any = true;
                 // A wake counts once: it is not to be asked for again.
                 if let Wait::Event {
                     stop: Some(stop), ..
@@ -305,7 +302,7 @@ impl World {
                     soonest = soonest.min(due);
                 }
             }
-            if !is_any {
+            if self.alive.is_empty() {
                 return Ok(None);
             }
             if self.ready.is_empty() {

@@ -5,7 +5,6 @@ use std::rc::Rc;
 
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Host};
-use tickbus_driver_cfg::Config;
 use tickbus_plc::{Program, Scan};
 
 use super::{Shared, judge_tick};
@@ -13,6 +12,7 @@ use crate::broken::Broken;
 use crate::clock::SimulatedClock;
 use crate::end::Found;
 use crate::judge::Shown;
+use crate::known;
 use crate::plan::{FAIL_SAFE, Plan};
 use crate::scheduler;
 use crate::stamp::{Stamp, level, real, whole};
@@ -48,8 +48,7 @@ struct Stamped {
 pub(super) fn open(shared: &Shared, (end, process): (usize, usize), life: u64) -> Host {
     let plan = &shared.plan;
     let text = plan.driver_cfg(end, &shared.link);
-    let config = Config::parse("driver.cfg", &text)
-        .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
+    let config = known::parse("driver.cfg", text);
     let program = Stamped {
         plan: plan.clone(),
         end,

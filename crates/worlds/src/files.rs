@@ -126,8 +126,14 @@ pub(crate) fn vcd(text: &str) -> Result<Contents, String> {
         values: Vec::new(),
     };
     for line in whole.lines() {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
+        // Nothing looks at a fifth word; and a list on the heap for each line would take longer than the rest.
+        let mut words = [""; 4];
+        let mut count = 0;
+        for (place, word) in words.iter_mut().zip(line.split_ascii_whitespace()) {
+            *place = word;
+            count += 1;
+        }
+        match words[..count] {
             ["$comment", "end", ..] => contents.end = Some(line.to_owned()),
             ["$comment", what, id, ..] => {
                 let name = line.split('"').nth(1).unwrap_or_default();

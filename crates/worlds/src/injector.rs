@@ -40,6 +40,9 @@ impl Injector {
     /// A tick is about to begin.
     pub(crate) fn before(&mut self, tick: u64, driver: &mut Driver) -> Result<(), Broken> {
         for (fault, number) in self.faults.iter().zip(&mut self.numbers) {
+            if tick != fault.first && tick != fault.first + fault.ticks {
+                continue;
+            }
             let text = fault.section();
             let inject = |driver: &mut Driver, text: &str| {
                 let injected = driver.inject_text(text);

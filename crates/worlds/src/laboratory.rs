@@ -124,41 +124,51 @@ impl Laboratory {
         let before = deliveries.partition_point(|delivery| delivery.at <= heard - 1_000_000);
         let answers = &deliveries[before.checked_sub(1)?..];
         let writers = self.clients[1 - end].borrow();
-        // What had come from the writer to the dispatcher of an answer, the newest first.
-        let arrived = |answer: &Delivery, limit: i64| {
-            let all = network.deliveries.get(&answer.from);
-            let all = all.map_or(&[][..], |all| all).iter().rev();
-            all.filter(move |delivery| delivery.at <= limit)
-                .filter_map(|delivery| {
-                    let life = writers.iter().position(|from| *from == delivery.from)?;
-                    Some((*delivery, life as u64 + 1))
-                })
+        // The life of the writer that sent this, from 1.
+        let life = |delivery: &Delivery| {
+            let life = writers.iter().position(|from| *from == delivery.from)?;
+            Some(life as u64 + 1)
         };
         let first = answers.first()?;
-        let limit = first.sent - slack(plan) - held(plan);
-        let silent = answers.iter().map(|answer| {
+        let mut silent = i64::MAX;
+        // What had come to the dispatcher of an answer. Of earlier answers that ends no later, so one walk back serves them all.
+        let mut arrived: &[Delivery] = &[];
+        let mut later: Option<&Delivery> = None;
+        for answer in answers.iter().rev() {
+            if later.is_none_or(|later| later.from != answer.from || later.at < answer.at) {
+                let all = network.deliveries.get(&answer.from);
+                arrived = all.map_or(&[], |all| all);
+            }
+            later = Some(answer);
             // It may read while it writes that.
-            let newest = arrived(answer, answer.at).next();
-            newest.map_or(i64::MAX, |(delivery, _)| answer.sent - delivery.at)
-        });
+            let is_newest =
+                |delivery: &Delivery| delivery.at <= answer.at && life(delivery).is_some();
+            let newest = arrived.iter().rposition(is_newest);
+            arrived = &arrived[..newest.map_or(0, |newest| newest + 1)];
+            if let Some(newest) = arrived.last() {
+                silent = silent.min(answer.sent - newest.at);
+            }
+        }
         // What a life says is no sign that the last ticks of the life before it have come: that may have closed without a
         // further cycle, and a dispatcher that holds has its values on.
         // Nor is what it says before it has been heard: that may ask to join, and be refused.
         let has_joined = |at: i64, life: u64| {
-            let since = usize::try_from(life - 1)
-                .ok()
-                .and_then(|life| valid_since.get(life));
+            let life = usize::try_from(life - 1).ok();
+            let since = life.and_then(|life| valid_since.get(life));
             since.is_some_and(|since| *since <= at)
         };
-        let joined =
-            arrived(first, limit).filter(|(delivery, life)| has_joined(delivery.sent, *life));
-        let mut least = joined.filter_map(|(delivery, life)| {
-            let written = delivery.sent - slack(plan) - plan.waits_for_pulses();
-            writer.newest_at(written).filter(|newest| newest.0 == life)
+        let slack = slack(plan);
+        let limit = first.sent - slack - held(plan);
+        let unread = slack + plan.waits_for_pulses();
+        let came = arrived.iter().rev().filter(|delivery| delivery.at <= limit);
+        let mut least = came.filter_map(|delivery| {
+            let life = life(delivery).filter(|life| has_joined(delivery.sent, *life))?;
+            let newest = writer.newest_at(delivery.sent - unread)?;
+            (newest.0 == life).then_some(newest)
         });
         Some(Known {
             least: least.next(),
-            silent: silent.min()?,
+            silent,
         })
     }
 }

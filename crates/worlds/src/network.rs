@@ -134,32 +134,35 @@ impl Network {
     /// The next time at which one of these sockets is ready.
     pub(crate) fn due(&self, sockets: &[(u64, Interest)]) -> i64 {
         let due = sockets.iter().map(|(id, interest)| {
-            let (read, write) = self.ready_at(*id);
-            match interest {
-                Interest::Read => read,
-                Interest::Write => write,
-                Interest::ReadWrite => read.min(write),
-            }
+            let (read, write) = self.ready_at(*id, *interest);
+            read.min(write)
         });
         due.min().unwrap_or(i64::MAX)
     }
 
-    /// When a socket can be read and written.
-    fn ready_at(&self, id: u64) -> (i64, i64) {
+    /// When a socket can be read and written, as far as that is of interest; `i64::MAX` otherwise.
+    fn ready_at(&self, id: u64, interest: Interest) -> (i64, i64) {
+        let (reads, writes) = (interest != Interest::Write, interest != Interest::Read);
         if let Some(listening) = self.listeners.get(&id) {
             let waiting = listening.waiting.iter();
             // One that is closed already is told by accepting it.
             let connected = waiting.map(|id| self.ends.get(id).map_or(0, |end| end.connected));
-            return (connected.min().unwrap_or(i64::MAX), i64::MAX);
+            let connected = connected.min().filter(|_| reads);
+            return (connected.unwrap_or(i64::MAX), i64::MAX);
         }
+        let of_interest = |at: i64, is: bool| if is { at } else { i64::MAX };
         let Some(end) = self.ends.get(&id) else {
-            return (i64::MIN, i64::MIN);
+            return (of_interest(i64::MIN, reads), of_interest(i64::MIN, writes));
         };
+        let read = of_interest(end.readable_at().max(end.connected), reads);
+        if !writes {
+            return (read, i64::MAX);
+        }
         let reset = end.reset.unwrap_or(i64::MAX);
         let other = self.ends.get(&end.other);
         let has_room = other.is_none_or(|other| other.room(self.conditions.capacity) > 0);
         let write = if has_room { end.connected } else { i64::MAX };
-        (end.readable_at().max(end.connected), write.min(reset))
+        (read, write.min(reset))
     }
 
     pub(crate) fn look(
@@ -169,11 +172,11 @@ impl Network {
         ready: &mut Vec<Ready>,
     ) {
         for (key, id, interest) in sockets {
-            let (read, write) = self.ready_at(*id);
+            let (read, write) = self.ready_at(*id, *interest);
             let found = Ready {
                 key: *key,
-                is_readable: read <= now && *interest != Interest::Write,
-                is_writable: write <= now && *interest != Interest::Read,
+                is_readable: read <= now,
+                is_writable: write <= now,
             };
             if found.is_readable || found.is_writable {
                 ready.push(found);

@@ -1,25 +1,41 @@
 //! Signals of every type, with byte orders and scales, whose values follow from the stamp beside them; and what docs/driver-cfg.md
 //! makes of such a value on its way.
 
+use std::iter::Take;
+use std::ops::Deref;
+
 use crate::random::{Random, scramble};
 
-/// The types of signals, with their widths in bits.
-const TYPES: [(&str, u32); 15] = [
-    ("BOOL", 1),
-    ("BYTE", 8),
-    ("SINT", 8),
-    ("USINT", 8),
-    ("WORD", 16),
-    ("INT", 16),
-    ("UINT", 16),
-    ("DWORD", 32),
-    ("DINT", 32),
-    ("UDINT", 32),
-    ("REAL", 32),
-    ("LWORD", 64),
-    ("LINT", 64),
-    ("ULINT", 64),
-    ("LREAL", 64),
+/// What the bits of a type mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// True or false.
+    Bool,
+    /// A number without a sign.
+    Unsigned,
+    /// A number in two's complement.
+    Signed,
+    /// A floating-point number.
+    Float,
+}
+
+/// The types of signals, with their shapes and their widths in bits.
+const TYPES: [(&str, Shape, u32); 15] = [
+    ("BOOL", Shape::Bool, 1),
+    ("BYTE", Shape::Unsigned, 8),
+    ("SINT", Shape::Signed, 8),
+    ("USINT", Shape::Unsigned, 8),
+    ("WORD", Shape::Unsigned, 16),
+    ("INT", Shape::Signed, 16),
+    ("UINT", Shape::Unsigned, 16),
+    ("DWORD", Shape::Unsigned, 32),
+    ("DINT", Shape::Signed, 32),
+    ("UDINT", Shape::Unsigned, 32),
+    ("REAL", Shape::Float, 32),
+    ("LWORD", Shape::Unsigned, 64),
+    ("LINT", Shape::Signed, 64),
+    ("ULINT", Shape::Unsigned, 64),
+    ("LREAL", Shape::Float, 64),
 ];
 
 /// Two points of a scale: raw values, and what they stand for.
@@ -32,6 +48,8 @@ pub struct Typed {
     pub number: usize,
     /// Its type.
     pub kind: &'static str,
+    /// What the bits of that mean.
+    pub shape: Shape,
     /// How many bits that has.
     pub bits: u32,
     /// The key `order`.
@@ -52,16 +70,17 @@ impl Typed {
         let mut place = first;
         let count = usize::try_from(random.within(1, 5)).expect("small");
         let typed = (0..count).map(|number| {
-            let (kind, bits) = random.of(&TYPES);
+            let (kind, shape, bits) = random.of(&TYPES);
             let order = random.of(&["ABCD", "DCBA", "CDAB", "BADC"]);
             // Powers of two, so that nothing is rounded but raw values.
             let (raw, value) = (random.of(&[0.0, 8.0, 32.0]), random.of(&[0.0, 8.0, -3.5]));
             let gain = random.of(&[0.25, 2.0, -0.5, 64.0]);
-            let has_scale = random.once_in(2) && bits > 1 && (bits < 64 || kind == "LREAL");
+            let has_scale = random.once_in(2) && bits > 1 && (bits < 64 || shape == Shape::Float);
             let size = usize::try_from(bits.div_ceil(8)).expect("small");
             let typed = Self {
                 number,
                 kind,
+                shape,
                 bits,
                 order: if bits > 8 { order } else { "ABCD" },
                 scale: has_scale.then_some([raw, raw + 64.0, value, value + 64.0 * gain]),
@@ -76,17 +95,9 @@ impl Typed {
         typed.collect()
     }
 
-    fn is_signed(&self) -> bool {
-        matches!(self.kind, "SINT" | "INT" | "DINT" | "LINT")
-    }
-
-    fn is_float(&self) -> bool {
-        matches!(self.kind, "REAL" | "LREAL")
-    }
-
     /// Whether its slot holds an integer, and no double.
     fn is_integer(&self) -> bool {
-        self.bits == 64 && !self.is_float()
+        self.bits == 64 && self.shape != Shape::Float
     }
 
     fn size(&self) -> usize {
@@ -169,10 +180,10 @@ impl Typed {
         // A zero has the sign of the gain that it was divided by.
         let is_negative_zero = half == 0.0 && self.line().0 < 0.0;
         let half = if is_negative_zero { -0.0 } else { half };
-        match self.kind {
+        match (self.shape, self.bits) {
             #[expect(clippy::cast_possible_truncation, reason = "a small number")]
-            "REAL" => u64::from((half as f32).to_bits()),
-            "LREAL" => half.to_bits(),
+            (Shape::Float, 32) => u64::from((half as f32).to_bits()),
+            (Shape::Float, _) => half.to_bits(),
             _ => self.fail_safe.cast_unsigned(),
         }
     }
@@ -194,13 +205,13 @@ impl Typed {
         let chance = scramble(stamp ^ (self.number as u64 + 1) << 56);
         let (gain, offset) = self.line();
         let wide = chance.cast_signed();
-        let value = match self.kind {
-            "BOOL" => (chance & 1) as f64,
+        let value = match (self.shape, self.bits) {
+            (Shape::Bool, _) => (chance & 1) as f64,
             _ if self.is_integer() => return chance,
             _ if chance >> 60 == 0 => f64::NAN,
             // What some floating-point numbers become is not of this shape.
-            "REAL" => f64::from(wide as i16) / 4.0 * gain + offset,
-            "LREAL" => f64::from(wide as i32) / 4.0 * gain + offset,
+            (Shape::Float, 32) => f64::from(wide as i16) / 4.0 * gain + offset,
+            (Shape::Float, _) => f64::from(wide as i32) / 4.0 * gain + offset,
             _ => {
                 // A little beyond both ends, and halves.
                 let span = 1_u64 << (self.bits + 1);
@@ -227,14 +238,14 @@ impl Typed {
         }
         let (gain, offset) = self.line();
         let raw = (value - offset) / gain;
-        match self.kind {
-            "BOOL" => u64::from(value != 0.0),
-            "REAL" => u64::from((raw as f32).to_bits()),
-            "LREAL" => raw.to_bits(),
+        match (self.shape, self.bits) {
+            (Shape::Bool, _) => u64::from(value != 0.0),
+            (Shape::Float, 32) => u64::from((raw as f32).to_bits()),
+            (Shape::Float, _) => raw.to_bits(),
             _ => {
                 let half = if raw < 0.0 { -0.5 } else { 0.5 };
                 let whole = (raw + half).trunc() as i64;
-                let (least, most) = if self.is_signed() {
+                let (least, most) = if self.shape == Shape::Signed {
                     (-(1_i64 << (self.bits - 1)), (1_i64 << (self.bits - 1)) - 1)
                 } else {
                     (0, (1_i64 << self.bits) - 1)
@@ -255,10 +266,10 @@ impl Typed {
             return bits;
         }
         let unused = 64 - self.bits;
-        let raw = match self.kind {
-            "REAL" => f64::from(f32::from_bits(bits as u32)),
-            "LREAL" => f64::from_bits(bits),
-            _ if self.is_signed() => ((bits << unused).cast_signed() >> unused) as f64,
+        let raw = match (self.shape, self.bits) {
+            (Shape::Float, 32) => f64::from(f32::from_bits(bits as u32)),
+            (Shape::Float, _) => f64::from_bits(bits),
+            (Shape::Signed, _) => ((bits << unused).cast_signed() >> unused) as f64,
             _ => bits as f64,
         };
         let (gain, offset) = self.line();
@@ -266,49 +277,103 @@ impl Typed {
     }
 
     /// The bytes of bits on the line, in its order.
-    fn laid_out(&self, bits: u64) -> Vec<u8> {
+    fn laid_out(&self, bits: u64) -> Few<u8> {
         let size = self.size();
-        self.ordered(bits.to_be_bytes()[8 - size..].to_vec())
+        let mut bytes = Few::default();
+        for byte in &bits.to_be_bytes()[8 - size..] {
+            bytes.push(*byte);
+        }
+        self.reorder(&mut bytes.items[..size]);
+        bytes
     }
 
-    /// Bytes from the greatest on, in its order; and the other way round, which is the same.
-    fn ordered(&self, big: Vec<u8>) -> Vec<u8> {
-        match self.order {
-            "DCBA" => big.into_iter().rev().collect(),
-            "CDAB" => big.chunks(2).rev().flatten().copied().collect(),
-            "BADC" => big
-                .chunks(2)
-                .flat_map(|word| word.iter().rev())
-                .copied()
-                .collect(),
-            _ => big,
+    /// Puts bytes from the greatest on in its order; and the other way round, which is the same.
+    fn reorder(&self, bytes: &mut [u8]) {
+        if matches!(self.order, "DCBA" | "CDAB") {
+            bytes.reverse();
+        }
+        if matches!(self.order, "BADC" | "CDAB") {
+            bytes.chunks_mut(2).for_each(<[u8]>::reverse);
         }
     }
 
     /// The bytes of a tick with this stamp.
-    pub(crate) fn bytes(&self, stamp: u64) -> Vec<u8> {
+    pub(crate) fn bytes(&self, stamp: u64) -> Few<u8> {
         self.laid_out(self.on_line(self.written(stamp)))
     }
 
     /// What bytes that begin with its own are, as an end is [shown](Self::shown) them.
-    pub(crate) fn taken(&self, bytes: &[u8], reads: bool) -> Vec<u64> {
-        let bytes = &bytes[..self.size()];
+    pub(crate) fn taken(&self, bytes: &[u8], reads: bool) -> Few<u64> {
+        let mut big = [0; 8];
+        let big = &mut big[..self.size()];
+        big.copy_from_slice(&bytes[..self.size()]);
         if self.is_split_at(reads) {
-            let bytes = bytes.iter();
-            return bytes.map(|byte| f64::from(*byte).to_bits()).collect();
+            return Few::of_bytes(big);
         }
-        let big = self.ordered(bytes.to_vec()).into_iter();
-        vec![self.read(big.fold(0, |bits, byte| bits << 8 | u64::from(byte)))]
+        self.reorder(big);
+        Few::one(
+            self.read(
+                big.iter()
+                    .fold(0, |bits, byte| bits << 8 | u64::from(*byte)),
+            ),
+        )
     }
 
     /// What an end is shown of a tick with this stamp, or of fail-safe values.
-    pub(crate) fn shown(&self, stamp: Option<u64>, reads: bool) -> Vec<u64> {
+    pub(crate) fn shown(&self, stamp: Option<u64>, reads: bool) -> Few<u64> {
         let bits = stamp.map_or(self.safe_bits(), |stamp| self.on_line(self.written(stamp)));
         if self.is_split_at(reads) {
-            let bytes = self.laid_out(bits).into_iter();
-            return bytes.map(|byte| f64::from(byte).to_bits()).collect();
+            return Few::of_bytes(&self.laid_out(bits));
         }
-        vec![self.read(bits)]
+        Few::one(self.read(bits))
+    }
+}
+
+/// Up to eight items, without memory from the heap: the judge makes one for each signal in each tick.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Few<T> {
+    items: [T; 8],
+    count: usize,
+}
+
+impl<T: Copy + Default> Few<T> {
+    fn one(item: T) -> Self {
+        let mut few = Self::default();
+        few.push(item);
+        few
+    }
+
+    fn push(&mut self, item: T) {
+        self.items[self.count] = item;
+        self.count += 1;
+    }
+}
+
+impl Few<u64> {
+    /// The slots of USINTs.
+    fn of_bytes(bytes: &[u8]) -> Self {
+        let mut few = Self::default();
+        for byte in bytes {
+            few.push(f64::from(*byte).to_bits());
+        }
+        few
+    }
+}
+
+impl<T> Deref for Few<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        &self.items[..self.count]
+    }
+}
+
+impl<T> IntoIterator for Few<T> {
+    type Item = T;
+    type IntoIter = Take<std::array::IntoIter<T, 8>>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.items.into_iter().take(self.count)
     }
 }
 
@@ -321,6 +386,7 @@ mod tests {
         let mut typed = Typed {
             number: 0,
             kind: "DWORD",
+            shape: Shape::Unsigned,
             bits: 32,
             order: "ABCD",
             scale: None,
@@ -335,7 +401,7 @@ mod tests {
             ("BADC", [2, 1, 4, 3]),
         ] {
             typed.order = order;
-            assert_eq!(typed.laid_out(0x0102_0304), bytes);
+            assert_eq!(*typed.laid_out(0x0102_0304), bytes);
         }
     }
 }

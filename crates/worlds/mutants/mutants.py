@@ -105,7 +105,7 @@ def fresh(number, seconds):
                 process.wait()
                 return took, promise, seed
             print(f"mutants: {seed} breaks a promise without any mutation", flush=True)
-        elif not line.startswith((" ", "pairs", "worlds=")):
+        elif not line.startswith((" ", "worlds=")):
             promise, took = line.split(":")[0], time.monotonic() - begun
     is_late = not patience.is_alive()
     patience.cancel()

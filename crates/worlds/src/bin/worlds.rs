@@ -1,13 +1,15 @@
 //! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
-//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds traces FIRST COUNT`
+//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds all FIRST SECONDS PAGE`
+//! does so on all processors, and writes an HTML file of what has met and what was found; `worlds traces FIRST COUNT`
 //! prints one number for all that happens in so many worlds, the same on every machine. FIRST may be a
 //! seed with masks, such as `4711:3ff:ff`: the worlds then have no features beside those of the masks. The name of a neighbour before
 //! the first two, as in `worlds board SEED`, runs that neighbour.
 
+use std::num::NonZero;
 use std::process::ExitCode;
 
-use tickbus_base::time::{Clock as _, Monotonic, Nanos};
-use tickbus_worlds::{Broken, Neighbour, Pairs, Plan, Seed};
+use tickbus_base::time::{Clock, Monotonic, Nanos};
+use tickbus_worlds::{Finding, Neighbour, Page, Plan, Run, Seed};
 
 /// Prints what the drivers log.
 struct Log;
@@ -42,6 +44,11 @@ fn main() -> ExitCode {
             (Err(why), _) => usage(&why),
             _ => usage("SECONDS is a whole number"),
         },
+        ["all", first, seconds, page] => match (first.parse(), seconds.parse::<u32>()) {
+            (Ok(first), Ok(seconds)) => all(first, Nanos::from_secs(seconds.into()), page),
+            (Err(why), _) => usage(&why),
+            _ => usage("SECONDS is a whole number"),
+        },
         ["traces", first, count] => match (first.parse::<u64>(), count.parse::<u32>()) {
             (Ok(first), Ok(count)) => traces(first, count),
             _ => usage("FIRST and COUNT are whole numbers"),
@@ -52,7 +59,7 @@ fn main() -> ExitCode {
 
 fn usage(why: &str) -> ExitCode {
     eprintln!(
-        "worlds: {why}\nusage: worlds [board|lockstep] SEED\n       worlds [board|lockstep] FIRST SECONDS\n       worlds traces FIRST COUNT"
+        "worlds: {why}\nusage: worlds [board|lockstep] SEED\n       worlds [board|lockstep] FIRST SECONDS\n       worlds all FIRST SECONDS PAGE\n       worlds traces FIRST COUNT"
     );
     ExitCode::from(2)
 }
@@ -95,40 +102,59 @@ fn traces(first: u64, count: u32) -> ExitCode {
 fn many(first: Seed, limit: Nanos) -> ExitCode {
     let clock = Monotonic::shared();
     let begun = clock.now();
-    let (mut worlds, mut failed) = (0_u64, 0);
-    let mut pairs = Pairs::default();
-    let mut next = first;
-    while clock.now() - begun < limit {
-        let seed = next;
-        next = seed.next();
-        let plan = Plan::draw(seed);
-        pairs.add(&plan);
-        worlds += 1;
-        if let Err(Broken { promise, what }) = plan.run() {
-            failed += 1;
-            let small = seed.shrunk(promise);
-            let features = Plan::draw(small).features().join(", ");
-            println!(
-                "{promise}: {what}\n  seed {seed}; smaller, with {features}:\n  worlds {small}"
-            );
-        }
+    let run = Run::on_one(first, limit, &*clock, &print);
+    last_line(&run, first, seconds_since(&*clock, begun), "");
+    verdict(&run)
+}
+
+/// Runs worlds on all processors, and writes a page.
+fn all(first: Seed, limit: Nanos, path: &str) -> ExitCode {
+    let clock = Monotonic::shared();
+    let processors = std::thread::available_parallelism().map_or(1, NonZero::get);
+    let begun = clock.now();
+    let run = Run::on_all(first, limit, processors, &*clock, &print);
+    let seconds = seconds_since(&*clock, begun);
+    let commit = std::env::var("TICKBUS_WORLDS_COMMIT").ok();
+    let page = Page {
+        run: &run,
+        first: first.number,
+        seconds,
+        processors,
+        commit: commit.as_deref(),
+    };
+    last_line(&run, first, seconds, &format!(" page={path}"));
+    if let Err(why) = std::fs::write(path, page.html()) {
+        eprintln!("worlds: {path} cannot be written: {why}");
+        return ExitCode::FAILURE;
     }
-    let seconds = (clock.now() - begun).to_duration().as_secs_f64();
-    println!(
-        "pairs of features that never met: {}",
-        pairs.strangers().join("; ")
-    );
+    verdict(&run)
+}
+
+fn print(finding: &Finding) {
+    println!("{finding}");
+}
+
+fn seconds_since(clock: &dyn Clock, begun: Nanos) -> f64 {
+    (clock.now() - begun).to_duration().as_secs_f64()
+}
+
+fn last_line(run: &Run, first: Seed, seconds: f64, rest: &str) {
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
-    let rate = worlds as f64 / seconds;
+    let rate = run.worlds as f64 / seconds;
     println!(
-        "worlds={worlds} failed={failed} first={} per_second={rate:.0} pairs={}",
+        "worlds={} failed={} first={} per_second={rate:.0} pairs={}{rest}",
+        run.worlds,
+        run.findings.len(),
         first.number,
-        pairs.met()
+        run.pairs.met()
     );
-    if failed > 0 {
-        ExitCode::FAILURE
-    } else {
+}
+
+fn verdict(run: &Run) -> ExitCode {
+    if run.findings.is_empty() {
         ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
     }
 }
 

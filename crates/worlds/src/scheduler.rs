@@ -82,7 +82,9 @@ struct World {
     tasks: Vec<Task>,
     /// Which of them have not ended.
     alive: Vec<usize>,
-    /// Which of them can run; kept for the next turn.
+    /// When each of those can run; kept for the next turn.
+    dues: Vec<i64>,
+    /// The places of those that can run; kept for the next turn.
     ready: Vec<usize>,
     processes: Vec<Process>,
     current: Option<usize>,
@@ -150,6 +152,7 @@ pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> R
             habits,
             tasks: Vec::new(),
             alive: Vec::new(),
+            dues: Vec::new(),
             ready: Vec::new(),
             processes: vec![Process::default()],
             current: None,
@@ -263,56 +266,29 @@ impl World {
         if self.turns > MOST_TURNS {
             return Err(Stuck::Endless);
         }
+        if self.alive.is_empty() {
+            return Ok(None);
+        }
+        // Nothing changes these times until a thread runs, but for a thread that gets the processor late.
+        self.dues.clear();
+        for place in 0..self.alive.len() {
+            let due = self.due(self.alive[place]);
+            self.dues.push(due);
+        }
         loop {
             self.ready.clear();
-            let mut soonest = i64::MAX;
-            for &index in &self.alive {
-                let task = &mut self.tasks[index];
-                // A wake counts once: it is not to be asked for again.
-                if let Wait::Event {
-                    stop: Some(stop), ..
-                } = &task.wait
-                    && stop.is_woken()
-                {
-                    (task.wait, task.awake_since) = (Wait::Nothing, self.now);
-                }
-                let resumed = self.processes[task.process]
-                    .suspended_until
-                    .max(task.not_before);
-                if resumed > self.now {
-                    soonest = soonest.min(resumed);
-                    continue;
-                }
-                let due = match &task.wait {
-                    Wait::Nothing => self.now,
-                    Wait::Event {
-                        deadline, sockets, ..
-                    } => self.network.due(sockets).min(*deadline),
-                    Wait::Anything { deadline, seen } => {
-                        if self.turns > seen + 1 {
-                            self.now
-                        } else {
-                            *deadline
-                        }
-                    }
-                };
-                if due <= self.now {
-                    self.ready.push(index);
-                } else {
-                    soonest = soonest.min(due);
-                }
-            }
-            if self.alive.is_empty() {
-                return Ok(None);
-            }
+            let dues = self.dues.iter().enumerate();
+            let ready = dues.filter(|(_, due)| **due <= self.now);
+            self.ready.extend(ready.map(|(place, _)| place));
             if self.ready.is_empty() {
-                if soonest == i64::MAX {
-                    return Err(Stuck::Deadlock);
-                }
-                self.now = soonest;
+                let soonest = self.dues.iter().min().copied();
+                self.now = soonest
+                    .filter(|soonest| *soonest < i64::MAX)
+                    .ok_or(Stuck::Deadlock)?;
                 continue;
             }
-            let chosen = self.random.of(&self.ready);
+            let place = self.random.of(&self.ready);
+            let chosen = self.alive[place];
             let task = &mut self.tasks[chosen];
             if !matches!(task.wait, Wait::Nothing) {
                 task.wait = Wait::Nothing;
@@ -320,6 +296,7 @@ impl World {
                 if late > 0 && self.random.once_in(4) {
                     task.not_before = self.now + self.random.within(0, late);
                     if task.not_before > self.now {
+                        self.dues[place] = task.not_before;
                         continue;
                     }
                 }
@@ -327,6 +304,29 @@ impl World {
             }
             return Ok(Some(chosen));
         }
+    }
+
+    /// When a thread can run, if no other one does so before.
+    fn due(&mut self, index: usize) -> i64 {
+        let task = &mut self.tasks[index];
+        // A wake counts once: it is not to be asked for again.
+        if let Wait::Event {
+            stop: Some(stop), ..
+        } = &task.wait
+            && stop.is_woken()
+        {
+            (task.wait, task.awake_since) = (Wait::Nothing, self.now);
+        }
+        let due = match &task.wait {
+            Wait::Nothing => i64::MIN,
+            Wait::Event {
+                deadline, sockets, ..
+            } => self.network.due(sockets).min(*deadline),
+            Wait::Anything { seen, .. } if self.turns > seen + 1 => i64::MIN,
+            Wait::Anything { deadline, .. } => *deadline,
+        };
+        let suspended = self.processes[task.process].suspended_until;
+        due.max(suspended).max(task.not_before)
     }
 }
 

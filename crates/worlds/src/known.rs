@@ -1,4 +1,4 @@
-//! What files of worlds say: several worlds have the same driver.cfg, and parsing it takes longer than a life of its driver.
+//! Parsed driver.cfg files. Several worlds have the same one, and parsing it takes longer than a life of its driver.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;

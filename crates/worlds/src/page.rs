@@ -98,8 +98,8 @@ impl Page<'_> {
         let strangers = self.run.pairs.strangers();
         html! {
             p.note {
-                "Each cell is the number of worlds that had the feature of its row and that of its column. Columns are named on the diagonal; \
-                 a cell shows both names and the exact count to whoever points at it."
+                "Each cell is the number of worlds that had the feature of its row and that of its column. Columns are named on the diagonal. \
+                 The tooltip of a cell has both names and the exact count."
             }
             ul.key {
                 @for (level, least) in LEVELS.iter().enumerate() {

@@ -12,7 +12,7 @@ static NUMBERS: LazyLock<BTreeMap<&'static str, usize>> = LazyLock::new(|| {
     names.map(|(number, name)| (name, number)).collect()
 });
 
-/// A world has one of them.
+/// The buses, of which a world has one.
 const BUSES: [&str; 7] = [
     "loopback",
     "socket",
@@ -23,7 +23,7 @@ const BUSES: [&str; 7] = [
     "dispatcher",
 ];
 
-/// What no world has together beside that, and why.
+/// Other features that no world has together, with the reason.
 const APART: [(&[&str], &[&str], &str); 4] = [
     (
         &["stations"],

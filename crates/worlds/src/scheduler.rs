@@ -80,7 +80,7 @@ struct World {
     random: Random,
     habits: Habits,
     tasks: Vec<Task>,
-    /// Which of them have not ended.
+    /// The tasks that have not ended.
     alive: Vec<usize>,
     /// When each of those can run; kept for the next turn.
     dues: Vec<i64>,

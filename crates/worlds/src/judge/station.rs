@@ -4,7 +4,7 @@ use super::reader::Reader;
 use super::seen::{Seen, Shown};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::faults::{self, Activity};
+use crate::faults::{self, Activity, FaultPlan};
 use crate::plan::{FAIL_SAFE, Plan};
 
 impl Reader {
@@ -78,9 +78,12 @@ impl Reader {
         let level = f64::from(u8::from(shown.level));
         let (whole, real) = shown.numbers.unwrap_or_default();
         let values = &[level, whole, real][..if shown.numbers.is_some() { 3 } else { 1 }];
-        // Most ticks have neither faults nor connections that come one by one.
-        if bends.0.is_empty() && values == &truth[..values.len()] {
-            self.before[..values.len()].copy_from_slice(values);
+        let is_bent = |fault: &FaultPlan| fault.signal().is_some_and(|(_, of)| of == letter);
+        // Most ticks are as they were written.
+        if !(station == 0 && bends.0.iter().any(is_bent)) && values == &truth[..values.len()] {
+            if station == 0 {
+                self.before[..values.len()].copy_from_slice(values);
+            }
             return Ok(());
         }
         let spans = faults::expected(bends, (letter, station), stamp, tick, was);

@@ -13,7 +13,7 @@ use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
 use crate::judge::{Known, Seen, Writer, held, promise, slack};
 use crate::network::{Delivery, Network};
-use crate::plan::{FAIL_SAFE, Misfortune, Plan};
+use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
 use crate::stamp::Stamp;
 
@@ -158,7 +158,7 @@ impl Laboratory {
             since.is_some_and(|since| *since <= at)
         };
         let slack = slack(plan);
-        let limit = first.sent - slack - held(plan);
+        let limit = first.sent - slack - held(plan) - waited(plan, first.sent, slack);
         let unread = slack + plan.waits_for_pulses();
         let came = arrived.iter().rev().filter(|delivery| delivery.at <= limit);
         let mut least = came.filter_map(|delivery| {
@@ -171,6 +171,23 @@ impl Laboratory {
             silent,
         })
     }
+}
+
+/// For how long what the dispatcher reads may have waited: right behind a suspension it reads that in several turns, and passes on
+/// what each of them has.
+fn waited(plan: &Plan, sent: i64, slack: i64) -> i64 {
+    let spans = plan.events.iter().map(|event| match event.what {
+        Misfortune::Suspend(BETWEEN, span) => {
+            let over = scheduler::BEGIN + (event.at + span).0;
+            if (over..over + slack).contains(&sent) {
+                span.0
+            } else {
+                0
+            }
+        }
+        _ => 0,
+    });
+    spans.sum()
 }
 
 /// A source that has been silent for longer than it promised is lost: nothing of it counts any more, unless the dispatcher holds.

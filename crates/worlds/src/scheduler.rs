@@ -23,6 +23,9 @@ use crate::random::Random;
 /// How much of a stack a thread of a driver has.
 const STACK: usize = 512 * 1024;
 
+/// The time at which a world begins, in ns.
+pub(crate) const BEGIN: i64 = 1_000_000_000;
+
 /// So many times a thread is starved in a world.
 pub(crate) const STARVED: u32 = 3;
 
@@ -147,7 +150,7 @@ pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> R
     WORLD.with(|world| {
         let before = world.borrow_mut().replace(World {
             // Some time after the computer was switched on.
-            now: 1_000_000_000,
+            now: BEGIN,
             random: Random::new(seed),
             habits,
             tasks: Vec::new(),

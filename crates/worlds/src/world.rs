@@ -462,7 +462,7 @@ fn judge_tick(
             Reader::judge_down(plan, since, &seen)?;
         }
         match shared.controller_left.get() {
-            Some(left) if end == 0 => Reader::judge_farewell(plan, left, &seen),
+            Some(left) if end == 0 => Reader::judge_farewell(plan, &peer_reader, left, &seen),
             _ => Ok(()),
         }
     });

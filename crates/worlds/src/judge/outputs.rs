@@ -50,8 +50,17 @@ impl Reader {
     }
 
     /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
-    pub(crate) fn judge_farewell(plan: &Plan, left: i64, seen: &Seen<'_>) -> Result<(), Broken> {
-        let holds = plan.ends[1].holds_at_close || plan.habits.starves > 0;
+    pub(crate) fn judge_farewell(
+        plan: &Plan,
+        controller: &Self,
+        left: i64,
+        seen: &Seen<'_>,
+    ) -> Result<(), Broken> {
+        // One that closes before it has joined leaves a dispatcher with what the life before it said.
+        let has_joined = controller.valid_since.last() < Some(&i64::MAX);
+        let holds = plan.ends[1].holds_at_close
+            || plan.habits.starves > 0
+            || plan.laboratory.holds && !has_joined;
         let through = if plan.bus == Bus::Dispatcher {
             held(plan) + relayed(plan)
         } else {

@@ -95,8 +95,10 @@ impl Reader {
                 let Stamp { life, tick, .. } = Stamp::of(shown.stamp);
                 (life, tick)
             });
-            // All of them travel in one message; connections that are asked for come one by one.
-            let is_apart = plan.laboratory.is_asked && (stamp.is_none() || first == Some(None));
+            // All of them travel in one message; connections that are asked for come one by one, also those that are asked for again,
+            // and until then a station keeps what it has.
+            let is_apart = plan.laboratory.is_asked
+                && (stamp.is_none() || first == Some(None) || !plan.events.is_empty());
             match first {
                 Some(_) if is_apart => {}
                 None => first = Some(stamp),

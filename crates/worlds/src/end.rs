@@ -10,6 +10,7 @@ use crate::injector::Injector;
 use crate::judge::Shown;
 use crate::known;
 use crate::plan::Plan;
+use crate::pulses::Pulses;
 use crate::scheduler::now;
 use crate::stamp::{Stamp, level, real, whole};
 use crate::tape::{Row, Tape};
@@ -37,7 +38,7 @@ pub(crate) struct End {
     writes: Vec<Places>,
     reads: Vec<Places>,
     halves: bool,
-    next_pulse: i64,
+    pulses: Pulses,
     plan: Plan,
     which: usize,
     tape: Option<Tape>,
@@ -127,17 +128,14 @@ impl End {
             slots,
             area: 1 - end as u64,
             halves: plan.ends[end].halves,
-            next_pulse: now().0 + plan.pulses.0,
+            pulses: Pulses::new(plan, now().0),
         })
     }
 
     /// One tick, the `tick`th of this `life`; returns what it found, and whether it wrote a pulse.
-    pub(crate) fn tick(&mut self, life: u64, tick: u64, pulses: Nanos) -> (Found, bool) {
+    pub(crate) fn tick(&mut self, life: u64, tick: u64) -> (Found, bool) {
         let time = now().0;
-        let is_pulse = time >= self.next_pulse;
-        if is_pulse {
-            self.next_pulse = time + pulses.0;
-        }
+        let is_pulse = self.pulses.are_due(time);
         let injected = self.injector.before(tick, &mut self.driver);
         let given = self.plan.features.times[self.which].at(tick);
         let found = if self.halves {

@@ -51,6 +51,8 @@ pub struct Features {
     pub beats: [Option<(i64, bool)>; 2],
     /// An end is a PLC program that tickbus scans.
     pub hosted: Option<usize>,
+    /// Pulses come in pairs, the second one while the first is still held.
+    pub pairs: bool,
 }
 
 impl Features {
@@ -102,6 +104,7 @@ impl Features {
         });
         let mut features = Self {
             hosted: None,
+            pairs: is(18),
             beats: [None; 2],
             faults: faults.collect(),
             watched: [13, 14].map(is),
@@ -174,6 +177,7 @@ impl Features {
         let beats = self.beats.iter().flatten();
         add(beats.clone().count() > 0, "heartbeat");
         add(beats.clone().any(|(_, is_watched)| *is_watched), "alive");
+        add(self.pairs, "pairs of pulses");
         add(self.hosted == Some(0), "hosted device");
         add(self.hosted == Some(1), "hosted controller");
         add(self.watched.contains(&true), "watched");
@@ -229,6 +233,7 @@ pub(crate) const NAMES: &[&str] = &[
     "64 bits",
     "heartbeat",
     "alive",
+    "pairs of pulses",
     "hosted device",
     "hosted controller",
     "watched",

@@ -28,6 +28,7 @@ mod network;
 mod page;
 mod pairs;
 mod plan;
+mod pulses;
 mod random;
 mod recording;
 mod replay;
@@ -35,6 +36,8 @@ mod run;
 mod scheduler;
 mod seed;
 mod shrink;
+mod silence;
+
 mod stamp;
 mod tape;
 mod typed;

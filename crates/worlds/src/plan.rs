@@ -99,6 +99,8 @@ pub struct Plan {
     pub hold: Nanos,
     /// Pulses are this far apart.
     pub pulses: Nanos,
+    /// The time between the two pulses of a pair.
+    pub pair: Nanos,
     /// A bit that is written beside the others, so that the frames have other sizes.
     pub numbers: bool,
     /// What the dispatcher does, if there is one.
@@ -218,6 +220,7 @@ impl Plan {
             reconnect,
             hold,
             pulses: Nanos::ZERO,
+            pair: Nanos::ZERO,
             numbers: is(13),
             laboratory: LaboratoryPlan {
                 // Rarely: what was refused is asked for again after 5 s, and such a world takes long.
@@ -245,7 +248,10 @@ impl Plan {
         plan.events.sort_by_key(|event| event.at);
         let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
         let line = plan.round_trip() + plan.habits.late * 8;
-        plan.pulses = Nanos((slowest.0 * 6 + hold.0 * 2 + line).max(max_age.0 / 2));
+        let count = if plan.features.pairs { 2 } else { 1 };
+        plan.pulses = Nanos(((slowest.0 * 6 + hold.0 * 2 + line) * count).max(max_age.0 / 2));
+        // Edges between two exchanges merge.
+        plan.pair = Nanos(slowest.0 * 2 + line);
         plan
     }
 

@@ -14,6 +14,7 @@ use crate::end::Found;
 use crate::judge::Shown;
 use crate::known;
 use crate::plan::{FAIL_SAFE, Plan};
+use crate::pulses::Pulses;
 use crate::scheduler;
 use crate::stamp::{Stamp, level, real, whole};
 
@@ -39,7 +40,7 @@ struct Stamped {
     process: usize,
     life: u64,
     tick: u64,
-    next_pulse: i64,
+    pulses: Pulses,
     /// The pulse that it read last.
     had_pulse: bool,
 }
@@ -55,7 +56,7 @@ pub(super) fn open(shared: &Shared, (end, process): (usize, usize), life: u64) -
         process,
         life,
         tick: 0,
-        next_pulse: scheduler::now().0 + plan.pulses.0,
+        pulses: Pulses::new(plan, scheduler::now().0),
         had_pulse: false,
     };
     let interval = plan.ends[end].period;
@@ -174,10 +175,7 @@ impl Program for Stamped {
         }
         state.writer.borrow_mut().begin(self.life, self.tick);
         let now = scan.now.0;
-        let is_pulse = now >= self.next_pulse;
-        if is_pulse {
-            self.next_pulse = now + self.plan.pulses.0;
-        }
+        let is_pulse = self.pulses.are_due(now);
         self.write(is_pulse, scan.outputs);
         {
             let mut writer = state.writer.borrow_mut();

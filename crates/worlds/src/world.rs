@@ -455,7 +455,7 @@ fn judge_tick(
         if let Some(limit) = watchdog(plan, 1 - end) {
             Reader::judge_watchdog(plan, limit.0, &writer, &seen)?;
         }
-        reader.judge_frozen(plan, 1 - end, &writer, &seen)?;
+        reader.judge_frozen(plan, 1 - end, &writer, connected, &seen)?;
         if end == 0 {
             Reader::judge_blind(plan, &peer_reader, connected, &seen)?;
         }

@@ -46,13 +46,14 @@ impl Reader {
         )
     }
 
-    /// The heartbeat of a writer that does not tick stands still, and the end that watches it becomes stale. The first frame is
-    /// a change of the heartbeat, and so is fail-safe values in place of a tick's values, or the other way round.
+    /// The heartbeat of a writer that does not tick stands still, and the end that watches it becomes stale. The first frame
+    /// of a connection is a change of the heartbeat, and so is fail-safe values in place of a tick's values, or the other way round.
     pub(crate) fn judge_frozen(
         &mut self,
         plan: &Plan,
         end: usize,
         writer: &Writer,
+        connected: i64,
         seen: &Seen<'_>,
     ) -> Result<(), Broken> {
         let Some((every, Some(within))) = plan.beat(end) else {
@@ -71,7 +72,7 @@ impl Reader {
         let Some(last) = writer.last_ended(seen.began) else {
             return Ok(());
         };
-        let frozen = seen.began - last.max(replaced);
+        let frozen = seen.began - last.max(replaced).max(connected);
         let limit = (within + every + plan.max_age).0
             + slack(plan)
             + plan.waits_for_pulses()

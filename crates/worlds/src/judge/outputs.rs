@@ -90,8 +90,10 @@ impl Reader {
             return Ok(());
         };
         let heard = seen.began - seen.age;
-        // One that is asked is no longer blind when it answers. Of a program that reads, nobody knows the age of what it reads.
+        // One that is asked is no longer blind when it answers. Of a program that reads, nobody knows the age of what it reads. The
+        // first cycle of a line that was down is like that of a new one.
         let is_unknown = plan.bus.asks()
+            || plan.goes_down(1)
             || plan.bus == Bus::Dispatcher
             || plan.features.hosted == Some(0)
             || heard > blind.last;

@@ -51,6 +51,12 @@ impl Plan {
         i64::try_from(slow.count()).expect("few") * (1_000_000_000 + self.hold.0)
     }
 
+    /// Whether the line of an end is down at any time.
+    pub(crate) fn goes_down(&self, end: usize) -> bool {
+        let mut faults = self.features.faults.iter();
+        faults.any(|fault| fault.end == end && fault.effect == Effect::LinkDown)
+    }
+
     /// Whether the line of an end is down in a tick.
     pub(crate) fn is_down(&self, end: usize, tick: u64) -> bool {
         self.features.faults.iter().any(|fault| {

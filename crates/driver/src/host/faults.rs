@@ -15,6 +15,8 @@ pub(super) struct FrameFaults {
     stations: Vec<StationFrames>,
     begun: Option<Nanos>,
     scans: u64,
+    /// The program has written outputs; until then its peer has the fail-safe values.
+    has_written: bool,
 }
 
 /// The frames of one station.
@@ -58,6 +60,7 @@ impl FrameFaults {
                 .collect(),
             begun: None,
             scans: 0,
+            has_written: true,
         }
     }
 
@@ -73,6 +76,7 @@ impl FrameFaults {
             return None;
         }
         let mut all = Self::new(table, (writes, reads), inputs, board);
+        all.has_written = false;
         let slots = Slots {
             table,
             writes,
@@ -100,8 +104,11 @@ impl FrameFaults {
         for (station, (inputs, outputs)) in self.stations.iter().zip(frames) {
             inputs.copy_from_slice(&station.truth);
             station.reads.decode(inputs, &mut self.slots);
-            station.writes.decode(outputs, &mut self.slots);
+            if self.has_written {
+                station.writes.decode(outputs, &mut self.slots);
+            }
         }
+        self.has_written = true;
         self.faults.begin_tick(moment, &mut self.slots);
     }
 

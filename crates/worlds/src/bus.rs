@@ -25,6 +25,11 @@ impl Bus {
         matches!(self, Self::Modbus | Self::ModbusRtu | Self::S7)
     }
 
+    /// Whether each station is asked by itself: a unit of Modbus.
+    pub(crate) fn has_units(self) -> bool {
+        matches!(self, Self::Modbus | Self::ModbusRtu)
+    }
+
     /// Whether one message carries several stations.
     pub(crate) fn has_stations(self) -> bool {
         matches!(

@@ -33,6 +33,9 @@ impl Plan {
         for station in 0..self.stations {
             if self.stations > 1 {
                 lines.push(format!("[[station]]\nname = \"s{station}\""));
+                if self.bus.has_units() {
+                    lines.push(format!("unit = {}", station + 1));
+                }
             }
         }
         for station in 0..self.stations {

@@ -27,8 +27,8 @@ const BUSES: [&str; 7] = [
 const APART: [(&[&str], &[&str], &str); 4] = [
     (
         &["stations"],
-        &["modbus", "modbus rtu", "s7"],
-        "a message of these buses carries one station",
+        &["s7"],
+        "an S7 client of these worlds dials one station",
     ),
     (
         &["stations"],

@@ -34,6 +34,9 @@ pub const BETWEEN: usize = 2;
 /// What makes the numbers that came later others than those of the seed.
 const LATER: u64 = 0x6C61_7465_7200;
 
+/// The bit of `more` that allows several units of Modbus.
+const UNITS: u32 = 19;
+
 /// When it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Event {
@@ -199,7 +202,14 @@ impl Plan {
             bus
         };
         let many = usize::try_from(random.within(2, 3)).expect("small");
-        let stations = if is(0) && bus.has_stations() { many } else { 1 };
+        let has_units = bus.has_units()
+            && seed.more >> UNITS & 1 == 1
+            && Random::new(scramble(seed.number ^ LATER ^ u64::from(UNITS))).once_in(3);
+        let stations = if is(0) && bus.has_stations() || has_units {
+            many
+        } else {
+            1
+        };
         let ends = [
             EndPlan::draw(random, cycle, max_age, false),
             EndPlan::draw(random, cycle, max_age, true),
@@ -243,6 +253,10 @@ impl Plan {
             let bytes = plan.features.frame() * plan.stations;
             plan.conditions.capacity = plan.conditions.capacity.max(bytes);
         }
+        if has_units {
+            // A unit has half of max_age for an answer, and the others wait meanwhile.
+            plan.max_age = plan.max_age.max(Nanos(plan.round_trip()));
+        }
         let between = plan.events_between(later, is);
         plan.events.extend(between);
         plan.events.sort_by_key(|event| event.at);
@@ -282,9 +296,10 @@ impl Plan {
         // A request is asked and answered before the next one, in as many pieces as the connection takes.
         let ways = match self.bus {
             Bus::Dispatcher => 8,
-            bus if bus.asks() => 12,
+            bus if bus.asks() => 12 * self.stations,
             _ => 4,
         };
+        let ways = i64::try_from(ways).expect("small");
         let bytes = self.features.frame() * self.stations;
         let pieces = match self.conditions.capacity {
             capacity if capacity < 500 => (bytes / capacity + 1).max(4),

@@ -8,7 +8,7 @@ use crate::rtu::{self, Echo, Framer};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Port, Renewal};
 
 use super::units::{BROADCAST, Carried, ServedUnits, Source};
 
@@ -34,7 +34,7 @@ pub(super) fn serve(
         line,
         // A line has a single client.
         source: Source {
-            writes: vec![true; units.len()].into(),
+            renewals: vec![Renewal::new(true); units.len()].into(),
             writer: None,
         },
         units,

@@ -7,7 +7,7 @@ use crate::mbap::{self, ADU_LIMIT, Telegram};
 use crate::{Exception, answer, refuse, rtu};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Limits, Service};
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Port, Renewal};
 
 use super::units::{BROADCAST, Carried, ServedUnits, Source};
 
@@ -91,7 +91,7 @@ impl Service for TcpService<'_> {
         Client {
             carried: Vec::new(),
             source: Source {
-                writes: vec![false; self.units.len()].into(),
+                renewals: vec![Renewal::new(false); self.units.len()].into(),
                 writer: Some(Arc::new(peer)),
             },
         }

@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Writer, Writers};
-use tickbus_fieldbus::{BusSetup, Events, Port, Receipt};
+use tickbus_fieldbus::{BusSetup, Events, Port, Receipt, Renewal};
 use tickbus_image::signal::fail_safe_frame;
 
 use super::ServerOptions;
@@ -40,8 +40,8 @@ struct Unit {
 /// Where requests come from.
 #[derive(Debug)]
 pub(super) struct Source {
-    /// The stations that it has written to.
-    pub(super) writes: Box<[bool]>,
+    /// Per station, whether its requests keep the values young.
+    pub(super) renewals: Box<[Renewal]>,
     /// The client; `None` on a line that has one master.
     pub(super) writer: Option<Writer>,
 }
@@ -157,7 +157,7 @@ impl ServedUnits {
                     return None;
                 }
                 unit.has_writer = true;
-                source.writes[station] = true;
+                source.renewals[station].wrote(now);
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
                     port.received_parts(station, now, frame, [bits]);
@@ -166,8 +166,12 @@ impl ServedUnits {
                 }
             }
             // A client that only reads must not make the values of one that writes look recent.
-            (None, None) if source.writes[station] || !unit.has_writer => port.touch(station, now),
-            (None, None) => {}
+            (None, None) => {
+                let counts = source.renewals[station].counts(now, port.max_age());
+                if counts || !unit.has_writer {
+                    port.touch(station, now);
+                }
+            }
         }
         Some(Carried {
             station,

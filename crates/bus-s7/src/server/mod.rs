@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, Address, Limits, Writer, Writers};
-use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Role};
+use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Renewal, Role};
 use tickbus_image::signal::fail_safe_frame;
 
 use super::item::{Object, ReturnCode};
@@ -126,8 +126,8 @@ struct Client {
     conversation: ServerSession,
     number: u64,
     writer: Writer,
-    /// The stations that it has written to.
-    writes: Box<[bool]>,
+    /// Per station, whether its requests keep the values young.
+    renewals: Box<[Renewal]>,
     /// For what answers to it carry.
     receipts: Vec<Receipt>,
 }
@@ -149,7 +149,7 @@ impl tcp::Service for Service {
             conversation: ServerSession::default(),
             number: self.welcomed,
             writer: Arc::new(peer),
-            writes: vec![false; self.memory.stations.len()].into(),
+            renewals: vec![Renewal::new(false); self.memory.stations.len()].into(),
             receipts: Vec::new(),
         }
     }
@@ -167,7 +167,7 @@ impl tcp::Service for Service {
         let mut jobs = Jobs {
             station: self.memory.map.station_of(client.conversation.called()),
             shared: &mut self.memory,
-            writes: &mut client.writes,
+            renewals: &mut client.renewals,
             writer: &client.writer,
             receipts: &mut client.receipts,
             port,
@@ -211,7 +211,7 @@ struct Jobs<'a> {
     shared: &'a mut Shared,
     /// The station whose inputs and outputs the client is connected to.
     station: Option<usize>,
-    writes: &'a mut [bool],
+    renewals: &'a mut [Renewal],
     writer: &'a Writer,
     receipts: &'a mut Vec<Receipt>,
     port: &'a mut Port,
@@ -325,13 +325,13 @@ impl Memory for Jobs<'_> {
 
     fn done(&mut self) {
         let alone = self.shared.stations.len() == 1;
-        let (now, writes, shared) = (self.now, &mut self.writes, &mut *self.shared);
+        let (now, renewals, shared) = (self.now, &mut self.renewals, &mut *self.shared);
         self.port.together(|port| {
             for (index, station) in shared.stations.iter_mut().enumerate() {
                 let addressed = std::mem::take(&mut station.addressed);
                 if !station.changed.is_empty() {
                     station.has_writer = true;
-                    writes[index] = true;
+                    renewals[index].wrote(now);
                     let written = station.changed.drain(..);
                     if shared.every_write {
                         port.received_parts(index, now, &station.written, written);
@@ -339,9 +339,12 @@ impl Memory for Jobs<'_> {
                         drop(written);
                         port.received(index, now, &station.written);
                     }
-                } else if (addressed || alone) && (writes[index] || !station.has_writer) {
+                } else if addressed || alone {
                     // A client that only reads must not make the values of one that writes look recent.
-                    port.touch(index, now);
+                    let counts = renewals[index].counts(now, port.max_age());
+                    if counts || !station.has_writer {
+                        port.touch(index, now);
+                    }
                 }
             }
         });

@@ -82,13 +82,8 @@ pub(super) fn judge_young(
     let Stamp {
         life, tick, area, ..
     } = stamp;
-    // A client that was kept from asking may read before it writes.
-    let unasked = if plan.bus.asks() {
-        held(plan) + plan.down_for()
-    } else {
-        0
-    };
-    let slack = slack(plan) + plan.waits_for_pulses() + unasked;
+    let slack =
+        slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
     // What a fault delays is told to have come that much later.
     let arrived = heard - plan.delayed_at(usize::from(area == 1));

@@ -98,7 +98,8 @@ impl Reader {
             // All of them travel in one message; connections that are asked for come one by one, also those that are asked for again,
             // and until then a station keeps what it has.
             let is_apart = plan.laboratory.is_asked
-                && (stamp.is_none() || first == Some(None) || !plan.events.is_empty());
+                && (stamp.is_none() || first == Some(None) || !plan.events.is_empty())
+                || plan.bus.has_units();
             match first {
                 Some(_) if is_apart => {}
                 None => first = Some(stamp),

@@ -17,7 +17,7 @@ impl Reader {
         shown: &Shown,
     ) -> Result<(), Broken> {
         // Of several stations one may have its sources, and another none yet.
-        let is_other = plan.laboratory.is_asked && plan.stations > 1;
+        let is_other = (plan.laboratory.is_asked || plan.bus.has_units()) && plan.stations > 1;
         if seen.is_stale && plan.features.hosted.map(|end| end as u64) == Some(area) {
             // What its inputs are meanwhile nobody has promised. Where a signal has got stuck then is known when they count again.
             self.hold(plan, area, seen.tick, &[f64::NAN; 3]);

@@ -57,17 +57,6 @@ impl Plan {
         faults.any(|fault| fault.end == end && fault.effect == Effect::LinkDown)
     }
 
-    /// For how long lines are down at most, in ns.
-    pub(crate) fn down_for(&self) -> i64 {
-        let faults = self.features.faults.iter();
-        let downs = faults.filter(|fault| fault.effect == Effect::LinkDown);
-        let spans = downs.map(|fault| {
-            let ticks = i64::try_from(fault.ticks).expect("small");
-            self.ends[fault.end].period.0 * 2 * ticks
-        });
-        spans.sum()
-    }
-
     /// Whether the line of an end is down in a tick.
     pub(crate) fn is_down(&self, end: usize, tick: u64) -> bool {
         self.features.faults.iter().any(|fault| {

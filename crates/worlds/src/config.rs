@@ -22,18 +22,18 @@ impl Plan {
         lines.extend(self.timing(end));
         lines.extend(self.life_signs(end));
         lines.extend(self.record_section(end));
-        lines.push(self.signal_sections(end));
+        lines.push(self.signal_sections(end, self.bus.has_units()));
         lines.extend(self.fault_sections(end));
         lines.join("\n")
     }
 
-    /// The stations and their signals.
-    pub(crate) fn signal_sections(&self, end: usize) -> String {
+    /// The stations and their signals; a station is a unit of Modbus, or is not.
+    pub(crate) fn signal_sections(&self, end: usize, has_units: bool) -> String {
         let mut lines = Vec::new();
         for station in 0..self.stations {
             if self.stations > 1 {
                 lines.push(format!("[[station]]\nname = \"s{station}\""));
-                if self.bus.has_units() {
+                if has_units {
                     lines.push(format!("unit = {}", station + 1));
                 }
             }

@@ -57,7 +57,7 @@ pub(crate) fn open(
         "[driver]\nid = 9\nname = \"{role}\"\n[fieldbus]\nrole = \"{role}\"\nkind = \"loopback\"\nreplay = \"{shown}\"\n\
          max_age = \"{}\"\n{again}{}",
         plan.max_age,
-        plan.signal_sections(end)
+        plan.signal_sections(end, false)
     );
     Driver::open(known::parse("driver.cfg", text), SimulatedClock::shared())
 }

@@ -457,7 +457,7 @@ fn judge_tick(
         }
         reader.judge_frozen(plan, 1 - end, &writer, connected, &seen)?;
         if end == 0 {
-            Reader::judge_blind(plan, &peer_reader, connected, &seen)?;
+            reader.judge_blind(plan, &peer_reader, connected, &seen)?;
         }
         for since in down {
             Reader::judge_down(plan, since, &seen)?;

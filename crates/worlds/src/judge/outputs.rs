@@ -60,7 +60,9 @@ impl Reader {
         let has_joined = controller.valid_since.last() < Some(&i64::MAX);
         let holds = plan.ends[1].holds_at_close
             || plan.habits.starves > 0
-            || plan.laboratory.holds && !has_joined;
+            || plan.laboratory.holds && !has_joined
+            // A client whose request was lost does not ask again in time.
+            || plan.bus.asks() && (plan.goes_down(0) || plan.goes_down(1));
         let through = if plan.bus == Bus::Dispatcher {
             held(plan) + relayed(plan)
         } else {
@@ -81,6 +83,7 @@ impl Reader {
 
     /// A controller that has heard nothing of its peer sends fail-safe values, unless it was to hold; its peer was `connected` then.
     pub(crate) fn judge_blind(
+        &self,
         plan: &Plan,
         controller: &Self,
         connected: i64,
@@ -98,7 +101,10 @@ impl Reader {
             || plan.features.hosted == Some(0)
             || heard > blind.last;
         // Its first cycle finds everything stale, and sends what the program has.
-        let since = blind.since.max(connected);
+        let since = blind
+            .since
+            .max(connected)
+            .max(self.begun.unwrap_or(connected));
         let soon = plan.cycle.0 * 2 + slack(plan) + plan.waits_for_pulses() + held(plan);
         if plan.ends[1].holds_while_stale || seen.is_stale || is_unknown || heard - since <= soon {
             return Ok(());

@@ -26,6 +26,8 @@ pub(crate) struct Reader {
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
     /// When each of its lives was first not stale; [`i64::MAX`] if none was.
     pub(crate) valid_since: Vec<i64>,
+    /// The first tick of its life.
+    pub(super) begun: Option<i64>,
     /// Since when it has been stale, up to its last tick.
     pub(super) blind: Option<Blind>,
     /// The times at which it was stale, or its line disturbed on purpose.
@@ -49,6 +51,7 @@ impl Reader {
         self.beat = None;
         self.kind = None;
         self.blind = None;
+        self.begun = None;
         self.sequence = 0;
         self.valid_since.push(i64::MAX);
     }
@@ -71,6 +74,7 @@ impl Reader {
         if seen.is_stale || is_unwritten || is_lost {
             self.stale.push(now);
         }
+        self.begun.get_or_insert(now);
         let before = self
             .blind
             .take()

@@ -60,13 +60,22 @@ struct Wire {
     came: bool,
     went: bool,
     out: Outgoing,
-    /// The frame that came last was lost, and the fault that did it is active.
-    has_lost: bool,
+    /// What became of the frame that came last.
+    newest: Newest,
     /// Received frames that are held back.
     waiting: Option<Ring>,
     /// When the last of them came.
     released: Nanos,
     rx_len: usize,
+}
+
+/// What became of a frame that came in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Newest {
+    /// It was handed on, or waits.
+    Handed,
+    /// It was lost, and the fault that lost it is still active.
+    Lost,
 }
 
 /// The shape of one station's frames.
@@ -93,7 +102,7 @@ impl LineFaults {
             came: true,
             went: true,
             out: Outgoing::new(shape.last_sent, shape.latched, taken),
-            has_lost: false,
+            newest: Newest::Handed,
             waiting: None,
             released: Nanos(i64::MIN),
             rx_len: shape.rx_len,
@@ -182,7 +191,9 @@ impl LineFaults {
         self.diagnoses.truncate(diagnoses);
         self.sum = sum;
         for wire in &mut self.stations {
-            wire.has_lost &= loses;
+            if !loses {
+                wire.newest = Newest::Handed;
+            }
         }
         if sum.down {
             self.carries_nothing();
@@ -330,7 +341,10 @@ impl LineFaults {
             return Fate::Lost;
         }
         let wire = &mut self.stations[station];
-        wire.has_lost = self.fate == Fate::Lost;
+        wire.newest = match self.fate {
+            Fate::Lost => Newest::Lost,
+            _ => Newest::Handed,
+        };
         let Fate::Passes(times) = self.fate else {
             return self.fate;
         };
@@ -398,7 +412,7 @@ impl LineFaults {
     pub fn withholds(&self, station: usize) -> bool {
         let wire = &self.stations[station];
         let ring = wire.waiting.as_ref();
-        wire.has_lost || ring.is_some_and(|ring| !ring.is_empty())
+        wire.newest == Newest::Lost || ring.is_some_and(|ring| !ring.is_empty())
     }
 
     /// When the next received frame is due; [`Nanos::MAX`] if none is held back.

@@ -121,8 +121,9 @@ impl Reader {
         }
         if !seen.is_stale {
             self.last_valid = Some((now, first.flatten()));
-            let since = self.valid_since.last_mut();
-            since.into_iter().for_each(|since| *since = now.min(*since));
+            if let Some(since) = self.valid_since.last_mut() {
+                *since = now.min(*since);
+            }
         }
         super::age::judge(plan, seen)
     }

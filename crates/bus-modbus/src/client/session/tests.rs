@@ -311,7 +311,7 @@ fn a_device_whose_connections_broke_while_it_was_asked_who_it_is_is_asked_again_
     line.read();
     line.read();
     assert_eq!(line.statistic("writes").as_deref(), Some("blocked"));
-    line.now = line.now + Nanos::from_secs(10);
+    line.now += Nanos::from_secs(10);
     line.read();
     line.introduce("7");
     line.write_and_read();

@@ -1,4 +1,4 @@
-//! What a tick costs in instructions, which a busy machine does not change: `tools/instructions` runs this under
+//! Counts the instructions of a tick, which a busy machine does not change: `tools/instructions` runs this under
 //! valgrind, and compares with `instructions.txt`.
 //!
 //! `instructions CASE TICKS` makes that many ticks; `instructions --list` gives the cases. Valgrind counts in the function
@@ -152,7 +152,7 @@ fn run(case: &Case, ticks: u64) {
     self::ticks(case, ticks, &mut driver, &mut slots, time);
 }
 
-/// What is counted.
+/// Valgrind counts the instructions in this function.
 #[inline(never)]
 fn ticks(case: &Case, count: u64, driver: &mut Driver, slots: &mut [Slot], begin: Nanos) {
     let mut copies = Copies::new(case.each_way);

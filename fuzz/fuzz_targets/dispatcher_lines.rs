@@ -18,7 +18,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// What two clients hear, of which the first sends the bytes.
+/// Returns the bytes that two clients get, of which the first sends `bytes`.
 fn talk(bytes: &[u8], piece: usize) -> [Vec<u8>; 2] {
     let mut dispatcher = Dispatcher::new(Settings::default(), Patch::new());
     let peer = "127.0.0.1:1".parse().expect("an address");

@@ -71,7 +71,7 @@ fn check_config(config: &Config) {
     }
 }
 
-/// What the faults' layers assume without checking.
+/// Checks what the faults' layers assume without checking.
 fn check_faults(config: &Config) {
     assert!(config.faults.len() <= LIMIT);
     for fault in &config.faults {

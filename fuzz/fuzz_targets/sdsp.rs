@@ -128,7 +128,7 @@ impl Run {
         }
     }
 
-    /// What the server says is right for every client that behaves.
+    /// Checks that the server's messages are right for every client that behaves.
     fn deliver(&mut self) {
         let mut frame = Vec::new();
         while let Some((seat, message)) = self.server.poll() {
@@ -153,7 +153,7 @@ impl Run {
         }
     }
 
-    /// What is waited for has a limit in time.
+    /// Every wait has a limit in time.
     fn check(&self) {
         match self.server.state() {
             State::InitialWrite | State::Write => assert!(self.server.deadline() <= self.now + HANG),

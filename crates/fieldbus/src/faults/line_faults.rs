@@ -264,7 +264,8 @@ impl LineFaults {
                 self.board.duplicated.fetch_add(1, Ordering::Relaxed);
             }
         }
-        self.repeats
+        // A station that is asked by itself may have paused alone.
+        self.repeats && !self.stations[station].out.has_paused(now)
     }
 
     /// Whether nothing gets through to or from the station.

@@ -89,7 +89,7 @@ impl Reader {
 }
 
 /// For how long an end is suspended: what it wrote right before goes out right behind that.
-fn suspended(plan: &Plan, end: usize) -> i64 {
+pub(super) fn suspended(plan: &Plan, end: usize) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Suspend(process, span) if process == end => span.0,
         _ => 0,

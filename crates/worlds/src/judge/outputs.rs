@@ -1,6 +1,7 @@
 //! Nothing is left on: a writer that stopped, and a controller that closed, leave fail-safe values.
 
 use super::age::{held, relayed, slack};
+use super::beats::suspended;
 use super::reader::Reader;
 use super::seen::Seen;
 use super::writer::Writer;
@@ -105,7 +106,11 @@ impl Reader {
             .since
             .max(connected)
             .max(self.begun.unwrap_or(connected));
-        let soon = plan.cycle.0 * 2 + slack(plan) + plan.waits_for_pulses() + held(plan);
+        let soon = plan.cycle.0 * 2
+            + slack(plan)
+            + plan.waits_for_pulses()
+            + held(plan)
+            + suspended(plan, 0);
         if plan.ends[1].holds_while_stale || seen.is_stale || is_unknown || heard - since <= soon {
             return Ok(());
         }

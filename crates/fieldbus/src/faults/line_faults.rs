@@ -69,6 +69,27 @@ struct Wire {
     rx_len: usize,
 }
 
+/// When a bus took the image of its stations last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Taken {
+    /// Not yet.
+    #[default]
+    Never,
+    /// At this time, by the present connection.
+    At(Nanos),
+    /// By a connection before the present one.
+    Before,
+}
+
+impl Taken {
+    /// The bus opens its line again.
+    pub fn reopen(&mut self) {
+        if *self != Self::Never {
+            *self = Self::Before;
+        }
+    }
+}
+
 /// What became of a frame that came in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Newest {
@@ -90,12 +111,11 @@ pub struct Shape {
 }
 
 impl LineFaults {
-    /// The line to stations of these shapes, without any fault. The bus took an image last at `taken`; `None` if it has not
-    /// since it opened the line.
+    /// The line to stations of these shapes, without any fault.
     pub fn new(
         board: Arc<FaultBoard>,
         stations: impl Iterator<Item = Shape>,
-        taken: Option<Nanos>,
+        taken: Taken,
     ) -> Self {
         let wire = |shape: Shape| Wire {
             dead: false,

@@ -27,7 +27,7 @@ pub use condition::{Condition, unknown};
 pub use diagnosis::{ChannelError, Diagnosis, Finding, Octets};
 pub use fault::{Begin, Direction, Effect, Fault, Lasts, LineEffect, SignalEffect};
 pub use line_fault::LineFault;
-pub use line_faults::{Fate, LineFaults, Shape};
+pub use line_faults::{Fate, LineFaults, Shape, Taken};
 pub use list::{Faults, Prepared, Retired, Slots};
 pub use section::{LIMIT, Scope, read_file, read_one, read_sections};
 pub use tick_time::TickTime;

@@ -7,7 +7,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::{BusEnd, Event};
 
 use super::image::{ImagePort, Report};
-use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape};
+use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape, Taken};
 use crate::{Cause, LinkState, LinkStatus};
 
 /// Passes everything on to an [`ImagePort`], and distorts it while line faults are active. Until the first one is
@@ -18,8 +18,8 @@ pub(super) struct FaultLayer {
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
-    /// When the bus took an image last since it opened the line, while there was no line fault: the first one begins there.
-    taken: Option<Nanos>,
+    /// When the bus took an image last, while there was no line fault: the first one begins there.
+    taken: Taken,
     /// The board was read for the message that the bus is handing in: the same faults act on all of its frames.
     has_looked: bool,
     /// A frame per station, for handing in what was held back.
@@ -137,7 +137,7 @@ impl FaultLayer {
         port: &'a mut ImagePort,
     ) -> &'a [u8] {
         let Some(line) = &mut self.line else {
-            self.taken = Some(now);
+            self.taken = Taken::At(now);
             return port.outgoing(station, now);
         };
         let repeats = line.repeats(station, now);
@@ -244,7 +244,7 @@ impl FaultLayer {
     /// The bus reports this of its line: kept while a fault hides it.
     pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
         if report.state == LinkState::Opening {
-            self.taken = None;
+            self.taken.reopen();
             if let Some(line) = &mut self.line {
                 line.carries_nothing();
             }

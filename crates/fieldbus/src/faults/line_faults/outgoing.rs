@@ -3,6 +3,7 @@
 use tickbus_base::time::Nanos;
 
 use super::super::ring::Ring;
+use super::Taken;
 
 /// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
 /// often than that.
@@ -49,8 +50,8 @@ pub(super) enum Given {
 }
 
 impl Outgoing {
-    /// Of a station that sent `last_sent` last, and that the bus took at `taken`, unless it has opened the line since.
-    pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>, taken: Option<Nanos>) -> Self {
+    /// Of a station that sent `last_sent` last, which the bus took at `taken`.
+    pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>, taken: Taken) -> Self {
         Self {
             latched,
             newest: last_sent.clone(),
@@ -60,8 +61,11 @@ impl Outgoing {
             reads: false,
             held_up: None,
             waiting: None,
-            is_behind: taken.is_none(),
-            taken,
+            is_behind: taken == Taken::Before,
+            taken: match taken {
+                Taken::At(time) => Some(time),
+                Taken::Never | Taken::Before => None,
+            },
             overtaken: 0,
             given: Given::Image,
         }

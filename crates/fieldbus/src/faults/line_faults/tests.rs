@@ -20,10 +20,10 @@ impl Rig {
     }
 
     fn of_stations(count: usize) -> Self {
-        Self::taken(count, Some(Nanos::ZERO))
+        Self::taken(count, Taken::At(Nanos::ZERO))
     }
 
-    fn taken(count: usize, taken: Option<Nanos>) -> Self {
+    fn taken(count: usize, taken: Taken) -> Self {
         let board = Arc::<FaultBoard>::default();
         let shape = Shape {
             last_sent: Box::new([0, 0]),
@@ -206,9 +206,13 @@ fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_tha
         rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
         rig.send(2 * PATIENCE.0, [0, 9], true).0
     };
-    assert_eq!(first(None), [0, 9]);
-    assert_eq!(first(Some(Nanos::ZERO)), [0, 9]);
-    assert_eq!(first(Some(PATIENCE)), [0, 0]);
+    assert_eq!(first(Taken::Before), [0, 9]);
+    assert_eq!(first(Taken::At(Nanos::ZERO)), [0, 9]);
+    assert_eq!(first(Taken::At(PATIENCE)), [0, 0]);
+    assert_eq!(first(Taken::Never), [0, 0]);
+    let mut taken = Taken::Never;
+    taken.reopen();
+    assert_eq!(taken, Taken::Never, "nothing was sent before");
 }
 
 #[test]

@@ -17,7 +17,7 @@ use crate::patch::{Patch, Pin};
 
 pub use snapshot::{ChannelState, ClientState, Connection, Snapshot};
 
-/// What an input gets when it no longer has a source.
+/// The value of an input that has lost its source.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OnLoss {
     /// Zero: as when a cable is pulled.
@@ -42,9 +42,9 @@ struct Output {
 
 #[derive(Debug)]
 struct Input {
-    /// What its client has been sent, or will be next.
+    /// The value that the client has been sent, or will be sent next.
     value: Number,
-    /// While its value comes from an operator: the last one that did not, which may be unknown.
+    /// The last value that came from no operator, while an operator forces the channel; may be unknown.
     unforced: Option<Number>,
     label: Label,
     is_waiting: bool,
@@ -65,42 +65,42 @@ impl Input {
 #[derive(Debug)]
 struct Plugged {
     device: Device,
-    /// Its line in the device list.
+    /// The client's line in the device list.
     line: Box<str>,
     order: Rank,
-    /// The name of its host, if it is a client of another dispatcher. Then it has no inputs here: what goes to them is
-    /// routed there.
+    /// The name of the host, for a client of another dispatcher. Such a client has no inputs here: its values are
+    /// routed on the host.
     host: Option<Box<str>>,
     outputs: Box<[Output]>,
-    /// Whether an input whose source is lost gets a sign for that, and not 0.
+    /// True if an input that loses its source gets `?` and not 0.
     hears_losses: bool,
-    /// Whether the client has been silent for longer than its `ALIVE` time; its outputs are then cut off from the patch.
+    /// True if the client has been silent for longer than its `ALIVE` time; the patch then ignores its outputs.
     is_silent: bool,
 }
 
-/// What the board keeps for a connection.
+/// The board's data for one connection.
 #[derive(Debug, Default)]
 struct Seat {
     plugged: Option<Box<Plugged>>,
-    /// The inputs of its client; or, if another dispatcher sits here, a place for each value that it wants.
+    /// The inputs of the client. If another dispatcher has this seat: a place for each value that it wants.
     inputs: Vec<Input>,
     outbox: Outbox,
 }
 
-/// What other dispatchers may have to hear of.
+/// A change that other dispatchers may have to learn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Change {
     /// A client was plugged in on a seat.
     Plugged(usize),
     /// A client that was on a seat has gone.
     Unplugged(usize, Rank),
-    /// An input, and its new source, if it has one.
+    /// An input, and its new source if any.
     Patched(Pin, Option<Pin>),
-    /// The first sink of an output of a client elsewhere has come, or its last one has gone.
+    /// An output of a client elsewhere got its first sink, or lost its last one.
     Wanted(Place),
 }
 
-/// What went through the board.
+/// Counts of everything that went through the board.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Lines received.
@@ -122,17 +122,17 @@ pub(crate) struct Board {
     by_order: BTreeMap<Rank, usize>,
     /// Later than every client so far.
     next_order: u64,
-    /// What other dispatchers want: outputs, and the places on their seats. A forced output has these, too.
+    /// Outputs that other dispatchers want, with the places on their seats. Forced outputs are listed, too.
     supplies: BTreeMap<Place, Vec<Place>>,
-    /// What has changed, if there are other dispatchers to be told.
+    /// Changes not yet sent to other dispatchers; `None` without other dispatchers.
     changes: Option<Vec<Change>>,
     patch: Patch,
-    /// Whether it is as it was saved last, or was in the beginning.
+    /// True if the patch equals the saved one, or the one that the board began with.
     is_saved: bool,
-    /// Channels of clients that are here, and what an operator holds them at.
+    /// Channels of connected clients, and the values that an operator forces them to.
     forces: BTreeMap<Pin, Number>,
     on_loss: OnLoss,
-    /// Seats that have something to write, or are to be closed.
+    /// Seats with something to write, or to be closed.
     touched: Vec<usize>,
     /// Number of the line being worked on: values that it causes may share a line.
     line: u64,
@@ -162,12 +162,12 @@ impl Board {
         &self.patch
     }
 
-    /// Whether the patch has not changed since it was saved.
+    /// True if the patch has not changed since it was saved.
     pub(crate) const fn is_saved(&self) -> bool {
         self.is_saved
     }
 
-    /// The patch was saved as it is.
+    /// Marks the patch as saved.
     pub(crate) const fn set_saved(&mut self) {
         self.is_saved = true;
     }
@@ -180,7 +180,7 @@ impl Board {
         self.clear(seat);
     }
 
-    /// Forgets everything about a seat, but that it is in the list of those that were touched.
+    /// Clears a seat, but keeps its entry in the list of touched seats.
     fn clear(&mut self, seat: usize) {
         let is_touched = self.seats[seat].outbox.is_touched;
         self.seats[seat] = Seat::default();
@@ -199,7 +199,7 @@ impl Board {
         touch(&mut self.touched, &mut self.seats[seat].outbox, seat);
     }
 
-    /// A seat that was touched and not asked for since.
+    /// Takes the next touched seat.
     pub(crate) fn next_touched(&mut self) -> Option<usize> {
         let seat = self.touched.pop()?;
         self.seats[seat].outbox.is_touched = false;
@@ -217,7 +217,7 @@ impl Board {
         self.touch(seat);
     }
 
-    /// The client on a seat, once it has said who it is.
+    /// The client on a seat, once it has identified itself.
     pub(crate) fn device(&self, seat: usize) -> Option<&Device> {
         self.seats[seat]
             .plugged
@@ -297,7 +297,7 @@ impl Board {
         }
     }
 
-    /// The client on this seat wants to hear of an input that its source is lost.
+    /// From now on, the client on this seat is sent `?` when an input loses its source.
     pub(crate) fn hear_losses(&mut self, seat: usize) {
         if let Some(plugged) = &mut self.seats[seat].plugged {
             plugged.hears_losses = true;
@@ -311,7 +311,7 @@ impl Board {
             let (Some(to), Some(from)) = (self.place(&sink), self.place(&source)) else {
                 continue;
             };
-            // What the client had itself goes with it.
+            // The own inputs and outputs of a client that leaves go with it.
             if !is_leaving || source.client != name {
                 self.part(to, from);
             }
@@ -327,7 +327,7 @@ impl Board {
         if let Some(plugged) = &self.seats[seat].plugged {
             let (name, order) = (plugged.device.name.clone(), plugged.order);
             if self.on_loss == OnLoss::Hold {
-                // What is held is what the client said last, and not what an operator put in its place.
+                // The inputs keep the client's last value, not an operator's.
                 self.release_all(&name);
             }
             self.forget_forces(&name);
@@ -359,7 +359,7 @@ impl Board {
         }
     }
 
-    /// Joins two channels, if both are there and not forced and the input is of a client of this dispatcher.
+    /// Joins two channels, if both are present and unforced, and the input belongs to a client of this dispatcher.
     fn join(&mut self, sink: &Pin, source: &Pin) {
         if self.forced(sink).is_some() || self.forced(source).is_some() {
             return;
@@ -394,7 +394,7 @@ impl Board {
         }
     }
 
-    /// Sends an input the value that it is to have once more, as far as that is known.
+    /// Resends an input its current value, as far as known.
     pub(crate) fn refresh(&mut self, sink: &Pin) {
         self.deliver_wanted(sink, true);
     }
@@ -411,7 +411,7 @@ impl Board {
         }
     }
 
-    /// An output has a value; what is connected to it gets it, if it is another one.
+    /// Sets the value of an output; connected inputs get it if it differs.
     #[inline]
     pub(crate) fn set(&mut self, seat: usize, channel: usize, value: Number) {
         let Some(output) = self.output(Place { seat, channel }) else {
@@ -425,7 +425,7 @@ impl Board {
             self.deliver(to, value, false);
             return;
         }
-        // They are not changed meanwhile.
+        // Setting a value does not change the list of sinks.
         let sinks = std::mem::take(&mut output.sinks);
         for to in &sinks {
             self.deliver(*to, value, false);
@@ -435,7 +435,7 @@ impl Board {
         }
     }
 
-    /// An input has no source any more.
+    /// Handles the loss of an input's source.
     fn lose(&mut self, sink: &Pin) {
         let Some(to) = self.place(sink).filter(|_| self.forced(sink).is_none()) else {
             return;
@@ -461,7 +461,7 @@ impl Board {
         }
     }
 
-    /// Sends a value to an input; unless `is_forced` only if it is another one.
+    /// Sends a value to an input; unless `is_forced`, only if the value differs.
     #[inline]
     fn deliver(&mut self, to: Place, value: Number, is_forced: bool) {
         let seat = &mut self.seats[to.seat];
@@ -487,7 +487,7 @@ impl Board {
         touch(&mut self.touched, outbox, to.seat);
     }
 
-    /// Asks for the device list of now.
+    /// Requests the current device list.
     pub(crate) fn list(&mut self, seat: usize) {
         self.seats[seat].outbox.listing = Some(Listing {
             after: None,
@@ -500,8 +500,8 @@ impl Board {
         self.touch(seat);
     }
 
-    /// Makes lines of what waits, as far as there is room: the device list, then values. `has_end` ends the list by a
-    /// line of its own.
+    /// Turns waiting data into lines while there is room: first the device list, then values. With `has_end`, a
+    /// separate line ends the list.
     pub(crate) fn refill(&mut self, seat: usize, has_end: bool) {
         let outbox = &mut self.seats[seat].outbox;
         if let Some(mut listing) = outbox.listing.take() {
@@ -558,7 +558,7 @@ impl Board {
         plugged.outputs.get_mut(place.channel)
     }
 
-    /// Whether the client on a seat has this channel.
+    /// True if the client on a seat has this channel.
     pub(crate) fn has(&self, seat: usize, channel: Channel) -> bool {
         let device = self.device(seat);
         device.is_some_and(|device| device.counts.place(channel).is_some())

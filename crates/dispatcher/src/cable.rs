@@ -1,4 +1,4 @@
-//! Connections as a client asks for them, such as `I1:PUMP:Q2`.
+//! Connections as clients request them, such as `I1:PUMP:Q2`.
 
 use std::fmt;
 
@@ -23,7 +23,7 @@ impl Cable {
     ///
     /// # Errors
     ///
-    /// It is none, or its channels do not fit together.
+    /// The text is no connection, or its channels do not fit together.
     pub fn parse(text: &str) -> Result<Self, Mistake> {
         const RIGHT: &str =
             "write an own channel, another client and its channel, such as I1:PUMP:Q2";
@@ -56,7 +56,7 @@ impl Cable {
     ///
     /// # Errors
     ///
-    /// It does not.
+    /// The client has no such channel.
     pub fn check(&self, counts: Counts) -> Result<(), Mistake> {
         if counts.has_from_1(self.own) {
             return Ok(());

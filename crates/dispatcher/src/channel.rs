@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What a channel is, as its client sees it.
+/// The kind of a channel, as its client sees it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// `Q`: a digital output.
@@ -24,7 +24,7 @@ impl Kind {
         Self::AnalogInput,
     ];
 
-    /// Its letters.
+    /// The letters in a channel's name.
     pub const fn letters(self) -> &'static str {
         match self {
             Self::DigitalOutput => "Q",
@@ -34,12 +34,12 @@ impl Kind {
         }
     }
 
-    /// Whether values come from its client.
+    /// True if the client sends values through the channel.
     pub const fn is_output(self) -> bool {
         matches!(self, Self::DigitalOutput | Self::AnalogOutput)
     }
 
-    /// Whether it carries more than on and off.
+    /// True for analog channels, which carry more than on and off.
     pub const fn is_analog(self) -> bool {
         matches!(self, Self::AnalogOutput | Self::AnalogInput)
     }
@@ -71,7 +71,7 @@ impl Kind {
             if !digit.is_ascii_digit() {
                 return None;
             }
-            // What is too large for a channel stays so.
+            // A number too large for a channel stays too large.
             number = number
                 .saturating_mul(10)
                 .saturating_add(u16::from(digit - b'0'));
@@ -83,9 +83,9 @@ impl Kind {
 /// A channel of a client, such as `AQ2`, by the number that the client itself uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Channel {
-    /// What it is.
+    /// The kind.
     pub kind: Kind,
-    /// Its number: from 1, or from 0 for analog channels.
+    /// The number: from 1, or from 0 for analog channels.
     pub number: u16,
 }
 
@@ -125,7 +125,7 @@ impl Counts {
         self.0[kind as usize] = count;
     }
 
-    /// Whether a client that counts from 1 has this channel.
+    /// True if a client that counts from 1 has this channel.
     pub const fn has_from_1(self, channel: Channel) -> bool {
         channel.number >= 1 && channel.number <= self.of(channel.kind)
     }
@@ -133,8 +133,8 @@ impl Counts {
     /// The place of a channel among all outputs, or among all inputs, of its client; `None` if the client does not have
     /// it.
     ///
-    /// Digital channels count from 1. Analog ones may be counted from 0 or from 1: the paper announces two and then uses
-    /// AQ0 to AQ2. So there is a place for both 0 and N.
+    /// Digital channels count from 1. Analog ones may be counted from 0 or from 1: the paper announces two and then
+    /// uses AQ0 to AQ2. So both 0 and N have a place.
     #[inline]
     pub(crate) fn place(self, channel: Channel) -> Option<usize> {
         let count = self.of(channel.kind);
@@ -158,7 +158,7 @@ impl Counts {
         Some(usize::from(place))
     }
 
-    /// Whether a client has this channel.
+    /// True if the client has this channel.
     pub fn has(self, channel: Channel) -> bool {
         self.place(channel).is_some()
     }

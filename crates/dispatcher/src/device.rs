@@ -1,4 +1,4 @@
-//! Who a client says it is.
+//! The identification of a client.
 
 use std::fmt;
 use std::net::{IpAddr, SocketAddr};
@@ -6,7 +6,7 @@ use std::net::{IpAddr, SocketAddr};
 use crate::channel::{Counts, Kind};
 use crate::name::is_shown_name;
 
-/// What a client is.
+/// The role of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// `VR`: a virtual controller.
@@ -16,7 +16,7 @@ pub enum Role {
 }
 
 impl Role {
-    /// Its keyword.
+    /// The role's keyword.
     pub const fn keyword(self) -> &'static str {
         match self {
             Self::Controller => "VR",
@@ -34,18 +34,18 @@ impl Role {
 /// A client as the device list shows it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Device {
-    /// What it is.
+    /// The role.
     pub role: Role,
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its channels.
+    /// The channels.
     pub counts: Counts,
-    /// Where it connected from.
+    /// The address from which the client connected.
     pub peer: SocketAddr,
 }
 
 impl Device {
-    /// Reads a line of a device list, without its end. Blanks do not count.
+    /// Reads a line of a device list, without its end; ignores blanks.
     pub fn parse(line: &[u8]) -> Option<Self> {
         let text: String = std::str::from_utf8(line).ok()?.split_whitespace().collect();
         let mut parts = text.splitn(7, ':');
@@ -60,7 +60,7 @@ impl Device {
             counts.set(kind, count);
         }
         let address = parts.next()?;
-        // A client of another dispatcher has the name of its host behind its address.
+        // For a client of another dispatcher, the name of the host follows the address.
         let address = address.split_once('@').map_or(address, |(it, _)| it);
         let (ip, port) = address.rsplit_once(':')?;
         let ip = ip

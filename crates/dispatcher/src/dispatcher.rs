@@ -1,4 +1,4 @@
-//! The dispatcher without its sockets: lines in, lines out, and time handed in.
+//! The dispatcher without its sockets: lines in, lines out; the caller passes the time.
 
 mod laboratory;
 mod operator;
@@ -24,14 +24,14 @@ use crate::refusal::{Code, Refusal};
 pub use operator::{Order, Reply};
 use requests::Waiting;
 
-/// How a dispatcher serves.
+/// The settings of a dispatcher.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// A client that has sent no complete line for this long is disconnected.
     pub idle: Nanos,
-    /// What an input gets when its source has gone.
+    /// The value of an input whose source has gone.
     pub on_loss: OnLoss,
-    /// The most clients at a time.
+    /// The maximum number of clients at a time.
     pub clients: usize,
 }
 
@@ -46,7 +46,7 @@ impl Default for Settings {
     }
 }
 
-/// The dispatcher. Each connection has a seat, a number that is used again when it is free.
+/// The dispatcher. Each connection has a seat, a number that is reused when it is free.
 ///
 /// Calls that take `now` come between [`woke`](Self::woke) and [`tick`](Self::tick). After them, and after
 /// [`saved`](Self::saved) and [`gone`](Self::gone), first save the patch if [`unsaved`](Self::unsaved) returns one; then, for
@@ -60,45 +60,45 @@ pub struct Dispatcher {
     count: usize,
     /// The values of the current line.
     items: Vec<(usize, Number)>,
-    /// Seats that were stuck and may go on.
+    /// Seats that were stuck and may continue.
     resumable: Vec<usize>,
-    /// Answers to be given when the patch is saved.
+    /// Answers due when the patch is saved.
     promised: Vec<Promised>,
-    /// How many of these wait for the patch that is being saved; the others came later.
+    /// How many of these answers wait for the patch that is being saved; the others came later.
     saving: usize,
-    /// When the times of all clients are looked at next.
+    /// When the dispatcher next checks the times of all clients.
     next_look: Nanos,
-    /// The shortest time within which a client has promised a line, or a longer one.
+    /// The shortest `ALIVE` time of any client at the last check or since.
     promise: Nanos,
     /// This process was held up: what is read until the next [`tick`](Self::tick) may have waited for long.
     is_catching_up: bool,
     /// The other dispatchers of the laboratory, if there can be any.
     federation: Option<Box<Federation>>,
-    /// Who waits for answers of other dispatchers.
+    /// Requests that wait for answers of other dispatchers.
     waiting: Vec<Waiting>,
 }
 
 #[derive(Debug)]
 struct Session {
     peer: SocketAddr,
-    /// When its last complete line came, or the connection.
+    /// When the client's last complete line came, or the connection was made.
     heard: Nanos,
-    /// What has arrived and was not worked on yet.
+    /// Bytes that have arrived but were not processed yet.
     begun: Vec<u8>,
-    /// The rest of the current line is too long, and is ignored.
+    /// The rest of the current line is too long, and is skipped.
     is_skipping: bool,
     is_version_2: bool,
-    /// It has promised a line at least this often.
+    /// The client has promised a line at least this often.
     alive: Option<Nanos>,
-    /// It has broken that promise, and was not heard since.
+    /// The client has broken that promise, and has sent no line since.
     is_silent: bool,
     progress: Progress,
 }
 
-/// Whether the next line of a client is looked at.
+/// When the dispatcher looks at a client's next line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
-    /// When it comes.
+    /// As soon as it comes.
     Going,
     /// When the client has read its answers, or its patch was saved.
     Stuck,
@@ -106,7 +106,7 @@ enum Progress {
     Closing,
 }
 
-/// An answer to be given when the patch is saved.
+/// An answer due when the patch is saved.
 #[derive(Debug)]
 struct Promised {
     author: Author,
@@ -114,7 +114,7 @@ struct Promised {
     sinks: Vec<Pin>,
 }
 
-/// Who has changed the patch.
+/// The author of a change of the patch.
 #[derive(Debug)]
 enum Author {
     Client {
@@ -127,7 +127,7 @@ enum Author {
         host: HostId,
         number: u32,
     },
-    /// A client that has left since. What it has changed is saved all the same.
+    /// A client that has left since. Its changes are saved anyway.
     Nobody,
 }
 
@@ -163,7 +163,7 @@ impl Dispatcher {
         self.board.patch()
     }
 
-    /// What went through so far.
+    /// The traffic so far.
     pub fn traffic(&self) -> Traffic {
         self.board.traffic
     }
@@ -177,7 +177,7 @@ impl Dispatcher {
     ///
     /// # Errors
     ///
-    /// There are as many clients as the settings allow. Send it this, and close.
+    /// The number of clients has reached the settings' maximum. Send the client this refusal, and close.
     pub fn connected(&mut self, now: Nanos, peer: SocketAddr) -> Result<usize, Refusal> {
         let most = self.settings.clients;
         if self.count >= most {
@@ -211,7 +211,7 @@ impl Dispatcher {
         seat
     }
 
-    /// The connection of a seat is gone, or was closed.
+    /// The connection of a seat was lost or closed.
     pub fn gone(&mut self, seat: usize) {
         if self.sessions[seat].take().is_some() {
             self.count -= 1;
@@ -226,13 +226,13 @@ impl Dispatcher {
         }
     }
 
-    /// Whether bytes of this client are wanted now. If not, it has to read its answers first.
+    /// True if the dispatcher wants bytes of this client now. If not, the client has to read its answers first.
     pub fn wants_bytes(&self, seat: usize) -> bool {
         self.session(seat)
             .is_some_and(|session| session.progress == Progress::Going)
     }
 
-    /// Whether the connection is to be closed when its answers are written.
+    /// True if the connection is to be closed once its answers are written.
     pub fn is_closing(&self, seat: usize) -> bool {
         self.session(seat)
             .is_some_and(|session| session.progress == Progress::Closing)
@@ -243,7 +243,7 @@ impl Dispatcher {
         self.board.next_touched()
     }
 
-    /// What is to be written to a client now.
+    /// The bytes to be written to a client now.
     pub fn to_write(&mut self, seat: usize) -> &[u8] {
         if let Some(session) = &self.sessions[seat] {
             self.board.refill(seat, session.is_version_2);
@@ -251,7 +251,7 @@ impl Dispatcher {
         self.board.to_write(seat)
     }
 
-    /// The system has taken this many bytes for a client.
+    /// The system has accepted this many bytes for a client.
     pub fn wrote(&mut self, seat: usize, count: usize) {
         self.board.outbox(seat).wrote(count);
         let is_stuck = self
@@ -267,7 +267,7 @@ impl Dispatcher {
         }
     }
 
-    /// Whether a client gets no answer before the patch is saved, or before another dispatcher has answered.
+    /// True if a client gets no answer before the patch is saved, or before another dispatcher has answered.
     fn is_owed_answer(&self, seat: usize) -> bool {
         let promised = self.promised.iter().map(|it| &it.author);
         let waiting = self.waiting.iter().map(|it| &it.author);
@@ -307,12 +307,13 @@ impl Dispatcher {
         }
     }
 
-    /// Works on the complete lines at the beginning of `bytes`; returns how many bytes those were.
+    /// Processes the complete lines at the beginning of `bytes`; returns how many bytes those were.
     fn work(&mut self, now: Nanos, seat: usize, bytes: &[u8]) -> usize {
         let mut at = 0;
         let mut counts = self.board.device(seat).map(|device| device.counts);
         while at < bytes.len() {
-            // The first line of a client that was silent is looked at alone: it restores the values of all its outputs.
+            // The first line of a client that was silent is processed alone: it restores the values of all outputs of
+            // that client.
             let (is_skipping, is_silent) = match &self.sessions[seat] {
                 Some(session) if session.progress == Progress::Closing => return bytes.len(),
                 Some(session) if session.progress == Progress::Going => {
@@ -391,14 +392,16 @@ impl Dispatcher {
         }
     }
 
-    /// Works on the lines of values in their usual form at the beginning of `bytes`; returns how many bytes those were.
+    /// Processes the lines of values in their usual form at the beginning of `bytes`; returns how many bytes those
+    /// were.
     fn quick_lines(&mut self, seat: usize, bytes: &[u8], counts: Counts) -> usize {
         let mut done = 0;
         while let Some(line) = bytes.get(done..)
             && line.starts_with(QUICK)
         {
             let mut value = grammar::quick_value(line, QUICK.len(), counts);
-            // Most lines have one value. Of others nothing holds before all is read: it may be wrong.
+            // Most lines have one value. A longer line takes effect only when all of it was read, since a later part
+            // may be wrong.
             self.items.clear();
             while let Some(first) = value.take_if(|it| !it.is_last) {
                 self.items.push((first.place, first.number));
@@ -415,10 +418,10 @@ impl Dispatcher {
         done
     }
 
-    /// Carries a line out.
+    /// Carries out a line.
     fn obey(&mut self, now: Nanos, seat: usize, line: &[u8]) -> Result<(), Refusal> {
         let line = grammar::parse(line);
-        // New values count before those of the time when it fell silent: these would be shown for a moment.
+        // New values take precedence over those before the silence, which would otherwise appear for a moment.
         if !matches!(line, Ok(Line::Values(_))) {
             self.speak_again(now, seat);
         }
@@ -443,7 +446,7 @@ impl Dispatcher {
                 self.confirm(seat, "LIST");
                 self.board.list(seat);
             }
-            // Whoever sends PING wants the answer, version 1 too.
+            // A client that sends PING wants the answer, in version 1 too.
             Line::Ping => self.board.say(seat, "OK PING"),
             Line::Bye => {
                 self.confirm(seat, "BYE");
@@ -506,7 +509,7 @@ impl Dispatcher {
         self.confirm(seat, Role::keyword(role));
         self.board.list(seat);
         self.board.refresh_all(seat);
-        // As far as there is room: what comes in this turn has not waited for a client that does not read.
+        // As far as there is room: values of this turn have not waited for a client that does not read.
         self.board.refill(seat, is_version_2);
         self.settle();
         Ok(())
@@ -597,7 +600,7 @@ impl Dispatcher {
         device.map(|device| device.name.clone()).unwrap_or_default()
     }
 
-    /// No further line of a client is looked at until it is answered.
+    /// Stops looking at further lines of a client until it is answered.
     fn stick(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Stuck;
@@ -627,7 +630,7 @@ impl Dispatcher {
         self.board.say(seat, &refusal.to_string());
     }
 
-    /// Closes the connection of a web browser: what follows the head of its request is the text of a web site.
+    /// Closes the connection of a web browser: the text after the head of its request comes from a web site.
     fn refuse_browser(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat] {
             session.progress = Progress::Closing;
@@ -641,7 +644,7 @@ impl Dispatcher {
     }
 }
 
-/// Whether a client may get further answers: it has read enough of the last ones.
+/// True if a client may get further answers: it has read enough of the last ones.
 fn may_answer(board: &mut Board, seat: usize) -> bool {
     let outbox = board.outbox(seat);
     outbox.listing.is_none() && !outbox.is_full()

@@ -8,7 +8,7 @@ use tickbus_base::time::{Nanos, Stop};
 
 use crate::dispatcher::{Dispatcher, Order, Reply};
 
-/// What is to be done in the loop.
+/// Work to be done in the loop.
 type Errand = Box<dyn FnOnce(&mut Dispatcher, Nanos) + Send>;
 
 /// Lets other threads work on the dispatcher, between the turns of its loop. Clones are the same door.
@@ -17,7 +17,7 @@ pub struct Door(Arc<Shared>);
 
 struct Shared {
     stop: Stop,
-    /// Looked at in each turn, so that the lock is taken only when there is something.
+    /// Checked in each turn, so that the loop takes the lock only when there is work.
     has_errands: AtomicBool,
     /// `None` when the loop has ended.
     errands: Mutex<Option<Vec<Errand>>>,
@@ -39,8 +39,8 @@ impl Door {
         }))
     }
 
-    /// Has `errand` done in the loop, which wakes for it. It must not block. It gets the time, and is dropped if the
-    /// loop has ended or ends first. Errands are done in the order in which they were sent.
+    /// Runs `errand` in the loop, and wakes the loop for it. The errand gets the time and must not block. It is dropped
+    /// if the loop has ended or ends first. Errands run in the order in which they were sent.
     pub fn send(&self, errand: impl FnOnce(&mut Dispatcher, Nanos) + Send + 'static) {
         let mut errands = self.errands();
         let Some(list) = errands.as_mut() else {
@@ -49,19 +49,19 @@ impl Door {
         list.push(Box::new(errand));
         let is_first = list.len() == 1;
         self.0.has_errands.store(true, Ordering::Release);
-        // The waker must not find the lock taken.
+        // The loop must not wake to find the lock taken.
         drop(errands);
         if is_first {
             self.0.stop.wake();
         }
     }
 
-    /// Has an operator's order carried out.
+    /// Runs an operator's order.
     pub fn operate(&self, order: Order, reply: Reply) {
         self.send(move |dispatcher, _| dispatcher.operate(order, reply));
     }
 
-    /// Does what was sent.
+    /// Runs all errands that were sent.
     pub(crate) fn serve(&self, dispatcher: &mut Dispatcher, now: Nanos) {
         if !self.0.has_errands.load(Ordering::Acquire) {
             return;
@@ -73,14 +73,14 @@ impl Door {
         }
     }
 
-    /// Drops what was sent and what will be.
+    /// Drops all errands, those sent from now on included.
     pub(crate) fn close(&self) {
         let errands = self.errands().take();
         drop(errands);
     }
 
     fn errands(&self) -> MutexGuard<'_, Option<Vec<Errand>>> {
-        // No errand is done under the lock, so the list is whole.
+        // No errand runs under the lock, so the list is intact.
         self.0
             .errands
             .lock()

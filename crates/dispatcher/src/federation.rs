@@ -1,4 +1,4 @@
-//! What a dispatcher knows of the other dispatchers of its laboratory. No I/O, and nothing of clients and lines.
+//! A dispatcher's knowledge of the other dispatchers in its laboratory. No I/O; no knowledge of clients and lines.
 
 pub(crate) mod link;
 pub(crate) mod message;
@@ -16,23 +16,23 @@ use crate::patch::Patch;
 use link::Link;
 use message::{Body, Joint, Letter, to_wire};
 
-/// Above all numbers of wants. They stand in lines of values.
+/// Above all numbers of wants, which appear in lines of values.
 pub(crate) const MOST_WANTS: u32 = 10_000_000;
 
-/// Who a dispatcher is among the others of its laboratory.
+/// A dispatcher's identity in its laboratory.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Identity {
-    /// Its number, that no other process has.
+    /// A number that no other process has.
     pub host: HostId,
     /// The name of its computer, for people.
     pub name: String,
-    /// The time of day at the zero of the dispatcher's clock, in nanoseconds since 1970. It only has to be about right: of
-    /// two clients that have taken one name on two hosts while these were cut off, the earlier one keeps it.
+    /// The time of day at the zero of the dispatcher's clock, in nanoseconds since 1970. A rough value will do: of two
+    /// clients that took one name on two hosts while these were cut off, the earlier one keeps it.
     pub since: u64,
 }
 
 impl Identity {
-    /// `name` may be any text: what cannot stand in a name is replaced by `-`.
+    /// `name` may be any text: characters that a name cannot have are replaced by `-`.
     pub fn new(host: HostId, name: &str, since: u64) -> Self {
         let letters = name.chars().take(LONGEST_NAME);
         let letters = letters.map(|letter| match letter {
@@ -54,11 +54,11 @@ impl Identity {
 pub(crate) struct Federation {
     pub(crate) identity: Identity,
     pub(crate) hosts: BTreeMap<HostId, Host>,
-    /// Names that several clients have, with the seats of these. The first keeps the name.
+    /// Names that several clients have, with their seats. The first client keeps the name.
     pub(crate) rivals: BTreeMap<String, BTreeMap<Rank, usize>>,
     pub(crate) news: VecDeque<String>,
     pub(crate) next_beat: Nanos,
-    /// What was said last of letters that cannot be read; it would come again with each of them.
+    /// The last complaint about letters that cannot be read, so that it is not repeated for each of them.
     pub(crate) complaint: String,
     streams: u64,
     requests: u32,
@@ -70,15 +70,15 @@ pub(crate) struct Federation {
 #[derive(Debug)]
 pub(crate) struct Host {
     pub(crate) link: Link,
-    /// The name of its computer; empty until it has said so, and while it is cut off.
+    /// The name of its computer; empty until the host has sent it, and while it is cut off.
     pub(crate) name: String,
-    /// Where it sits on the board, as the sink of what it wants.
+    /// The host's seat on the board, as the sink of the values that it wants.
     pub(crate) seat: usize,
     /// The seats of its clients, by the time of registration.
     pub(crate) clients: BTreeMap<u64, usize>,
     /// The connections of its clients' inputs.
     pub(crate) patch: Patch,
-    /// The outputs here that it wants, and the places on its seat that they go through.
+    /// The outputs here that the host wants, and the places on its seat that they go through.
     pub(crate) supplies: BTreeMap<Place, usize>,
     /// Places on its seat that are free, and how many there are.
     pub(crate) free: Vec<usize>,
@@ -87,11 +87,11 @@ pub(crate) struct Host {
     pub(crate) wants: BTreeMap<Place, u32>,
     pub(crate) wanted: HashMap<u32, Place>,
     next_want: u32,
-    /// What it was asked and has not answered.
+    /// Requests to the host that it has not answered.
     pub(crate) asked: BTreeMap<u32, Request>,
 }
 
-/// Connections to be made and to be cut by another dispatcher.
+/// Connections that another dispatcher is to make and to cut.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Request {
     pub(crate) connect: Vec<Joint>,
@@ -113,14 +113,14 @@ impl Federation {
         }
     }
 
-    /// Sends a letter to everyone.
+    /// Sends a letter to all hosts.
     pub(crate) fn tell_all(&mut self, mut body: impl FnMut() -> Body) {
         for host in self.hosts.values_mut() {
             host.link.send(body());
         }
     }
 
-    /// Begins a new stream of letters to a host; what was asked and not answered is asked again.
+    /// Begins a new stream of letters to a host; repeats requests that it has not answered.
     pub(crate) fn open(&mut self, now: Nanos, host: HostId, snapshot: Body) {
         self.streams += 1;
         let Some(host) = self.hosts.get_mut(&host) else {
@@ -186,9 +186,9 @@ impl Host {
         }
     }
 
-    /// Notes that an output is wanted; returns the number of that.
+    /// Notes that an output is wanted; returns the number of this want.
     pub(crate) fn want(&mut self, output: Place) -> u32 {
-        // A number that was used is long out of every letter when it comes again.
+        // By the time a number is reused, no letter contains it any more.
         while self.wanted.contains_key(&self.next_want) {
             self.next_want = (self.next_want + 1) % MOST_WANTS;
         }
@@ -199,7 +199,7 @@ impl Host {
         number
     }
 
-    /// Notes that an output is not wanted any more; whether it was.
+    /// Notes that an output is not wanted any more; returns whether it was.
     pub(crate) fn unwant(&mut self, output: Place) -> bool {
         let number = self.wants.remove(&output);
         number.is_some_and(|number| self.wanted.remove(&number).is_some())

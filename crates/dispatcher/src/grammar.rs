@@ -25,10 +25,10 @@ use tickbus_base::time::Nanos;
 /// The longest line, in bytes, with its end.
 pub const LONGEST_LINE: usize = 4096;
 
-/// The shortest time that a client can promise between two lines: threads and networks are late by some milliseconds.
+/// The shortest time that a client can promise between two lines: threads and networks are some milliseconds late.
 pub const LEAST_PROMISE: Nanos = Nanos::from_millis(10);
 
-/// The longest one: 60 s.
+/// The longest such time: 60 s.
 pub const LONGEST_PROMISE: Nanos = Nanos::from_secs(60);
 
 /// A line, read as far as its keyword says what it is.
@@ -36,11 +36,11 @@ pub const LONGEST_PROMISE: Nanos = Nanos::from_secs(60);
 pub enum Line<'a> {
     /// An empty line.
     Nothing,
-    /// Who the client is.
+    /// The client's identification.
     Identify(Identification<'a>),
     /// Values of its outputs.
     Values(Values<'a>),
-    /// Connections to be made.
+    /// Connections to make.
     Connect(Joints<'a>),
     /// Channels whose connections are to be cut.
     Disconnect(Channels<'a>),
@@ -52,20 +52,20 @@ pub enum Line<'a> {
     Bye,
 }
 
-/// What a client says of itself.
+/// A client's description of itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identification<'a> {
-    /// What it is.
+    /// The role.
     pub role: Role,
-    /// Its name.
+    /// The name.
     pub name: &'a str,
-    /// Its channels.
+    /// The channels.
     pub counts: Counts,
-    /// Whether it wants confirmations: version 2 and later.
+    /// True if the client wants confirmations: version 2 and later.
     pub is_version_2: bool,
-    /// Whether it wants to hear of an input that its source is lost: version 3.
+    /// True if the client wants to learn when an input loses its source: version 3.
     pub hears_losses: bool,
-    /// It promises a line at least this often.
+    /// The client promises a line at least this often.
     pub alive: Option<Nanos>,
 }
 
@@ -73,7 +73,7 @@ pub struct Identification<'a> {
 ///
 /// # Errors
 ///
-/// The line is not in the grammar. What the iterators of [`Line`] yield can be wrong as well.
+/// The line is not in the grammar. The items that the iterators of [`Line`] yield can be invalid as well.
 pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
     const VERBS: [&str; 6] = ["P", "CONNECT", "DISCONNECT", "LIST", "PING", "BYE"];
 
@@ -182,7 +182,7 @@ fn identification(role: Role, mut words: Words<'_>) -> Result<Identification<'_>
     })
 }
 
-/// How often a client promises a line.
+/// Reads the time within which a client promises a line.
 fn promise(text: &[u8]) -> Result<Nanos, Refusal> {
     let time = std::str::from_utf8(text).ok();
     let time = time.and_then(|text| text.parse::<Nanos>().ok());
@@ -199,7 +199,7 @@ fn promise(text: &[u8]) -> Result<Nanos, Refusal> {
 #[derive(Clone, Debug)]
 pub struct Values<'a> {
     words: Words<'a>,
-    /// Whether `?` may stand for the value of an input that has lost its source.
+    /// True if `?` may stand for the value of an input that has lost its source.
     may_be_lost: bool,
 }
 
@@ -211,7 +211,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// The values in a line from the dispatcher, behind its keyword.
+    /// The values in a line from the dispatcher, after its keyword.
     pub const fn delivered(text: &'a [u8]) -> Self {
         Self {
             words: Words(text),
@@ -243,7 +243,7 @@ impl Iterator for Values<'_> {
     }
 }
 
-/// One connection, as a client asks for it.
+/// One connection, as a client requests it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Joint<'a> {
     /// The channel of the client itself.
@@ -303,7 +303,7 @@ impl Iterator for Channels<'_> {
     }
 }
 
-/// What is left of a line.
+/// The rest of a line.
 #[derive(Clone, Copy, Debug)]
 struct Words<'a>(&'a [u8]);
 
@@ -389,7 +389,7 @@ impl<'a> Words<'a> {
     }
 }
 
-/// What a client sent, for an answer of one line.
+/// A client's text, shortened for an answer of one line.
 fn shown(bytes: &[u8]) -> String {
     const LONGEST: usize = 40;
 
@@ -398,7 +398,7 @@ fn shown(bytes: &[u8]) -> String {
     text + end
 }
 
-/// What somebody sent, with ? in place of what cannot be shown.
+/// A text with ? in place of all characters that cannot be printed.
 pub(crate) fn printable(bytes: &[u8]) -> String {
     let character = |byte: &u8| match byte {
         b' '..=b'~' => char::from(*byte),
@@ -420,8 +420,8 @@ pub(crate) struct QuickValue {
 /// How a line of values in its usual form begins.
 pub(crate) const QUICK: &[u8] = b"P ";
 
-/// Reads a value in its usual form from `at` on in a line of values, in one pass; its client has these `counts`. `None` if the
-/// line has to be looked at properly.
+/// Reads a value in its usual form at `at` in a line of values, in one pass; its client has these `counts`. `None` if
+/// the line needs the full parser.
 #[inline]
 pub(crate) fn quick_value(bytes: &[u8], mut at: usize, counts: Counts) -> Option<QuickValue> {
     let kind = match *bytes.get(at)? {

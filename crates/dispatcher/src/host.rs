@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// A dispatcher of a laboratory: a number that no other process has, and that ends with its process.
+/// A dispatcher of a laboratory: a number that no other process has, and that changes with each start.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -19,9 +19,9 @@ impl fmt::Display for HostId {
 /// The place of a client in the order of registration. No two clients of a laboratory have the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Rank {
-    /// When it registered, in nanoseconds, and later than every client that its dispatcher knew then; unique in one
-    /// dispatcher.
+    /// The time of registration in nanoseconds, but later than every client that the dispatcher knew then; unique in
+    /// one dispatcher.
     pub(crate) since: u64,
-    /// Its dispatcher.
+    /// The client's dispatcher.
     pub(crate) host: HostId,
 }

@@ -1,8 +1,8 @@
 //! The dispatcher of a virtual laboratory.
 //!
-//! Virtual controllers and virtual processes are clients of one server. Each says by a line of text how many inputs and
-//! outputs it has, asks for connections, and sends its values; the dispatcher passes them on along the patch.
-//! docs/dispatcher.md has the protocol, for users and for authors of clients.
+//! Virtual controllers and virtual processes are clients of one server. Each client announces its inputs and outputs in
+//! a line of text, requests connections, and sends its values; the dispatcher forwards them along the patch.
+//! docs/dispatcher.md describes the protocol, for users and for authors of clients.
 //!
 //! [`Dispatcher`] does no I/O; [`tcp`] puts it on a port. [`client::Client`] is the other end, without I/O as well.
 
@@ -28,7 +28,7 @@ pub mod tcp;
 mod trickle;
 mod volts;
 
-/// The TCP port on which a dispatcher listens, unless it is started with another one.
+/// The default TCP port of a dispatcher.
 pub const PORT: u16 = 20_070;
 
 pub use board::{ChannelState, ClientState, Connection, OnLoss, Snapshot, Traffic};

@@ -7,15 +7,15 @@ pub const LONGEST_NUMBER: usize = 23;
 
 /// A decimal number such as `-4.5`, without superfluous zeros: equal numbers have equal text.
 ///
-/// The dispatcher compares values and passes them on; it never computes. So a value stays the text that it is, and is
-/// neither rounded nor converted.
+/// The dispatcher compares values and forwards them; it never computes. So a value stays text, and is neither rounded
+/// nor converted.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Number {
     /// The text, zeros behind it, and in the last byte its length.
     bytes: [u8; LONGEST_NUMBER + 1],
 }
 
-/// By lengths: the bytes that count, of three words.
+/// By length: masks of the bytes that count, three words each.
 static MASKS: [[u64; 3]; LONGEST_NUMBER + 1] = {
     let mut masks = [[0; 3]; LONGEST_NUMBER + 1];
     let mut length = 0;
@@ -31,7 +31,7 @@ static MASKS: [[u64; 3]; LONGEST_NUMBER + 1] = {
 };
 
 impl Number {
-    /// No number: nothing was said yet.
+    /// No number: no value was sent yet.
     pub(crate) const UNKNOWN: Self = Self {
         bytes: [0; LONGEST_NUMBER + 1],
     };
@@ -44,7 +44,7 @@ impl Number {
         Self { bytes }
     };
 
-    /// What stands for a value when the source of an input is lost: `?`.
+    /// The sign for an input that has lost its source: `?`.
     pub const LOST: Self = {
         let mut bytes = [0; LONGEST_NUMBER + 1];
         bytes[0] = b'?';
@@ -52,8 +52,9 @@ impl Number {
         Self { bytes }
     };
 
-    /// Reads digits with a sign or none, a point somewhere or none, and an exponent or none, such as `-4.5`, `+3`, `.5` and `1e3`;
-    /// `None` for everything else, and for more than 23 characters that count. With an exponent the number is rounded to a double.
+    /// Reads digits with an optional sign, point and exponent, such as `-4.5`, `+3`, `.5` and `1e3`; `None` for
+    /// everything else, and for more than 23 significant characters. With an exponent the number is rounded to a
+    /// double.
     pub fn parse(text: &[u8]) -> Option<Self> {
         let (is_negative, digits) = match text {
             [b'-', rest @ ..] => (true, rest),
@@ -96,10 +97,11 @@ impl Number {
         Some(number)
     }
 
-    /// The number that a floating-point value shows: shorter by digits behind the point if they are too many. `None` for
-    /// what is not finite, and for what has more than 23 characters before the point.
+    /// The number that a floating-point value shows, with fewer digits after the point if there are too many. `None`
+    /// for infinities and NaN, and for more than 23 characters before the point.
     ///
-    /// Takes `f32` and `f64`, which are not shown alike.
+    ///
+    /// Takes `f32` and `f64`, which are displayed differently.
     pub fn of(value: impl fmt::Display) -> Option<Self> {
         /// As much of a text as may count.
         struct Text {
@@ -129,7 +131,7 @@ impl Number {
             has_point: false,
         };
         if fmt::write(&mut text, format_args!("{value}")).is_err() {
-            // The whole part may get longer by rounding.
+            // Rounding may make the whole part longer.
             let digits = LONGEST_NUMBER.checked_sub(text.whole + 2)?;
             text.length = 0;
             fmt::write(&mut text, format_args!("{value:.digits$}")).ok()?;
@@ -142,8 +144,8 @@ impl Number {
         self.as_str().parse().unwrap_or_default()
     }
 
-    /// Reads the number at the beginning of `bytes` if it has no superfluous zeros, which is the usual case, and something
-    /// stands behind it. Also returns its length.
+    /// Reads the number at the beginning of `bytes` if it has no superfluous zeros, which is the usual case, and
+    /// something follows it. Also returns its length.
     #[inline]
     pub(crate) fn quick(bytes: &[u8]) -> Option<(Self, usize)> {
         let start = usize::from(*bytes.first()? == b'-');
@@ -181,8 +183,8 @@ impl Number {
         Some((number, length))
     }
 
-    /// The first `length` of these bytes, at most 23. Three words under a mask take fewer instructions than a copy of any
-    /// length.
+    /// The first `length` of these bytes, at most 23. Masking three words takes fewer instructions than a copy of
+    /// variable length.
     fn of_first(bytes: &[u8; LONGEST_NUMBER + 1], length: usize) -> Self {
         let (words, _) = bytes.as_chunks::<8>();
         let mut number = Self::UNKNOWN;
@@ -214,14 +216,14 @@ impl Number {
         usize::from(self.bytes[LONGEST_NUMBER])
     }
 
-    /// The text, with other bytes behind it.
+    /// The text, followed by other bytes.
     pub(crate) const fn padded(&self) -> &[u8; LONGEST_NUMBER + 1] {
         &self.bytes
     }
 
-    /// The text.
+    /// The value as text.
     pub fn as_str(&self) -> &str {
-        // It consists of digits, a sign and a point.
+        // The text consists of digits, a sign and a point.
         std::str::from_utf8(&self.bytes[..self.len()]).unwrap_or_default()
     }
 }
@@ -341,7 +343,7 @@ mod tests {
                 proptest::prop_assert_eq!(length, text.len());
                 proptest::prop_assert_eq!(Some(number), thorough);
             } else if let Some(number) = thorough {
-                // Only what needs a clean-up is left to the thorough way.
+                // Only numbers that need a clean-up are left to the slow way.
                 proptest::prop_assert_ne!(number.as_str(), text);
             }
         }

@@ -1,4 +1,4 @@
-//! What a client has not read yet.
+//! The bytes and values that a client has not read yet.
 
 use std::fmt;
 
@@ -8,11 +8,11 @@ use crate::number::Number;
 /// The bytes of an outbox above which no further answers are made.
 const FULL: usize = 64 * 1024;
 
-/// The bytes of an outbox above which values wait in their channels. It is less than for answers: a client that only sends
-/// values and never reads is served all the same.
+/// The bytes of an outbox above which values wait in their channels. Below the limit for answers, so that a client that
+/// only sends values and never reads is still served.
 const JAMMED: usize = 32 * 1024;
 
-/// The bytes of an outbox below which lines are made of values that have waited.
+/// The bytes of an outbox below which waiting values are turned into lines.
 const ROOM: usize = 16 * 1024;
 
 /// The longest line of values that is made, in bytes, without its last value.
@@ -37,42 +37,42 @@ impl Label {
     }
 }
 
-/// A part of the device list that is still to be written.
+/// A part of the device list still to be written.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Listing {
     /// The last device written, by the order of registration.
     pub(crate) after: Option<Rank>,
-    /// Before the first device that came after the list was asked for.
+    /// The rank that ends the list: devices after it came after the request.
     pub(crate) end: Rank,
     /// Devices written.
     pub(crate) count: usize,
 }
 
-/// The bytes for a client that the system has not taken yet, and what waits behind them: at most the newest value of
-/// each input.
+/// The bytes that the system has not accepted for a client yet, and the data waiting after them: at most the newest
+/// value of each input.
 #[derive(Debug, Default)]
 pub(crate) struct Outbox {
     bytes: Vec<u8>,
     written: usize,
-    /// Inputs whose newest value waits, in the order in which they began to.
+    /// Inputs whose newest value waits, in the order in which the waiting began.
     pub(crate) waiting: Vec<usize>,
     pub(crate) listing: Option<Listing>,
-    /// There was a list in it, which is asked for rarely: its memory is not kept.
+    /// The outbox contained a device list. Lists are rare, so the memory is freed afterwards.
     pub(crate) is_swollen: bool,
-    /// The line received of which the last line of values was made, and where that begins.
+    /// The received line that caused the last line of values, and where that begins.
     line: u64,
     line_start: usize,
-    /// Whether it is in the list of those that have news.
+    /// True if the outbox is in the list of touched seats.
     pub(crate) is_touched: bool,
 }
 
 impl Outbox {
-    /// What is to be written.
+    /// The bytes to write.
     pub(crate) fn to_write(&self) -> &[u8] {
         &self.bytes[self.written..]
     }
 
-    /// The system has taken `count` bytes.
+    /// The system has accepted `count` bytes.
     pub(crate) fn wrote(&mut self, count: usize) {
         self.written += count;
         self.line = 0;
@@ -88,17 +88,17 @@ impl Outbox {
         }
     }
 
-    /// Whether no more answers are to be made for now.
+    /// True if no more answers may be made for now.
     pub(crate) fn is_full(&self) -> bool {
         self.to_write().len() >= FULL
     }
 
-    /// Whether lines of values may be made.
+    /// True if lines of values may be made.
     pub(crate) fn has_room(&self) -> bool {
         self.to_write().len() < ROOM
     }
 
-    /// Whether a value has to wait in its channel: behind others, behind a list, or because the client does not read.
+    /// True if a value has to wait in its channel: after others, after a list, or because the client does not read.
     pub(crate) fn is_jammed(&self) -> bool {
         !self.waiting.is_empty() || self.listing.is_some() || self.to_write().len() >= JAMMED
     }
@@ -110,8 +110,8 @@ impl Outbox {
         self.line = 0;
     }
 
-    /// Adds a value: to the last line, if that was made of the same line received. What a client sends together
-    /// arrives together.
+    /// Adds a value; to the last line, if the same received line caused that. Values that a client sends together thus
+    /// arrive together.
     #[inline]
     pub(crate) fn value(&mut self, line: u64, label: &Label, number: &Number) {
         let mut text = [0; 40];
@@ -125,7 +125,7 @@ impl Outbox {
             self.line_start = self.bytes.len();
             text[..2].copy_from_slice(b"P ");
         }
-        // Copies of fixed length take fewer instructions than those of any length.
+        // Copies of fixed length take fewer instructions than those of variable length.
         text[at..at + 8].copy_from_slice(&label.text);
         at += usize::from(label.length);
         text[at..at + 24].copy_from_slice(number.padded());

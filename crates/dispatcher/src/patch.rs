@@ -11,7 +11,7 @@ use crate::name::is_shown_name;
 pub struct Pin {
     /// The name of the client.
     pub client: String,
-    /// Its channel.
+    /// The channel.
     pub channel: Channel,
 }
 
@@ -29,7 +29,7 @@ impl Pin {
         is_shown_name(client).then(|| Self::new(client, channel))
     }
 
-    /// The first pin that a client of this name can have, in their order.
+    /// The first pin that a client of this name can have, in sort order.
     fn first(client: &str) -> Self {
         let kind = Kind::DigitalOutput;
         Self::new(client, Channel { kind, number: 0 })
@@ -42,8 +42,8 @@ impl fmt::Display for Pin {
     }
 }
 
-/// All connections: an input has one source, an output any number of sinks. They hold whether their clients are there
-/// or not.
+/// All connections: an input has one source, an output any number of sinks. Connections exist even while their clients
+/// are absent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Patch {
     sources: BTreeMap<Pin, Pin>,
@@ -57,14 +57,14 @@ impl Patch {
         Self::default()
     }
 
-    /// Connects an input to an output of the same sort, in place of what it was connected to.
+    /// Connects an input to an output of the same sort, in place of its former source.
     pub fn connect(&mut self, sink: Pin, source: Pin) {
         self.disconnect(&sink);
         self.sinks.insert((source.clone(), sink.clone()));
         self.sources.insert(sink, source);
     }
 
-    /// Cuts the connection of an input; returns what it was connected to.
+    /// Cuts the connection of an input; returns its former source.
     pub fn disconnect(&mut self, sink: &Pin) -> Option<Pin> {
         let source = self.sources.remove(sink)?;
         self.sinks.remove(&(source.clone(), sink.clone()));
@@ -94,7 +94,7 @@ impl Patch {
         self.sources.len()
     }
 
-    /// Whether nothing is connected.
+    /// True if there are no connections.
     pub fn is_empty(&self) -> bool {
         self.sources.is_empty()
     }
@@ -107,7 +107,7 @@ impl Patch {
         let from = (Pin::first(name), Pin::first(""));
         let others = self.sinks.range(from..);
         let others = others.take_while(|(source, _)| source.client == name);
-        // What joins the client with itself is among its own already.
+        // Connections of the client with itself are already among its own.
         let others = others.filter(|(_, sink)| sink.client != name);
         own.chain(others.map(|(source, sink)| (sink.clone(), source.clone())))
             .collect()

@@ -9,18 +9,18 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, load_text, read_text};
 
 use crate::patch::{Patch, Pin};
 
-/// What a file that was written here begins with.
+/// The heading of a file written here.
 const HEADING: &str = "\
 # The patch of a tickbus dispatcher, input = output. It is written anew with every CONNECT and DISCONNECT: edit it only
 # while the dispatcher does not run.
 [patch]
 ";
 
-/// A file with a patch. It is replaced as a whole: at every moment it has either the old patch or the new one.
+/// A file with a patch. The file is replaced as a whole: at every moment it has either the old patch or the new one.
 #[derive(Clone, Debug)]
 pub struct PatchFile {
     path: PathBuf,
-    /// Where the next one is written, in the same folder.
+    /// Where the next version is written, in the same folder.
     next: PathBuf,
 }
 
@@ -50,18 +50,18 @@ impl PatchFile {
         parse(&self.path.display().to_string(), &text)
     }
 
-    /// Replaces the file. When this returns, the patch survives a crash of the computer, too.
+    /// Replaces the file. On return the patch is safe, even if the computer crashes.
     ///
     /// # Errors
     ///
-    /// The file cannot be written. It then still has the old patch.
+    /// The file cannot be written, and still has the old patch.
     pub fn save(&self, patch: &Patch) -> io::Result<()> {
         let mut text = HEADING.to_owned();
         for (sink, source) in patch.iter() {
-            // Into a text, which takes everything.
+            // Writing to a String cannot fail.
             let _ = writeln!(text, "\"{sink}\" = \"{source}\"");
         }
-        // In a folder of several users the name may be another one's link, which is not followed.
+        // In a shared folder the name may be another user's link, which must not be followed.
         match fs::remove_file(&self.next) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}

@@ -1,14 +1,15 @@
-//! The way of letters to other dispatchers.
+//! The transport of letters to other dispatchers.
 
 use crate::host::HostId;
 
-/// A network that takes letters for other dispatchers. What arrives from them comes in through the [`Door`](crate::Door).
+/// A network that transports letters to other dispatchers. Letters from them arrive through the [`Door`](crate::Door).
 ///
-/// It is used in the dispatcher's thread and must not block.
+/// The dispatcher's thread calls the methods; they must not block.
 pub trait Post: Send {
-    /// Whether it takes a letter now. When it does again it wakes the loop, by an errand through the door.
+    /// True if the network accepts a letter now. When it becomes ready again, it wakes the loop by an errand through
+    /// the door.
     fn has_room(&self) -> bool;
 
-    /// Takes a letter. Letters to one dispatcher must not overtake each other; they may get lost.
+    /// Sends a letter. Letters to one dispatcher must not overtake each other; they may be lost.
     fn send(&mut self, to: HostId, letter: Vec<u8>);
 }

@@ -1,15 +1,15 @@
-//! What the dispatcher answers to a line that it does not carry out.
+//! The dispatcher's answers to lines that it does not carry out.
 
 use std::fmt;
 
-/// Why a line was refused, as the answer `ERR <code> <text>` says it. A line that is refused has changed nothing, except
+/// Why a line was refused, as the answer `ERR <code> <text>` reports it. A refused line has changed nothing, except
 /// with [`Code::Internal`]: then its change holds, but was not saved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("ERR {} {text}", code.number())]
 pub struct Refusal {
-    /// What kind of mistake it is.
+    /// The kind of mistake.
     pub code: Code,
-    /// What happened and what would be right, in one line.
+    /// The cause and the remedy, in one line.
     pub text: String,
 }
 
@@ -22,7 +22,7 @@ pub enum Code {
     IdentifyFirst,
     /// 404: there is no such client, channel or connection.
     NotFound,
-    /// 408: nothing was heard for too long; the connection is closed.
+    /// 408: no line came for too long; the connection is closed.
     TimeOut,
     /// 409: the name or the input is taken.
     Conflict,
@@ -32,7 +32,7 @@ pub enum Code {
     Mismatch,
     /// 429: more than the dispatcher serves.
     Limit,
-    /// 500: the dispatcher could not do its part.
+    /// 500: the dispatcher failed.
     Internal,
 }
 

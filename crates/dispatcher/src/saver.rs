@@ -9,12 +9,12 @@ use tickbus_base::time::Stop;
 use crate::patch::Patch;
 use crate::patch_file::PatchFile;
 
-/// Whether it was saved, or why not.
+/// The outcome of saving, with the reason for a failure.
 type Saved = Result<(), String>;
 
 /// The thread that saves, one patch at a time.
 pub(crate) struct Saver {
-    /// `None` when it is to end.
+    /// `None` when the thread is to end.
     patches: Option<SyncSender<Patch>>,
     outcomes: Receiver<Saved>,
     is_busy: bool,
@@ -22,11 +22,11 @@ pub(crate) struct Saver {
 }
 
 impl Saver {
-    /// Saves to this file; each outcome wakes who waits with `stop`.
+    /// Starts the thread. It saves to this file; each outcome wakes the thread that waits with `stop`.
     ///
     /// # Errors
     ///
-    /// The system has no thread.
+    /// The system could not start a thread.
     pub(crate) fn start(file: PatchFile, stop: Stop) -> io::Result<Self> {
         let (patches, to_save) = sync_channel::<Patch>(1);
         let (tell, outcomes) = sync_channel(1);
@@ -48,7 +48,7 @@ impl Saver {
         })
     }
 
-    /// Begins to save, unless it still saves.
+    /// Begins to save, unless the last save is still running; returns whether it did.
     pub(crate) fn save(&mut self, patch: &Patch) -> bool {
         if self.is_busy {
             return false;
@@ -58,7 +58,7 @@ impl Saver {
         self.is_busy
     }
 
-    /// What became of the patch that was handed over, once that is known; waits for it if asked to.
+    /// The outcome of the last save, once it is known. With `waits`, waits for it.
     pub(crate) fn outcome(&mut self, waits: bool) -> Option<Saved> {
         if !self.is_busy {
             return None;
@@ -77,7 +77,7 @@ impl Drop for Saver {
     fn drop(&mut self) {
         drop(self.patches.take());
         if let Some(thread) = self.thread.take() {
-            // A panic has been reported by itself.
+            // A panic has been reported already.
             let _ = thread.join();
         }
     }

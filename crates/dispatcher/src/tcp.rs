@@ -28,20 +28,20 @@ const ACCEPTS: usize = 64;
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 64 * 1024;
 
-/// How long no client is accepted after the system had no socket.
+/// The pause in accepting after the system had no free socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// How often peers are looked at that have not confirmed what was sent.
+/// How often to check for peers that have not confirmed sent bytes.
 const LOOK: Nanos = Nanos::from_secs(1);
 
 /// A computer that has confirmed nothing for this long is gone.
 const SILENCE: Nanos = Nanos::from_secs(3);
 
-/// How long the system keeps bytes that a client does not read. Not the dispatcher's limit: who is silent for 60 s is
-/// disconnected, and who only sends need not read.
+/// How long the system keeps bytes that a client does not read. This is not the dispatcher's limit: it disconnects
+/// clients that are silent for 60 s, and clients that only send need not read.
 const PATIENCE: Nanos = Nanos::from_secs(3600);
 
-/// A port that is listened on.
+/// A listening port.
 pub struct Listener {
     socket: TcpListener,
     address: SocketAddr,
@@ -56,17 +56,17 @@ impl fmt::Debug for Listener {
     }
 }
 
-/// What a dispatcher on a port works with.
+/// The environment of a dispatcher on a port.
 pub struct Hosting<'h> {
     /// The clock.
     pub clock: &'h dyn Clock,
-    /// Ends it.
+    /// Ends the dispatcher.
     pub stop: &'h Stop,
-    /// The way in for other threads, if there are any; made for the same `stop`.
+    /// The way in for other threads, if any; made for the same `stop`.
     pub door: Option<&'h Door>,
-    /// Where the patch survives, if anywhere.
+    /// The file that keeps the patch, if any.
     pub patch_file: Option<&'h PatchFile>,
-    /// Takes what an operator should know, a line each.
+    /// Takes news for an operator, one line each.
     pub news: &'h mut dyn FnMut(&str),
 }
 
@@ -80,11 +80,11 @@ impl Listener {
         Self::bind_in(address, None)
     }
 
-    /// As [`bind`](Self::bind), on the network of `simulation` if there is one.
+    /// Like [`bind`](Self::bind), on the network of `simulation` if there is one.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as for `bind`.
     pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
         let (socket, address) = bind(address, simulation)?;
         let post = None;
@@ -95,14 +95,14 @@ impl Listener {
         })
     }
 
-    /// Sends the letters of a dispatcher that is one of several to the others by this.
+    /// The transport of letters, for a dispatcher that is one of several.
     #[must_use]
     pub fn with_post(mut self, post: Box<dyn Post>) -> Self {
         self.post = Some(post);
         self
     }
 
-    /// The address that it listens on.
+    /// The address on which it listens.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
@@ -150,14 +150,14 @@ impl Listener {
 
 struct Connection {
     stream: TcpStream,
-    /// What the set waits for; `None` while it is not in the set, since nothing is wanted from it.
+    /// The events that the poll set waits for; `None` while the connection is not in the set.
     interest: Option<Interest>,
-    /// Something was written since all was confirmed.
+    /// Bytes were written since the peer last confirmed everything.
     is_unconfirmed: bool,
 }
 
 impl Connection {
-    /// Waits for something else from now on.
+    /// Waits for different events from now on.
     fn watch(
         &mut self,
         set: &mut PollSet,
@@ -168,7 +168,7 @@ impl Connection {
             (before, after) if before == after => return Ok(()),
             (Some(_), Some(interest)) => set.change(seat, &self.stream, interest)?,
             (None, Some(interest)) => set.add(seat, &self.stream, interest)?,
-            // Not merely without an interest: a connection that breaks would be reported all the same, again and again.
+            // Clearing the interest is not enough: the system would keep reporting a broken connection.
             (_, None) => set.remove(seat, &self.stream),
         }
         self.interest = wanted;
@@ -189,9 +189,9 @@ struct Host<'d, 'h> {
     ready: Vec<Ready>,
     accept_paused_until: Option<Nanos>,
     trickle: Trickle,
-    /// When peers are looked at that have not confirmed what was sent.
+    /// When to check next for peers that have not confirmed sent bytes.
     next_look: Nanos,
-    /// What saves the patch, if it survives anywhere; `unsaved` is why that failed last.
+    /// Saves the patch, if there is a file; `unsaved` is why saving failed last.
     saver: Option<Saver>,
     unsaved: Option<String>,
 }
@@ -249,7 +249,7 @@ impl Host<'_, '_> {
         Ok(())
     }
 
-    /// Everyone who has changed the patch waits for the disk, one write for all; values do not wait.
+    /// Saves the patch. All authors of changes wait for the disk, with one write for all; values do not wait.
     fn save(&mut self, waits: bool) {
         let Some(saver) = &mut self.saver else {
             if self.dispatcher.unsaved().is_some() {
@@ -281,17 +281,17 @@ impl Host<'_, '_> {
         }
     }
 
-    /// What has changed is saved before the end, and answered.
+    /// Saves and answers all changes before the end.
     fn save_the_rest(&mut self) {
         if self.saver.is_none() {
             return;
         }
-        // The one that is under way, and what has changed since.
+        // First the save that is under way, then the changes since.
         for _ in 0..3 {
             self.save(true);
         }
         while let Some(seat) = self.dispatcher.next_touched() {
-            // Nothing is waited for any more.
+            // The end does not wait for clients.
             let _ = self.write(seat);
         }
     }
@@ -323,8 +323,8 @@ impl Host<'_, '_> {
             return Ok(());
         };
         if !self.dispatcher.wants_bytes(seat) {
-            // It waits for an answer, which may come from another host. What it says meanwhile must not keep this thread
-            // awake. What ends its wait touches it, and `write` waits for it again.
+            // The client waits for an answer, perhaps from another host. Lines that arrive meanwhile must not keep this
+            // thread awake. The end of the wait touches the seat, and `write` then waits for bytes again.
             let wanted = match connection.interest {
                 Some(Interest::ReadWrite | Interest::Write) => Some(Interest::Write),
                 Some(Interest::Read) | None => None,
@@ -340,7 +340,7 @@ impl Host<'_, '_> {
         Ok(())
     }
 
-    /// Writes what the system takes, and closes if that was the last.
+    /// Writes as much as the system accepts, and closes after the last byte if asked to.
     fn write(&mut self, seat: usize) -> io::Result<()> {
         let Some(connection) = self.connections.get_mut(seat).and_then(Option::as_mut) else {
             return Ok(());
@@ -382,10 +382,10 @@ impl Host<'_, '_> {
         connection.watch(&mut self.set, seat, wanted)
     }
 
-    /// The connection of a seat is gone.
+    /// Removes a client whose connection is gone.
     fn drop_client(&mut self, seat: usize) {
         if let Some(mut connection) = self.connections[seat].take() {
-            // Without an interest nothing can fail.
+            // Clearing an interest cannot fail.
             let _ = connection.watch(&mut self.set, seat, None);
             self.dispatcher.gone(seat);
         }
@@ -415,14 +415,14 @@ impl Host<'_, '_> {
                     return Ok(());
                 }
             };
-            // If it broke at once, it will come again.
+            // A client whose connection broke at once will connect again.
             if prepare(stream.os(), PATIENCE).is_err() || watch_peer(stream.os()).is_err() {
                 continue;
             }
             let seat = match self.dispatcher.connected(now, peer) {
                 Ok(seat) => seat,
                 Err(refusal) => {
-                    // A new connection has room for a line; if it is gone already, that is as well.
+                    // A new connection has room for one line. If it is gone already, so is the line.
                     let _ = (&stream).write(format!("{refusal}\r\n").as_bytes());
                     close_gracefully(&stream);
                     continue;

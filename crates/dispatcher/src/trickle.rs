@@ -8,28 +8,28 @@ const QUICK: Nanos = Nanos::from_micros(100);
 /// A turn with fewer lines than this costs more than its lines do.
 const FEW: u64 = 8;
 
-/// So many such turns in succession are a stream. A burst of some lines is none, and is passed on without a pause.
+/// This many consecutive turns count as a stream. A shorter burst does not, and is forwarded at once.
 const STREAM: u32 = 16;
 
-/// Tells when a client writes each line by itself, so quickly that it would be interrupted for every few of them.
+/// Detects a client that writes lines one by one, so fast that it would be interrupted for every few of them.
 ///
-/// On a core that it shares with the dispatcher, each of its writes wakes the dispatcher, and the system soon prefers the one
-/// that has just slept: two switches and a turn for four lines or so. If the dispatcher lets it run on, it finds hundreds of
-/// lines at once, and both get more done. Whoever else says something at that moment waits as well, for as long as the system
-/// gives the core to others; below such rates nothing changes.
+/// If that client shares a core with the dispatcher, each write wakes the dispatcher, and the system soon prefers the
+/// thread that has just slept: two switches and a turn for four lines or so. If the dispatcher yields first, it finds
+/// hundreds of lines at once, and both get more done. Other clients that send at that moment also wait, for as long as
+/// the system gives the core to others. Below such rates nothing changes.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Trickle {
     /// When the last turn began.
     last: Nanos,
     /// Lines received before its end.
     lines: u64,
-    /// Quick turns with few lines since there was another one.
+    /// Quick turns with few lines since the last other turn.
     turns: u32,
 }
 
 impl Trickle {
-    /// A turn that began at `now` is over, and `lines` were received so far. Returns whether others that want this core should
-    /// have it first.
+    /// A turn that began at `now` is over, with `lines` received so far. Returns whether other threads should get this
+    /// core first.
     pub(crate) fn turn(&mut self, now: Nanos, lines: u64) -> bool {
         let is_quick = now - self.last < QUICK;
         let has_few = (1..FEW).contains(&(lines - self.lines));
@@ -48,7 +48,7 @@ impl Trickle {
 mod tests {
     use super::*;
 
-    /// The number of pauses in 100 turns, each `span` after the other and with so many lines.
+    /// The number of pauses in 100 turns that are `span` apart and have `lines` lines.
     fn pauses(span: Nanos, lines: impl Fn(u64) -> u64) -> usize {
         let mut trickle = Trickle::default();
         let (mut now, mut all) = (Nanos::from_secs(1), 0);

@@ -1,6 +1,6 @@
 //! Digital values as voltages of a 24 V input.
 
-/// What an output that is on says, in volts.
+/// The value of an output that is on, in volts.
 pub const ON_VOLTS: u8 = 24;
 
 /// Below this voltage a digital input is off.
@@ -9,7 +9,7 @@ const OFF_BELOW: f64 = 5.0;
 /// Above this voltage it is on.
 const ON_ABOVE: f64 = 8.0;
 
-/// What a voltage makes of a digital input: on, off, or, between 5 and 8 V, `None`: it stays as it is.
+/// The level of a digital input at a voltage: on, off, or, between 5 and 8 V, `None`: unchanged.
 pub fn level(volts: f64) -> Option<bool> {
     if volts > ON_ABOVE {
         Some(true)

@@ -36,7 +36,7 @@ impl Seated {
         }
     }
 
-    /// Exchanges what there is, and returns the events.
+    /// Exchanges all pending bytes, and returns the events.
     fn settle(&mut self, lab: &mut Lab) -> Result<Vec<String>, ClientError> {
         loop {
             self.client.turn(lab.now);
@@ -103,7 +103,7 @@ fn two_clients_exchange_values_and_find_each_other_in_any_order() {
         logo.settle(&mut lab).expect("taken"),
         ["I1 is lost", "AI2 is lost"]
     );
-    // It comes back: what sleeps wakes, and values are said anew.
+    // The client comes back: connections wake, and it sends its values again.
     pump.seat = lab.connect();
     pump.client.connected(lab.now);
     pump.settle(&mut lab).expect("taken");

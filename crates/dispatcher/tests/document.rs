@@ -1,4 +1,4 @@
-//! The sessions in docs/dispatcher.md are what is said and heard.
+//! Replays the sessions in docs/dispatcher.md.
 #![allow(missing_docs, reason = "tests")]
 
 mod common;

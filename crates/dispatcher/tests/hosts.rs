@@ -25,7 +25,7 @@ fn hosts() -> Hosts {
     Hosts::new(settings(OnLoss::FailSafe))
 }
 
-/// The time after which a host that is not heard is cut off.
+/// The time after which a silent host is cut off.
 const SILENCE: i64 = 6;
 
 fn refused(heard: &[String], code: u16) -> String {
@@ -118,7 +118,7 @@ fn an_output_is_connected_with_an_input_elsewhere_and_the_other_side_answers() {
     assert_eq!(hosts.patch(1), NOTHING);
     assert_eq!(hosts.patch(2), ["OTHER:I1 = PUMP:Q2"]);
     refused(&hosts.ask(0, pump, "DISCONNECT Q1"), 404);
-    // It sleeps, and is cut all the same.
+    // The connection sleeps; cutting it still works.
     hosts.labs[2].dispatcher.gone(other);
     hosts.settle();
     assert_eq!(hosts.ask(0, pump, "DISCONNECT Q2"), ["OK DISCONNECT"]);
@@ -131,7 +131,7 @@ fn when_one_host_refuses_the_others_undo_what_they_did() {
     let logo = hosts.join(1, "VR LOGO I01");
     let other = hosts.join(2, "VR OTHER Q01 I01");
     let pump = hosts.join(0, "VP PUMP Q02 I01 V=2");
-    // What is on its way is not known yet: the line passes here, and fails there.
+    // The letter on its way is not known here yet: the line passes here, and fails there.
     hosts.labs[2].say(other, "CONNECT I1:OTHER:Q1");
     let told = hosts.ask(0, pump, "CONNECT Q1:LOGO:I1 Q1:OTHER:I1 Q2:PUMP:I1");
     assert!(refused(&told, 409).contains("OTHER:I1 is connected to OTHER:Q1"));
@@ -140,7 +140,7 @@ fn when_one_host_refuses_the_others_undo_what_they_did() {
     assert_eq!(hosts.patch(2), ["OTHER:I1 = OTHER:Q1"]);
     hosts.ask(0, pump, "P Q1=3");
     assert_eq!(hosts.hear(1, logo), NOTHING);
-    // It leaves while the request is on its way.
+    // The client leaves while the request is on its way.
     hosts.labs[0].say(pump, "CONNECT Q1:LOGO:I1");
     hosts.labs[1].dispatcher.gone(logo);
     refused(&hosts.hear(0, pump), 404);
@@ -175,7 +175,7 @@ fn a_client_that_waits_for_a_host_that_is_cut_off_is_answered() {
     );
     assert_eq!(heard[1..], ["OK PING"]);
     refused(&hosts.ask(0, pump, "CONNECT Q1:LOGO:I1"), 404);
-    // A letter that was lost alone is asked for again.
+    // A single lost letter is requested again.
     hosts.heal();
     hosts.wait(2);
     hosts.to_lose = 1;
@@ -218,7 +218,7 @@ fn connections_sleep_while_a_host_is_cut_off_and_wake_with_the_value_of_now() {
                 "the dispatcher of alpha is here; its clients: 1",
             ]
         );
-        // One that ends is gone at once.
+        // A dispatcher that ends is gone at once.
         hosts.labs[1].dispatcher.host_vanished(id(0));
         assert_eq!(
             hosts.hear(1, logo).len(),
@@ -290,7 +290,7 @@ fn of_two_clients_with_one_name_the_first_keeps_it_and_the_other_gets_it_back() 
         .filter_map(|line| line.split(':').nth(1))
         .collect();
     assert_eq!(names, ["WATCH", "OWN", "PUMP", "PUMP@beta"]);
-    // Under its long name it takes part.
+    // The client takes part under its long name.
     assert_eq!(hosts.ask(2, watch, "CONNECT I2:PUMP@beta:Q1"), ["P I2=2"]);
     assert_eq!(
         hosts.ask(1, second, "CONNECT I1:PUMP:Q1"),
@@ -316,7 +316,7 @@ fn hosts_of_one_name_are_told_apart() {
     }
     hosts.wait(SILENCE);
     for host in 0..3 {
-        // The second and the third say that they are one computer.
+        // The second and the third dispatcher claim to be the same computer.
         let identity = tickbus_dispatcher::Identity::new(id(host), ["a", "b?", "b?"][host], 0);
         hosts.labs[host].dispatcher.federate(identity);
         hosts.join(host, "VP PUMP Q01");
@@ -376,7 +376,7 @@ fn an_operator_patches_clients_of_all_hosts_and_forces_those_of_one() {
     assert_eq!(hosts.hear(1, logo), ["P I1=7"]);
     hosts.ask(0, pump, "P Q1=4");
     assert_eq!(hosts.hear(1, logo), NOTHING);
-    // Who wants it only now gets what it is forced to.
+    // A new sink gets the forced value.
     let late = hosts.join(2, "VR LATE I01");
     assert_eq!(hosts.ask(2, late, "CONNECT I1:PUMP:Q1"), ["P I1=7"]);
     assert_eq!(order(&mut hosts, 0, Order::Release(pin("PUMP:Q1"))), Ok(()));
@@ -421,7 +421,7 @@ enum Step {
     Wait(i64),
 }
 
-/// Names of clients; each may be taken on every host while it is cut off.
+/// Names of clients; each can be in use on every host while that is cut off.
 const CLIENTS: [&str; 3] = ["A", "B", "C"];
 
 /// Clients are numbered: 3 names on each of 3 hosts.
@@ -444,7 +444,7 @@ fn step() -> impl Strategy<Value = Step> {
     ]
 }
 
-/// What a client has said and heard last.
+/// The last state that a client sent and received.
 #[derive(Default)]
 struct Client {
     host: usize,
@@ -511,7 +511,7 @@ impl Clients {
                 let Some(client) = self.0.get_mut(at) else {
                     return;
                 };
-                // A client that waits for an answer is not heard.
+                // A client that waits for an answer is not read.
                 if hosts.labs[client.host].dispatcher.wants_bytes(client.seat) {
                     let refused = hosts.labs[client.host].dispatcher.traffic().refused;
                     hosts.labs[client.host].say(client.seat, &line);
@@ -522,7 +522,7 @@ impl Clients {
             }
             Step::Connect(at, joints) => {
                 let joints = joints.iter().map(|(own, peer, channel)| {
-                    // Half of them from the output's side.
+                    // Half of the connections are requested from the output's side.
                     let (own_kind, kind) = if own % 2 == 0 { ("I", "Q") } else { ("Q", "I") };
                     format!(" {own_kind}{own}:{}:{kind}{channel}", CLIENTS[*peer])
                 });
@@ -581,7 +581,7 @@ proptest! {
         let mut boards = Vec::new();
         for host in 0..NAMES.len() {
             let seat = hosts.labs[host].connect();
-            // Version 1 is shown no hosts; the last line is the one who asks.
+            // Version 1 shows no hosts; the last line is the client that asks.
             let mut list = hosts.labs[host].ask(seat, &format!("VP WATCH{host} Q01"));
             list.pop();
             hosts.labs[host].dispatcher.gone(seat);
@@ -591,7 +591,7 @@ proptest! {
         prop_assert_eq!(&boards[0], &boards[2]);
         prop_assert_eq!(boards[0].len(), clients.0.len());
 
-        // By the port from which it connected.
+        // Identified by the port from which it connected.
         let mut by_name: BTreeMap<String, (&Client, Device)> = BTreeMap::new();
         for client in clients.0.values() {
             let line = boards[0].iter().find(|line| {
@@ -629,7 +629,7 @@ proptest! {
         hosts.labs[0].dispatcher.letter_arrived(now, &bytes);
         bytes.insert(0, 1);
         hosts.labs[0].dispatcher.letter_arrived(now, &bytes);
-        // A true one with a wrong byte.
+        // A valid letter with one wrong byte.
         hosts.labs[1].join("VR LOGO Q01 I01");
         while let Some((_, mut letter)) = hosts.labs[1].dispatcher.next_letter() {
             let at = usize::from(at) % letter.len();

@@ -11,7 +11,7 @@ use tickbus_dispatcher::{OnLoss, Patch, Settings};
 
 const NAMES: [&str; 3] = ["A", "B", "C"];
 const CHANNELS: [&str; 8] = ["Q1", "Q2", "I1", "I2", "AQ0", "AQ1", "AI0", "AI1"];
-/// What a client may have, and the same as an identification.
+/// The possible channels of a client, and the same as an identification.
 const SHAPES: [(&str, &[&str]); 2] = [
     ("Q02 I01", &["Q1", "Q2", "I1"]),
     (
@@ -51,7 +51,7 @@ struct Model {
     patch: BTreeMap<Pin, Pin>,
     values: BTreeMap<Pin, u8>,
     told: BTreeMap<Pin, u8>,
-    /// What has been sent since this was taken last, to whom.
+    /// Values sent since the last look, with their receivers.
     events: Vec<(Pin, u8)>,
 }
 

@@ -1,4 +1,4 @@
-//! What an operator does on the board, without sockets.
+//! An operator's orders on the board, without sockets.
 #![allow(missing_docs, reason = "tests")]
 
 mod common;
@@ -289,7 +289,7 @@ fn what_a_client_has_changed_is_saved_when_it_has_left() {
     lab.dispatcher.gone(logo);
     let saved = lab.dispatcher.unsaved().expect("it is not saved yet");
     assert_eq!(saved.len(), 1);
-    // Who sits there now gets no answer that is not his.
+    // The next client on that seat must not get the answer.
     let other = lab.connect();
     lab.dispatcher.saved(&Ok(()));
     assert_eq!(lab.hear(other), NOTHING);

@@ -1,4 +1,4 @@
-//! Clients that promise a line at least every so often, and do not keep that.
+//! Clients that promise a line at least every so often, and break that promise.
 #![allow(missing_docs, reason = "tests")]
 
 mod common;
@@ -68,7 +68,7 @@ fn a_client_that_breaks_its_promise_to_speak_is_lost_until_it_speaks() {
 
 #[test]
 fn after_a_silence_new_values_come_alone_and_no_pulse_is_swallowed() {
-    // As most write it, and as some do.
+    // The usual spelling, and a rare one.
     for line in ["P Q1=5", "p  q1 = 5"] {
         let mut lab = Lab::new();
         let logo = lab.join("VR LOGO I02 V=3");
@@ -192,14 +192,14 @@ fn a_client_that_breaks_its_promise_is_lost_on_other_hosts_too() {
     hosts.wait(3);
     assert_eq!(hosts.hear(1, logo), ["P I1=?"]);
     assert_eq!(hosts.hear(1, old), ["P I1=0"]);
-    // Who is connected meanwhile gets nothing.
+    // A client that connects meanwhile gets nothing.
     let late = hosts.join(2, "VR LATE I01 V=3");
     assert_eq!(hosts.ask(2, late, "CONNECT I1:PUMP:Q1"), ["OK CONNECT"]);
     hosts.ask(0, pump, "PING");
     assert_eq!(hosts.hear(1, logo), ["P I1=24"]);
     assert_eq!(hosts.hear(1, old), ["P I1=24"]);
     assert_eq!(hosts.hear(2, late), ["P I1=24"]);
-    // An operator's value is no client's promise.
+    // An operator's value does not count as a client's line.
     hosts.wait(3);
     let heard = (hosts.hear(1, logo), hosts.hear(2, late));
     assert_eq!(

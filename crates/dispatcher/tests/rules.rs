@@ -23,19 +23,19 @@ fn what_a_web_site_has_a_browser_send_is_refused_with_its_body() {
     for head in [
         "POST / HTTP/1.1\r\nHost: 127.0.0.1:20070\r\n\r\n".to_owned(),
         format!("GET /{} HTTP/1.1\r\n\r\n", "a".repeat(5000)),
-        // The hello of TLS, with a ticket that another server has given, as behind a name that suddenly means this computer.
+        // The TLS hello with a ticket of another server, as after a name that suddenly resolves to this computer.
         format!(
             "\x16\x03\x01\x01\x7c\x01\0\x01\x78\x03\x03{}\r\n",
             "a".repeat(200)
         ),
-        // One whose length is a line feed.
+        // A TLS hello whose length contains a line feed.
         format!(
             "\x16\x03\x01\x01\x0e\x01\0\x01\x0a\x03\x03{}\r\n",
             "a".repeat(200)
         ),
     ] {
         let request = format!("{head}VR EVIL Q01 I01\r\nCONNECT Q1:PUMP:I1\r\nP Q1=24\r\n");
-        // In the pieces of a slow network, too.
+        // Also in the pieces of a slow network.
         for size in [request.len(), 1000, 1] {
             refuses_browser(request.as_bytes().chunks(size));
         }
@@ -119,7 +119,7 @@ fn values_that_come_while_a_client_joins_have_not_waited_for_it() {
     lab.say(pump, "P Q1=1");
     lab.dispatcher.gone(logo);
     let logo = lab.connect();
-    // All of it before anything is written.
+    // All input is processed before anything is written.
     lab.say(logo, "VR LOGO I01 V=3");
     lab.say(pump, "P Q1=2");
     let heard = lab.hear(logo);
@@ -219,7 +219,7 @@ fn every_mistake_has_its_code_and_changes_nothing() {
             "{line}: {heard:?}"
         );
         assert!(lab.dispatcher.patch().is_empty(), "{line}");
-        // What goes on the wire in between is whole.
+        // Lines on the wire in between stay whole.
         assert_eq!(lab.hear(other), NOTHING);
     }
     lab.say(other, "CONNECT I1:LOGO:Q1 I2:LOGO:Q2");
@@ -341,7 +341,7 @@ fn connections_sleep_and_wake_by_name() {
         lab.ask(to, "VR TO I02").last().expect("the value"),
         "P I1=12"
     );
-    // It comes back without that output.
+    // The client comes back without that output.
     lab.dispatcher.gone(back);
     let small = lab.join("VP FROM AQ01");
     assert_eq!(lab.hear(to), ["P I1=0"]);
@@ -428,7 +428,7 @@ fn a_line_too_long_is_ignored_and_the_next_one_counts() {
     let values = "P Q1=1".to_owned() + &" Q1=1".repeat(1000);
     lab.say(logo, &values);
     refused(&lab.hear(logo), 413);
-    // Without an end, it is refused once, nothing is kept, and it is no sign of life.
+    // A line without an end is refused once, not stored, and no sign of life.
     for _ in 0..1000 {
         lab.send(logo, &[b'P'; 1000]);
     }
@@ -456,7 +456,7 @@ fn a_client_that_does_not_read_keeps_the_newest_value_per_channel_and_nobody_wai
         lab.say(from, &format!("P Q1={value} AQ1={}", -value));
         assert_eq!(lab.hear(quick), [format!("P I1={value}")]);
     }
-    // What it sends itself is served although it does not read.
+    // The client's own values are served although it does not read.
     lab.say(slow, "P Q1=5");
     assert_eq!(lab.hear(quick), ["P I2=5"]);
     assert!(lab.dispatcher.to_write(slow).len() < 40_000);
@@ -516,7 +516,7 @@ fn a_client_that_sends_lines_too_long_and_does_not_read_has_to_wait_itself() {
     }
     assert!(!lab.dispatcher.wants_bytes(seat));
     assert!(lab.dispatcher.to_write(seat).len() < 100_000);
-    // When it reads, each of them is answered, and it goes on.
+    // Once the client reads, each line is answered, and the client is served again.
     let heard = lab.hear(seat);
     assert_eq!(heard.len(), sent);
     assert!(lab.dispatcher.wants_bytes(seat));
@@ -590,7 +590,7 @@ fn who_asks_again_for_the_connections_that_it_has_is_answered_without_a_further_
         );
         lab.dispatcher.gone(logo);
     }
-    // What could not be saved is tried again.
+    // A failed save is retried.
     let logo = lab.join("VR LOGO I01 V=2");
     lab.say(logo, "DISCONNECT I1");
     lab.hear(logo);
@@ -620,7 +620,7 @@ fn values_and_further_changes_do_not_wait_for_the_disk() {
     let heard = lab.dispatcher.to_write(logo).to_vec();
     assert_eq!(String::from_utf8_lossy(&heard), "P I1=24 I2=24\r\n");
     lab.dispatcher.wrote(logo, heard.len());
-    // The change that came meanwhile is not in what was saved.
+    // The change that came meanwhile was not part of that save.
     assert_eq!(lab.dispatcher.unsaved().map(Patch::len), Some(3));
     lab.dispatcher.saved(&Ok(()));
     assert_eq!(lab.dispatcher.to_write(logo), b"OK CONNECT\r\nP I2=24\r\n");

@@ -20,7 +20,7 @@ use tickbus_dispatcher::{
 };
 use tickbus_fieldbus::tcp::Address;
 
-/// Runs `test` with a dispatcher on a free port; returns what went through.
+/// Runs `test` with a dispatcher on a free port; returns its traffic.
 fn serve(settings: Settings, test: impl FnOnce(SocketAddr)) -> Traffic {
     let listener = Listener::bind(&Address::local(0)).expect("a free port");
     let address = listener.address();
@@ -38,7 +38,7 @@ fn serve(settings: Settings, test: impl FnOnce(SocketAddr)) -> Traffic {
             listener.run(&mut dispatcher, hosting).expect("it serves");
             dispatcher.traffic()
         });
-        // The server is stopped even if the test fails; else its failure would never be told.
+        // Stop the server even if the test fails; otherwise the failure would never be reported.
         let outcome = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| test(address)));
         stop.stop();
         let traffic = served.join().expect("no panic");
@@ -60,7 +60,7 @@ impl Client {
         Self { stream, lines }
     }
 
-    /// A client that has joined by this line, and has read its list.
+    /// A client that has joined with this line, and has read the list.
     fn join(address: SocketAddr, identification: &str) -> Self {
         let mut client = Self::connect(address);
         client.say(&format!("{identification} V=2"));
@@ -114,7 +114,7 @@ fn clients_are_patched_together_over_sockets() {
     );
 }
 
-/// A way of letters that takes one at a time, to another loop in this process.
+/// A transport that takes one letter at a time, to another loop in this process.
 struct Pipe {
     own: Door,
     other: Door,
@@ -122,12 +122,12 @@ struct Pipe {
     cable: Arc<Cable>,
 }
 
-/// What becomes of the letters.
+/// The fate of the letters.
 #[derive(Default)]
 struct Cable {
-    /// They are lost.
+    /// Letters are lost.
     is_cut: AtomicBool,
-    /// How many were.
+    /// How many letters were lost.
     lost: AtomicUsize,
     /// How often a loop has asked whether there is room: once per turn, and once per letter.
     asked: AtomicUsize,
@@ -154,7 +154,7 @@ impl Post for Pipe {
     }
 }
 
-/// Runs `test` with two dispatchers that are joined by a cable, once each has told that the other is there.
+/// Runs `test` with two dispatchers that are joined by a cable, once each has reported the other.
 fn serve_two(test: impl FnOnce([SocketAddr; 2], &Cable)) {
     let stops = [Stop::new(), Stop::new()];
     let doors = [Door::new(&stops[0]), Door::new(&stops[1])];
@@ -227,17 +227,17 @@ fn a_client_that_waits_for_another_host_keeps_no_loop_awake_and_is_heard_again()
     serve_two(|[left, right], cable| {
         let mut other = Client::join(left, "VP OTHER Q01");
         let _logo = Client::join(right, "VR LOGO I01");
-        // A client of version 1 gets no answer, and is heard again all the same.
+        // A client of version 1 gets no answer, and is read again anyway.
         let mut pump = Client::connect(left);
         pump.say("VP PUMP Q01");
         while !other.list().contains("VR:LOGO:") {}
         cable.is_cut.store(true, Ordering::Relaxed);
         pump.say("CONNECT Q1:LOGO:I1");
-        // Who is answered came later: that line was read.
+        // The other client is answered after that line was read.
         assert_eq!(other.ask("PING"), "OK PING");
-        // While its answer is awaited, there is something to be read.
+        // While the answer is awaited, more bytes arrive.
         pump.say("PING");
-        // Signs of life come once a second. A loop that is kept awake has made thousands of turns by then.
+        // Signs of life come once a second. By then, a loop that is kept awake would have made thousands of turns.
         let lost = || cable.lost.load(Ordering::Relaxed);
         let (before, beats) = (cable.asked.load(Ordering::Relaxed), lost() + 3);
         while lost() < beats {
@@ -309,7 +309,7 @@ fn ten_thousand_connects_and_disconnects_leave_nothing() {
                 }
             }
         }
-        // The last one is gone when its name is free.
+        // The last client is gone when its name is free.
         while Client::connect(address)
             .ask("VP GOES9999 Q1")
             .starts_with("ERR 409")
@@ -334,12 +334,12 @@ fn nobody_waits_for_a_client_that_never_reads_nor_for_a_flood() {
             scope.spawn(move || {
                 let mut flood = flood;
                 while !is_over.is_stopped() {
-                    // It never reads what it gets for this, so the system takes no more at some time.
+                    // The client never reads the answers, so at some point the system accepts no more.
                     let _ = flood.write(&[b'\n', b'x'].repeat(10_000));
                     thread::yield_now();
                 }
             });
-            // More than systems keep for one connection; each answer is read before the next value is sent.
+            // More than systems buffer for one connection; each answer is read before the next value is sent.
             for block in 0..400 {
                 let line = |value| format!("P Q1={}{:017}\r\n", 1 + block * 1000 + value, 1);
                 let lines: String = (0..1000).map(line).collect();
@@ -438,7 +438,7 @@ fn other_threads_come_in_by_the_door_and_know_when_it_closes() {
     });
 }
 
-/// The argument and the variable that make this program a dispatcher of its own, with a file.
+/// The argument and the variable that turn this program into a separate dispatcher with a file.
 const CHILD: &str = "TICKBUS_TEST_PATCH_FILE";
 
 /// Not a test, but the process that is killed.
@@ -505,7 +505,7 @@ fn whenever_it_is_killed_the_patch_is_the_old_one_or_the_new_one_and_what_was_co
         let victim = Victim::start(&path);
         let mut from = Client::join(victim.1, "VP FROM Q02 I64");
         let mut confirmed = before.clone();
-        // Some changes that are confirmed, then one that may come too late, or in the middle.
+        // Some confirmed changes, then one that may come too late, or be interrupted.
         let turns = ["CONNECT", "DISCONNECT"];
         for turn in 0..round % 3 {
             let is_connected = confirmed.0 > 0;
@@ -534,7 +534,7 @@ fn whenever_it_is_killed_the_patch_is_the_old_one_or_the_new_one_and_what_was_co
     println!("{cut_short} of 40 changes came too late");
 }
 
-/// A line that connects 60 inputs, or cuts them all.
+/// A line that connects 60 inputs, or one that cuts them all.
 fn change(is_connected: bool) -> String {
     if is_connected {
         return "DISCONNECT Q1".to_owned();

@@ -37,7 +37,7 @@ struct Extent {
 struct Pairs {
     name: &'static str,
     streams: Vec<(TcpStream, TcpStream)>,
-    /// Makes what sends one value through a pair.
+    /// Makes the message that sends one value through a pair.
     message: fn(usize, usize) -> String,
 }
 
@@ -132,7 +132,7 @@ fn start(stop: &Stop) -> (SocketAddr, thread::JoinHandle<Traffic>) {
     (address, served)
 }
 
-/// A client of the dispatcher that has said something and heard a line that begins with `until`.
+/// A client of the dispatcher that has sent `words` and received a line that begins with `until`.
 fn client(address: SocketAddr, words: &str, until: &str) -> TcpStream {
     let mut stream = TcpStream::connect(address).expect("it listens");
     stream.set_nodelay(true).expect("a TCP option");
@@ -258,7 +258,7 @@ impl Pairs {
             }
             turn += 1;
         }
-        // The next span begins with another value than this one has ended with.
+        // The next span begins with a different value than the last one of this span.
         if turn % 2 == 1 {
             for ((sender, receiver), lines) in self.streams.iter_mut().zip(&lines) {
                 sender.write_all(lines[1].as_bytes()).expect("it reads");
@@ -332,7 +332,7 @@ fn resident() -> f64 {
 fn crowd(extent: &Extent, address: SocketAddr) {
     raise_open_files();
     let before = resident();
-    // In a process of its own: the limit of open files, and the memory that is measured, are then the server's.
+    // In a separate process: the limit of open files and the measured memory then belong to the server alone.
     let mut idle = Command::new(std::env::current_exe().expect("a path"))
         .args([IDLE, &address.to_string(), &extent.idle.to_string()])
         .stdin(Stdio::piped())

@@ -19,7 +19,7 @@ impl Mosquitto {
         let address = listener.local_addr().expect("it is bound");
         drop(listener);
         let mut settings = NamedTempFile::new().expect("a file");
-        // Without these limits it would lose messages, and be faster for it.
+        // Without these limits the broker would lose messages, and be faster for it.
         write!(
             settings,
             "listener {} 127.0.0.1\nallow_anonymous true\nset_tcp_nodelay true\nlog_type none\n\
@@ -50,7 +50,7 @@ impl Mosquitto {
         Some(broker)
     }
 
-    /// A client of this name, and what it hears of.
+    /// A client of this name, subscribed to `topic`.
     pub(crate) fn connect(&self, name: &str, topic: Option<&str>) -> TcpStream {
         let mut stream = TcpStream::connect(self.address).expect("it listens");
         stream.set_nodelay(true).expect("a TCP option");

@@ -31,7 +31,7 @@ impl Nats {
         Some(server)
     }
 
-    /// A client, after what it says of itself.
+    /// A client that introduces itself with `words`.
     pub(crate) fn connect(&self, words: &str) -> TcpStream {
         let mut stream = TcpStream::connect(self.1).expect("it listens");
         stream.set_nodelay(true).expect("a TCP option");

@@ -1,19 +1,19 @@
 //! Forced channels: an operator's value in place of the client's.
 //!
-//! A forced channel is taken out of the routes, and put back when it is released. So a value on its way costs nothing more
-//! because channels can be forced.
+//! A forced channel is taken out of the routes, and put back when it is released, so forcing costs nothing on the path
+//! of a value.
 
 use super::{Board, Place};
 use crate::number::Number;
 use crate::patch::Pin;
 
 impl Board {
-    /// What a channel is forced to.
+    /// The value that a channel is forced to.
     pub(crate) fn forced(&self, pin: &Pin) -> Option<Number> {
         self.forces.get(pin).copied()
     }
 
-    /// Holds a channel of a client that is here at a value: an input has it, or an output gives it to its inputs.
+    /// Forces a channel of a connected client to a value: an input receives it, and an output passes it to its inputs.
     pub(crate) fn force(&mut self, pin: Pin, value: Number) {
         let sinks = self.fed_by(&pin);
         if pin.channel.kind.is_output() {
@@ -38,7 +38,7 @@ impl Board {
         }
     }
 
-    /// The places on the seats of other dispatchers that want an output.
+    /// The places on the seats of other dispatchers that want this output.
     fn supplied(&self, from: Option<Place>) -> Vec<(Place, Place)> {
         let places = from.and_then(|from| Some((from, self.supplies.get(&from)?)));
         let places = places.into_iter();
@@ -61,7 +61,7 @@ impl Board {
         }
     }
 
-    /// Ends that; returns whether there was anything to end.
+    /// Releases a channel; returns whether it was forced.
     pub(crate) fn release(&mut self, pin: &Pin) -> bool {
         let was_forced = self.forces.remove(pin).is_some();
         if was_forced {
@@ -82,13 +82,13 @@ impl Board {
         was_forced
     }
 
-    /// Forgets what channels of a client that leaves were forced to.
+    /// Forgets the forced values of a client that leaves.
     pub(super) fn forget_forces(&mut self, client: &str) {
         self.forces.retain(|pin, _| pin.client != client);
     }
 
-    /// Sends an input the value that it is to have: its own forced one, or that of its source. Unless it is sent `again`,
-    /// only if it is another one. Returns whether there is such a value.
+    /// Sends an input its value: its own forced one, or that of its source. Unless `again`, only if the value differs.
+    /// Returns whether there is such a value.
     pub(super) fn deliver_wanted(&mut self, sink: &Pin, again: bool) -> bool {
         let source = self.patch.source(sink);
         let forced = self.forced(sink);
@@ -104,7 +104,7 @@ impl Board {
         true
     }
 
-    /// What the client of an output has said of it.
+    /// The value that the client of an output sent last.
     fn said(&self, source: &Pin) -> Option<Number> {
         let place = self.place(source)?;
         let plugged = self.seats[place.seat].plugged.as_ref()?;
@@ -115,7 +115,7 @@ impl Board {
         value.is_known().then_some(value)
     }
 
-    /// The inputs that get another value when this channel is forced: the sinks of an output, or the input itself.
+    /// The inputs whose value changes when this channel is forced: the sinks of an output, or the input itself.
     fn fed_by(&self, pin: &Pin) -> Vec<Pin> {
         if pin.channel.kind.is_output() {
             self.patch.sinks(pin).cloned().collect()
@@ -124,7 +124,7 @@ impl Board {
         }
     }
 
-    /// Sends an input the value that it is to have, if that is another one.
+    /// Sends an input its value if that differs from the last one.
     fn follow(&mut self, sink: &Pin) {
         if !self.deliver_wanted(sink, false) {
             self.lose(sink);

@@ -1,4 +1,4 @@
-//! Clients of other dispatchers on the board, and other dispatchers as takers of values.
+//! Clients of other dispatchers on the board, and other dispatchers as receivers of values.
 
 use crate::device::Device;
 use crate::host::Rank;
@@ -9,12 +9,12 @@ use crate::patch::Pin;
 use super::{Board, Change, Input, Place};
 
 impl Board {
-    /// From now on, keeps what other dispatchers may have to hear of.
+    /// Starts to record changes for other dispatchers.
     pub(crate) fn keep_changes(&mut self) {
         self.changes = Some(Vec::new());
     }
 
-    /// What has changed since this was asked for last.
+    /// Takes the changes since the last call.
     pub(crate) fn take_changes(&mut self) -> Vec<Change> {
         self.changes
             .as_mut()
@@ -22,17 +22,17 @@ impl Board {
             .unwrap_or_default()
     }
 
-    /// The name of the host of a client of another dispatcher.
+    /// The name of the host, for a client of another dispatcher.
     pub(crate) fn host(&self, seat: usize) -> Option<&str> {
         self.seats[seat].plugged.as_ref()?.host.as_deref()
     }
 
-    /// Where a client stands in the order of registration.
+    /// The client's rank in the order of registration.
     pub(crate) fn order(&self, seat: usize) -> Option<Rank> {
         Some(self.seats[seat].plugged.as_ref()?.order)
     }
 
-    /// The seat of the client at this place in the order of registration.
+    /// The seat of the client with this rank.
     pub(crate) fn seat_at(&self, order: Rank) -> Option<usize> {
         self.by_order.get(&order).copied()
     }
@@ -43,13 +43,13 @@ impl Board {
         all.filter(|seat| self.host(*seat).is_none())
     }
 
-    /// Puts a client of another dispatcher on a seat. It has no name on this board yet.
+    /// Puts a client of another dispatcher on a seat. The client has no name on this board yet.
     pub(crate) fn place_remote(&mut self, seat: usize, device: Device, order: Rank, host: &str) {
         self.place_device(seat, device, order, Some(host.into()));
     }
 
-    /// Gives clients free names in the place of those that they have. Connections of the old names sleep, those of the
-    /// new ones wake, with the values of now.
+    /// Renames clients; the new names must be free. Connections of the old names sleep. Those of the new names wake,
+    /// with the current values.
     pub(crate) fn rename(&mut self, renamed: Vec<(usize, String)>) {
         for (seat, _) in &renamed {
             let name = self.device(*seat).map(|device| device.name.clone());
@@ -67,22 +67,22 @@ impl Board {
         }
     }
 
-    /// Whether an output has sinks here.
+    /// True if an output has sinks here.
     pub(crate) fn is_wanted(&mut self, output: Place) -> bool {
         self.output(output)
             .is_some_and(|output| !output.sinks.is_empty())
     }
 
-    /// The value of an output is not known any more.
+    /// Marks the value of an output as unknown.
     pub(crate) fn forget(&mut self, output: Place) {
         if let Some(output) = self.output(output) {
             output.value = Number::UNKNOWN;
         }
     }
 
-    /// Sends another dispatcher the values of an output: the one of now, and those to come. They are marked by a number
-    /// below ten million. `to` is the seat of the dispatcher, with a place on it that is free, or the next. `None`: there
-    /// is no such output.
+    /// Sends another dispatcher the current value of an output and all later ones, marked by a number below ten
+    /// million. `to` is the dispatcher's seat, with a place on it that is free, or the next. Returns `None` if the
+    /// output does not exist.
     pub(crate) fn supply(&mut self, to: Place, number: u32, from: Place) -> Option<()> {
         self.output(from)?;
         let input = Input::new(Label::new(number));
@@ -96,7 +96,7 @@ impl Board {
         Some(())
     }
 
-    /// Sends another dispatcher the values of an output that it wants: unless that is forced, those to come, too.
+    /// Sends another dispatcher the value of an output that it wants, and later ones too unless the output is forced.
     pub(super) fn resume(&mut self, to: Place, from: Place) {
         if self.forced_at(from).is_none()
             && !self.is_silent(from.seat)
@@ -107,14 +107,14 @@ impl Board {
         self.supply_again(to, from);
     }
 
-    /// What an output is forced to.
+    /// The value that an output is forced to.
     pub(super) fn forced_at(&self, from: Place) -> Option<Number> {
         let device = self.device(from.seat).filter(|_| self.has_forces())?;
         let channel = device.counts.channels(true).nth(from.channel)?;
         self.forced(&Pin::new(&device.name, channel))
     }
 
-    /// Sends another dispatcher the value of an output once more.
+    /// Resends another dispatcher the value of an output.
     pub(crate) fn supply_again(&mut self, to: Place, from: Place) {
         let said = if self.is_silent(from.seat) {
             Some(Number::LOST)
@@ -127,7 +127,7 @@ impl Board {
         }
     }
 
-    /// Ends what [`supply`](Self::supply) began. The output need not be there any more.
+    /// Ends what [`supply`](Self::supply) began. The output may be gone already.
     pub(crate) fn end_supply(&mut self, to: Place, from: Place) {
         if let Some(output) = self.output(from) {
             output.sinks.retain(|other| *other != to);

@@ -5,7 +5,7 @@ use super::{Board, Place};
 use crate::patch::Pin;
 
 impl Board {
-    /// Whether the client on a seat has exceeded its `ALIVE` time.
+    /// True if the client on a seat has exceeded its `ALIVE` time.
     pub(super) fn is_silent(&self, seat: usize) -> bool {
         let plugged = self.seats[seat].plugged.as_ref();
         plugged.is_some_and(|plugged| plugged.is_silent)
@@ -54,7 +54,8 @@ impl Board {
         }
     }
 
-    /// Sets the mark of a client, and returns the connections from its outputs, except outputs that an operator has forced.
+    /// Marks a client as silent or not, and returns the connections from its outputs, except outputs that an operator
+    /// has forced.
     fn set_silent(&mut self, seat: usize, is_silent: bool) -> Vec<(Pin, Pin)> {
         let Some(plugged) = &mut self.seats[seat].plugged else {
             return Vec::new();
@@ -67,7 +68,8 @@ impl Board {
             .collect()
     }
 
-    /// Which outputs of a client go to other dispatchers, each with its place on the other's seat, except forced outputs.
+    /// The outputs of a client that go to other dispatchers, each with its place on the other's seat; without forced
+    /// outputs.
     fn all_supplied(&self, seat: usize) -> Vec<(Place, Place)> {
         let of_client = self.supplies.range(
             Place { seat, channel: 0 }..=Place {
@@ -81,7 +83,7 @@ impl Board {
             .collect()
     }
 
-    /// An output by its names.
+    /// The pin of an output.
     fn pin(&self, output: Place) -> Option<Pin> {
         let device = self.device(output.seat)?;
         let channel = device.counts.channels(true).nth(output.channel)?;

@@ -1,4 +1,4 @@
-//! The board at one moment, for those who look at it.
+//! The state of the board at one moment, for viewers.
 
 use super::{Board, Traffic};
 use crate::channel::Channel;
@@ -9,35 +9,35 @@ use crate::patch::{Patch, Pin};
 /// Everything on the board at one moment.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Snapshot {
-    /// The clients, in the order in which they came.
+    /// The clients, in the order of their registration.
     pub clients: Vec<ClientState>,
     /// All connections, those of each dispatcher in the order of their sinks.
     pub connections: Vec<Connection>,
-    /// What went through so far.
+    /// The traffic so far.
     pub traffic: Traffic,
 }
 
 /// A client and its channels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ClientState {
-    /// Who it is.
+    /// The client's identification.
     pub device: Device,
-    /// The name of its host, if it is a client of another dispatcher. Then its inputs have no values here, and of its
-    /// outputs those that are connected here.
+    /// The name of the host, for a client of another dispatcher. Such a client has no input values here, and values
+    /// only of connected outputs.
     pub host: Option<String>,
-    /// Its outputs, then its inputs. Analog channels from 0 to N, as the dispatcher accepts them.
+    /// The outputs, then the inputs. Analog channels run from 0 to N, as the dispatcher accepts them.
     pub channels: Vec<ChannelState>,
 }
 
 /// A channel and its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChannelState {
-    /// Which one.
+    /// The channel.
     pub channel: Channel,
     /// The last value that the client sent for its output, or was sent for its input. `None` if there was no value yet, if the
     /// client has exceeded its `ALIVE` time, or if the input has lost its source.
     pub value: Option<Number>,
-    /// What an operator holds it at.
+    /// The value that an operator forces the channel to.
     pub forced: Option<Number>,
 }
 
@@ -48,7 +48,7 @@ pub struct Connection {
     pub sink: Pin,
     /// The output.
     pub source: Pin,
-    /// Whether both channels are there. If not, it waits for them.
+    /// True if both channels are present; otherwise the connection sleeps until they are.
     pub is_awake: bool,
 }
 

@@ -19,7 +19,7 @@ pub(super) enum Heard<'a> {
 ///
 /// # Errors
 ///
-/// No dispatcher says that.
+/// No dispatcher sends such a line.
 pub(super) fn read(line: &[u8]) -> Result<Heard<'_>, ClientError> {
     let (keyword, rest) = match line.iter().position(|byte| *byte == b' ') {
         Some(at) => (&line[..at], &line[at + 1..]),
@@ -49,7 +49,7 @@ pub(super) fn read(line: &[u8]) -> Result<Heard<'_>, ClientError> {
     Err(nonsense(line, "no dispatcher says that"))
 }
 
-/// The error about a line.
+/// The error for a line that makes no sense.
 pub(super) fn nonsense(line: &[u8], why: &str) -> ClientError {
     ClientError::Protocol(format!(
         "the line \"{}\" came, but {why}; see whether a dispatcher listens there",
@@ -57,7 +57,7 @@ pub(super) fn nonsense(line: &[u8], why: &str) -> ClientError {
     ))
 }
 
-/// Lines out of bytes that come in any pieces.
+/// Splits bytes that arrive in any pieces into lines.
 #[derive(Debug, Default)]
 pub(super) struct Lines {
     begun: Vec<u8>,
@@ -74,11 +74,11 @@ impl Lines {
         self.begun.clear();
     }
 
-    /// Hands on each line that `bytes` complete, without its end.
+    /// Passes each line that `bytes` complete to `take`, without its end.
     ///
     /// # Errors
     ///
-    /// A line is too long, or `take` does not want to go on.
+    /// A line is too long, or `take` fails.
     pub(super) fn each(
         &mut self,
         mut bytes: &[u8],

@@ -16,26 +16,26 @@ use crate::refusal::Code;
 use lines::{Heard, Lines};
 use outputs::Outputs;
 
-/// How often a client says or asks something, if it has nothing else to say: well within the 60 s after which a
-/// dispatcher disconnects.
+/// How often an otherwise quiet client sends or requests something: well within the 60 s after which a dispatcher
+/// disconnects.
 pub const KEEP_ALIVE: Nanos = Nanos::from_secs(20);
 
-/// A dispatcher that has not answered, or not read, for this long is given up.
+/// The client gives up a dispatcher that has not answered, or not read, for this long.
 pub const PATIENCE: Nanos = Nanos::from_secs(10);
 
-/// A connection that was refused is asked for again after this time: its other client may have come.
+/// The client retries a refused connection after this time: the other client may have come.
 pub const ASK_AGAIN: Nanos = Nanos::from_secs(5);
 
-/// What a client says of itself.
+/// A client's description of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Profile {
-    /// What it is.
+    /// The role.
     pub role: Role,
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// Its channels. It counts all of them from 1.
+    /// The channels. All kinds count from 1.
     pub counts: Counts,
-    /// The connections that it asks for.
+    /// The connections that the client requests.
     pub cables: Vec<Cable>,
     /// The client sends a line at least this often, 10 ms to 60 s; the dispatcher cuts its outputs off while it does not. `None`:
     /// the dispatcher does not supervise it.
@@ -43,7 +43,7 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Checks that a dispatcher can take it.
+    /// Checks that a dispatcher can accept this profile.
     ///
     /// # Errors
     ///
@@ -70,43 +70,44 @@ impl Profile {
     }
 }
 
-/// What a client hears.
+/// An event that a client reports.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// The dispatcher has taken it. The list of devices follows.
+    /// The dispatcher has accepted the client. The device list follows.
     Identified,
     /// The value of an input.
     Value(Channel, Number),
     /// The source of an input is gone, or was disconnected: it has no value until there is a source again.
     Lost(Channel),
-    /// The end of a line of values: what was said together before belongs together.
+    /// The end of a line of values: all values since the last such event belong together.
     LineEnd,
-    /// A device of the list; itself, too.
+    /// A device of the list; the client itself, too.
     Device(Device),
     /// The end of the list.
     ListEnd,
-    /// Every connection was asked for once, and the values that the inputs have at first have arrived.
+    /// Every connection was requested once, and the first values of the inputs have arrived.
     Settled,
-    /// A connection is there.
+    /// A connection was made.
     Connected(&'a Cable),
-    /// The dispatcher refused this connection; it is asked for again. Or, without one, another line.
+    /// The dispatcher refused this connection, and the client will retry. Without a connection: it refused another
+    /// line.
     Refused {
         /// The connection.
         cable: Option<&'a Cable>,
         /// The number of the refusal, such as 404.
         code: u16,
-        /// Its text.
+        /// The text of the refusal.
         text: String,
     },
 }
 
-/// Why a connection with a dispatcher cannot go on.
+/// Why a connection with a dispatcher cannot continue.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ClientError {
-    /// The dispatcher does not take this client. It may do so later: names become free.
+    /// The dispatcher does not accept this client. It may do so later, as names become free.
     #[error("{0}")]
     Refused(String),
-    /// The dispatcher says something that it should not.
+    /// The dispatcher sent something invalid.
     #[error("{0}")]
     Protocol(String),
     /// The dispatcher neither answers nor reads.
@@ -114,17 +115,18 @@ pub enum ClientError {
     Silent(String),
 }
 
-/// A client, from one connection to the next: it keeps the values of its outputs, and says them anew.
+/// A client across connections: it keeps the values of its outputs, and resends them after a reconnect.
 ///
-/// After [`connected`](Self::connected) the owner of the socket calls [`hear`](Self::hear) with what arrives,
-/// [`turn`](Self::turn) at [`deadline`](Self::deadline) and after all else, writes [`to_write`](Self::to_write) and reports
-/// that by [`wrote`](Self::wrote), and asks [`check`](Self::check) last whether the connection may go on.
+/// After [`connected`](Self::connected) the owner of the socket calls [`hear`](Self::hear) with the bytes that arrive,
+/// and [`turn`](Self::turn) at [`deadline`](Self::deadline) and after every other call. It writes
+/// [`to_write`](Self::to_write) and reports that by [`wrote`](Self::wrote). Last it asks [`check`](Self::check) whether
+/// the connection may continue.
 #[derive(Debug)]
 pub struct Client {
     profile: Profile,
     keep_alive: Nanos,
     progress: Progress,
-    /// What is to be done about each of the cables.
+    /// The state of each cable's request.
     wishes: Box<[Wish]>,
     outputs: Outputs,
     lines: Lines,
@@ -132,11 +134,11 @@ pub struct Client {
     written: usize,
     wants_list: bool,
     is_settled: bool,
-    /// When it has last made bytes, or all of them were written.
+    /// When the client last made bytes, or all of them were written.
     said: Nanos,
-    /// When it has last asked for an answer.
+    /// When the client last requested an answer.
     asked: Nanos,
-    /// When the last complete line came, or the connection.
+    /// When the last complete line came, or the connection was made.
     heard: Nanos,
 }
 
@@ -145,9 +147,9 @@ pub struct Client {
 enum Progress {
     Apart,
     Connected,
-    /// Taken by the dispatcher, and between two requests.
+    /// Accepted by the dispatcher, and between two requests.
     Idle,
-    /// This request waits for its answer, and others for it: so each answer belongs to one.
+    /// Awaiting the answer to this request. Others wait meanwhile, so each answer belongs to one request.
     Asking(Request),
 }
 
@@ -162,17 +164,17 @@ enum Request {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wish {
     Granted,
-    /// To be asked for at this time.
+    /// To be requested at this time.
     At(Nanos),
 }
 
 impl Client {
-    /// A client that is not connected. It says something, if only `PING`, whenever nothing was said or heard for
+    /// A client that is not connected. It sends something, if only `PING`, whenever nothing was sent or received for
     /// `keep_alive`: [`KEEP_ALIVE`], or shorter to notice a lost dispatcher earlier.
     ///
     /// # Errors
     ///
-    /// No dispatcher can take this profile.
+    /// No dispatcher can accept this profile.
     pub fn new(profile: Profile, keep_alive: Nanos) -> Result<Self, Mistake> {
         profile.check()?;
         let outputs = Outputs::new(profile.counts);
@@ -193,12 +195,12 @@ impl Client {
         })
     }
 
-    /// What it says of itself.
+    /// The client's description of itself.
     pub const fn profile(&self) -> &Profile {
         &self.profile
     }
 
-    /// A connection was established: all is said anew.
+    /// A connection was established: the client sends everything again.
     pub fn connected(&mut self, now: Nanos) {
         self.progress = Progress::Connected;
         self.wishes.fill(Wish::At(now));
@@ -212,7 +214,7 @@ impl Client {
         self.heard = now;
     }
 
-    /// Whether the dispatcher has taken this client.
+    /// True if the dispatcher has accepted this client.
     pub fn is_identified(&self) -> bool {
         !matches!(
             self.progress,
@@ -220,13 +222,13 @@ impl Client {
         )
     }
 
-    /// When the dispatcher was last heard, or the connection established.
+    /// When the dispatcher last sent a line, or the connection was established.
     pub const fn heard(&self) -> Nanos {
         self.heard
     }
 
-    /// Sets an output. It is said if that differs from what was said last; of several values between two writes, the
-    /// newest.
+    /// Sets an output. The client sends the value if it differs from the last one sent; of several values between two
+    /// writes, only the newest.
     ///
     /// # Panics
     ///
@@ -235,12 +237,12 @@ impl Client {
         self.outputs.set(channel, value);
     }
 
-    /// Whether everything that was set has been written.
+    /// True if all values that were set have been written.
     pub fn is_all_written(&self) -> bool {
         self.is_identified() && !self.outputs.has_news() && self.to_write().is_empty()
     }
 
-    /// Asks for the list of devices.
+    /// Requests the device list.
     pub fn ask_list(&mut self) {
         self.wants_list = true;
     }
@@ -249,7 +251,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// The connection cannot go on.
+    /// The connection cannot continue.
     pub fn hear(
         &mut self,
         now: Nanos,
@@ -378,7 +380,7 @@ impl Client {
         Ok(())
     }
 
-    /// Makes what is to be said at `now`.
+    /// Makes the bytes that are due at `now`.
     pub fn turn(&mut self, now: Nanos) {
         // While the system has not taken everything, newer values replace those that wait.
         if !self.to_write().is_empty() {
@@ -469,7 +471,7 @@ impl Client {
     ///
     /// # Errors
     ///
-    /// It does not.
+    /// The dispatcher neither answers nor reads.
     pub fn check(&self, now: Nanos) -> Result<(), ClientError> {
         if now < self.given_up() {
             return Ok(());
@@ -485,7 +487,7 @@ impl Client {
     }
 
     fn given_up(&self) -> Nanos {
-        // Values that it says meanwhile are no answer.
+        // Values that arrive meanwhile are no answer.
         let asked = matches!(self.progress, Progress::Asking(_)).then_some(self.asked);
         let unwritten = (!self.to_write().is_empty()).then_some(self.said);
         let since = asked.into_iter().chain(unwritten).min();

@@ -1,4 +1,4 @@
-//! The outputs of a client: what was set, and what of it is still to be said.
+//! The outputs of a client: the values that were set, and those still to be sent.
 
 use crate::channel::{Channel, Counts};
 use crate::number::{LONGEST_NUMBER, Number};
@@ -15,7 +15,7 @@ pub(super) struct Outputs {
 
 #[derive(Debug)]
 struct Output {
-    /// Behind a blank: ` Q1=`.
+    /// With a leading blank: ` Q1=`.
     label: Box<str>,
     value: Number,
     is_new: bool,
@@ -60,7 +60,7 @@ impl Outputs {
         }
     }
 
-    /// All that is known is to be said again.
+    /// Marks all known values for resending.
     pub(super) fn repeat(&mut self) {
         for output in &mut self.all {
             output.is_new = output.value.is_known();
@@ -72,7 +72,7 @@ impl Outputs {
         self.has_news
     }
 
-    /// Writes lines of what is to be said.
+    /// Writes lines of all values that are due.
     pub(super) fn write(&mut self, out: &mut Vec<u8>) {
         let mut start = None;
         for output in &mut self.all {

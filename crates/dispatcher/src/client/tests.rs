@@ -1,6 +1,6 @@
 use super::*;
 
-/// A client with a clock, and what it has heard.
+/// A client with a clock, and the events that it reported.
 struct Bench {
     client: Client,
     now: Nanos,
@@ -24,7 +24,7 @@ impl Bench {
         Self { client, now }
     }
 
-    /// A client that was taken.
+    /// A client that the dispatcher has accepted.
     fn taken(cables: &[&str]) -> Self {
         let mut bench = Self::new(cables);
         assert_eq!(
@@ -39,7 +39,7 @@ impl Bench {
         bench
     }
 
-    /// All was asked for; the first values have come.
+    /// Everything was requested; the first values have come.
     fn settles(&mut self) {
         assert_eq!(self.says(), "PING\r\n");
         assert_eq!(self.hears("OK PING\r\n").expect("right"), ["settled"]);

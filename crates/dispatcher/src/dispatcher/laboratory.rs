@@ -16,11 +16,11 @@ use crate::patch::Patch;
 use super::Dispatcher;
 
 impl Dispatcher {
-    /// Makes it one of several dispatchers of a laboratory. Letters to the others come from
-    /// [`next_letter`](Self::next_letter), news for an operator from [`next_news`](Self::next_news); ask for both when
-    /// clients have been worked on.
+    /// Makes this dispatcher one of several in a laboratory. Letters to the others come from
+    /// [`next_letter`](Self::next_letter), news for an operator from [`next_news`](Self::next_news); ask for both after
+    /// working on clients.
     ///
-    /// Letters may be lost, if those that arrive from one dispatcher are in their order.
+    /// Letters may be lost, but those from one dispatcher must arrive in their order.
     pub fn federate(&mut self, identity: Identity) {
         self.board.keep_changes();
         self.federation = Some(Box::new(Federation::new(identity)));
@@ -68,7 +68,7 @@ impl Dispatcher {
         Some((host, letter.to_bytes()))
     }
 
-    /// Something that an operator should know, a line.
+    /// The next news for an operator, one line.
     pub fn next_news(&mut self) -> Option<String> {
         self.federation.as_mut()?.news.pop_front()
     }
@@ -110,7 +110,7 @@ impl Dispatcher {
         self.settle();
     }
 
-    /// Gives signs of life, and cuts off who gives none.
+    /// Sends signs of life, and cuts off dispatchers that send none.
     pub(super) fn beat(&mut self, now: Nanos) {
         let Some(federation) = &mut self.federation else {
             return;
@@ -141,7 +141,7 @@ impl Dispatcher {
         federation.map_or(Nanos::MAX, |federation| federation.next_beat)
     }
 
-    /// The time of day, as nanoseconds.
+    /// The next rank; based on the time of day in nanoseconds.
     pub(super) fn next_order(&mut self, now: Nanos) -> Rank {
         let identity = self.federation.as_ref().map(|it| &it.identity);
         let host = identity.map(|it| it.host).unwrap_or_default();
@@ -155,7 +155,7 @@ impl Dispatcher {
         self.federation.as_mut()?.hosts.get_mut(&id)
     }
 
-    /// Tells the other dispatchers what has changed here.
+    /// Sends the changes of this board to the other dispatchers.
     pub(super) fn settle(&mut self) {
         loop {
             let changes = self.board.take_changes();
@@ -230,17 +230,17 @@ impl Dispatcher {
                 since,
                 output: place,
             });
-            // What it is worth will not be heard any more.
+            // No further value of this output will arrive.
             self.board.forget(output);
         }
     }
 
-    /// Tells a host everything from the beginning.
+    /// Sends a host the complete state.
     fn open_stream(&mut self, now: Nanos, id: HostId) {
         let own = self.board.own_clients().filter_map(|seat| {
             let (order, device) = (self.board.order(seat)?, self.board.device(seat)?);
             let mut device = device.clone();
-            // The name that it has taken itself, whatever it is shown by.
+            // The name that the client has chosen, not the one that it is shown by.
             let name = device.name.split_once('@').map(|(name, _)| name.to_owned());
             device.name = name.unwrap_or(device.name);
             Some(Client::new(order.since, &device))
@@ -284,7 +284,7 @@ impl Dispatcher {
         host.link.beat();
     }
 
-    /// Works on a letter that came in its turn.
+    /// Processes a letter that came in order.
     fn read(&mut self, id: HostId, body: Body) {
         match body {
             Body::Beat { .. } => {}
@@ -353,7 +353,7 @@ impl Dispatcher {
         for (sink, source) in patch.iter().filter_map(joint) {
             host.patch.connect(sink, source);
         }
-        // It says again what it wants.
+        // The host sends its wants again.
         let supplies: Vec<_> = host.supplies.keys().copied().collect();
         for output in supplies {
             end_supply(&mut self.board, host, output);
@@ -370,7 +370,7 @@ impl Dispatcher {
         }
     }
 
-    /// There is a client at another dispatcher.
+    /// Another dispatcher reports a client.
     fn here(&mut self, id: HostId, client: &Client) {
         let Some(host) = self.host(id) else {
             return;
@@ -403,7 +403,7 @@ impl Dispatcher {
         self.resolve(&name);
     }
 
-    /// Gives a name to the first client that has taken it, and others to the rest.
+    /// Gives a name to the first client that has taken it, and other names to the rest.
     fn resolve(&mut self, name: &str) {
         let Some(federation) = &mut self.federation else {
             return;
@@ -412,7 +412,7 @@ impl Dispatcher {
             return;
         };
         let mut shown: Vec<(usize, String)> = Vec::new();
-        // Two computers may have one name.
+        // Two computers may have the same name.
         let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
         for seat in group.values() {
             let host = self.board.host(*seat);
@@ -457,7 +457,7 @@ impl Dispatcher {
         }
     }
 
-    /// Nothing is heard of a dispatcher any more.
+    /// Cuts off a dispatcher that has fallen silent.
     fn cut_off(&mut self, id: HostId) {
         let Some(host) = self.host(id) else {
             return;
@@ -549,7 +549,7 @@ impl Dispatcher {
                     Some((output, Some(value))) => {
                         self.board.set(output.seat, output.channel, value);
                     }
-                    // The client over there has broken its promise to speak.
+                    // The remote client has broken its `ALIVE` promise.
                     Some((output, None)) => self.board.lose_output(output),
                     None => {}
                 }

@@ -1,4 +1,4 @@
-//! What an operator does: patches any two channels, and forces them. A client can do that only with its own.
+//! The orders of an operator: patch any two channels, and force them. A client can patch only its own.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use crate::number::Number;
 use crate::patch::Pin;
 use crate::refusal::{Code, Refusal};
 
-/// Takes the answer to an operator. It is dropped without a call if the dispatcher ends first.
+/// Takes the answer to an operator. The dispatcher drops it without a call if it ends first.
 pub struct Reply(Box<dyn FnOnce(Result<(), Refusal>) + Send>);
 
 impl Reply {
@@ -29,23 +29,23 @@ impl fmt::Debug for Reply {
     }
 }
 
-/// What an operator orders. An order that is refused has changed nothing, unless its code is [`Code::Internal`]: then the
-/// patch is changed, but could not be saved.
+/// An order of an operator. A refused order has changed nothing, unless its code is [`Code::Internal`]: then the patch
+/// has changed, but could not be saved.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Connects an output with an input, in either order.
     Connect(Pin, Pin),
-    /// Cuts the connection of an input, or all those of an output; their clients need not be here.
+    /// Cuts the connection of an input, or all those of an output; their clients may be absent.
     Disconnect(Pin),
-    /// Holds a channel at a value until it is released or its client leaves: an input has it, an output gives it to its
-    /// inputs.
+    /// Forces a channel to a value until it is released or its client leaves: an input receives it, an output passes it
+    /// to its inputs.
     Force(Pin, Number),
-    /// Ends that.
+    /// Ends a force.
     Release(Pin),
 }
 
 impl Dispatcher {
-    /// Carries out what an operator orders. What changes the patch is answered when that is saved, the rest at once.
+    /// Carries out an order. Changes of the patch are answered once saved, other orders at once.
     pub fn operate(&mut self, order: Order, reply: Reply) {
         self.board.begin_line();
         let request = match order {
@@ -70,8 +70,8 @@ impl Dispatcher {
         }
     }
 
-    /// All clients, their values and all connections, of other dispatchers as well. This copies them: ask no more often
-    /// than somebody looks.
+    /// All clients, their values and all connections, including those of other dispatchers. This copies everything, so
+    /// call it no more often than somebody looks.
     pub fn snapshot(&self) -> Snapshot {
         let federation = self.federation.iter();
         let hosts = federation.flat_map(|federation| federation.hosts.values());

@@ -10,14 +10,14 @@ use crate::refusal::{Code, Refusal};
 
 use super::{Author, Dispatcher, Promised};
 
-/// A change of connections that other dispatchers take part in.
+/// A change of connections that involves other dispatchers.
 #[derive(Debug)]
 pub(super) struct Waiting {
     pub(super) author: Author,
-    /// What is to be done here when all others have agreed.
+    /// The connections to make here once all others have agreed.
     connect: Vec<Joint>,
     cut: Vec<Pin>,
-    /// Requests that are not answered.
+    /// Requests without an answer so far.
     open: BTreeSet<(HostId, u32)>,
     /// New connections that others have made, to be cut if one of them refuses.
     made: Vec<(HostId, Vec<Joint>)>,
@@ -54,7 +54,7 @@ impl Dispatcher {
         }
     }
 
-    /// The connections that end at this channel, whatever dispatcher they belong to.
+    /// The connections that end at this channel, no matter which dispatcher they belong to.
     pub(super) fn joints_at(&self, pin: &Pin) -> Vec<Joint> {
         let federation = self.federation.iter();
         let hosts = federation.flat_map(|federation| federation.hosts.values());
@@ -84,7 +84,7 @@ impl Dispatcher {
         let (mut connect, mut cut) = (Vec::new(), Vec::new());
         for joint in all.connect {
             match self.home(&joint.0.client) {
-                // It is so already.
+                // The connection exists already.
                 Some(_) if self.patch_of(&joint.0.client).source(&joint.0) == Some(&joint.1) => {}
                 Some(host) => requests.entry(host).or_default().connect.push(joint),
                 None => connect.push(joint),
@@ -151,10 +151,10 @@ impl Dispatcher {
         self.promise(Promised { author, sinks });
     }
 
-    /// Answers when the patch is saved; at once, if the file has it as it is.
+    /// Answers when the patch is saved; at once, if the file is up to date.
     fn promise(&mut self, promised: Promised) {
-        // Controllers that come back ask for the connections that they have. Writing the file for each of them would keep all
-        // others waiting.
+        // Controllers that come back request the connections that they already have. Writing the file for each of them
+        // would keep all others waiting.
         if self.board.is_saved() {
             self.fulfil(promised, Ok(()));
         } else {

@@ -11,14 +11,14 @@ impl Dispatcher {
         (self.promised.len() > self.saving).then(|| self.board.patch())
     }
 
-    /// The patch as it is now begins to be saved by another thread. Until [`saved`](Self::saved) lines are worked on, and the patch
-    /// may change again.
+    /// Marks the current patch as being saved by another thread. Until [`saved`](Self::saved) the dispatcher keeps
+    /// working, and the patch may change again.
     pub fn saving(&mut self) {
         self.saving = self.promised.len();
     }
 
-    /// The patch was saved as it is, or as it was when [`saving`](Self::saving) was called; or why not. Who changed it until then is
-    /// answered.
+    /// The patch was saved as it is, or as it was when [`saving`](Self::saving) was called; or saving failed. Answers
+    /// the authors of all changes up to then.
     pub fn saved(&mut self, outcome: &Result<(), String>) {
         let outcome = outcome.as_ref().map(drop).map_err(|why| {
             Code::Internal.because(format_args!(
@@ -50,7 +50,7 @@ impl Dispatcher {
         }
     }
 
-    /// Answers who has changed the patch, or wanted to.
+    /// Answers the author of a change of the patch.
     pub(super) fn conclude(&mut self, author: Author, outcome: Result<(), Refusal>) {
         match author {
             Author::Client { seat, verb } => {
@@ -66,7 +66,7 @@ impl Dispatcher {
         }
     }
 
-    /// A client that had to wait for its answer has got it.
+    /// Resumes a client that had to wait for its answer.
     pub(super) fn go_on(&mut self, seat: usize) {
         if let Some(session) = &mut self.sessions[seat]
             && session.progress == Progress::Stuck
@@ -75,7 +75,7 @@ impl Dispatcher {
             if !session.begun.is_empty() {
                 self.resumable.push(seat);
             }
-            // Its bytes are wanted again, even if there was nothing to say.
+            // Touch the seat, so that its bytes are read again even without an answer to write.
             self.board.touch(seat);
         }
     }

@@ -1,4 +1,4 @@
-//! Clients that say nothing for too long, and clients whose lines have waited for too long.
+//! Clients that are silent for too long, and clients whose lines have waited for too long.
 
 use tickbus_base::time::Nanos;
 
@@ -6,13 +6,14 @@ use super::{Code, Dispatcher, Progress};
 use crate::board::OnLoss;
 
 impl Dispatcher {
-    /// A thread that serves has waited, and reads next what has arrived.
+    /// Call when a thread that serves has waited, before it reads what has arrived.
     ///
-    /// If it was held up for longer than a client has promised a line, that client's lines may have waited as long. They are no sign of
-    /// life: its outputs are cut off before they are read, and restored by its first line after [`tick`](Self::tick).
+    /// If the thread was held up for longer than a client's `ALIVE` time, that client's lines may have waited as long.
+    /// Such lines are no sign of life: the client's outputs are cut off before the lines are read, and restored by its
+    /// first line after [`tick`](Self::tick).
     pub fn woke(&mut self, now: Nanos) {
         let late = now - self.next_look;
-        // Where inputs keep their values, nobody would be told, and have values that are older still.
+        // With `Hold`, inputs would not learn of the loss, and would keep even older values.
         if late <= self.promise || self.settings.on_loss == OnLoss::Hold {
             return;
         }
@@ -29,7 +30,7 @@ impl Dispatcher {
         }
     }
 
-    /// Goes on with clients that had to wait, and disconnects those that have been silent for too long.
+    /// Continues with clients that had to wait, and disconnects those that have been silent for too long.
     pub fn tick(&mut self, now: Nanos) {
         for seat in std::mem::take(&mut self.resumable) {
             if let Some(session) = &mut self.sessions[seat] {
@@ -46,7 +47,7 @@ impl Dispatcher {
             return;
         }
         let idle = self.settings.idle;
-        // If this process was held up, lines of clients may wait that were not read yet.
+        // If this process was held up, clients may have sent lines that were not read yet.
         let is_late = now - self.next_look > Nanos(self.promise.0 / 2);
         let (mut first, mut promise) = (Nanos::MAX, Nanos::MAX);
         for seat in 0..self.sessions.len() {
@@ -76,7 +77,7 @@ impl Dispatcher {
             if now < due || is_late {
                 first = first.min(due);
             } else if self.is_owed_answer(seat) {
-                // Its lines are not read. Once they are, it has its time again.
+                // The dispatcher does not read this client's lines. Once it does, the client has its full time again.
                 first = first.min(now + alive);
             } else if let Some(session) = &mut self.sessions[seat] {
                 session.is_silent = true;
@@ -84,7 +85,7 @@ impl Dispatcher {
             }
         }
         self.promise = promise;
-        // With many clients there is always one whose time comes next; they are looked at together.
+        // With many clients one is always due soon; check them together.
         let soonest = now + Nanos((idle.0 / 600).min(promise.0 / 10));
         self.next_look = first.max(soonest);
         if first == Nanos::MAX {

@@ -1,4 +1,4 @@
-//! The streams of letters between two dispatchers: what is missing is noticed, and who is silent is gone.
+//! The streams of letters between two dispatchers: missing letters are noticed, and silent dispatchers cut off.
 
 use std::collections::VecDeque;
 
@@ -11,43 +11,43 @@ use super::message::{Body, Letter};
 /// How often a dispatcher gives a sign of life.
 pub(crate) const BEAT: Nanos = Nanos::from_secs(1);
 
-/// A dispatcher that nothing was heard of for this long is cut off.
+/// A dispatcher that has been silent for this long is cut off.
 pub(crate) const SILENCE: Nanos = Nanos::from_secs(5);
 
-/// The most letters kept for a network that does not take them.
+/// The most letters kept for a network that does not accept them.
 const LONGEST_QUEUE: usize = 10_000;
 
 /// The two streams between this dispatcher and another one.
 #[derive(Debug)]
 pub(crate) struct Link {
-    /// The number of the stream to it, and of the next letter in that.
+    /// The number of the stream to the other dispatcher, and of the next letter in that stream.
     stream: u64,
     next: u64,
-    /// Letters to it that the network has not taken yet.
+    /// Letters to the other dispatcher that the network has not accepted yet.
     queue: VecDeque<Body>,
-    /// Whether there is a stream to it. Nothing is kept for who is cut off.
+    /// True if there is a stream to the other dispatcher. Nothing is kept for a dispatcher that is cut off.
     pub(crate) is_open: bool,
     began: Nanos,
-    /// The stream from it that is followed, and the next letter expected.
+    /// The stream from the other dispatcher, and the number of the next letter expected.
     followed: Option<(u64, u64)>,
     heard: Nanos,
 }
 
-/// What a letter means for the link.
+/// The meaning of a letter for the link.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Taken {
-    /// It comes next, and is to be worked on.
+    /// The letter is the next one, to be processed.
     Next(Body),
-    /// It only said that the dispatcher lives, or is of no use any more.
+    /// The letter is only a sign of life, or too late to be of use.
     Nothing,
-    /// Letters are missing before it; that was said to the other side.
+    /// Letters before this one are missing; the other side has been informed.
     Missing,
     /// The other side misses letters: begin a new stream.
     Restart,
 }
 
 impl Link {
-    /// To a dispatcher that has just appeared; there is no stream yet.
+    /// A link to a dispatcher that has just appeared; there is no stream yet.
     pub(crate) fn new(now: Nanos) -> Self {
         Self {
             stream: 0,
@@ -83,7 +83,7 @@ impl Link {
     /// Adds a letter to the stream, if there is one.
     pub(crate) fn send(&mut self, body: Body) {
         if self.queue.len() >= LONGEST_QUEUE {
-            // A snapshot will be shorter: the next sign of life from there brings it.
+            // A snapshot will be shorter: the next sign of life from the other side triggers one.
             self.is_open = false;
             self.queue.clear();
         }
@@ -92,7 +92,7 @@ impl Link {
         }
     }
 
-    /// Gives a sign of life, to a dispatcher that is cut off as well.
+    /// Sends a sign of life, even to a dispatcher that is cut off.
     pub(crate) fn beat(&mut self) {
         let is_lost = self.followed.is_none();
         if !matches!(self.queue.back(), Some(Body::Beat { .. })) {
@@ -135,10 +135,10 @@ impl Link {
         self.check(place)
     }
 
-    /// Looks whether what comes next is this letter, or one behind it.
+    /// Checks whether letters before this one are missing.
     fn check(&mut self, place: (u64, u64)) -> Taken {
         match self.followed {
-            // What comes late, or twice.
+            // A late letter, or a duplicate.
             Some(next) if place <= next => Taken::Nothing,
             Some(_) => {
                 self.followed = None;

@@ -1,7 +1,7 @@
-//! What dispatchers say to each other.
+//! The messages between dispatchers.
 //!
-//! A letter is a byte with the version of this format, and then `postcard`. Clients and channels stand in it as the text
-//! that clients use, so what is read here is checked by the same rules.
+//! A letter is a byte with the version of this format, followed by `postcard`. Clients and channels appear as the text
+//! that clients use, so the same rules check them.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::host::HostId;
 use crate::name::is_name;
 use crate::patch::Pin;
 
-/// The version of this format. A dispatcher with another one is not understood.
+/// The version of this format. Dispatchers with different versions do not understand each other.
 const VERSION: u8 = 1;
 
 /// A connection: a sink and its source.
@@ -20,20 +20,20 @@ pub(crate) type Joint = (Pin, Pin);
 /// One message from one dispatcher to another.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Letter {
-    /// Who sent it.
+    /// The sender.
     pub(crate) from: HostId,
-    /// The stream of letters that it belongs to: a new one begins with [`Body::Snapshot`], and has a higher number.
+    /// The stream that this letter belongs to. A new stream begins with [`Body::Snapshot`], and has a higher number.
     pub(crate) stream: u64,
-    /// Its number in the stream, from 0. A [`Body::Beat`] has the number of the next letter.
+    /// The letter's number in the stream, from 0. A [`Body::Beat`] has the number of the next letter.
     pub(crate) number: u64,
-    /// What it says.
+    /// The content.
     pub(crate) body: Body,
 }
 
-/// What a letter says.
+/// The content of a letter.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Body {
-    /// A sign of life. It stands outside of the stream. `is_lost`: letters of yours are missing here, begin a new stream.
+    /// A sign of life, outside of the stream. `is_lost`: letters of yours are missing here, begin a new stream.
     Beat { is_lost: bool },
     /// All clients and connections of a dispatcher.
     Snapshot {
@@ -46,16 +46,16 @@ pub(crate) enum Body {
     Here(Client),
     /// The client that registered at this time has gone.
     Gone(u64),
-    /// An input has this source now, or none any more.
+    /// An input has this source now, or no longer has one.
     Patched(WirePin, Option<WirePin>),
-    /// The values of an output are wanted: of the client of yours that registered at this time, at this place among its
-    /// outputs. They are to be marked by this number.
+    /// The values of an output are wanted: of your client that registered at this time, at this place among its
+    /// outputs. Mark them by this number.
     Want {
         since: u64,
         output: u16,
         number: u32,
     },
-    /// They are not wanted any more.
+    /// The values of this output are not wanted any more.
     Unwant { since: u64, output: u16 },
     /// Lines of values, as for clients: `P 17=20 18=3`, by the numbers of wants.
     Values(String),
@@ -65,7 +65,7 @@ pub(crate) enum Body {
         connect: Vec<WireJoint>,
         cut: Vec<WireJoint>,
     },
-    /// What became of a request: `Err` has the code and the text of the refusal.
+    /// The outcome of a request: `Err` has the code and the text of the refusal.
     Answer {
         number: u32,
         outcome: Result<(), (u16, String)>,
@@ -76,7 +76,7 @@ pub(crate) enum Body {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Client {
     pub(crate) since: u64,
-    /// Its line in the list of devices.
+    /// The client's line in the device list.
     line: String,
 }
 
@@ -94,7 +94,7 @@ impl From<&Pin> for WirePin {
 }
 
 impl WirePin {
-    /// The pin, if it is one.
+    /// The pin, or `None` if the text is not a valid one.
     pub(crate) fn pin(&self) -> Option<Pin> {
         Pin::parse(&self.0)
     }
@@ -107,7 +107,7 @@ pub(crate) fn to_wire(joints: &[Joint]) -> Vec<WireJoint> {
         .collect()
 }
 
-/// A connection of an input with an output of its kind, if it is one.
+/// A connection of an input with an output of its kind, or `None` if the text is not a valid one.
 pub(crate) fn joint((sink, source): &WireJoint) -> Option<Joint> {
     let (sink, source) = (sink.pin()?, source.pin()?);
     let (to, from) = (sink.channel.kind, source.channel.kind);
@@ -121,12 +121,12 @@ impl Client {
         Self { since, line }
     }
 
-    /// The client, if it can be one.
+    /// The client, or `None` if the line is not a valid one.
     pub(crate) fn device(&self) -> Option<Device> {
         let device = Device::parse(self.line.as_bytes())?;
         let counts = Kind::ALL.map(|kind| device.counts.of(kind));
         let is_right = is_name(&device.name) && counts.iter().all(|count| *count <= MOST_CHANNELS);
-        // Further ones must be able to come later.
+        // Later clients need room for higher numbers.
         (is_right && self.since < u64::MAX / 2).then_some(device)
     }
 }

@@ -13,7 +13,7 @@ pub(crate) const NAMES: [&str; 3] = ["alpha", "beta", "gamma"];
 
 pub(crate) struct Hosts {
     pub(crate) labs: Vec<Lab>,
-    /// Pairs of hosts, the smaller first, between which nothing goes.
+    /// Pairs of hosts, the smaller first, whose letters are held back.
     cuts: BTreeSet<(usize, usize)>,
     /// Letters on their way: from, to.
     on_the_way: VecDeque<(usize, usize, Vec<u8>)>,
@@ -30,7 +30,7 @@ impl Hosts {
         let names = NAMES.iter().enumerate();
         let labs = names.map(|(at, name)| {
             let mut lab = Lab::with(settings, Patch::new());
-            // Each client of all has its own port.
+            // Each client in all hosts has its own port.
             lab.next_port += 1000 * u16::try_from(at).expect("few");
             lab.dispatcher.federate(Identity::new(id(at), name, 0));
             lab
@@ -46,7 +46,7 @@ impl Hosts {
         hosts
     }
 
-    /// Every host appears to all others that it reaches.
+    /// Makes every host appear to all others that it reaches.
     fn meet(&mut self) {
         for one in 0..self.labs.len() {
             for other in 0..self.labs.len() {
@@ -68,19 +68,19 @@ impl Hosts {
             .retain(|(from, to, _)| (*from, *to) != (one, other) && (*to, *from) != (one, other));
     }
 
-    /// Nothing is cut any more, and nothing gets lost; and the network says so.
+    /// Ends all cuts and losses, and lets the network report that.
     pub(crate) fn heal(&mut self) {
         self.mend();
         self.meet();
     }
 
-    /// The same, but the network says nothing.
+    /// Ends all cuts and losses, without a report by the network.
     pub(crate) fn mend(&mut self) {
         self.cuts.clear();
         self.to_lose = 0;
     }
 
-    /// Carries one letter; whether there was one.
+    /// Carries one letter; returns whether there was one.
     pub(crate) fn carry_one(&mut self) -> bool {
         for from in 0..self.labs.len() {
             while let Some((to, letter)) = self.labs[from].dispatcher.next_letter() {
@@ -121,7 +121,7 @@ impl Hosts {
         }
     }
 
-    /// Sends a line, and returns what its client hears when all letters are carried.
+    /// Sends a line, and returns the lines for its client once all letters are carried.
     pub(crate) fn ask(&mut self, host: usize, seat: usize, line: &str) -> Vec<String> {
         self.labs[host].say(seat, line);
         self.settle();
@@ -161,7 +161,7 @@ pub(crate) fn number(text: &str) -> Number {
     Number::parse(text.as_bytes()).expect(text)
 }
 
-/// Has an operator's order carried out at a host; returns the answer when all letters are carried.
+/// Carries out an operator's order at a host; returns the answer once all letters are carried.
 pub(crate) fn order(hosts: &mut Hosts, host: usize, order: Order) -> Result<(), String> {
     let (sender, answer) = channel();
     let reply = Reply::new(move |outcome| sender.send(outcome).expect("it is waited for"));

@@ -1,4 +1,4 @@
-//! A dispatcher without sockets, and clients that say and hear lines.
+//! A dispatcher without sockets, and clients that send and receive lines.
 #![allow(dead_code, reason = "each test file uses a part")]
 
 pub(crate) mod hosts;
@@ -36,7 +36,7 @@ impl Lab {
             .expect("there is room")
     }
 
-    /// A client that has said who it is, and has read what it got for that.
+    /// A client that has identified itself, and has read the answers.
     pub(crate) fn join(&mut self, identification: &str) -> usize {
         let seat = self.connect();
         let heard = self.ask(seat, identification);
@@ -74,7 +74,7 @@ impl Lab {
         }
     }
 
-    /// Sends a line, and returns what its client hears then.
+    /// Sends a line, and returns the lines that its client receives then.
     pub(crate) fn ask(&mut self, seat: usize, line: &str) -> Vec<String> {
         self.say(seat, line);
         self.hear(seat)

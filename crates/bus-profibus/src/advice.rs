@@ -1,4 +1,4 @@
-//! Which times the PLC's project should have for a line whose answers take as long as they do here.
+//! The times to set in the PLC's project for a line whose answers take as long as here.
 
 use std::fmt::Write as _;
 
@@ -11,25 +11,25 @@ use crate::station::MIN_TSDR;
 /// The slot time exceeds the longest wait for an answer by at least this many bits.
 const BEHIND: i64 = 15;
 
-/// Above this rate a serial port is not for PROFIBUS.
+/// A serial port is not suitable for PROFIBUS above this rate.
 const FASTEST: u32 = 500_000;
 
-/// What to write into the PLC's project for one rate.
+/// The settings for the PLC's project at one rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advice {
     /// The rate, in bits per second.
     pub baud: u32,
     /// The longest wait for an answer by the standard, in bits.
     pub standard: u16,
-    /// The share of answers that come within it, from 0 to 1.
+    /// The share of answers that arrive within that wait, from 0 to 1.
     pub in_time: f64,
     /// `MaxTsdr` and the slot time, in bits; `None` if no slot time is long enough.
     pub bits: Option<(u16, u16)>,
 }
 
-/// Advice for each rate of user space. `replies` are times at the highest of these, at which the wait before
-/// an answer is next to nothing, from the last byte of a request to the first of its answer; `held_back` is what the port
-/// itself adds to them.
+/// Advice for each rate that a program in user space can serve. `replies` are the times from the last byte of a request
+/// to the first of its answer, at the highest of these rates, where the wait before an answer is almost nothing.
+/// `held_back` is the delay that the port itself adds.
 pub fn advise(replies: &TimeHistogram, held_back: Nanos) -> Vec<Advice> {
     let of_user_space = RATES.iter().filter(|rate| rate.baud <= FASTEST);
     of_user_space
@@ -43,7 +43,7 @@ fn advise_rate(rate: &Rate, replies: &TimeHistogram, held_back: Nanos) -> Advice
     let limit = bits(rate.baud, i64::from(rate.max_tsdr) - wait) - held_back;
     let steps = replies.steps().filter(|(longest, _)| *longest <= limit);
     let in_time: u64 = steps.map(|(_, count)| count).sum();
-    // The longest one that was seen is not the longest there is.
+    // Waits can be longer than the longest one seen.
     let longest = replies.longest() + held_back;
     let needed = (longest.0 + longest.0 / 4).saturating_mul(baud) / 1_000_000_000 + 1 + wait;
     let max_tsdr = needed.max(rate.max_tsdr.into()).next_multiple_of_ten();
@@ -120,7 +120,7 @@ mod tests {
 
     #[test]
     fn slow_answers_need_a_longer_slot_time_at_higher_rates() {
-        // 1 ms in one of ten: 500 bits at 500 kbit/s, and a quarter more.
+        // 1 ms in one of ten: 500 bits at 500 kbit/s, plus a quarter.
         let mut micros = vec![100; 9];
         micros.push(1000);
         let all = advise(&replies(&micros), Nanos(0));

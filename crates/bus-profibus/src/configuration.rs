@@ -1,14 +1,14 @@
-//! What a station is made of: the identifiers of its modules, as `Chk_Cfg` and `Get_Cfg` carry them.
+//! The modules of a station: their identifiers, as in `Chk_Cfg` and `Get_Cfg`.
 
 use std::fmt::Write as _;
 use std::ops::Range;
 
 use tickbus_base::toml_text::shown;
 
-/// How many octets a message shows at most.
+/// The most octets that a message shows.
 const SHOWN_OCTETS: usize = 16;
 
-/// The longest block of one identifier, in bytes.
+/// The longest data block of one identifier, in bytes.
 const BLOCK: usize = 16;
 
 /// The modules of a station, in the order of their slots.
@@ -18,24 +18,24 @@ pub struct Configuration {
     bytes: Vec<u8>,
     inputs: usize,
     outputs: usize,
-    /// Any modules of the same sizes will do.
+    /// Accept any modules of the same sizes.
     sizes_only: bool,
 }
 
 /// A module in its slot.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SlotModule {
-    /// Its name in the GSD file; empty if there is none.
+    /// The name in the GSD file; empty if unknown.
     pub name: String,
-    /// Its identifiers.
+    /// The identifiers.
     pub identifiers: Vec<u8>,
-    /// Its bytes among those that the station sends.
+    /// The position of its bytes among those that the station sends.
     pub inputs: Range<usize>,
-    /// Its bytes among those that the station receives.
+    /// The position of its bytes among those that the station receives.
     pub outputs: Range<usize>,
 }
 
-/// One identifier: how many bytes of it there are, and what they say of the I/O.
+/// One identifier: its number of bytes, and the I/O that it describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Identifier {
     length: usize,
@@ -44,7 +44,7 @@ struct Identifier {
 }
 
 impl Identifier {
-    /// Reads the identifier at the start of `bytes`; `None` if they end in the midst of it.
+    /// Reads the identifier at the start of `bytes`; `None` if it is incomplete.
     fn read(bytes: &[u8]) -> Option<Self> {
         let first = *bytes.first()?;
         let size = |octet: u8, count: u8| {
@@ -61,7 +61,7 @@ impl Identifier {
         }
         let (has_outputs, has_inputs) = (first & 0x80 != 0, first & 0x40 != 0);
         let mut length = 1;
-        // The length of the outputs comes before that of the inputs.
+        // The length of the outputs precedes that of the inputs.
         let mut read = |is_there: bool| {
             if !is_there {
                 return Some(0);
@@ -71,7 +71,7 @@ impl Identifier {
             Some(size(octet, 0x3F))
         };
         let (outputs, inputs) = (read(has_outputs)?, read(has_inputs)?);
-        // 15 stands for no comparison of the vendor's octets, and there are none.
+        // 15 means that vendor-specific octets are not compared; none follow.
         let vendors = match first & 0x0F {
             0x0F => 0,
             count => usize::from(count),
@@ -90,7 +90,7 @@ impl Configuration {
     ///
     /// # Errors
     ///
-    /// The identifiers of one end in their midst: the message names it.
+    /// An identifier is incomplete: the message names its module.
     pub fn of_modules<'a>(
         modules: impl IntoIterator<Item = (&'a str, &'a [u8])>,
     ) -> Result<Self, String> {
@@ -125,7 +125,7 @@ impl Configuration {
     ///
     /// # Errors
     ///
-    /// They end in the midst of an identifier.
+    /// The last identifier is incomplete.
     pub fn of_bytes(bytes: &[u8]) -> Result<Self, String> {
         let mut slots = Vec::new();
         let mut rest = bytes;
@@ -138,8 +138,8 @@ impl Configuration {
         Self::of_modules(slots)
     }
 
-    /// A configuration of these sizes in bytes, for a station of which nothing else is known: it takes any other
-    /// that has the same sizes.
+    /// A configuration of these sizes in bytes, for a station with unknown modules: it accepts any other with the same
+    /// sizes.
     pub fn of_sizes(inputs: usize, outputs: usize) -> Self {
         let mut bytes = Vec::new();
         for (size, kind) in [(inputs, 0x10), (outputs, 0x20)] {
@@ -153,17 +153,17 @@ impl Configuration {
         all
     }
 
-    /// Its identifiers.
+    /// The identifiers.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Its modules: that of slot 1, and so on.
+    /// The modules: that of slot 1, and so on.
     pub fn modules(&self) -> &[SlotModule] {
         &self.modules
     }
 
-    /// Whether any other modules of the same sizes will do.
+    /// True if any other modules of the same sizes are accepted.
     pub fn has_sizes_only(&self) -> bool {
         self.sizes_only
     }
@@ -178,8 +178,8 @@ impl Configuration {
         self.outputs
     }
 
-    /// What a channel of the module in `slot`, from 1, is, as a diagnosis tells it: 1 for inputs, 2 for outputs, 3 for both;
-    /// and 1 for bits, 5 for words.
+    /// The kind of the channels of the module in `slot`, from 1, as a diagnosis encodes it: 1 for inputs, 2 for
+    /// outputs, 3 for both; and 1 for bits, 5 for words.
     pub(crate) fn channel_kind(&self, slot: usize) -> (u8, u8) {
         let module = slot.checked_sub(1).and_then(|at| self.modules.get(at));
         let first = module.and_then(|module| module.identifiers.first());
@@ -191,7 +191,7 @@ impl Configuration {
         }
     }
 
-    /// Why a master that expects the modules in `received` does not mean this station; `None` if it does.
+    /// Why the modules in `received` are not those of this station; `None` if they are.
     pub fn difference(&self, received: &[u8]) -> Option<String> {
         if received == self.bytes {
             return None;
@@ -237,7 +237,7 @@ impl Configuration {
     }
 }
 
-/// Identifiers as text: their bytes and what they mean.
+/// Describes identifiers: their bytes and meaning.
 fn in_words(identifiers: &[u8]) -> String {
     let (mut ins, mut outs) = (0, 0);
     let mut rest = identifiers;
@@ -273,7 +273,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     octets.join(" ")
 }
 
-/// As [`hex`], shortened for a message.
+/// Like [`hex`], shortened for a message.
 fn brief(bytes: &[u8]) -> String {
     if bytes.len() <= SHOWN_OCTETS {
         return hex(bytes);
@@ -297,7 +297,7 @@ mod tests {
         assert_eq!(sizes(&[0x70]), (2, 2));
         assert_eq!(sizes(&[0x1F, 0x20]), (16, 1));
         assert_eq!(sizes(&[0xD3, 0xE1]), (8, 4));
-        // An empty slot with four octets of the vendor's, and one with both lengths.
+        // An empty slot with four vendor-specific octets, and one with both lengths.
         assert_eq!(sizes(&[0x04, 0x00, 0x00, 0xAD, 0xC0]), (0, 0));
         assert_eq!(sizes(&[0xC1, 0x43, 0x81, 0xAA]), (2, 8));
         assert_eq!(sizes(&[0x42, 0x00, 0x01, 0x02, 0x8F, 0x3F]), (1, 64));

@@ -1,4 +1,4 @@
-//! The bus: carries bytes between the serial port and the stations, and frames between these and the image.
+//! The bus: moves bytes between the serial port and the stations, and frames between the stations and the image.
 
 mod diagnosis;
 #[cfg(unix)]
@@ -12,7 +12,7 @@ use crate::event::{Event, Leaving};
 use crate::layout::Layout;
 use crate::station::{Identity, Process};
 
-/// What the line says while it has no master.
+/// The line's message while it has no master.
 const WAITS: &str = "waiting for a master";
 
 /// The line of a driver.cfg.
@@ -20,9 +20,10 @@ const WAITS: &str = "waiting for a master";
 pub struct LineOptions {
     /// The system's name of the serial port.
     pub device: String,
-    /// Its settings.
+    /// The settings of the port.
     pub settings: SerialSettings,
-    /// After so many bits an answer is not sent any more: the master repeats its request, and they would collide.
+    /// The device drops an answer that is more than this many bits late: the master repeats its request by then, and
+    /// both would collide.
     pub max_tsdr: u16,
 }
 
@@ -38,7 +39,7 @@ pub struct ProfibusDevice {
 pub(crate) struct StationSetup {
     pub(crate) address: u8,
     pub(crate) identity: Identity,
-    /// Where its signals lie among the bytes that it sends and receives.
+    /// The positions of the signals among the bytes that the station sends and receives.
     pub(crate) inputs: Layout,
     pub(crate) outputs: Layout,
 }
@@ -77,12 +78,12 @@ struct Stations {
 #[derive(Debug)]
 struct Side {
     address: u8,
-    /// For the inputs that the master may have by now.
+    /// Receipt for the inputs that the master may have by now.
     receipt: Option<Receipt>,
     exchanges: bool,
     inputs: Layout,
     outputs: Layout,
-    /// The outputs as they lie in the image.
+    /// The outputs in the layout of the image.
     frame: Vec<u8>,
 }
 
@@ -101,7 +102,7 @@ impl Stations {
         }
     }
 
-    /// The addresses of those that exchange data, as text.
+    /// The addresses of the stations that exchange data, as text.
     fn exchanging(&self) -> Option<String> {
         let exchanging = self.all.iter().filter(|side| side.exchanges);
         let all: Vec<String> = exchanging.map(|side| side.address.to_string()).collect();
@@ -168,7 +169,7 @@ impl Process for Machine<'_> {
             return false;
         };
         let side = &mut self.stations.all[index];
-        // Modules may have more bytes than there are signals.
+        // The modules may have more bytes than the signals.
         side.inputs.send(frames.frame(index), inputs);
         side.receipt = Some(frames.receipt());
         true

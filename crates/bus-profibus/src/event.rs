@@ -1,18 +1,18 @@
-//! What happens to a station, in words.
+//! The events of a station, in words.
 
 use std::fmt;
 
 use tickbus_base::time::Nanos;
 
-/// Something that happened to a station, for the state of the line and the log.
+/// An event of a station, for the state of the line and the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Event {
     /// A master has sent the right parameters, and owns the station from now on.
     Parameterised {
-        /// Its address.
+        /// The master's address.
         master: u8,
     },
-    /// The configuration is right: data are exchanged from now on.
+    /// The configuration is right: the station exchanges data from now on.
     Exchanges {
         /// The master's address.
         master: u8,
@@ -21,39 +21,39 @@ pub enum Event {
     Cleared,
     /// The master sets the outputs again.
     Operates,
-    /// The station no longer exchanges data, or never began to: why.
+    /// The station no longer exchanges data, or never did: why.
     Left(Leaving),
 }
 
-/// Why a station no longer exchanges data, or never began to.
+/// Why a station no longer exchanges data, or never did.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Leaving {
     /// The master sent other parameters than those of this device.
     Parameters {
-        /// Its address.
+        /// The master's address.
         master: u8,
-        /// What was expected, and what was received.
+        /// The expected and the received parameters.
         why: String,
     },
     /// The master expects other modules.
     Configuration {
-        /// Its address.
+        /// The master's address.
         master: u8,
-        /// What was expected, and what was received.
+        /// The expected and the received modules.
         why: String,
     },
     /// The master sent another number of outputs than the configuration has.
     Length {
-        /// What was expected.
+        /// The expected number.
         expected: usize,
-        /// What was received.
+        /// The received number.
         received: usize,
     },
-    /// The master has been silent for longer than the watchdog's time, which it had set.
+    /// The master has been silent for longer than the watchdog time that it had set.
     Watchdog(Nanos),
     /// The master released the station.
     Released {
-        /// Its address.
+        /// The master's address.
         master: u8,
     },
 }

@@ -5,7 +5,8 @@ use tickbus_base::time::Nanos;
 
 use crate::telegram::Telegram;
 
-/// A telegram that is not complete after so long a pause never will be, however late a driver hands over its bytes.
+/// A telegram still incomplete after a pause of this length never completes, however late a driver hands over its
+/// bytes.
 pub(crate) const PATIENCE: Nanos = Nanos::from_millis(50);
 
 /// The silence, in bit times, that precedes every request.
@@ -16,7 +17,7 @@ pub(crate) fn bits(baud: u32, count: i64) -> Nanos {
     Nanos(count * 1_000_000_000 / i64::from(baud))
 }
 
-/// What has arrived of the next telegram.
+/// The bytes of the next telegram so far.
 #[derive(Debug)]
 pub(crate) struct Finder {
     silence: Nanos,
@@ -27,12 +28,12 @@ pub(crate) struct Finder {
     heard: Nanos,
 }
 
-/// What a piece of the line's traffic is.
+/// A piece of the line's traffic.
 #[derive(Debug)]
 pub(crate) enum Found<'a> {
     /// A telegram, and its bytes.
     Telegram(Telegram<'a>, &'a [u8]),
-    /// Bytes that are none, however many.
+    /// Any number of bytes that are no telegram.
     Damaged,
 }
 
@@ -47,12 +48,12 @@ impl Finder {
         }
     }
 
-    /// Takes characters off the line, and hands out what is found in them. A telegram with a damaged one is none, whatever its
-    /// checksum says: that is a sum, which two of them can leave as it was.
+    /// Takes characters off the line, and passes on the telegrams in them. A telegram with a damaged character counts
+    /// as damaged whatever its checksum: two damaged characters can leave the sum unchanged.
     ///
     /// # Errors
     ///
-    /// That of `each`.
+    /// An error of `each`.
     pub(crate) fn hear<E>(
         &mut self,
         now: Nanos,
@@ -100,7 +101,7 @@ impl Finder {
         Ok(())
     }
 
-    /// Whether the next telegram has begun, and is not complete.
+    /// True if a telegram has begun and is incomplete.
     pub(crate) fn has_begun(&self) -> bool {
         !self.buffer.is_empty()
     }

@@ -1,4 +1,4 @@
-//! Where the signals lie in the telegrams: at their image addresses, or where `[fieldbus.at]` puts them in a module.
+//! The positions of signals in the telegrams: at their image addresses, or where `[fieldbus.at]` puts them in a module.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use crate::configuration::Configuration;
 
 const EXAMPLE: &str = "write the slot and the address in its module, such as \"slot 2 %IW0\"";
 
-/// A place in a module, as `[fieldbus.at]` has it: `slot 2 %IW0`.
+/// A position in a module, as in `[fieldbus.at]`: `slot 2 %IW0`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub(crate) slot: usize,
@@ -40,7 +40,7 @@ impl FromStr for Place {
 }
 
 impl Place {
-    /// Whether it suits the signal, which its module need not.
+    /// Checks that the position suits the signal; the module is checked elsewhere.
     pub(crate) fn suits(self, signal: &Signal) -> Result<(), Mistake> {
         let own = signal.address();
         if (self.address.area, self.address.width) == (own.area, own.width) {
@@ -56,7 +56,7 @@ impl Place {
         ))
     }
 
-    /// Its bits among all those of the station.
+    /// The position's bits among all those of the station.
     fn bits(self, modules: &Configuration) -> Result<Range<usize>, Mistake> {
         let count = modules.modules().len();
         let module = self
@@ -103,7 +103,7 @@ struct Move {
     wire: Range<usize>,
 }
 
-/// Where the signals of one area of a station lie in its telegrams.
+/// The positions of the signals of one area of a station in its telegrams.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Layout {
     /// `None`: as in the image.
@@ -111,12 +111,12 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// For these signals of one area of a station, of which some have a place of their own; these with their offset in
+    /// The layout of these signals of one area of a station. Some have their own positions, given with their offset in
     /// the driver.cfg.
     ///
     /// # Errors
     ///
-    /// The modules have no such place, or two signals would be sent in the same bits.
+    /// The modules do not have such a position, or two signals would share bits.
     pub(crate) fn new<'s>(
         signals: impl Iterator<Item = &'s Signal>,
         places: &BTreeMap<String, (Place, usize)>,
@@ -173,7 +173,7 @@ impl Layout {
         })
     }
 
-    /// Puts the frame of the image into a telegram, which may be longer.
+    /// Copies the frame of the image into a telegram, which may be longer.
     pub(crate) fn send(&self, frame: &[u8], wire: &mut [u8]) {
         let Some(moves) = &self.moves else {
             wire[..frame.len()].copy_from_slice(frame);
@@ -185,7 +185,7 @@ impl Layout {
         }
     }
 
-    /// The frame of the image that a telegram brings; `frame` has its size, and may be used for it.
+    /// The frame of the image from a telegram; `frame` has its size and serves as a buffer.
     pub(crate) fn receive<'f>(&self, wire: &'f [u8], frame: &'f mut [u8]) -> &'f [u8] {
         let Some(moves) = &self.moves else {
             return &wire[..frame.len()];

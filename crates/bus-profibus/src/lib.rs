@@ -1,8 +1,8 @@
 //! PROFIBUS DP over a serial line: DP-V0 slaves in software.
 //!
-//! The core knows no port and no image. [`telegram`] reads and writes what is on the line; a [`Station`] is one slave,
-//! a function of its state, the time and a request, to an answer; a [`Segment`] has all stations of a line, and finds the
-//! telegrams among the bytes. [`Gsd`] says from its maker's file which device a station is.
+//! The core knows no port and no image. [`telegram`] reads and writes telegrams. A [`Station`] is one slave, a function
+//! of its state, the time and a request, to an answer. A [`Segment`] has all stations of a line, and finds the
+//! telegrams among the bytes. A [`Gsd`] is a manufacturer's description of a device.
 
 pub mod advice;
 mod configuration;

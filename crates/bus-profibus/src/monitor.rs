@@ -1,4 +1,4 @@
-//! Listens to a line: who talks to whom, and how well.
+//! Listens to a line: the parties and the quality of their traffic.
 
 mod words;
 
@@ -14,23 +14,23 @@ use crate::telegram::{BROADCAST, Control, Frame, Telegram};
 pub use words::words;
 use words::{Service, service};
 
-/// What passes on a line, and who is there. It says nothing.
+/// Records the traffic and the stations of a line; sends nothing.
 #[derive(Debug)]
 pub struct Monitor {
     finder: Finder,
     all: Seen,
 }
 
-/// All that was seen.
+/// Everything seen so far.
 #[derive(Debug, Default)]
 struct Seen {
     masters: BTreeMap<u8, MasterSeen>,
     slaves: BTreeMap<u8, SlaveSeen>,
     telegrams: u64,
     damaged: u64,
-    /// The last request, as long as its answer may come.
+    /// The last request, as long as its answer may still come.
     open: Option<Open>,
-    /// The last request that remained without an answer.
+    /// The last request without an answer.
     unanswered: Option<Open>,
 }
 
@@ -61,19 +61,19 @@ struct SlaveSeen {
     replies: TimeHistogram,
 }
 
-/// One thing on the line.
+/// One piece of traffic.
 #[derive(Debug)]
 pub struct Heard<'a> {
-    /// The telegram; `None` for bytes that are none.
+    /// The telegram; `None` for bytes that are no telegram.
     pub telegram: Option<Telegram<'a>>,
-    /// Its bytes.
+    /// The bytes.
     pub bytes: &'a [u8],
-    /// What is remarkable about it; empty if nothing is.
+    /// A remark; empty if there is nothing remarkable.
     pub note: &'static str,
 }
 
 impl Monitor {
-    /// Of a line of `baud` bits per second.
+    /// Creates a monitor for a line of `baud` bits per second.
     pub fn new(baud: u32) -> Self {
         Self {
             finder: Finder::new(baud),
@@ -81,7 +81,7 @@ impl Monitor {
         }
     }
 
-    /// Takes characters off the line, and hands out what is in them.
+    /// Takes characters off the line, and passes on the telegrams in them.
     pub fn hear<'a>(
         &mut self,
         now: Nanos,
@@ -113,12 +113,12 @@ impl Monitor {
         }
     }
 
-    /// The stations and their masters, one a line.
+    /// The stations and their masters, one per line.
     pub fn table(&self) -> String {
         let all = &self.all;
         let mut text = format!("telegrams {}  damaged {}\n", all.telegrams, all.damaged);
         // Writing to a string cannot fail.
-        // A token has no checksum, so that one telegram proves nothing.
+        // A token has no checksum, so one telegram alone proves nothing.
         let masters = all.masters.iter();
         for (address, master) in masters.filter(|(_, seen)| seen.requests + seen.tokens > 1) {
             let _ = writeln!(
@@ -162,7 +162,7 @@ impl Seen {
         }
     }
 
-    /// The master goes on: the answer to its last request, if it has not come, will be late.
+    /// The master continues: an answer to its last request, if still to come, will be late.
     fn give_up(&mut self) {
         let Some(open) = self.open.take() else { return };
         if let Some(slave) = self.slaves.get_mut(&open.slave) {
@@ -183,7 +183,8 @@ impl Seen {
         let service = service(frame);
         let before = self.unanswered.take();
         let is_repeated = before.is_some_and(|before| before.bytes == bytes);
-        // Masters ask every address for its status, in search of others: that makes no slave.
+        // Masters ask every address for its status, in search of other masters, which does not prove that there is a
+        // slave.
         if service != Service::Status || self.slaves.contains_key(&frame.destination) {
             let slave = self.slaves.entry(frame.destination).or_default();
             slave.master = frame.source;
@@ -200,7 +201,7 @@ impl Seen {
         if is_repeated { "repeated" } else { "" }
     }
 
-    /// An answer; a short one does not say whose it is.
+    /// An answer; a short acknowledgement does not name its sender.
     fn answer(&mut self, now: Nanos, from: Option<u8>, control: Option<Control>) -> &'static str {
         let fits = |open: &mut Open| from.is_none_or(|from| from == open.slave);
         let Some(open) = self.open.take_if(fits) else {
@@ -248,7 +249,7 @@ mod tests {
         bytes
     }
 
-    /// What is said of these telegrams, a millisecond apart.
+    /// The monitor's notes on these telegrams, a millisecond apart.
     fn notes(monitor: &mut Monitor, telegrams: &[Vec<u8>]) -> Vec<&'static str> {
         let mut notes = Vec::new();
         for (number, bytes) in (1..).zip(telegrams) {
@@ -266,7 +267,7 @@ mod tests {
             &mut monitor,
             &[
                 vec![0xDC, 2, 2],
-                // Nobody is at 5.
+                // There is no station at 5.
                 frame(5, 2, 0x49, None, &[]),
                 frame(8, 2, 0x6D, Some(60), &[]),
                 frame(2, 8, 0x08, Some(62), &[2, 5, 0, 255, 0, 1]),
@@ -317,7 +318,7 @@ mod tests {
                 ask.clone(),
                 ask.clone(),
                 frame(2, 8, 0x08, None, &[1]),
-                // The answer to the first one.
+                // The answer to the first request.
                 frame(2, 8, 0x08, None, &[1]),
                 frame(8, 2, 0x5D, None, &[7]),
                 vec![0xDC, 2, 2],

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus.
+//! The bus's section of a driver.cfg.
 
 mod details;
 mod machine;
@@ -29,9 +29,9 @@ pub struct Options {
     pub line: LineOptions,
     /// The keys of a station in `[fieldbus]`.
     common: Keys,
-    /// Those of the `[[station]]` tables.
+    /// The keys of the `[[station]]` tables.
     own: Vec<Keys>,
-    /// The places of single signals in modules, by the signals' names, each with its offset.
+    /// The positions of single signals in modules, by the signals' names, each with its offset.
     places: BTreeMap<String, (Place, usize)>,
     /// The offset of `[fieldbus]`.
     at: usize,
@@ -41,7 +41,7 @@ pub struct Options {
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Keys {
     Absent,
-    /// They have mistakes, which are reported.
+    /// The keys have mistakes, which are reported.
     Wrong,
     Right(StationOptions),
 }
@@ -235,7 +235,7 @@ impl BusOptions for Options {
 }
 
 impl Options {
-    /// What its stations are; a mistake comes with its offset in the driver.cfg.
+    /// The identities of the stations; a mistake comes with its offset in the driver.cfg.
     fn setups(
         &self,
         folder: &Path,
@@ -260,7 +260,7 @@ impl Options {
         })
     }
 
-    /// Whether any inputs, and any outputs, of a station have places of their own.
+    /// True if any inputs, and any outputs, of a station have their own positions.
     fn have_places(&self, table: &SignalTable, station: usize) -> [bool; 2] {
         [Area::Input, Area::Output].map(|area| {
             let own = table.signals.iter();
@@ -269,7 +269,7 @@ impl Options {
         })
     }
 
-    /// The stations, in the order of the signal table; none of those with mistakes.
+    /// The stations without mistakes, in the order of the signal table.
     pub fn stations(&self) -> impl Iterator<Item = &StationOptions> {
         std::iter::once(&self.common)
             .chain(&self.own)

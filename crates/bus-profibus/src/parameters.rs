@@ -5,7 +5,7 @@ use tickbus_base::time::Nanos;
 /// The octets before the user's parameters.
 const HEAD: usize = 7;
 
-/// What `Set_Prm` says.
+/// The content of `Set_Prm`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -18,7 +18,7 @@ pub(crate) struct Parameters<'a> {
     pub(crate) freeze: bool,
     /// `WD_On`, and the product of the two factors.
     pub(crate) watchdog: Option<i64>,
-    /// In bit times; 0 keeps what there is.
+    /// In bit times; 0 keeps the current value.
     pub(crate) min_tsdr: u8,
     pub(crate) ident: u16,
     pub(crate) group: u8,
@@ -26,7 +26,7 @@ pub(crate) struct Parameters<'a> {
 }
 
 impl<'a> Parameters<'a> {
-    /// Reads the data of the request; `None` if they are too short.
+    /// Reads the data of the request; `None` if there are too few octets.
     pub(crate) fn read(data: &'a [u8]) -> Option<Self> {
         let (&[status, first, second, min_tsdr, high, low, group], user) =
             data.split_first_chunk::<HEAD>()?;
@@ -44,14 +44,14 @@ impl<'a> Parameters<'a> {
         })
     }
 
-    /// The watchdog's time, for a station that has the parameter octets of DPV1 or not.
+    /// The watchdog's time; `dpv1` tells whether the station has the parameter octets of DPV1.
     pub(crate) fn watchdog(&self, dpv1: bool) -> Option<Nanos> {
         let in_milliseconds = dpv1 && self.user.first().is_some_and(|octet| octet & 0x04 != 0);
         let unit = if in_milliseconds { 1 } else { 10 };
         self.watchdog.map(|count| Nanos::from_millis(count * unit))
     }
 
-    /// Whether the master shows by telegrams without outputs that it is in CLEAR, in the parameter octets of DPV1.
+    /// True if the master signals CLEAR by telegrams without outputs, according to the parameter octets of DPV1.
     pub(crate) fn fail_safe(&self, dpv1: bool) -> bool {
         dpv1 && self.user.first().is_some_and(|octet| octet & 0x40 != 0)
     }

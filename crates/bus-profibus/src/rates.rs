@@ -1,16 +1,16 @@
 //! The rates of the standard.
 
-/// The longest slot time that a master can have, in bits: an answer has to come earlier.
+/// The longest slot time that a master can have, in bits: an answer must come earlier.
 pub(crate) const SLOT_TIME_LIMIT: u16 = 16_383;
 
-/// One of them.
+/// One rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Rate {
     /// In bits per second.
     pub(crate) baud: u32,
     /// The longest wait before an answer, in bits.
     pub(crate) max_tsdr: u16,
-    /// Its name in GSD files: `<name>_supp`, `MaxTsdr_<name>`.
+    /// The name in GSD files: `<name>_supp`, `MaxTsdr_<name>`.
     pub(crate) name: &'static str,
 }
 
@@ -22,7 +22,7 @@ const fn rate(baud: u32, max_tsdr: u16, name: &'static str) -> Rate {
     }
 }
 
-/// All of them, with the wait that the standard states.
+/// All rates, with the wait that the standard states.
 pub(crate) const RATES: [Rate; 10] = [
     rate(9_600, 60, "9.6"),
     rate(19_200, 60, "19.2"),

@@ -1,4 +1,4 @@
-//! All stations of one line: what of its bytes are telegrams, and for whom.
+//! All stations of one line: finds the telegrams among the bytes, and the stations that they address.
 
 use tickbus_base::os::Characters;
 use tickbus_base::time::Nanos;
@@ -7,7 +7,7 @@ use crate::finder::{Finder, Found, bits};
 use crate::station::{Process, Station};
 use crate::telegram::{BROADCAST, Frame, Telegram};
 
-/// The stations on a line, and what has arrived of the next telegram.
+/// The stations on a line, and the bytes of the next telegram so far.
 #[derive(Debug)]
 pub struct Segment {
     baud: u32,
@@ -15,23 +15,23 @@ pub struct Segment {
     finder: Finder,
 }
 
-/// Whether an address is known to be free.
+/// How far an address is known to be free.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Listening {
-    /// Nobody has been asked there.
+    /// No master has sent a request to the address.
     Silent,
-    /// Somebody was asked there, and may answer yet.
+    /// A master has sent a request, and an answer may still come.
     Asked,
-    /// The master has gone on without an answer.
+    /// The master has continued without an answer.
     Free,
 }
 
-/// What a piece of the line's traffic leads to.
+/// The result of a piece of the line's traffic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
     /// How often bytes were skipped that are no telegram.
     pub damaged: usize,
-    /// The station that answers, if any does, and how long it has to wait before it does so.
+    /// The station that answers, if any, and its wait before the answer.
     pub answer: Option<(u8, Nanos)>,
 }
 
@@ -76,7 +76,7 @@ impl Segment {
         bits(self.baud, count)
     }
 
-    /// When a station acts by itself; [`Nanos::MAX`] for never.
+    /// When a station acts on its own; [`Nanos::MAX`] for never.
     pub fn deadline(&self) -> Nanos {
         let deadlines = self.stations().map(Station::deadline);
         deadlines.min().unwrap_or(Nanos::MAX)
@@ -89,12 +89,12 @@ impl Segment {
         }
     }
 
-    /// Takes characters off the line. `reply` becomes the answer to the last telegram; a station whose master has gone on
-    /// no longer answers what came before.
+    /// Takes characters off the line. `reply` becomes the answer to the last telegram; a station no longer answers an
+    /// earlier request once its master has continued.
     ///
     /// # Errors
     ///
-    /// Another device answers at the address of a station, before that has ever answered.
+    /// Another device answers at the address of a station that has never answered itself.
     pub fn hear<'a>(
         &mut self,
         now: Nanos,
@@ -112,7 +112,7 @@ impl Segment {
             match found {
                 Found::Damaged => {
                     heard.damaged += 1;
-                    // What follows may be a part of a telegram: it proves nothing.
+                    // The next bytes may be a part of a telegram: they prove nothing.
                     for (_, listening) in &mut *stations {
                         if *listening == Listening::Asked {
                             *listening = Listening::Silent;
@@ -136,7 +136,7 @@ impl Segment {
     }
 }
 
-/// Whom a telegram is for; the station that answers, if any does, with its wait in bits.
+/// Serves a telegram; returns the station that answers, if any, with its wait in bits.
 fn serve(
     stations: &mut [(Station, Listening)],
     now: Nanos,
@@ -167,7 +167,7 @@ fn serve(
     answer.filter(|_| !reply.is_empty())
 }
 
-/// Finds out whether the addresses are free: a request to each has to remain without an answer once.
+/// Finds out whether the addresses are free: one request to each must remain unanswered.
 fn listen(stations: &mut [(Station, Listening)], telegram: &Telegram<'_>) -> Result<(), Taken> {
     for (station, listening) in stations {
         let address = station.address();
@@ -183,7 +183,7 @@ fn listen(stations: &mut [(Station, Listening)], telegram: &Telegram<'_>) -> Res
                 false
             }
         };
-        // An adapter may echo what is sent here; nothing is before an address is free.
+        // An adapter may echo sent bytes, but nothing is sent before an address is free.
         if is_answered && *listening != Listening::Free {
             return Err(Taken { address });
         }
@@ -248,7 +248,7 @@ mod tests {
         bytes
     }
 
-    /// Who answers these bytes.
+    /// The station that answers these bytes.
     fn hear(segment: &mut Segment, now: Nanos, bytes: &[u8]) -> Option<u8> {
         let mut reply = Vec::new();
         let heard = segment.hear(now, bytes, &mut Nothing, &mut reply);
@@ -257,7 +257,7 @@ mod tests {
         answer.map(|(address, _)| address)
     }
 
-    /// After a request to each of its stations has remained without an answer.
+    /// The segment after a request to each of its stations has remained unanswered.
     fn free(addresses: &[u8]) -> Segment {
         let mut segment = segment(addresses);
         for address in addresses {
@@ -294,12 +294,12 @@ mod tests {
     #[test]
     fn a_telegram_that_never_ends_does_not_swallow_the_next_one() {
         let mut line = free(&[3]);
-        // The head of a long telegram, and then silence.
+        // The head of a long telegram, followed by silence.
         let head = [0x68, 200, 200, 0x68, 3, 2, 0x5D];
         assert_eq!(hear(&mut line, Nanos(0), &head), None);
         let later = line.bits(SILENCE) + Nanos(1);
         assert_eq!(hear(&mut line, later, &status(3)), Some(3));
-        // Even in pieces, though not at once.
+        // Works in pieces too, but not at once.
         assert_eq!(hear(&mut line, later, &head), None);
         let much_later = later + PATIENCE + Nanos(1);
         assert_eq!(hear(&mut line, much_later, &status(3)[..2]), None);

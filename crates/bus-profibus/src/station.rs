@@ -12,7 +12,7 @@ use crate::telegram::{BROADCAST, Control, Frame, append_short_ack};
 use crate::user_parameters::UserParameters;
 use exchange::Clear;
 
-/// The service access points of a slave, and that of a master.
+/// The service access points of a slave, and a master's.
 pub(crate) mod sap {
     pub(crate) const RD_INP: u8 = 56;
     pub(crate) const RD_OUTP: u8 = 57;
@@ -21,78 +21,78 @@ pub(crate) mod sap {
     pub(crate) const SLAVE_DIAG: u8 = 60;
     pub(crate) const SET_PRM: u8 = 61;
     pub(crate) const CHK_CFG: u8 = 62;
-    /// Of a master, for all of these.
+    /// The master's end for all of these.
     pub(crate) const MASTER: u8 = 62;
 }
 
-/// The time in bits before an answer, as long as the master has set no other.
+/// The time in bits before an answer, unless the master has set another.
 pub(crate) const MIN_TSDR: u8 = 11;
 
-/// What stands behind a station: the machine.
+/// The machine behind a station.
 pub trait Process {
-    /// Whether the station takes part in the line's traffic at all; a device without power does not.
+    /// True if the station takes part in the line's traffic; a device without power does not.
     fn is_up(&mut self, _station: u8, _now: Nanos) -> bool {
         true
     }
 
-    /// Fills in what the station sends now. `false`: it is lost on the way, so nothing is to be sent.
+    /// Fills in the current inputs. `false`: they are lost on the way, so send nothing.
     fn inputs(&mut self, station: u8, now: Nanos, inputs: &mut [u8]) -> bool;
 
-    /// The master has the inputs of the last [`inputs`](Self::inputs).
+    /// The master has received the inputs of the last [`inputs`](Self::inputs).
     fn delivered(&mut self, station: u8);
 
     /// The outputs that a telegram brought.
     fn outputs(&mut self, station: u8, now: Nanos, outputs: &[u8]);
 
-    /// The master is alive, and the outputs stay as they are.
+    /// The master is alive, and the outputs are unchanged.
     fn alive(&mut self, station: u8, now: Nanos);
 
-    /// What happened to the station.
+    /// Reports an event of the station.
     fn tell(&mut self, station: u8, now: Nanos, event: Event);
 }
 
-/// Which device a station is.
+/// The identity of a station's device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[allow(
     clippy::struct_excessive_bools,
     reason = "the standard's own flags, independent of each other"
 )]
 pub struct Identity {
-    /// The number of its kind, from its GSD file.
+    /// The ident number, from its GSD file.
     pub ident: u16,
-    /// Its modules.
+    /// The modules.
     pub configuration: Configuration,
-    /// Its user's parameters; by default it accepts any.
+    /// The user parameters; by default any are accepted.
     pub user: UserParameters,
-    /// Whether it supports SYNC.
+    /// True if the device supports SYNC.
     pub sync: bool,
-    /// Whether it supports FREEZE.
+    /// True if the device supports FREEZE.
     pub freeze: bool,
-    /// Whether a master in CLEAR sends it telegrams without outputs.
+    /// True if a master in CLEAR sends the device telegrams without outputs.
     pub fail_safe: bool,
-    /// Whether the first octets of the user's parameters are those of DPV1.
+    /// True if the user parameters begin with the octets of DPV1.
     pub dpv1: bool,
-    /// The most octets of its diagnosis, with the 6 of the standard.
+    /// The most octets of a diagnosis, including the 6 of the standard.
     pub max_diagnosis: usize,
 }
 
 /// An extended diagnosis.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Diagnosed {
-    /// Its blocks, as the standard has them.
+    /// The blocks, in the standard's format.
     pub blocks: Vec<Vec<u8>>,
-    /// The station cannot exchange data properly until it is over (`Stat_Diag`): the master goes on reading it.
+    /// The station cannot exchange data properly while the diagnosis lasts (`Stat_Diag`): the master keeps reading it.
     pub is_static: bool,
 }
 
-/// The states of a DP slave; `Power_On` is before it is made.
+/// The states of a DP slave; `Power_On` precedes its construction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
-    /// It waits for its parameters.
+    /// Waiting for parameters.
     WaitPrm,
-    /// It waits for the configuration to be checked.
+    /// Waiting for the configuration check.
     WaitCfg,
-    /// It exchanges data.
+    /// Exchanging data.
     DataExch,
 }
 
@@ -108,7 +108,7 @@ pub struct Station {
     state: State,
     /// The master that has set the parameters.
     owner: Option<u8>,
-    /// The master whose parameters were refused last.
+    /// The master whose parameters were last refused.
     refused: Option<u8>,
     watchdog: Option<Nanos>,
     /// When the owner was last heard.
@@ -117,9 +117,9 @@ pub struct Station {
     group: u8,
     fail_safe: bool,
     faults: diagnosis::Faults,
-    /// The extended diagnosis that the machine has raised; empty if there is none.
+    /// The extended diagnosis that the machine has raised; empty without one.
     extended: Vec<u8>,
-    /// There is more of it than fits.
+    /// The diagnosis has more blocks than fit.
     has_more: bool,
     /// The machine cannot exchange data properly until its diagnosis is taken back.
     is_static: bool,
@@ -130,16 +130,16 @@ pub struct Station {
     is_frozen: bool,
     is_synced: bool,
     clear: Clear,
-    /// The inputs have been frozen and not sent since.
+    /// The frozen inputs have not been sent yet.
     is_fresh: bool,
     inputs: Vec<u8>,
     outputs: Vec<u8>,
-    /// They are 0 since CLEAR, or since the last master left, and the machine does not have them.
+    /// The outputs are 0 since CLEAR, or since the last master left, and the machine does not have them.
     is_cleared: bool,
-    /// Outputs that wait for the next SYNC, if there are any.
+    /// Outputs that wait for the next SYNC.
     held: Vec<u8>,
     is_held: bool,
-    /// The last answer to `Data_Exchange` has inputs of which the master has not shown that it has them.
+    /// The last answer to `Data_Exchange` has inputs that the master may not have received.
     is_pending: bool,
     last: Last,
 }
@@ -147,7 +147,7 @@ pub struct Station {
 /// The last request and its answer, for a master that repeats it.
 #[derive(Debug, Default)]
 struct Last {
-    /// All of its head but the address of the station; `None` if there is nothing to repeat.
+    /// The head without the address of the station; `None` if there is nothing to repeat.
     head: Option<Head>,
     data: Vec<u8>,
     answer: Vec<u8>,
@@ -202,22 +202,22 @@ impl Station {
         }
     }
 
-    /// Its address.
+    /// The address.
     pub fn address(&self) -> u8 {
         self.address
     }
 
-    /// Its state.
+    /// The state.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// How long it waits before it answers, in bit times.
+    /// The wait before an answer, in bit times.
     pub fn min_tsdr(&self) -> u8 {
         self.min_tsdr
     }
 
-    /// When it acts by itself: the end of the watchdog's time; [`Nanos::MAX`] for never.
+    /// When the station acts on its own: the end of the watchdog's time; [`Nanos::MAX`] for never.
     pub fn deadline(&self) -> Nanos {
         match (self.state, self.watchdog) {
             (State::WaitPrm, _) | (_, None) => Nanos::MAX,
@@ -234,8 +234,8 @@ impl Station {
         }
     }
 
-    /// Raises an extended diagnosis, or takes it back by an empty one. The master is told with the next data that there is
-    /// something to read. Blocks for which the device has no room are left out, and the master is told that there are more.
+    /// Raises an extended diagnosis, or clears it with an empty one. The next data answer announces the diagnosis to
+    /// the master. Blocks that exceed the device's room are left out, and the master learns that there are more.
     pub fn diagnose(&mut self, diagnosed: &Diagnosed) {
         let room = diagnosis::room(self.identity.max_diagnosis);
         let mut extended = Vec::new();
@@ -256,7 +256,7 @@ impl Station {
         self.is_news |= is_news;
     }
 
-    /// Takes a request to this station or to all, and appends its answer, if it has any.
+    /// Takes a request to this station or to all, and appends its answer, if any.
     pub fn request(
         &mut self,
         now: Nanos,
@@ -285,7 +285,7 @@ impl Station {
             _ => return self.append(request, Control::NOT_ACTIVE, &[], reply),
         }
         if is_owner && !request.control.counts() {
-            // The master begins anew: it has given up waiting for the last answer.
+            // The master restarts: it no longer waits for the last answer.
             self.is_pending = false;
         }
         if self.is_repeated(request) {
@@ -297,7 +297,7 @@ impl Station {
         }
         let before = reply.len();
         self.serve(now, request, process, reply);
-        // The repetition of a request whose answer was lost here is served anew.
+        // A repeated request whose answer was lost here is served again.
         self.last.head = (reply.len() > before).then(|| head_of(request));
         self.last.data.clear();
         self.last.data.extend_from_slice(request.data);
@@ -305,8 +305,8 @@ impl Station {
         self.last.answer.extend_from_slice(&reply[before..]);
     }
 
-    /// Whether the master repeats its last request because it did not get the answer. The frame count bit alone would
-    /// do, but some masters never toggle it: a telegram with new outputs is never taken for a repetition.
+    /// True if the master repeats its last request because the answer did not arrive. The frame count bit alone would
+    /// do, but some masters never toggle it: a telegram with new outputs never counts as a repetition.
     fn is_repeated(&self, request: &Frame<'_>) -> bool {
         request.control.counts()
             && self.last.head == Some(head_of(request))
@@ -344,7 +344,7 @@ impl Station {
                 self.check(now, request.source, request.data, process);
                 Answer::Acknowledged
             }
-            // A master that has not read the diagnosis yet goes on, and would wait here forever.
+            // Acknowledge; a master that has not read the diagnosis yet would otherwise wait here forever.
             sap::CHK_CFG if self.refused == Some(request.source) => Answer::Acknowledged,
             sap::RD_INP if exchanges => Answer::Data(Control::DATA_LOW, &self.inputs),
             sap::RD_OUTP if exchanges => Answer::Data(Control::DATA_LOW, &self.outputs),
@@ -367,7 +367,7 @@ impl Station {
         }
     }
 
-    /// An answer without access points.
+    /// Appends an answer without access points.
     fn append(&self, request: &Frame<'_>, control: Control, data: &[u8], reply: &mut Vec<u8>) {
         let answer = Frame {
             destination: request.source,
@@ -380,13 +380,13 @@ impl Station {
         answer.append(reply);
     }
 
-    /// `Set_Prm`: it is acknowledged in any case, and the diagnosis tells whether the parameters were right.
+    /// `Set_Prm`: always acknowledged; the diagnosis shows whether the parameters were right.
     fn parameterise(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
         if self.owner.is_some_and(|owner| owner != master) {
             return;
         }
         self.refused = None;
-        // The answer to the last exchange may be the reason why the master begins anew.
+        // The last exchange's answer may be the reason why the master restarts.
         self.is_pending = false;
         let Some(parameters) = Parameters::read(data) else {
             let why = format!("{} octets, expected at least 7", data.len());
@@ -457,7 +457,7 @@ impl Station {
         self.refused = Some(master);
     }
 
-    /// `Chk_Cfg`, acknowledged in any case, too.
+    /// `Chk_Cfg`, also always acknowledged.
     fn check(&mut self, now: Nanos, master: u8, data: &[u8], process: &mut impl Process) {
         if let Some(why) = self.identity.configuration.difference(data) {
             self.leave(now, Leaving::Configuration { master, why }, process);
@@ -487,7 +487,7 @@ impl Station {
         self.is_held = false;
         self.outputs.fill(0);
         self.is_cleared = true;
-        // What was answered in another state is not repeated.
+        // An answer of another state is not repeated.
         self.last.head = None;
         process.tell(self.address, now, Event::Left(why));
     }

@@ -80,17 +80,17 @@ impl Control {
     /// As [`SRD_LOW`](Self::SRD_LOW), with high priority.
     pub const SRD_HIGH: u8 = 0x0D;
 
-    /// Whether it is a request, and not an answer.
+    /// True for a request, false for an answer.
     pub const fn is_request(self) -> bool {
         self.0 & 0x40 != 0
     }
 
-    /// FCV: whether the frame count bit counts.
+    /// FCV: true if the frame count bit counts.
     pub const fn counts(self) -> bool {
         self.0 & 0x10 != 0
     }
 
-    /// Whether a request is answered: SDN is not.
+    /// True if a request gets an answer: SDN does not.
     pub const fn is_answered(self) -> bool {
         !matches!(self.function(), Self::SDN_LOW | Self::SDN_HIGH)
     }
@@ -113,7 +113,7 @@ pub enum TelegramError {
     /// The checksum is wrong.
     #[error("the checksum {found:02X}, expected {expected:02X}")]
     Checksum {
-        /// What was sent.
+        /// The checksum in the telegram.
         found: u8,
         /// The sum of the octets.
         expected: u8,
@@ -121,7 +121,7 @@ pub enum TelegramError {
     /// The last octet is not the end delimiter, or the start delimiter is not repeated.
     #[error("{0:02X} in the place of a delimiter")]
     Delimiter(u8),
-    /// It ends before the service access points that it announces.
+    /// The telegram ends before the service access points that it announces.
     #[error("no octets for the service access points")]
     AccessPoint,
     /// The address of a token is out of range.
@@ -170,7 +170,7 @@ fn token<'a>(bytes: &[u8]) -> Result<Option<(Telegram<'a>, usize)>, TelegramErro
     let Some(&[destination, source]) = bytes.get(1..3) else {
         return Ok(None);
     };
-    // It has no checksum: an address that does not exist is all that can be seen to be wrong with it.
+    // A token has no checksum: only an address that does not exist can be detected as wrong.
     match [destination, source]
         .into_iter()
         .find(|address| *address >= BROADCAST)
@@ -233,11 +233,11 @@ impl<'a> Frame<'a> {
         })
     }
 
-    /// Appends its bytes: SD1 if it has no data, and SD2 otherwise.
+    /// Appends the frame's bytes: SD1 without data, SD2 otherwise.
     ///
     /// # Panics
     ///
-    /// When it has more than [`DATA_LIMIT`] octets of data.
+    /// When the frame has more than [`DATA_LIMIT`] octets of data.
     pub fn append(&self, out: &mut Vec<u8>) {
         assert!(self.data.len() <= DATA_LIMIT, "it does not fit");
         let flag = |sap: Option<u8>| if sap.is_some() { HAS_SAP } else { 0 };
@@ -279,7 +279,7 @@ mod tests {
             .collect()
     }
 
-    /// Telegrams recorded from other programs and devices, each with what it says.
+    /// Telegrams recorded from other programs and devices, each with its meaning.
     fn golden() -> Vec<(Vec<u8>, Telegram<'static>)> {
         let frame = |destination, source, control, dsap, ssap, data| {
             Telegram::Frame(Frame {
@@ -345,12 +345,12 @@ mod tests {
             for length in 0..bytes.len() {
                 assert_eq!(Telegram::parse(&bytes[..length]), Ok(None), "{length}");
             }
-            // The addresses of a token are not protected: only the parity bit of the line would tell.
+            // The addresses of a token are not protected: only the line's parity bit would detect an error.
             let protected = if bytes[0] == SD4 { 8 } else { 8 * bytes.len() };
             for bit in 0..protected {
                 let mut flipped = bytes.clone();
                 flipped[bit / 8] ^= 1 << (bit % 8);
-                // A longer length cannot be seen to be wrong before its copy has arrived; here it has.
+                // Before the copy of a length has arrived, a longer one cannot be detected as wrong; here it has.
                 assert!(
                     Telegram::parse(&flipped).is_err(),
                     "bit {bit} of {bytes:02X?}"

@@ -1,4 +1,4 @@
-//! The user's parameters: the octets of `Set_Prm` behind the standard's own, as a GSD file describes them.
+//! The user parameters: the octets of `Set_Prm` after the standard's own, as a GSD file describes them.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -8,35 +8,35 @@ use std::sync::Arc;
 
 use tickbus_base::toml_text::shown;
 
-/// The most octets of them in one telegram.
+/// The most such octets in one telegram.
 pub(crate) const LIMIT: usize = 237;
 
-/// How many of a list's values a message names.
+/// The most values of a list that a message names.
 const SHOWN_VALUES: usize = 8;
 
 /// A parameter that an engineer can set in the PLC's project.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Parameter {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// How it lies in the octets.
+    /// The encoding in the octets.
     pub kind: ParameterKind,
-    /// What it is unless somebody sets it.
+    /// The default.
     pub default: i64,
-    /// What it may be.
+    /// The allowed values.
     pub allowed: Allowed,
-    /// What single values mean, in words.
+    /// The meaning of single values, in words.
     pub texts: Arc<BTreeMap<i64, String>>,
-    /// Whether an engineer may change it.
+    /// True if an engineer may change the parameter.
     pub is_changeable: bool,
-    /// Whether an engineer sees it.
+    /// True if an engineer sees the parameter.
     pub is_visible: bool,
 }
 
-/// How a parameter lies in the octets; those with several have the high one first.
+/// The encoding of a parameter in the octets; with several octets the high one comes first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterKind {
-    /// A number from 0 on, of 1, 2 or 4 octets.
+    /// A number without a sign, of 1, 2 or 4 octets.
     Unsigned(usize),
     /// A number with a sign, of 1, 2 or 4 octets.
     Signed(usize),
@@ -50,7 +50,7 @@ pub enum ParameterKind {
 }
 
 impl ParameterKind {
-    /// How many octets it reaches into.
+    /// The number of octets that the parameter occupies.
     pub const fn octets(self) -> usize {
         match self {
             Self::Unsigned(octets) | Self::Signed(octets) => octets,
@@ -58,7 +58,7 @@ impl ParameterKind {
         }
     }
 
-    /// The values that it can hold.
+    /// The values that fit.
     pub fn range(self) -> RangeInclusive<i64> {
         match self {
             Self::Unsigned(octets) => 0..=(1 << (8 * octets)) - 1,
@@ -67,7 +67,7 @@ impl ParameterKind {
         }
     }
 
-    /// The bits that it has in each of its octets.
+    /// The parameter's bits in each of its octets.
     fn mask(self) -> u8 {
         match self {
             Self::Unsigned(_) | Self::Signed(_) => 0xFF,
@@ -75,7 +75,7 @@ impl ParameterKind {
         }
     }
 
-    /// Reads it from the start of `octets`, which have to be enough.
+    /// Reads the parameter from the start of `octets`, which must be long enough.
     fn read(self, octets: &[u8]) -> i64 {
         let own = octets[..self.octets()].iter();
         let value = own.fold(0, |value, octet| {
@@ -91,7 +91,7 @@ impl ParameterKind {
         }
     }
 
-    /// Writes it at the start of `octets`, which have to be enough. The value has to be one that it can hold.
+    /// Writes the parameter at the start of `octets`, which must be long enough. The value must fit.
     fn write(self, value: i64, octets: &mut [u8]) {
         if let Self::Bits { first, .. } = self {
             let bits = value.to_be_bytes()[7] << first;
@@ -103,10 +103,10 @@ impl ParameterKind {
     }
 }
 
-/// What a parameter may be.
+/// The allowed values of a parameter.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Allowed {
-    /// All that its kind can hold.
+    /// All that fit the kind.
     Any,
     /// From the first to the second.
     Range(i64, i64),
@@ -115,7 +115,7 @@ pub enum Allowed {
 }
 
 impl Parameter {
-    /// Whether the file allows `value`. A device accepts the default, too, whether it does or not.
+    /// True if the file allows `value`. A device always accepts the default, too.
     pub fn allows(&self, value: i64) -> bool {
         match &self.allowed {
             Allowed::Any => true,
@@ -124,7 +124,7 @@ impl Parameter {
         }
     }
 
-    /// A value, with what it means.
+    /// A value with its meaning.
     fn value(&self, value: i64) -> String {
         match self.texts.get(&value) {
             Some(text) => format!("{value} ({})", shown(text)),
@@ -154,16 +154,16 @@ impl fmt::Display for Allowed {
 /// The parameters of a device itself, or of one module.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ParameterBlock {
-    /// How many octets they have: what follows reaches no further.
+    /// The number of octets; nothing extends beyond.
     pub length: usize,
-    /// Octets that the PLC's tool sends as they are, each piece with its offset.
+    /// Octets that the PLC's tool sends unchanged, each piece with its offset.
     pub constants: Vec<(usize, Vec<u8>)>,
     /// The parameters among them, each with its offset.
     pub parameters: Vec<(usize, Arc<Parameter>)>,
 }
 
 impl ParameterBlock {
-    /// What a PLC's tool sends unless somebody changes it.
+    /// The octets that a PLC's tool sends by default.
     pub fn defaults(&self) -> Vec<u8> {
         let mut octets = vec![0; self.length];
         for (at, constant) in &self.constants {
@@ -175,7 +175,7 @@ impl ParameterBlock {
         octets
     }
 
-    /// The bits of each octet that no parameter has.
+    /// The bits of each octet that belong to no parameter.
     fn constant_bits(&self) -> Vec<u8> {
         let mut bits = vec![0xFF; self.length];
         for (at, parameter) in &self.parameters {
@@ -191,14 +191,14 @@ impl ParameterBlock {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct UserParameters {
     parts: Vec<Part>,
-    /// What a PLC's tool sends for the device and all modules.
+    /// The octets that a PLC's tool sends by default for the device and all modules.
     defaults: Vec<u8>,
 }
 
-/// What belongs to the device itself or to one module.
+/// The parameters of the device itself or of one module.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Part {
-    /// As messages have it.
+    /// The name in messages.
     label: String,
     at: usize,
     block: Arc<ParameterBlock>,
@@ -227,7 +227,7 @@ impl UserParameters {
         self.defaults.extend(block.defaults());
     }
 
-    /// What a PLC's tool sends unless somebody changes it.
+    /// The octets that a PLC's tool sends by default.
     pub fn defaults(&self) -> &[u8] {
         &self.defaults
     }
@@ -249,13 +249,13 @@ impl UserParameters {
         })
     }
 
-    /// Why a device refuses the octets in `received`; otherwise what is unusual in them, if anything is.
+    /// Why a device refuses the octets in `received`; otherwise a remark on unusual ones, if any.
     ///
-    /// Other constants are unusual: engineers change them by hand, in tools that do not know the parameters.
+    /// Different constants are unusual: engineers change them by hand, in tools that do not know the parameters.
     ///
     /// # Errors
     ///
-    /// They are too few, or a parameter has a value that the GSD file does not allow.
+    /// There are too few octets, or a parameter has a value that the GSD file does not allow.
     pub fn check(&self, received: &[u8]) -> Result<Option<String>, String> {
         if let Some(part) = self
             .parts
@@ -273,7 +273,7 @@ impl UserParameters {
             for (at, parameter) in &part.block.parameters {
                 let at = part.at + at;
                 let value = parameter.kind.read(&received[at..]);
-                // Where a file puts two parameters into the same bits, the tool sends the later one.
+                // If a file puts two parameters into the same bits, the tool sends the later one.
                 let is_default = value == parameter.kind.read(&self.defaults[at..]);
                 if !is_default && !parameter.allows(value) {
                     return Err(format!(
@@ -411,7 +411,7 @@ mod tests {
             constant,
             "the device: octet 1 of its parameters is 00; the GSD's constant is 08"
         );
-        // Of the octet that is shared with a parameter the other bits count.
+        // In an octet that is shared with a parameter, the other bits count.
         let shared = noted(&[0xC0, 0x08, 0x02, 0, 0, 1]).expect("bits 0 and 7");
         assert!(shared.contains("slot 2 \"4 AO\": octet 0"), "{shared}");
         let more = noted(&[0xC0, 0x08, 0x83, 0, 0, 1, 0]).expect("more");

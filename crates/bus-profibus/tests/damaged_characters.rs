@@ -1,4 +1,5 @@
-//! Characters that a serial port finds damaged: the checksum of a telegram is a sum, which two of them can leave as it was.
+//! Characters that a serial port reports as damaged: the checksum of a telegram is a sum, and two damaged characters
+//! can leave it unchanged.
 #![allow(missing_docs, reason = "tests")]
 
 use tickbus_base::os::Marks;
@@ -13,10 +14,10 @@ const STATION: u8 = 8;
 /// Six octets of outputs, one of inputs.
 const CONFIG: [u8; 2] = [0x10, 0x25];
 
-/// A character on the line, and whether it is damaged.
+/// A character on the line; true if it is damaged.
 type Character = (u8, bool);
 
-/// What the kernel hands over, by termios(3), with `PARMRK`.
+/// The kernel's output by termios(3), with `PARMRK`.
 fn marked(line: &[Character]) -> Vec<u8> {
     let codes = line.iter().map(|&(value, is_damaged)| match value {
         _ if is_damaged => vec![0xFF, 0, value],
@@ -98,7 +99,7 @@ impl Rig {
         rig
     }
 
-    /// Whether the station answers.
+    /// True if the station answers.
     fn hear(&mut self, bytes: &[u8]) -> bool {
         self.now += Nanos::from_millis(1);
         let mut reply = Vec::new();
@@ -109,7 +110,7 @@ impl Rig {
         heard.expect("the address is free").answer.is_some()
     }
 
-    /// Sends these outputs over a line that does `harm`. Whether they were answered.
+    /// Sends these outputs over a line that does `harm`; returns whether they were answered.
     fn exchange(&mut self, outputs: [u8; 6], harm: impl FnOnce(&mut [Character])) -> bool {
         let mut line = sound(&telegram(self.control, None, &outputs));
         harm(&mut line);
@@ -125,7 +126,7 @@ fn sound(bytes: &[u8]) -> Vec<Character> {
     bytes.iter().map(|byte| (*byte, false)).collect()
 }
 
-/// Where the outputs begin in a telegram.
+/// The start of the outputs in a telegram.
 const DATA: usize = 7;
 
 #[test]
@@ -133,10 +134,10 @@ fn two_damaged_characters_that_leave_the_sum_as_it_was_are_no_outputs() {
     let mut rig = Rig::new();
     let before = rig.machine.outputs.len();
     for (first, second, of_it) in [
-        // What a port without marks makes of them.
+        // The characters that a port without marks delivers.
         (0x80, 0x80, [0, 0]),
         (0xFF, 0x01, [0, 0]),
-        // A bit each, one up and one down.
+        // One bit each, one up and one down.
         (0x10, 0x01, [0x11, 0x00]),
         (0x7F, 0x80, [0xFF, 0x00]),
     ] {
@@ -147,7 +148,7 @@ fn two_damaged_characters_that_leave_the_sum_as_it_was_are_no_outputs() {
         assert!(!is_answered, "{first:02X} {second:02X}");
     }
     assert_eq!(rig.machine.outputs.len(), before);
-    // Only the marks tell: the checksum is right.
+    // Only the marks reveal the damage: the checksum is right.
     assert!(rig.exchange([0x80, 0x80, 0, 0, 0, 2], |line| {
         line[DATA].0 = 0;
         line[DATA + 1].0 = 0;
@@ -167,7 +168,7 @@ fn no_outputs_are_believed_that_the_master_has_not_sent() {
     };
     let (mut answered, mut harmed) = (0, 0);
     for _ in 0..20_000 {
-        // Common data, of which many a pair adds up to 256.
+        // Common data, with many pairs that add up to 256.
         let outputs = [0; 6].map(|_: u8| {
             let common = [0x00, 0x01, 0x40, 0x80, 0xC0, 0xFF];
             common[usize::try_from(random(6)).expect("below six")]

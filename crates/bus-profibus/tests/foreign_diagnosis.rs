@@ -1,4 +1,4 @@
-//! Diagnoses that the simulation raises, read by profirust. (pyprofibus reads some in the tests of the whole.)
+//! Diagnoses that the simulation raises, read by profirust. (The integration tests have pyprofibus read some.)
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
@@ -24,7 +24,7 @@ fn a_fault_raises_a_diagnosis_which_the_master_reads_once_and_takes_it_back() {
     let master = Master::run(line.end(1), project());
     until_exchanging(&mut device, &master);
     for (fault, block) in [
-        // Four bytes of inputs in words, and outputs likewise.
+        // Four bytes of inputs in words, and the same of outputs.
         (
             "slot = 1\nchannel = 5\nerror = \"line-break\"",
             &[0x80, 0x45, 0xA6][..],
@@ -39,7 +39,7 @@ fn a_fault_raises_a_diagnosis_which_the_master_reads_once_and_takes_it_back() {
         until(&mut device, "the master has read it", |_| {
             master.first(|seen| seen.diagnosis == (WATCHDOG_ON | EXT_DIAG, block.to_vec()))
         });
-        // The data go on, and nobody reads the diagnosis again.
+        // The data exchange continues, and nobody reads the diagnosis again.
         exchange(&mut device, &master, 7);
         exchange(&mut device, &master, 8);
         master.first(|seen| assert_eq!(seen.diagnoses, before + 1));

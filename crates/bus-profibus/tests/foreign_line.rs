@@ -1,4 +1,4 @@
-//! A line in trouble: damaged telegrams, noise, a second master, tokens that get lost. The masters are profirust.
+//! A line in trouble: damaged telegrams, noise, a second master, lost tokens. The masters are profirust.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -45,7 +45,7 @@ fn damaged_and_cut_telegrams_and_noise_between_them_are_never_believed() {
     assert_ne!(damaged, "0");
 }
 
-/// Sends bytes that nobody asked for, in pieces, at a third end of the line.
+/// Sends unrequested bytes, in pieces, from a third end of the line.
 fn babble(end: &Path, piece: impl Fn(u32) -> Vec<u8>) {
     let mut babbler = OpenOptions::new().write(true).open(end).expect("an end");
     for number in 0..300 {
@@ -54,8 +54,8 @@ fn babble(end: &Path, piece: impl Fn(u32) -> Vec<u8>) {
     }
 }
 
-/// A request to the station that never ends, half a telegram after another one, and the tokens and the requests of a
-/// master that has gone mad.
+/// An endless request to the station, half a telegram after another one, and the tokens and requests of a master that
+/// has gone mad.
 #[test]
 fn a_babbling_master_does_not_hinder_the_next_exchange() {
     let pieces: [fn(u32) -> Vec<u8>; 3] = [
@@ -89,7 +89,7 @@ fn a_babbling_master_does_not_hinder_the_next_exchange() {
     }
 }
 
-/// One driver with two stations, each with a master of its own, who pass the token to each other.
+/// One driver with two stations, each with its own master; the masters pass the token to each other.
 #[test]
 fn two_masters_take_turns_and_either_goes_on_when_the_other_is_lost() {
     logged::expect("station 9: the master has been silent for longer");
@@ -97,7 +97,7 @@ fn two_masters_take_turns_and_either_goes_on_when_the_other_is_lost() {
     let mut listener = OpenOptions::new();
     let listener = listener.read(true).open(line.end(3)).expect("an end");
     let heard = std::thread::spawn(move || {
-        // Until the line ends, which is an error on a pseudo-terminal.
+        // Reads until the line ends, which is an error on a pseudo-terminal.
         let mut heard = Vec::new();
         let _ = std::io::BufReader::new(listener).read_to_end(&mut heard);
         heard
@@ -145,7 +145,7 @@ fn two_masters_take_turns_and_either_goes_on_when_the_other_is_lost() {
             both_ways(&mut device, &first, "a", number);
             both_ways(&mut device, &second, "b", number + 100);
         }
-        // Its token is lost with it.
+        // The second master's token is lost, too.
         drop(second);
         await_that("its station is released", || {
             device.tick();

@@ -1,5 +1,5 @@
-//! The bus `profibus-device` with profirust, a DP master that somebody else wrote, at the other end of a
-//! pseudo-terminal, in real time.
+//! The bus `profibus-device` with profirust, an independent DP master, at the other end of a pseudo-terminal, in real
+//! time.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -29,7 +29,7 @@ use tickbus_conformance::rig::{End, await_that, config, logged};
 use tickbus_driver::Code;
 use tickbus_fieldbus::LinkState;
 
-/// What a PLC's tool sends to `remote_io.gsd` with its first three modules.
+/// The parameters that a PLC's tool sends to `remote_io.gsd` with its first three modules.
 const REMOTE_IO_PARAMETERS: [u8; 10] = [0xC0, 0, 0, 0, 0, 0x11, 0xFF, 0xFF, 0xFF, 0xFE];
 
 #[test]
@@ -79,7 +79,7 @@ fn pulses_of_one_tick_and_of_one_exchange_arrive() {
                 seen.outputs[0] = level;
                 seen.exchanges
             });
-            // The machine does not tick while the pulse is there. One exchange may be under way already.
+            // The machine does not tick during the pulse. One exchange may be under way already.
             await_that("it has gone out", || {
                 std::thread::sleep(Duration::from_micros(500));
                 master.first(|seen| seen.exchanges > exchanges + 2)
@@ -123,7 +123,7 @@ fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_
     for rate in RATES {
         let line = pty::Line::new();
         let bus = OnPort(line.end(0).display().to_string());
-        // So long that only the watchdog can be the reason.
+        // Long enough that only the watchdog can be the reason.
         let text = config(&bus, "device", "").replace("\"300ms\"", "\"60s\"");
         let text = text.replace("baud = 500000", &format!("baud = {}", rate.1));
         let mut device = End::open(&text, &Monotonic::shared());
@@ -140,7 +140,7 @@ fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_
                 device.tick().age < Nanos::from_secs(60),
                 "young, and invalid"
             );
-            // The data are stale first, and the reason is told a moment later.
+            // The data turn stale first; the reason is logged a moment later.
             let words = "station 8: the master has been silent for longer than 500";
             until(&mut device, "the reason is told", |device| {
                 let link = device.link();
@@ -261,7 +261,7 @@ fn many_stations_of_different_devices_share_a_line() {
             );
         }
     }
-    // All others have the address in the image.
+    // All others use their image addresses.
     let at = "[fieldbus.at]\n\"from 20\" = \"slot 2 %IW0\"\n\"to 20\" = \"slot 3 %QW0\"\n";
     text.push_str(at);
     let low = |address| if address == 20 { 1 } else { 3 };
@@ -307,7 +307,7 @@ fn many_stations_of_different_devices_share_a_line() {
     assert_eq!(device.statistic("exchanging"), "3 5 9 20 125");
 }
 
-/// One of two stations has another configuration in the master's project.
+/// One of two stations has a different configuration in the master's project.
 #[test]
 fn a_station_with_a_mistake_does_not_hinder_the_others() {
     logged::expect("station 9: master 2 sent another configuration");
@@ -364,7 +364,7 @@ fn an_answer_that_would_be_late_is_not_sent() {
     await_that("an answer is late", || {
         let asked = [0x10, ADDRESS, 0x02, 0x49, 0x53, 0x16];
         master.write_all(&asked).expect("a line");
-        // Whenever the request is heard, the clock is never between.
+        // Whenever the request arrives, the clock is never in that interval.
         clock.advance(Nanos::from_millis(10));
         let statistics = device.driver.statistics();
         statistics.contains("\nprofibus-device.late=")

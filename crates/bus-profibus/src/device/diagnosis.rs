@@ -1,4 +1,4 @@
-//! What an injected fault reports, as blocks of the extended diagnosis.
+//! The report of an injected fault, as blocks of the extended diagnosis.
 
 use tickbus_fieldbus::faults::{Diagnosis, Finding};
 
@@ -9,7 +9,7 @@ use crate::station::Diagnosed;
 const IDENTIFIER: u8 = 0x40;
 const CHANNEL: u8 = 0x80;
 
-/// What a station with these modules tells its master.
+/// The diagnosis that a station with these modules sends to its master.
 pub(super) fn diagnosed<'a>(
     modules: &Configuration,
     all: impl Iterator<Item = &'a Diagnosis>,
@@ -47,7 +47,7 @@ pub(super) fn diagnosed<'a>(
     told
 }
 
-/// A block whose first octet has its kind and its length.
+/// A block whose first octet holds its kind and length.
 fn with_header(kind: u8, octets: &[u8]) -> Vec<u8> {
     let length = u8::try_from(octets.len() + 1).expect("a fault has few octets");
     let mut block = vec![kind | length];

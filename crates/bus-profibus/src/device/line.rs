@@ -13,11 +13,11 @@ use super::{LineOptions, Machine, StationSetup, Stations};
 use crate::segment::{Segment, Taken};
 use crate::station::Station;
 
-/// A wait before an answer that is no longer than this is spent looking at the clock: to sleep and to be woken takes a
-/// thread as long, and the master's slot time runs meanwhile. It is the shortest wait at 500 kbit/s, and some more.
+/// A wait for an answer up to this long is spent polling the clock: sleeping and waking take a thread as long, while
+/// the master's slot time runs. The value is the shortest wait at 500 kbit/s plus a margin.
 const NO_SLEEP: Nanos = Nanos::from_micros(30);
 
-/// The clock is read at most this often per wait, in case it stands still; on a fast computer that takes longer than
+/// The most clock reads per wait, in case the clock stands still; on a fast computer that many take longer than
 /// [`NO_SLEEP`].
 const LOOKS: u32 = 3_000;
 
@@ -25,7 +25,7 @@ const LOOKS: u32 = 3_000;
 ///
 /// # Errors
 ///
-/// The serial port does not exist, or is gone, or an address is taken.
+/// The serial port does not exist or has disappeared, or an address is taken.
 pub(super) fn serve(
     options: &LineOptions,
     setups: &[StationSetup],
@@ -50,7 +50,7 @@ pub(super) fn serve(
         not_after: Nanos(0),
         is_offered: false,
     };
-    // Stations that begin anew have neither masters nor diagnoses.
+    // Restarted stations have neither masters nor diagnoses.
     port.tell("exchanging", "none");
     port.report_diagnoses_anew();
     call.run(&mut line, port, stop)
@@ -66,14 +66,14 @@ struct Line<'a> {
     /// The answer being sent, and how much of it the system has accepted.
     reply: Vec<u8>,
     written: usize,
-    /// When its first byte may go out.
+    /// The earliest and the latest time for its first byte.
     not_before: Nanos,
     not_after: Nanos,
-    /// Whether the system could have taken its first byte.
+    /// True if the system could have taken its first byte.
     is_offered: bool,
 }
 
-/// Looks at the clock until `time`.
+/// Polls the clock until `time`.
 fn comes_at_once(time: Nanos, clock: &dyn Clock) -> bool {
     (0..LOOKS).any(|_| {
         std::hint::spin_loop();
@@ -90,7 +90,7 @@ impl Line<'_> {
 impl Caller for Line<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         let characters = self.marks.read(bytes);
-        // A line that is down by an injected fault carries nothing.
+        // An injected fault has taken the line down; nothing passes.
         if !port.is_up(now) {
             return Ok(());
         }
@@ -106,7 +106,7 @@ impl Caller for Line<'_> {
             stations: &mut self.stations,
             port,
         };
-        // Whatever it is, nobody waits for the last answer any more.
+        // Any new telegram means that nobody waits for the last answer any more.
         self.reply.clear();
         self.written = 0;
         let heard = self
@@ -165,7 +165,7 @@ impl Caller for Line<'_> {
         let stale = port.stale_at(port.clock().now());
         let deadline = self.segment.deadline().min(stale);
         if self.begins() {
-            // What was offered and not taken waits for the system, until it is late.
+            // An answer that the system was offered but did not take waits until it is late.
             deadline.min(if self.is_offered {
                 self.not_after + Nanos(1)
             } else {

@@ -1,4 +1,4 @@
-//! A device with the modules that somebody has chosen for its slots.
+//! A device with the modules chosen for its slots.
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{did_you_mean, shown};
@@ -9,15 +9,16 @@ use crate::configuration::{Configuration, hex};
 use crate::telegram::DATA_LIMIT;
 use crate::user_parameters::{LIMIT, UserParameters};
 
-/// How many modules a message names.
+/// The most modules that a message names.
 const SHOWN_MODULES: usize = 6;
 
 impl Gsd {
-    /// The device with these modules in its slots, by their names; a device whose modules are fixed needs none.
+    /// The device with these modules in its slots, by their names; a device with fixed modules needs none.
     ///
     /// # Errors
     ///
-    /// It does not have one of them, or not in that slot, or not so many, or they have too many bytes.
+    /// The device lacks a module, or does not accept it in that slot, or the modules are too many or have too many
+    /// bytes.
     pub fn identity(&self, chosen: &[String]) -> Result<Identity, Mistake> {
         let modules = self.modules(chosen)?;
         let slots = modules
@@ -72,7 +73,7 @@ impl Gsd {
 
     fn modules(&self, chosen: &[String]) -> Result<Vec<&Module>, Mistake> {
         let most = self.max_module.unwrap_or(usize::MAX);
-        // Of the modules of a device that has room for some of them alone, they are chosen in any case.
+        // If only some of a device's modules fit at a time, they must be chosen in any case.
         let are_fixed = !self.modular && self.modules.len() <= most;
         let modules: Vec<&Module> = if chosen.is_empty() && are_fixed {
             self.modules.iter().collect()
@@ -96,7 +97,7 @@ impl Gsd {
         Ok(modules)
     }
 
-    /// The names of the modules that its slots have by default, or of its first module.
+    /// The names of the default modules of its slots, or of its first module.
     fn proposal(&self) -> String {
         let of_slot = |slot: &super::Slot| {
             let mut all = self.modules.iter();
@@ -109,7 +110,7 @@ impl Gsd {
         quoted(proposed.into_iter())
     }
 
-    /// The module with this name, or with this number (`#12`) where no module has such a name.
+    /// The module with this name, or with this number (`#12`) if no module has that name.
     fn module(&self, slot: u32, name: &str) -> Result<&Module, Mistake> {
         let mut named: Vec<&Module> = self.modules.iter().filter(|m| m.name == name).collect();
         let number = name.strip_prefix('#').and_then(|text| text.parse().ok());
@@ -175,7 +176,7 @@ impl Gsd {
     }
 }
 
-/// The names of some modules, and whether there are more.
+/// The names of some modules, with a sign if there are more.
 fn quoted<'m>(mut modules: impl Iterator<Item = &'m Module>) -> String {
     let names = modules.by_ref().take(SHOWN_MODULES);
     let names: Vec<String> = names

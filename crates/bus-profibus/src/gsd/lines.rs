@@ -1,17 +1,17 @@
-//! The lines of a GSD file, and what stands in each.
+//! The lines of a GSD file, and their contents.
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
 
 use super::GsdError;
 
-/// A line with the lines that continue it, without its comment.
+/// A line and its continuation lines, without comments.
 pub(super) struct Line {
     pub(super) number: usize,
     text: String,
 }
 
-/// The lines behind `#Profibus_DP`, and the number of the last line of the file.
+/// The lines after `#Profibus_DP`, and the number of the last line of the file.
 ///
 /// A backslash at the end of a line continues it; a semicolon outside quotes begins a comment.
 pub(super) fn lines(text: &str) -> Result<(Vec<Line>, usize), GsdError> {
@@ -60,8 +60,8 @@ pub(super) fn wrong(line: usize, what: impl Into<String>, right: impl Into<Strin
 }
 
 impl Line {
-    /// The keyword in lower case, its index in brackets, and what stands behind `=`. A line without `=` is a keyword
-    /// alone.
+    /// The keyword in lower case, its index in brackets, and the values after `=`. A line without `=` is just a
+    /// keyword.
     pub(super) fn setting(&self) -> (String, Option<Values<'_>>, Values<'_>) {
         let (key, value) = match self.text.split_once('=') {
             Some((key, value)) if !key.contains('"') => (key, value),
@@ -79,7 +79,7 @@ impl Line {
         (key, index.map(values), values(value))
     }
 
-    /// All of the line, for one that is no setting.
+    /// The values of a line that is no setting.
     pub(super) fn values(&self) -> Values<'_> {
         Values {
             line: self.number,
@@ -100,7 +100,7 @@ impl<'t> Values<'t> {
         wrong(self.line, what, right)
     }
 
-    /// Whether nothing is left.
+    /// True if nothing is left.
     pub(super) fn is_empty(&self) -> bool {
         self.rest.trim_start().is_empty()
     }
@@ -121,7 +121,7 @@ impl<'t> Values<'t> {
         word
     }
 
-    /// Takes a number, decimal or hexadecimal, with a sign or without.
+    /// Takes a number, decimal or hexadecimal, with an optional sign.
     pub(super) fn number(&mut self) -> Result<i64, GsdError> {
         let before = *self;
         let sign = if self.eat('-') { "-" } else { "" };
@@ -182,7 +182,7 @@ impl<'t> Values<'t> {
         Ok(text.trim().to_owned())
     }
 
-    /// Nothing is left.
+    /// Checks that nothing is left.
     pub(super) fn end(self) -> Result<(), GsdError> {
         if self.is_empty() {
             return Ok(());

@@ -14,17 +14,17 @@ use crate::user_parameters::{Allowed, LIMIT, Parameter, ParameterBlock, Paramete
 /// The most values, modules of a slot, and the like in one list.
 const LIST_LIMIT: usize = 4096;
 
-/// Blocks that say nothing to a slave, each with its end.
+/// Blocks that do not concern a slave, each with its end.
 const SKIPPED: [(&str, &str); 3] = [
     ("unitdiagtype", "EndUnitDiagType"),
     ("physical_interface", "End_Physical_Interface"),
     ("jokerblock_type", "End_Jokerblock_Type"),
 ];
 
-/// The parameters of a device or a module, as far as they are read.
+/// The parameters of a device or a module, as read so far.
 #[derive(Default)]
 struct Open {
-    /// As stated.
+    /// As stated in the file.
     length: Option<usize>,
     /// The octets of `User_Prm_Data`, and the line.
     plain: Option<(Vec<u8>, usize)>,
@@ -42,17 +42,17 @@ struct Reader<'l> {
     modules: Vec<Open>,
     parameters: BTreeMap<u32, Arc<Parameter>>,
     texts: BTreeMap<u32, Arc<BTreeMap<i64, String>>>,
-    /// The rates, by their names, and what is said of each.
+    /// The supported rates, by their names, and the wait of each.
     supported: Vec<u32>,
     waits: BTreeMap<u32, u16>,
 }
 
 impl Gsd {
-    /// Reads the bytes of a file, which are UTF-8 or, as in most, Latin-1.
+    /// Reads the bytes of a file, which are UTF-8 or, as in most files, Latin-1.
     ///
     /// # Errors
     ///
-    /// It is no GSD file, or the first mistake in what a station needs of it.
+    /// The file is no GSD file, or has a mistake in the parts that describe a station; the first one is returned.
     pub fn read(bytes: &[u8]) -> Result<Self, GsdError> {
         let text = match std::str::from_utf8(bytes) {
             Ok(text) => text.trim_start_matches('\u{FEFF}').to_owned(),
@@ -120,7 +120,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The next line of the block that begins in `opening`, which has to end with `end`.
+    /// The next line of the block that begins in `opening` and must end with `end`.
     fn inner(&mut self, opening: &Line, end: &str) -> Result<&Line, GsdError> {
         let next = self.lines.next();
         next.ok_or_else(|| {
@@ -193,7 +193,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// `ExtUserPrmData`: the line of its kind and values comes first, keywords follow.
+    /// `ExtUserPrmData`: the line with its kind and values comes first, keywords follow.
     fn parameter(&mut self, line: &Line, mut values: Values<'_>) -> Result<(), GsdError> {
         const END: &str = "EndExtUserPrmData";
         let reference = values.up_to(u32::MAX)?;
@@ -222,7 +222,7 @@ impl Reader<'_> {
                 "endextuserprmdata" => break,
                 "prm_text_ref" => {
                     let texts = values.up_to(u32::MAX)?;
-                    // Texts are for people alone: a device works without them.
+                    // Only people need the texts; a device works without them.
                     parameter.texts = self.texts.get(&texts).cloned().unwrap_or_default();
                 }
                 "changeable" => parameter.is_changeable = flag(values)?,
@@ -250,7 +250,7 @@ impl Reader<'_> {
                     let what = format!("the module of line {} has no \"EndModule\"", line.number);
                     return Err(values.wrong(what, "add it before the next one"));
                 }
-                // The reference of a module is a number in a line of its own.
+                // The reference of a module is a number on a separate line.
                 key if module.reference.is_none()
                     && values.is_empty()
                     && key.starts_with(|c: char| c.is_ascii_digit()) =>
@@ -292,13 +292,13 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The file is read to its `last` line: what refers to something else is looked up.
+    /// Finishes after the `last` line: resolves references.
     fn finish(mut self, last: usize) -> Result<Gsd, GsdError> {
         self.gsd.ident = self.ident.ok_or_else(|| {
             let right = "take the whole file; each device has one";
             wrong(last, "the file ends, and there is no Ident_Number", right)
         })?;
-        // Newer keywords replace the older ones.
+        // Newer keywords replace older ones.
         let own = &mut self.own;
         if !own.constants.is_empty() || !own.references.is_empty() {
             own.length = None;
@@ -322,7 +322,7 @@ impl Reader<'_> {
 }
 
 impl Open {
-    /// Takes a keyword that a device and a module have in common; `false` if it is another one.
+    /// Reads a keyword that devices and modules have in common; `false` if it is another one.
     fn statement(
         &mut self,
         key: &str,
@@ -387,12 +387,12 @@ impl Open {
     }
 }
 
-/// The offset in brackets behind a keyword of parameters.
+/// The offset in brackets after a keyword of parameters.
 fn offset(index: Option<Values<'_>>, values: Values<'_>) -> Result<usize, GsdError> {
     Ok(index_of(index, values)? as usize)
 }
 
-/// The number in brackets behind a keyword.
+/// The number in brackets after a keyword.
 fn index_of(index: Option<Values<'_>>, values: Values<'_>) -> Result<u32, GsdError> {
     let missing = || values.wrong("there is no number in brackets", "write it, such as (0)");
     index.ok_or_else(missing)?.up_to(u32::MAX)
@@ -450,7 +450,7 @@ fn kind(values: &mut Values<'_>) -> Result<ParameterKind, GsdError> {
     Ok(kind)
 }
 
-/// The values behind the default: a range, a list, or none.
+/// The values after the default: a range, a list, or nothing.
 fn allowed(mut values: Values<'_>) -> Result<Allowed, GsdError> {
     if values.is_empty() {
         return Ok(Allowed::Any);

@@ -19,7 +19,7 @@ const VALVES: &str = include_str!("../../../../tests/gsd/valves.gsd");
 
 const ALL: [&str; 4] = [REMOTE_IO, ENCODER, DRIVE, VALVES];
 
-/// The bytes of a file as most makers write them.
+/// The bytes of a file in the usual encoding.
 fn latin_1(text: &str) -> Vec<u8> {
     let text = text.replace('\n', "\r\n");
     let octets = text.chars().map(|c| u8::try_from(c).expect("Latin-1"));
@@ -185,7 +185,7 @@ fn the_default_parameters_are_those_of_the_device_and_of_each_slot() {
     );
 }
 
-/// profirust's author has written another parser, which knows the most of what a tool sends.
+/// Another parser, by profirust's author, which reads most of the parameters that a tool sends.
 #[test]
 fn another_parser_reads_the_same_parameters() {
     let foreign = |text: &str| {
@@ -391,7 +391,7 @@ fn modules_of_one_name_are_told_apart_by_their_numbers() {
     assert_eq!(sizes(&gsd(["11", "12"], "0x40,0x01"), "2 byte"), Ok((2, 0)));
 }
 
-/// Whether it panics is the question; and an error names a line that there is.
+/// Checks that the reader does not panic, and that an error names an existing line.
 fn endure(file: &[u8]) {
     let lines = file.split(|byte| *byte == b'\n').count();
     match Gsd::read(file) {
@@ -429,7 +429,7 @@ fn no_piece_of_a_file_makes_it_panic() {
 }
 
 proptest! {
-    /// Octets replaced by others that mean something in such a file, or by any.
+    /// Octets replaced by others, with or without a meaning in such files.
     #[test]
     fn no_change_of_a_file_makes_it_panic(
         which in 0..ALL.len(),
@@ -444,7 +444,7 @@ proptest! {
         endure(&file);
     }
 
-    /// Lines that are missing, and lines that come twice.
+    /// Missing and duplicate lines.
     #[test]
     fn no_order_of_lines_makes_it_panic(
         which in 0..ALL.len(),

@@ -1,29 +1,29 @@
-//! Writes the GSD file of a machine of one's own.
+//! Writes the GSD file of a user's own machine.
 
 use crate::configuration::{SlotModule, hex};
 use crate::rates::{RATES, SLOT_TIME_LIMIT};
 use crate::station::Identity;
 use crate::telegram::DATA_LIMIT;
 
-/// The longest name that every tool takes, in characters.
+/// The longest name that every tool accepts, in characters.
 const NAME_LIMIT: usize = 32;
 
-/// Rates above are not for software behind a serial port.
+/// Higher rates are not for software behind a serial port.
 const SOFTWARE_LIMIT: u32 = 500_000;
 
-/// A kind of device that nobody else has described.
+/// A kind of device that no maker has described.
 pub(crate) struct Machine<'a> {
-    /// Its name.
+    /// The name.
     pub(crate) model: &'a str,
     /// The rate of its line, and the longest wait before an answer there, in bits.
     pub(crate) baud: u32,
     pub(crate) max_tsdr: u16,
-    /// Its stations, at least one: address, name, and what they are.
+    /// The stations, at least one: address, name and identity.
     pub(crate) stations: Vec<(u8, &'a str, Identity)>,
 }
 
 impl Machine<'_> {
-    /// The file.
+    /// The text of the file.
     pub(crate) fn write(&self) -> String {
         let mut out = String::new();
         let mut line = |text: &str| {
@@ -89,7 +89,7 @@ impl Machine<'_> {
         line("Auto_Baud_supp=0");
         line("Set_Slave_Add_supp=0");
         line(&format!("Fail_Safe={}", u8::from(own.fail_safe)));
-        // In units of 100 µs: a millisecond, which the bus's thread needs under load.
+        // In units of 100 µs: a millisecond, which the bus thread needs under load.
         line("Min_Slave_Intervall=10");
         line(&format!("Max_Diag_Data_Len={DATA_LIMIT}"));
         line("Slave_Family=3");
@@ -120,7 +120,7 @@ impl Machine<'_> {
         out
     }
 
-    /// All different modules of its stations.
+    /// All different modules of the stations.
     fn modules(&self) -> Vec<&SlotModule> {
         let mut all: Vec<&SlotModule> = Vec::new();
         for (.., identity) in &self.stations {
@@ -136,8 +136,8 @@ impl Machine<'_> {
         all
     }
 
-    /// The rates that it supports, by their names, with the longest wait in bits: at least the standard's, and no shorter
-    /// in time than on its own line.
+    /// The rates that the machine supports, by their names, with the longest wait in bits: at least the standard's, and
+    /// no shorter in time than on the machine's own line.
     fn waits(&self) -> impl Iterator<Item = (&'static str, u64)> {
         RATES.iter().filter_map(|rate| {
             let own = u64::from(self.max_tsdr) * u64::from(rate.baud);
@@ -148,7 +148,7 @@ impl Machine<'_> {
     }
 }
 
-/// The name of a module, the `number`th of its file.
+/// The name of the `number`th module of a file.
 fn name(number: usize, module: &SlotModule) -> String {
     let (inputs, outputs) = (module.inputs.len(), module.outputs.len());
     match module.identifiers[..] {
@@ -164,7 +164,7 @@ fn name(number: usize, module: &SlotModule) -> String {
     }
 }
 
-/// Text that every tool takes, in quotes.
+/// Text that every tool accepts, in quotes.
 fn plain(text: &str) -> String {
     let kept = |c: char| {
         if c == ' ' || c.is_ascii_graphic() && !"\"'@;\\~".contains(c) {
@@ -183,7 +183,7 @@ mod tests {
     use crate::configuration::Configuration;
     use crate::user_parameters::UserParameters;
 
-    /// What two stations of a machine of one's own are, one with modules and one with sizes alone.
+    /// The stations of a user's machine: one with modules and one with sizes alone.
     fn machine() -> Machine<'static> {
         let own = |configuration| Identity {
             ident: 0x80E0,
@@ -243,7 +243,7 @@ mod tests {
                 (UserParameters::default(), false, false)
             );
         }
-        // 46.9 ms at 19.2 kbit/s; at 500 kbit/s more bits than a slot time can have.
+        // 46.9 ms at 19.2 kbit/s; at 500 kbit/s that is more bits than a slot time can have.
         let waits: Vec<(u32, u16)> = own.rates.into_iter().collect();
         assert_eq!(
             waits,

@@ -4,7 +4,7 @@ use crate::configuration::hex;
 use crate::station::sap;
 use crate::telegram::{BROADCAST, Control, Frame, Telegram};
 
-/// What a request is for.
+/// The purpose of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Service {
     Status,

@@ -1,4 +1,4 @@
-//! What a station is, for `tickbus check`: its device, its modules, its parameters.
+//! A station's details, for `tickbus check`: its device, modules and parameters.
 
 use std::ops::Range;
 use std::path::Path;
@@ -12,7 +12,7 @@ use crate::configuration::{SlotModule, hex};
 use crate::device::LineOptions;
 
 impl StationOptions {
-    /// The lines, each with its head; `None` for a station that has mistakes.
+    /// The lines, each with its heading; `None` for a station with mistakes.
     pub(super) fn details(
         &self,
         line: &LineOptions,
@@ -67,8 +67,8 @@ impl StationOptions {
     }
 }
 
-/// A module: its name, its identifiers, and where its bytes are in the image; in the telegrams, if signals of the area
-/// have places of their own.
+/// A module: its name, its identifiers, and the position of its bytes in the image; or in the telegrams, if signals of
+/// the area have their own positions.
 fn in_words(module: &SlotModule, has_places: [bool; 2]) -> String {
     let name = if module.name.is_empty() {
         String::new()

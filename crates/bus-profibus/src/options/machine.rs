@@ -1,4 +1,4 @@
-//! The GSD file of a machine of one's own: of the stations that have none.
+//! The GSD file of a user's own machine: of its stations without one.
 
 use tickbus_base::Mistake;
 use tickbus_image::signal::SignalTable;
@@ -7,11 +7,11 @@ use super::{Device, Options};
 use crate::gsd::write::Machine;
 
 impl Options {
-    /// The GSD file of the stations with `ident`, or of all that have no GSD file, of the machine called `name`.
+    /// The GSD file of the stations with `ident`, or of all without a GSD file, for the machine `name`.
     ///
     /// # Errors
     ///
-    /// There is no such station, or they have several idents, and each needs a file of its own.
+    /// No station matches, or the stations have several idents, each of which needs a separate file.
     pub fn gsd(
         &self,
         name: &str,

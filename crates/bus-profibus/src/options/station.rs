@@ -1,4 +1,4 @@
-//! The keys of a station: its address, and which device it is.
+//! The keys of a station: its address and its device.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -29,11 +29,11 @@ const GSD_LIMIT: u64 = 16 << 20;
 /// The keys of one station.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StationOptions {
-    /// Its address on the line.
+    /// The address on the line.
     pub address: u8,
-    /// Which device it is.
+    /// The device.
     pub device: Device,
-    /// The offset of its address, and the line.
+    /// The offset of the address, and the line.
     pub(super) at: usize,
     pub(super) line: usize,
     /// The offsets of `gsd` and `modules`.
@@ -41,27 +41,27 @@ pub struct StationOptions {
     modules_at: usize,
 }
 
-/// Which device a station is.
+/// The device of a station.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Device {
-    /// That of a GSD file, with these modules.
+    /// A device with a GSD file and these modules.
     Gsd {
         /// The file as written: relative to the folder of the driver.cfg.
         file: PathBuf,
-        /// Their names.
+        /// The names of the modules.
         modules: Vec<String>,
     },
-    /// One without a file.
+    /// A device without a GSD file.
     Plain {
-        /// The number of its kind.
+        /// The ident number.
         ident: u16,
-        /// Its modules; `None` for any that have the sizes of its signals.
+        /// The modules; `None` for any modules with the sizes of the signals.
         configuration: Option<Configuration>,
     },
 }
 
-/// Whether signals of these sizes fit into the modules, or into any station. An area in which signals have places of
-/// their own is checked with those.
+/// Checks that signals of these sizes fit into the modules, or into any station. An area in which signals have their
+/// own positions is checked with those.
 pub(super) fn check_sizes(
     configuration: Option<&Configuration>,
     signals: &signal::Station,
@@ -84,7 +84,7 @@ pub(super) fn check_sizes(
 }
 
 impl StationOptions {
-    /// The device that it is, whose signals have these sizes; a mistake comes with its offset in the driver.cfg.
+    /// The identity of the device, whose signals have these sizes; a mistake comes with its offset in the driver.cfg.
     pub(super) fn identity(
         &self,
         folder: &Path,
@@ -105,13 +105,14 @@ impl StationOptions {
 }
 
 impl StationOptions {
-    /// A mistake in what the modules of its GSD file are.
+    /// A mistake in the modules of the GSD file.
     fn of_modules(&self, Mistake { what, right }: Mistake) -> (usize, Mistake) {
         let what = format!("station {}: {what}", self.address);
         (self.modules_at, Mistake::new(what, right))
     }
 
-    /// Whether its signals fit into the modules of its GSD file; the sizes of others are checked without any file.
+    /// Checks that the signals fit into the modules of the GSD file; the sizes of other devices are checked without a
+    /// file.
     pub(super) fn check_modules(
         &self,
         identity: &Identity,
@@ -145,7 +146,7 @@ pub(super) fn plain(
     }
 }
 
-/// Reads the GSD file at `path`; mistakes in it name it and the line.
+/// Reads the GSD file at `path`; mistakes name the file and the line.
 pub(super) fn read_gsd(path: &Path) -> Result<Gsd, Mistake> {
     let name = path.display();
     let size = fs::metadata(path).map(|file| file.len());
@@ -167,7 +168,7 @@ pub(super) fn read_gsd(path: &Path) -> Result<Gsd, Mistake> {
     })
 }
 
-/// Reads the keys of a station, which has to be there or not.
+/// Reads the keys of a station; `is_required` tells whether they must be present.
 pub(super) fn read_station(table: &mut Table<'_>, is_required: bool) -> Keys {
     const ADDRESS: &str = "write the station's address in the PLC's project, such as address = 3";
     let address = if is_required {

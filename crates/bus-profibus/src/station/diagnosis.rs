@@ -1,16 +1,16 @@
-//! What a station answers to `Slave_Diag`.
+//! A station's answer to `Slave_Diag`.
 
 use super::{State, Station};
 
 /// The octets of the standard's part.
 const STANDARD: usize = 6;
 
-/// The octets of extended diagnosis of a device that has room for so many in all.
+/// The room for extended diagnosis in a device with at most `most` octets in all.
 pub(super) fn room(most: usize) -> usize {
     most.clamp(STANDARD, crate::telegram::DATA_LIMIT) - STANDARD
 }
 
-/// What was wrong with the last parameters or configuration.
+/// The mistakes in the last parameters or configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Faults {
     pub(super) parameters: bool,
@@ -19,7 +19,7 @@ pub(super) struct Faults {
 }
 
 impl Station {
-    /// Appends the diagnosis as it is now.
+    /// Appends the current diagnosis.
     pub(super) fn append_diagnosis(&self, out: &mut Vec<u8>) {
         let flag = |bit: u8, is_set: bool| u8::from(is_set) << bit;
         let waits = self.state == State::WaitPrm;
@@ -30,7 +30,7 @@ impl Station {
                 | flag(4, self.faults.not_supported)
                 | flag(6, self.faults.parameters),
         );
-        // Bit 2 is always set by a slave.
+        // A slave always sets bit 2.
         out.push(
             flag(0, waits)
                 | flag(1, self.is_static)

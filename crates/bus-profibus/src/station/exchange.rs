@@ -1,4 +1,4 @@
-//! What a master does with a station in each cycle: `Data_Exchange` and `Global_Control`.
+//! A master's cyclic requests to a station: `Data_Exchange` and `Global_Control`.
 
 use tickbus_base::time::Nanos;
 
@@ -40,7 +40,7 @@ impl Station {
             self.leave(now, Leaving::Length { expected, received }, process);
             return self.append(request, Control::NOT_ACTIVE, &[], reply);
         }
-        // A master that goes on to the next exchange has the answer to the last one.
+        // A master that continues with the next exchange has received the last answer.
         if std::mem::take(&mut self.is_pending) {
             process.delivered(self.address);
         }
@@ -97,7 +97,7 @@ impl Station {
         };
         self.set_clear(now, clear, process);
         if self.has_sync {
-            // Every SYNC lets the outputs through that have waited for it; UNSYNC does so for good.
+            // Every SYNC releases the held outputs; UNSYNC ends holding.
             if (has(4) || has(5)) && std::mem::take(&mut self.is_held) && !clear.is_on() {
                 self.outputs.copy_from_slice(&self.held);
                 self.hand_over(now, process);
@@ -114,13 +114,13 @@ impl Station {
         }
     }
 
-    /// Hands the outputs to the machine.
+    /// Passes the outputs to the machine.
     fn hand_over(&mut self, now: Nanos, process: &mut impl Process) {
         self.is_cleared = false;
         process.outputs(self.address, now, &self.outputs);
     }
 
-    /// The master goes to CLEAR or leaves it.
+    /// The master enters or leaves CLEAR.
     fn set_clear(&mut self, now: Nanos, clear: Clear, process: &mut impl Process) {
         let before = std::mem::replace(&mut self.clear, clear);
         if before.is_on() == clear.is_on() {

@@ -5,7 +5,7 @@ use crate::telegram::{DATA_LIMIT, Telegram};
 const MASTER: u8 = 2;
 const SLAVE: u8 = 8;
 
-/// A machine that remembers what it is told.
+/// A machine that records its events.
 #[derive(Default)]
 struct Machine {
     inputs: u8,
@@ -48,7 +48,7 @@ struct Rig {
     control: u8,
 }
 
-/// What came back.
+/// The reply.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Came {
     Nothing,
@@ -82,7 +82,7 @@ impl Rig {
         }
     }
 
-    /// Up to data exchange, with these bits of the first octet of `Set_Prm` and this watchdog.
+    /// A rig in data exchange, with these bits of the first octet of `Set_Prm` and this watchdog.
     fn exchanging(identity: Identity, status: u8, watchdog: u8) -> Self {
         let mut rig = Self::new(identity);
         assert_eq!(rig.parameterise(status | LOCK, watchdog), Came::Short);
@@ -201,7 +201,7 @@ fn a_repeated_request_gets_the_same_answer_and_is_not_served_twice() {
     assert_eq!(rig.machine.delivered, 0, "the master does not have it");
     assert_eq!(rig.raw(None, 0x7D, &[1, 2]), data(&[9, 9]));
     assert_eq!(rig.machine.delivered, 1, "it has gone on");
-    // Other outputs are taken even from a master whose bit is stuck.
+    // Different outputs are accepted even from a master whose bit is stuck.
     assert_eq!(rig.raw(None, 0x7D, &[5, 6]), data(&[9, 9]));
     assert_eq!(rig.machine.outputs, [[1, 2], [1, 2], [5, 6]]);
     // A first request is never a repetition.
@@ -226,7 +226,7 @@ fn the_watchdog_releases_the_station_and_clears_its_outputs() {
     let limit = Nanos::from_millis(100);
     assert_eq!(rig.station.deadline(), limit);
     rig.now = limit - Nanos(1);
-    // Any telegram of its master will do, even one to all.
+    // Any telegram of the master will do, even a broadcast.
     rig.control(0, 0);
     rig.now = limit;
     rig.station.turn(rig.now, &mut rig.machine);
@@ -262,7 +262,7 @@ fn wrong_parameters_are_acknowledged_and_told_in_the_diagnosis_and_in_words() {
             panic!("nothing told of {words}");
         };
         assert!(why.to_string().contains(words), "{why}");
-        // The right ones mend it.
+        // The right parameters repair that.
         rig.parameterise(LOCK, 0);
         assert_eq!(rig.diagnosis()[..2], [0x02, 0x04]);
     }
@@ -379,7 +379,7 @@ fn telegrams_without_outputs_mean_clear_to_a_device_that_knows_them() {
     rig.exchange(&[1, 2]);
     assert_eq!(rig.exchange(&[]), data(&[0, 0]));
     assert_eq!(rig.machine.events.last(), Some(&Event::Cleared));
-    // After Clear by Global_Control, outputs alone do not end it.
+    // After Clear by Global_Control, outputs alone do not end CLEAR.
     rig.control(0x02, 0);
     rig.exchange(&[3, 4]);
     assert_eq!(rig.machine.events.last(), Some(&Event::Cleared));
@@ -420,7 +420,7 @@ fn freeze_holds_the_inputs_and_sync_the_outputs_of_the_groups_they_are_for() {
     rig.control(0x20, 0);
     assert_eq!(rig.machine.outputs.last(), Some(&vec![6, 6]));
     rig.exchange(&[7, 7]);
-    // The command that ends it wins over the one that begins it.
+    // The command that ends the mode wins over the one that begins it.
     rig.control(0x30, 0);
     rig.exchange(&[8, 8]);
     assert_eq!(rig.machine.outputs[before..], [[6, 6], [7, 7], [8, 8]]);
@@ -529,7 +529,7 @@ fn an_answer_that_the_master_never_got_does_not_count_when_it_begins_anew() {
     for asked in [60, 61] {
         let mut rig = Rig::exchanging(identity(), 0, 0);
         rig.exchange(&[1, 2]);
-        // The answer is lost, and so are those to the repetitions.
+        // The answer is lost, like those to the repetitions.
         let prm = [LOCK, 0, 1, 11, 0x80, 0xE0, 0];
         let first: &[u8] = if asked == 61 { &prm } else { &[] };
         rig.raw(Some(asked), 0x6D, first);

@@ -1,4 +1,4 @@
-//! profirust, a DP master that somebody else wrote, on one end of a pseudo-terminal.
+//! profirust, an independent DP master, on one end of a pseudo-terminal.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 #[path = "../../../../tests/peers/dp_phy.rs"]
@@ -19,7 +19,7 @@ use dp_phy::Pty;
 /// The time for an answer in the master's project, in bits: a pseudo-terminal has no wire, and a busy machine needs time.
 pub const SLOT: u16 = 6_000;
 
-/// What the master's project says of one station.
+/// The settings of one station in the master's project.
 #[derive(Clone, Debug)]
 pub struct Slave {
     pub address: u8,
@@ -41,12 +41,12 @@ pub struct Project {
     pub slaves: Vec<Slave>,
 }
 
-/// What the master knows of one station.
+/// The master's knowledge of one station.
 #[derive(Clone, Debug, Default)]
 pub struct Seen {
     pub inputs: Vec<u8>,
     pub outputs: Vec<u8>,
-    /// Data exchanges, in all.
+    /// Data exchanges in total.
     pub exchanges: usize,
     /// Rising edges of the lowest bit of the inputs.
     pub edges: usize,
@@ -63,7 +63,7 @@ impl Seen {
     }
 }
 
-/// A master that runs; dropping it ends it.
+/// A running master; dropping it ends it.
 pub struct Master {
     seen: Arc<Mutex<Vec<Seen>>>,
     over: Arc<AtomicBool>,
@@ -90,7 +90,7 @@ impl Master {
         }
     }
 
-    /// What it knows of its first station.
+    /// The master's knowledge of its first station.
     pub fn first<R>(&self, look: impl FnOnce(&mut Seen) -> R) -> R {
         look(&mut self.all()[0])
     }
@@ -153,10 +153,10 @@ fn run(mut phy: Pty, project: &Project, seen: &Mutex<Vec<Seen>>, over: &AtomicBo
             } else {
                 seen.events.push(event);
             }
-            // One that it reads while it begins anew is no event.
+            // A diagnosis read during a restart is no event.
             if let Some(told) = slave.last_diagnostics() {
                 let extended = told.extended_diagnostics.raw_diag_buffer();
-                // It keeps the last one beyond its end.
+                // profirust keeps the last diagnosis beyond its end.
                 let is_there = told.flags.contains(DiagnosticFlags::EXT_DIAG);
                 let extended = extended.filter(|_| is_there);
                 seen.diagnosis = (told.flags.bits(), extended.unwrap_or_default().to_vec());

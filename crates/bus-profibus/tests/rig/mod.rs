@@ -1,4 +1,4 @@
-//! A device with one station for a master of others, and what tests wait for.
+//! A device with one station for an independent master, and helpers that wait for conditions.
 #![allow(
     dead_code,
     unreachable_pub,
@@ -87,7 +87,7 @@ pub fn project() -> Project {
     }
 }
 
-/// The same at one of the [`RATES`].
+/// The project at one of the [`RATES`].
 pub fn project_at((baud, _, slot): (Baudrate, u32, u16)) -> Project {
     Project {
         baud,
@@ -126,7 +126,7 @@ pub fn exchange(device: &mut End, master: &Master, number: u8) {
     });
 }
 
-/// The rates of user space, each with a slot time for a busy machine.
+/// The rates that a program in user space can serve, each with a slot time for a busy machine.
 pub const RATES: [(Baudrate, u32, u16); 4] = [
     (Baudrate::B9600, 9_600, 500),
     (Baudrate::B19200, 19_200, 1_000),

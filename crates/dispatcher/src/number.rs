@@ -100,7 +100,6 @@ impl Number {
     /// The number that a floating-point value shows, with fewer digits after the point if there are too many. `None`
     /// for infinities and NaN, and for more than 23 characters before the point.
     ///
-    ///
     /// Takes `f32` and `f64`, which are displayed differently.
     pub fn of(value: impl fmt::Display) -> Option<Self> {
         /// As much of a text as may count.

@@ -1,6 +1,6 @@
-//! Steps per second of an empty run, compared with a bare TCP coordinator: a loop that sends one message to each client
-//! and waits for their answers; and with HELICS if it is installed. In alternating rounds of one run, with each client a
-//! process of its own.
+//! Steps per second of an empty run, compared with a bare TCP coordinator (a loop that sends one message to each client
+//! and waits for the answers), and with HELICS if it is installed. The rounds of one run alternate; each client is a
+//! separate process.
 //!
 //! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 #![allow(missing_docs, reason = "a bench")]
@@ -24,7 +24,7 @@ use tickbus_virtual_time::{
     in_process, tcp,
 };
 
-/// The bytes of a step and of its answer without any variable, as we send them.
+/// The bytes of a step and of its answer without any variable, in our format.
 const ASKED: usize = 21;
 const ANSWERED: usize = 13;
 
@@ -40,7 +40,7 @@ fn main() {
     } else {
         (1, Duration::from_millis(1))
     };
-    // A word on the command line selects what is measured.
+    // A word on the command line selects what to measure.
     let wanted = |name: &str| {
         let mut words = arguments[1..].iter().filter(|word| !word.starts_with("--"));
         words.next().is_none_or(|word| name.contains(&**word))
@@ -114,7 +114,7 @@ fn median(figures: &mut [f64]) -> f64 {
     figures[figures.len() / 2]
 }
 
-/// A client that does nothing, with this many variables, which it also reads.
+/// A client that does nothing, with this many variables, which the client also reads.
 struct Idle(String, usize);
 
 impl Participant for Idle {
@@ -228,7 +228,7 @@ struct Meter {
 }
 
 impl Meter {
-    /// Whether it is time to stop.
+    /// True when the time is over.
     fn step(&mut self, sequence: u64, span: Duration) -> bool {
         if sequence == 100 {
             self.begun = Some(Instant::now());
@@ -237,7 +237,7 @@ impl Meter {
         let Some(begun) = self.begun else {
             return false;
         };
-        // The clock is looked at by the bare coordinator, too.
+        // The bare coordinator reads the clock, too.
         let elapsed = begun.elapsed();
         if self.rate == 0.0 && elapsed >= span {
             #[expect(clippy::cast_precision_loss, reason = "exact for years")]

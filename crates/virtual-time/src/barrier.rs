@@ -1,5 +1,5 @@
-//! The states of a run, from the initial write on, and the data that pass through them; who is connected how does not
-//! matter here.
+//! The states of a run, from the initial write on, and the data that pass through them; how clients are connected does
+//! not matter here.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ use crate::members::{Client, Members};
 use crate::shared_data::SharedData;
 use crate::{Declaration, Outcome, Step};
 
-/// Where a run is. The names are those of the paper.
+/// The state of a run. The names are those of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum State {
     /// Clients join.
@@ -22,11 +22,11 @@ pub enum State {
     InitialWrite,
     /// All writes are committed; which clients are due in the next step is fixed now.
     PreRead,
-    /// The clients that are due read; at the end of it time moves on.
+    /// The clients that are due read; then time moves on.
     Read,
-    /// They run.
+    /// The clients that are due run.
     PreWrite,
-    /// They finish their runs and write.
+    /// The clients that are due finish their runs and write.
     Write,
     /// The run has ended.
     Ended,
@@ -41,7 +41,7 @@ pub(crate) struct Barrier<'l> {
     members: Vec<Member>,
     data: SharedData,
     logic: Logic<'l>,
-    /// The variables of the hooks for changes, in their order, each with its hook.
+    /// The variables with hooks for changes, in their order, each with its hook.
     change_calls: Vec<(usize, usize)>,
     /// The clients and the hooks for reads, in the order in which they are called.
     read_calls: Vec<(usize, usize)>,
@@ -55,12 +55,12 @@ struct Member {
     writes: Range<usize>,
     reads: Box<[u32]>,
     read_types: Box<[DataType]>,
-    /// What it reads in this step.
+    /// The values that the client reads in this step.
     snapshot: Box<[u64]>,
-    /// The number of the step in which it runs next.
+    /// The number of the step in which the client runs next.
     next_update: u64,
     is_due: bool,
-    /// It has not answered yet.
+    /// The client has not answered yet.
     owes: bool,
 }
 
@@ -156,11 +156,11 @@ impl<'l> Barrier<'l> {
         self.step
     }
 
-    /// How many steps were committed.
+    /// The number of committed steps.
     pub(crate) const fn steps(&self) -> u64 {
         match self.state {
             State::PreWrite | State::Write => self.step.sequence - 1,
-            // The number is that of the step before until its hooks of reads have run.
+            // The number is still that of the previous step until its read hooks have run.
             _ => self.step.sequence,
         }
     }
@@ -173,22 +173,22 @@ impl<'l> Barrier<'l> {
         }
     }
 
-    /// What a client has declared.
+    /// The declaration of a client.
     pub(crate) fn declaration(&self, client: usize) -> &Declaration {
         &self.members[client].declaration
     }
 
-    /// The types of what a client reads.
+    /// The types of the variables that a client reads.
     pub(crate) fn read_types(&self, client: usize) -> &[DataType] {
         &self.members[client].read_types
     }
 
-    /// What a client reads in this step.
+    /// The values that a client reads in this step.
     pub(crate) fn snapshot(&self, client: usize) -> &[u64] {
         &self.members[client].snapshot
     }
 
-    /// Who takes part.
+    /// The participants of the run.
     pub(crate) fn members(&self) -> Members {
         let client = |member: &Member| Client {
             name: member.declaration.name.clone(),
@@ -201,12 +201,12 @@ impl<'l> Barrier<'l> {
         }
     }
 
-    /// The values that all see, one per variable.
+    /// The values that everyone sees, one per variable.
     pub(crate) fn committed(&self) -> &[u64] {
         self.data.committed()
     }
 
-    /// Per client, whether it has not answered yet.
+    /// Per client, true if it has not answered yet.
     pub(crate) fn owes(&self) -> Vec<bool> {
         self.members.iter().map(|member| member.owes).collect()
     }
@@ -223,12 +223,12 @@ impl<'l> Barrier<'l> {
         members.filter_map(|(at, member)| member.is_due.then_some(at))
     }
 
-    /// Whether nobody is waited for.
+    /// True if all clients have answered.
     pub(crate) const fn is_synchronised(&self) -> bool {
         self.owing == 0
     }
 
-    /// A client has finished its run of the step `sequence`; the error tells how it violates the protocol.
+    /// A client has finished its run of the step `sequence`; the error describes a violation of the protocol.
     pub(crate) fn done(
         &mut self,
         client: usize,
@@ -261,7 +261,7 @@ impl<'l> Barrier<'l> {
         Ok(())
     }
 
-    /// Commits what all have written, and fixes who is due next.
+    /// Commits all writes, and determines the clients of the next step.
     pub(crate) fn commit(&mut self) -> Result<(), String> {
         debug_assert!(self.is_synchronised(), "a client still runs");
         self.data.begin_commit();
@@ -285,7 +285,7 @@ impl<'l> Barrier<'l> {
         Ok(())
     }
 
-    /// Takes the next step as far as to the runs of the clients that are due.
+    /// Begins the next step, up to the runs of the clients that are due.
     pub(crate) fn begin_step(&mut self) -> Result<(), String> {
         debug_assert_eq!(self.state, State::PreRead, "a step begins between two");
         self.state = State::Read;

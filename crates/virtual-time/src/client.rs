@@ -1,4 +1,4 @@
-//! The client, without I/O: frames of the server in; what it asks for, and frames for it, out.
+//! The client, without I/O: frames of the server in; requests and frames for the server out.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use tickbus_image::signal::DataType;
 use crate::wire::{self, FromServer};
 use crate::{Cause, Declaration, Ended, Outcome, Participant, Step};
 
-/// What the server asks for.
+/// A request of the server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Asked {
     /// The initial values.
@@ -24,9 +24,9 @@ pub enum Asked {
 #[derive(Debug)]
 pub struct Client {
     declaration: Declaration,
-    /// The step that it owes an answer to.
+    /// The step that the client owes an answer to.
     owes: Option<u64>,
-    /// The step that it ran last; `None` before the initial write.
+    /// The step that the client ran last; `None` before the initial write.
     ran: Option<u64>,
     step: Nanos,
     read_types: Vec<DataType>,
@@ -35,7 +35,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// A client with this declaration, whose join is to be [sent](Self::frame).
+    /// A client with this declaration; [send](Self::frame) its join next.
     ///
     /// # Errors
     ///
@@ -56,7 +56,7 @@ impl Client {
         })
     }
 
-    /// What it has declared.
+    /// The client's declaration.
     pub const fn declaration(&self) -> &Declaration {
         &self.declaration
     }
@@ -66,27 +66,27 @@ impl Client {
         self.step
     }
 
-    /// The types of what it reads, in the order of its declaration; none before the start.
+    /// The types of the variables that the client reads, in the order of its declaration; empty before the start.
     pub fn read_types(&self) -> &[DataType] {
         &self.read_types
     }
 
-    /// What it reads in this step.
+    /// The values that the client reads in this step.
     pub fn reads(&self) -> &[u64] {
         &self.reads
     }
 
-    /// The frame to be sent: first the join, then what was made last.
+    /// The frame to send: first the join, then the last one made.
     pub fn frame(&self) -> &[u8] {
         &self.out
     }
 
-    /// How many steps were surely committed: the server went on after them.
+    /// The steps that were certainly committed: the server continued after them.
     fn steps(&self) -> u64 {
         self.ran.unwrap_or(0).saturating_sub(1)
     }
 
-    /// Takes a frame of the server, without its header; `None`: it asks for nothing yet.
+    /// Takes a frame of the server, without its header; `None`: nothing is requested yet.
     ///
     /// # Errors
     ///
@@ -145,11 +145,11 @@ impl Client {
         }
     }
 
-    /// Makes the answer to what was asked: the frame is then to be [sent](Self::frame).
+    /// Answers the last request: [send](Self::frame) the frame afterwards.
     ///
     /// # Panics
     ///
-    /// When nothing was asked, or `writes` has not one value per variable of [`Declaration::writes`].
+    /// When nothing was requested, or `writes` does not have one value per variable of [`Declaration::writes`].
     pub fn answer(&mut self, writes: &[u64]) {
         let sequence = self.owes.take().expect("the server has asked");
         assert_eq!(writes.len(), self.declaration.writes.len(), "values");
@@ -158,19 +158,19 @@ impl Client {
         wire::done(&mut self.out, sequence, writes);
     }
 
-    /// Makes the frame that says why it does not go on.
+    /// Makes the frame that says why the client gives up.
     pub fn give_up(&mut self, reason: &str) {
         self.out.clear();
         wire::give_up(&mut self.out, reason);
     }
 }
 
-/// A way to a server, of which a client waits for one frame at a time.
+/// A line to a server; a client waits for one frame at a time.
 pub(crate) trait Line: fmt::Debug + Send {
-    /// Sends a frame. If that fails, receiving says so.
+    /// Sends a frame. If that fails, the next `receive` returns the error.
     fn send(&mut self, frame: &[u8]);
 
-    /// Waits for the next frame, for `limit` at most, and gives it without its header.
+    /// Waits for the next frame, for `limit` at most, and returns it without its header.
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended>;
 }
 
@@ -183,29 +183,29 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// Joins.
+    /// Joins a run.
     pub(crate) fn join(client: Client, mut line: impl Line + 'static) -> Self {
         line.send(client.frame());
         let line = Box::new(line);
         Self { client, line }
     }
 
-    /// The client: what it declared, and what it reads in the step that was asked for.
+    /// The client, with its declaration and the values that it reads in the current step.
     pub const fn client(&self) -> &Client {
         &self.client
     }
 
-    /// Waits for what the server asks next. If the server says nothing for `limit` of wall-clock time, to some 50 ms, it
-    /// hangs: while it waits itself, it says so every second.
+    /// Waits for the server's next request. A server that sends nothing for `limit` of wall-clock time, give or take 50
+    /// ms, hangs: a waiting server sends a message every second.
     ///
     /// # Errors
     ///
-    /// The server is lost, violates the protocol or says nothing, or this client was stopped.
+    /// The server is lost, violates the protocol or sends nothing, or this client was stopped.
     pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
         loop {
             let steps = self.client.steps();
             let frame = self.line.receive(limit);
-            // The line does not know how far the run has come.
+            // The line does not know the number of steps.
             let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
             match self.client.receive(frame) {
                 Ok(Some(asked)) => return Ok(asked),
@@ -218,24 +218,24 @@ impl Connection {
         }
     }
 
-    /// Answers what was asked, with one value per variable of the declaration's writes. If the server is lost, the next
-    /// [`wait`](Self::wait) says so.
+    /// Answers the request, with one value per variable of the declaration's writes. If the server is lost, the next
+    /// [`wait`](Self::wait) returns the error.
     ///
     /// # Panics
     ///
-    /// When nothing was asked, or the number of values is another one.
+    /// When nothing was requested, or the number of values is wrong.
     pub fn answer(&mut self, writes: &[u64]) {
         self.client.answer(writes);
         self.line.send(self.client.frame());
     }
 
-    /// Tells the server why this client does not go on. The run ends for everyone; [`wait`](Self::wait) gives the end.
+    /// Tells the server why this client gives up. The run ends for everyone; [`wait`](Self::wait) returns the end.
     pub fn give_up(&mut self, reason: &str) {
         self.client.give_up(reason);
         self.line.send(self.client.frame());
     }
 
-    /// Lets `participant` take part until the run ends.
+    /// Runs `participant` until the run ends.
     ///
     /// # Errors
     ///
@@ -249,7 +249,7 @@ impl Connection {
                     let ran = participant.run(step, self.client.reads(), &mut writes);
                     if let Err(reason) = ran {
                         self.give_up(&reason);
-                        // The server answers with the end, which has the number of steps.
+                        // The server answers with the end, which contains the number of steps.
                         continue;
                     }
                 }
@@ -260,7 +260,7 @@ impl Connection {
     }
 }
 
-/// The server has said nothing for `limit`.
+/// The server has sent nothing for `limit`.
 pub(crate) fn silent(limit: Nanos) -> Ended {
     let reason = format!("the server has not said anything for {limit}");
     Ended::before(Cause::Hung, reason)

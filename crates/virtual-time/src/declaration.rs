@@ -1,4 +1,4 @@
-//! What a client declares before the run.
+//! The declaration of a client before the run.
 
 use std::collections::HashSet;
 use std::num::NonZeroU32;
@@ -13,25 +13,25 @@ pub(crate) const LONGEST_NAME: usize = 255;
 /// The most variables that one client may write, and the most that it may read.
 pub(crate) const MOST_VARIABLES: usize = 65_535;
 
-/// What a client tells the server before the run.
+/// The declaration that a client sends to the server before the run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Declaration {
-    /// Its name, which no other client has: 1 to 255 bytes. The order of the names is the order of the clients.
+    /// The name, unique among the clients: 1 to 255 bytes. Clients are ordered by name.
     pub name: String,
     /// How many steps of the server one step of this client takes.
     pub multiple: NonZeroU32,
-    /// The virtual time of one step of this client. The server then sets the multiple by it.
+    /// The virtual time of one step of this client. The server then derives the multiple.
     pub interval: Option<Nanos>,
-    /// The variables that it writes, at most 65535. No one else writes them.
+    /// The variables that the client writes, at most 65535. No other client writes them.
     pub writes: Vec<Variable>,
-    /// The names of the variables that it reads, at most 65535; they may be its own.
+    /// The names of the variables that the client reads, at most 65535; may include its own.
     pub reads: Vec<String>,
 }
 
 /// A variable that all clients may read and one writes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Variable {
-    /// Its name, which no other variable of the run has: 1 to 255 bytes.
+    /// The name, unique among the variables of the run: 1 to 255 bytes.
     pub name: String,
     /// The type of its values.
     pub data_type: DataType,
@@ -46,7 +46,7 @@ impl Variable {
 }
 
 impl Declaration {
-    /// A client of this name that runs at every step, and as yet writes and reads nothing.
+    /// A client of this name that runs at every step, without any variables so far.
     pub fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -57,11 +57,11 @@ impl Declaration {
         }
     }
 
-    /// Sets the multiple by the interval, if there is one, at a server with this step.
+    /// Derives the multiple from the interval, if there is one, at a server with this step.
     ///
     /// # Errors
     ///
-    /// The interval is no multiple of the step that can be counted.
+    /// The interval is no multiple of the step, or too large a one.
     pub(crate) fn fit(&mut self, step: Nanos) -> Result<(), String> {
         let Some(interval) = self.interval else {
             return Ok(());
@@ -77,11 +77,11 @@ impl Declaration {
         Ok(())
     }
 
-    /// Checks what can be checked without knowing the other clients.
+    /// Checks everything that does not depend on other clients.
     ///
     /// # Errors
     ///
-    /// A name that is not allowed, a variable that is written or read twice, or too many of them.
+    /// A name is not allowed, a variable is written or read twice, or there are too many of them.
     pub fn check(&self) -> Result<(), Mistake> {
         check_name("client", &self.name)?;
         let writes = self.writes.iter().map(|variable| &variable.name);
@@ -141,8 +141,8 @@ pub(crate) fn check_name(of: &str, name: &str) -> Result<(), Mistake> {
     Ok(())
 }
 
-/// Whether `slot` holds a raw value of this type: integers and bit strings extended to 64 bits by their sign or by
-/// zeros, BOOL as 0 or 1, REAL as the 32 bits of its number, LREAL as the 64 bits.
+/// True if `slot` holds a raw value of this type: integers and bit strings extended to 64 bits by sign or zeros, BOOL
+/// as 0 or 1, REAL as the 32 bits of its number, LREAL as the 64 bits.
 pub const fn is_raw(data_type: DataType, slot: u64) -> bool {
     let unused = 64 - data_type.width().bits();
     if data_type.is_signed() {

@@ -1,4 +1,4 @@
-//! The trace hash: whether two runs were the same.
+//! The trace hash, which shows if two runs were the same.
 
 use std::fmt;
 use std::hash::Hasher as _;
@@ -9,8 +9,8 @@ use crate::{Declaration, Step, Variable};
 
 /// The hash over all commits of a run: equal for runs that are equal to the last bit.
 ///
-/// It is SipHash-2-4 with a key of zeros over the stream that docs/sdsp.md describes, so other programs can compute
-/// it from a trace of their own.
+/// The algorithm is SipHash-2-4 with a key of zeros, over the stream that docs/sdsp.md describes. Other programs can
+/// compute the hash from their own trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TraceHash(pub u64);
 
@@ -20,7 +20,7 @@ impl fmt::Display for TraceHash {
     }
 }
 
-/// Hashes a run while it goes on; allocates nothing.
+/// Hashes a run in progress; allocates nothing.
 #[derive(Clone, Debug)]
 pub struct Trace(SipHasher24);
 
@@ -49,7 +49,7 @@ impl Trace {
         }
     }
 
-    /// The hash of what was added so far.
+    /// The hash so far.
     pub fn hash(&self) -> TraceHash {
         TraceHash(self.0.finish())
     }

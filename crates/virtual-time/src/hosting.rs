@@ -1,4 +1,4 @@
-//! What a server that runs on a thread of its own has to do with the rest of its process.
+//! The connection between a server on its own thread and the rest of the process.
 
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,7 +16,7 @@ pub struct Controls {
     stop: Stop,
 }
 
-/// What the server was asked for, and what it has shown.
+/// The requests to the server, and the last copy of the run.
 #[derive(Debug, Default)]
 struct Asked {
     controls: Vec<Control>,
@@ -32,14 +32,14 @@ impl Controls {
         Self { asked, stop }
     }
 
-    /// Asks the server for something; it does so within some 20 ms.
+    /// Sends the server a request; the server acts within some 20 ms.
     pub fn send(&self, control: Control) {
         self.lock().controls.push(control);
         self.stop.wake();
     }
 
-    /// Asks the server for a copy of the run, for [`take_view`](Self::take_view); it makes one within some 20 ms, and none any
-    /// more once the run has ended.
+    /// Requests a copy of the run, for [`take_view`](Self::take_view); the server makes it within some 20 ms, but no
+    /// longer once the run has ended.
     pub fn ask_view(&self) {
         let is_new = !std::mem::replace(&mut self.lock().wants_view, true);
         if is_new {
@@ -47,13 +47,13 @@ impl Controls {
         }
     }
 
-    /// The copy that was asked for, if it has come. Each is given once, to whoever comes first.
+    /// The requested copy, if it is ready. The first caller takes it.
     pub fn take_view(&self) -> Option<RunView> {
         self.lock().view.take()
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Asked> {
-        // It is in order after every single change.
+        // Every single change leaves the data consistent.
         self.asked.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -62,9 +62,9 @@ impl Controls {
         &self.stop
     }
 
-    /// Passes on what was asked.
+    /// Passes the requests on.
     pub(crate) fn apply(&self, now: Nanos, server: &mut Server<'_>) {
-        // A hook may send one, too.
+        // A hook may send a request, too.
         let (controls, wants_view) = {
             let mut asked = self.lock();
             let wants_view = std::mem::take(&mut asked.wants_view);
@@ -83,13 +83,13 @@ impl Controls {
     }
 }
 
-/// What a server needs besides its settings.
+/// The environment of a server, besides its settings.
 pub struct Hosting<'h> {
     /// The wall clock, for pacing and for patience.
     pub clock: &'h dyn Clock,
-    /// How other threads control it.
+    /// The controls for other threads.
     pub controls: &'h Controls,
-    /// Is given a line for people about every event: who joins, who is refused and why, that the run starts.
+    /// Takes a line for people about every event: a client joins or is refused and why, or the run starts.
     pub news: &'h mut dyn FnMut(&str),
 }
 

@@ -9,8 +9,8 @@ use crate::{Cause, Ended, Outcome, Pacing, Participant, Settings};
 
 /// Runs these participants, one after another in each step, until the run ends.
 ///
-/// The start condition of `settings` must fit them. A run without a number of steps ends when a participant, or the
-/// logic, fails; to control it from outside, use a [`Server`].
+/// The start condition of `settings` must fit the participants. A run without a number of steps ends when a participant
+/// or the logic fails; use a [`Server`] to control a run from outside.
 ///
 /// # Errors
 ///
@@ -25,7 +25,7 @@ pub fn run(
         return Err(Ended::before(Cause::Configuration, reason));
     }
     let clock = Monotonic::shared();
-    // Who hangs, hangs this thread, so without a pace nobody asks for the time.
+    // A participant that hangs blocks this thread, so without pacing nothing needs the time.
     let is_paced = settings.pacing != Pacing::Fast;
     let mut now = clock.now();
     let mut server = Server::new(settings, logic, now)
@@ -41,7 +41,7 @@ pub fn run(
         }
         if !has_begun {
             has_begun = true;
-            // Nobody is left out silently.
+            // Report a participant that is left out.
             if let Some(refused) = locals.refusal() {
                 return Err(refused.clone());
             }

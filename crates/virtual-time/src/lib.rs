@@ -1,11 +1,11 @@
 //! SDSP: a server hands out virtual time, and its clients run in lock-step.
 //!
 //! Each client declares the variables that it writes and reads, and runs once per step of its own, a whole multiple of
-//! the server's. All clients of a step see one snapshot; what they write is committed at once, when the last of them
-//! has written. So the result does not depend on who answers first, nor on the speed of the computer, and two runs are
-//! equal to the last bit: [`TraceHash`] tells.
+//! the server's. All clients of a step see one snapshot; their writes are committed together, when the last client has
+//! written. So the result depends neither on the order of answers nor on the speed of the computer, and two runs are
+//! equal to the last bit: [`TraceHash`] shows it.
 //!
-//! [`Participant`] is what a client implements; it then takes part in this process, over TCP or through shared memory.
+//! A client implements [`Participant`]; it then takes part in this process, over TCP or through shared memory.
 
 mod barrier;
 mod declaration;

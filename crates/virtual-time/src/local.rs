@@ -31,7 +31,7 @@ impl<'p> Locals<'p> {
             (participant, declaration)
         };
         let mut declared: Vec<_> = participants.into_iter().map(declared).collect();
-        // They run one after another in the order of all clients.
+        // Local clients run one after another in the order of all clients.
         declared.sort_by(|(_, a), (_, b)| a.name.cmp(&b.name));
         let local = |(participant, declaration): (&'p mut dyn Participant, Declaration)| {
             let seat = server.connected(now);
@@ -49,8 +49,8 @@ impl<'p> Locals<'p> {
         Self(declared.into_iter().map(local).collect())
     }
 
-    /// Takes a message, if it is for one of them, to be dealt with when all messages were sent: so those who run
-    /// elsewhere run at the same time.
+    /// Takes a message, if it is for one of the local participants. They run once all messages were sent, at the same
+    /// time as clients elsewhere.
     pub(crate) fn take(&mut self, seat: usize, message: &ToClient<'_>) -> bool {
         let mut locals = self.0.iter_mut();
         let Some(local) = locals.find(|local| local.seat == seat && local.end.is_none()) else {
@@ -71,7 +71,7 @@ impl<'p> Locals<'p> {
         true
     }
 
-    /// Runs those who were asked; false if none was.
+    /// Runs the participants that have requests; false if there were none.
     pub(crate) fn run(&mut self, server: &mut Server<'_>, now: Nanos) -> bool {
         let mut has_run = false;
         for local in &mut self.0 {
@@ -99,7 +99,7 @@ impl<'p> Locals<'p> {
         has_run
     }
 
-    /// The first of them that was refused before the run.
+    /// The first local participant that was refused before the run.
     pub(crate) fn refusal(&self) -> Option<&Ended> {
         let mut ends = self.0.iter().filter_map(|local| local.end.as_ref());
         ends.find_map(|end| end.as_ref().err())

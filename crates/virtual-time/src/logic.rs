@@ -1,4 +1,4 @@
-//! The server's own logic: what it does when the run starts, when time moves on, and when data are accessed.
+//! The server's own logic, called when the run starts, when time moves on, and when data are accessed.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub type Hook<'l> = Box<dyn FnMut(&mut Access<'_>) -> Result<(), String> + Send 
 /// | [`on_read`](Self::on_read) | once for each client that reads the variable in a step, in the order of clients and their reads | with the step's commit |
 /// | [`on_time`](Self::on_time) | time has moved on, before the clients run; in the order of registration | with the step's commit |
 ///
-/// What logic writes calls no other hook. If two hooks write the same variable before one commit, the later one wins.
+/// Writes of the logic call no other hooks. If two hooks write the same variable before one commit, the later one wins.
 #[derive(Default)]
 pub struct Logic<'l> {
     pub(crate) variables: Vec<Variable>,
@@ -91,7 +91,7 @@ impl<'l> Logic<'l> {
     }
 }
 
-/// What a hook sees and may do.
+/// The view of a hook, and its actions.
 #[derive(Debug)]
 pub struct Access<'a> {
     pub(crate) data: &'a mut SharedData,
@@ -100,18 +100,18 @@ pub struct Access<'a> {
 }
 
 impl Access<'_> {
-    /// The step: its time is what the clock shows now. Before the first step its number is 0, and its time one step
+    /// The step; its time is the current virtual time. Before the first step its number is 0, and its time one step
     /// below 0.
     pub const fn step(&self) -> Step {
         self.step
     }
 
-    /// The client that reads, in a hook for reads.
+    /// The reading client, in a hook for reads.
     pub const fn reader(&self) -> Option<&str> {
         self.reader
     }
 
-    /// The raw value of the variable `name`: at a commit the one that is being committed, else the one committed last.
+    /// The raw value of the variable `name`: during a commit the new one, otherwise the one committed last.
     ///
     /// # Errors
     ///
@@ -124,13 +124,13 @@ impl Access<'_> {
     ///
     /// # Errors
     ///
-    /// There is no such variable, it is not the logic's, or its type has no such value.
+    /// The variable does not exist or does not belong to the logic, or its type has no such value.
     pub fn set(&mut self, name: &str, value: u64) -> Result<(), String> {
         let at = self.data.find(name)?;
         self.data.write_by_logic(at, value)
     }
 
-    /// The variable `name`, for its type.
+    /// The declaration of the variable `name`, with its type.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Where the clients of a run meet the server.
+//! The meeting place of the server and the clients of a run.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use tickbus_fieldbus::tcp::Address;
 use crate::client::{Client, Connection};
 use crate::{Ended, tcp};
 
-/// Where the clients of a run meet the server.
+/// The meeting place of the server and the clients of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Meeting {
     /// The server listens at this address.
@@ -20,7 +20,8 @@ pub enum Meeting {
 }
 
 impl Meeting {
-    /// Reads a name for shared memory: letters, digits, hyphens and underscores, which are names of files everywhere.
+    /// Reads a name for shared memory: letters, digits, hyphens and underscores, which are valid in file names on every
+    /// system.
     pub fn read_name(value: &Value<'_>) -> Option<String> {
         let right = "write a name of letters, digits, hyphens and underscores, such as \"cell\"";
         let name = value.label(40, right)?;
@@ -33,11 +34,11 @@ impl Meeting {
         Some(name.to_owned())
     }
 
-    /// Joins the server there; over TCP, times are those of the clock. When `stop` is stopped, the client leaves the run.
+    /// Joins the server there; over TCP, `clock` provides the times. When `stop` is stopped, the client leaves the run.
     ///
     /// # Errors
     ///
-    /// There is no server, or it has no seat free; or this system has no shared memory for clients.
+    /// There is no server, or it has no free seat; or this system has no shared memory for clients.
     pub fn connect(
         &self,
         client: Client,
@@ -57,7 +58,7 @@ impl Meeting {
     }
 }
 
-/// Shows it to people.
+/// Formats the place for people.
 impl fmt::Display for Meeting {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

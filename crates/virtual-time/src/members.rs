@@ -1,23 +1,23 @@
-//! Who takes part in a run.
+//! The participants of a run.
 
 use std::num::NonZeroU32;
 use std::ops::Range;
 
 use crate::Variable;
 
-/// Who takes part in a run, and what they write.
+/// The participants of a run, and the variables that they write.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Members {
-    /// In the order of their names.
+    /// The clients in the order of their names.
     pub clients: Vec<Client>,
-    /// All variables, each client's together, those of the server's logic last. None before everyone has joined.
+    /// All variables, grouped by client, those of the server's logic last. Empty before everyone has joined.
     pub variables: Vec<Variable>,
 }
 
 impl Members {
-    /// The place of the client that writes a variable; the number of clients, if the server's logic does.
+    /// The index of the client that writes a variable; the number of clients if the server's logic writes it.
     pub fn writer(&self, variable: usize) -> usize {
-        // Each client's stand together, in the order of the clients.
+        // The variables of each client are adjacent, in the order of the clients.
         self.clients
             .partition_point(|client| client.writes.end <= variable)
     }
@@ -26,10 +26,10 @@ impl Members {
 /// A client of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Client {
-    /// Its name.
+    /// The name.
     pub name: String,
-    /// How many steps of the server one step of it takes.
+    /// The number of server steps per step of this client.
     pub multiple: NonZeroU32,
-    /// Which of the variables it writes.
+    /// The range of its variables.
     pub writes: Range<usize>,
 }

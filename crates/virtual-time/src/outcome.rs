@@ -6,12 +6,12 @@ use tickbus_base::time::Nanos;
 
 use crate::TraceHash;
 
-/// A run that came to its end, or was stopped between two steps.
+/// A run that ended regularly, or was stopped between two steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Outcome {
     /// The number of steps. All clients have finished all of them.
     pub steps: u64,
-    /// The virtual time of the last step; one step below 0 when there was none.
+    /// The virtual time of the last step; one step below 0 if there was none.
     pub time: Nanos,
     /// The hash over everything that was committed.
     pub hash: TraceHash,
@@ -22,7 +22,7 @@ pub struct Outcome {
 pub struct Ended {
     /// The kind of reason.
     pub cause: Cause,
-    /// The client that is to blame, where there is one.
+    /// The client responsible, if any.
     pub client: Option<String>,
     /// The reason, for people; it does not repeat the client's name.
     pub reason: String,
@@ -43,18 +43,18 @@ pub enum Cause {
     Hung,
     /// A client, or the server, violated the protocol.
     Protocol,
-    /// A client said that it cannot go on.
+    /// A client reported that it cannot continue.
     Failed,
     /// The server's logic failed.
     Logic,
     /// Somebody stopped the run before a step could be finished.
     Stopped,
-    /// The operating system did not play along.
+    /// A system call failed.
     System,
 }
 
 impl Cause {
-    /// All of them, in the order of their codes on the wire, from 1.
+    /// All causes, in the order of their codes on the wire, from 1.
     pub const ALL: [Self; 9] = [
         Self::Configuration,
         Self::Refused,
@@ -67,7 +67,7 @@ impl Cause {
         Self::System,
     ];
 
-    /// The word for it in logs and results.
+    /// The name in logs and results.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Configuration => "configuration",
@@ -84,7 +84,7 @@ impl Cause {
 }
 
 impl Ended {
-    /// A run that ended for a reason that is no client's, before its first step.
+    /// A run that ended before its first step for a reason that no client caused.
     pub(crate) fn before(cause: Cause, reason: impl Into<String>) -> Self {
         Self {
             cause,

@@ -10,12 +10,12 @@ use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;
 use crate::{Meeting, Pacing, Settings, StartCondition};
 
-/// What the file of a run says.
+/// The content of a run file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunFile {
-    /// How the server runs.
+    /// The settings of the server.
     pub settings: Settings,
-    /// Where the clients meet it.
+    /// The meeting place of server and clients.
     pub meeting: Meeting,
     /// The script with the server's logic.
     pub logic: Option<PathBuf>,
@@ -33,11 +33,11 @@ impl RunFile {
         Self::parse(&path.display().to_string(), &text, folder)
     }
 
-    /// Reads the text of such a file; its paths are relative to `folder`.
+    /// Reads the text of a run file; its paths are relative to `folder`.
     ///
     /// # Errors
     ///
-    /// As [`load`](Self::load).
+    /// The same as for [`load`](Self::load).
     pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
         let read = read_text(&mut collector, text, |mut root| {

@@ -1,10 +1,11 @@
 //! The server's logic as a script in Rhai.
 //!
-//! The script is run once, and says by `variable` what it writes and by `on_start`, `on_time`, `on_change` and `on_read`
-//! which functions are hooks; these use `get`, `set`, `time`, `step` and `reader`. docs/sdsp.md has an example.
+//! The script runs once. It declares the variables that it writes by `variable`, and registers hook functions by
+//! `on_start`, `on_time`, `on_change` and `on_read`; these use `get`, `set`, `time`, `step` and `reader`. docs/sdsp.md
+//! has an example.
 //!
-//! A script cannot reach outside: it has no files, no modules, no clock but the virtual one and no random numbers, and a
-//! hook that does not come to its end is broken off. So it is as deterministic as the rest.
+//! A script cannot reach outside: it has no files, no modules, no clock but the virtual one and no random numbers, and
+//! a hook that does not finish is aborted. So a script is as deterministic as the rest.
 
 mod frame;
 
@@ -21,23 +22,23 @@ use crate::logic::Access;
 use crate::{Logic, Variable};
 use frame::Frame;
 
-/// How much one hook may do: some hundredths of a second.
+/// The most operations of one hook: some hundredths of a second.
 const MOST_OPERATIONS: u64 = 1_000_000;
 
 /// The most characters, elements or entries of a value.
 const LARGEST: usize = 65_536;
 
-/// How deep functions may call each other.
+/// The deepest nesting of function calls.
 const DEEPEST: usize = 32;
 
 type Failed = Box<EvalAltResult>;
 
-/// What a script has registered so far.
+/// Everything that a script has registered so far.
 #[derive(Default)]
 struct Registered {
     variables: Vec<Variable>,
     hooks: Vec<(When, FnPtr)>,
-    /// The script has been run: from now on only its hooks are.
+    /// The script has run: from now on only its hooks run.
     is_complete: bool,
 }
 
@@ -57,21 +58,21 @@ struct Script {
     frame: Arc<Mutex<Frame>>,
 }
 
-/// Reads the script at `path`, and makes logic of it.
+/// Reads the script at `path`, and turns it into logic.
 ///
 /// # Errors
 ///
-/// With what is wrong, and where.
+/// The mistakes, with their positions.
 pub fn load(path: &Path) -> Result<Logic<'static>, Mistakes> {
     let text = load_text(path)?;
     parse(&path.display().to_string(), &text)
 }
 
-/// Makes logic of the text of a script; messages call it `file`.
+/// Turns the text of a script into logic; messages call it `file`.
 ///
 /// # Errors
 ///
-/// As [`load`].
+/// The same as for [`load`].
 pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
     let registered = Arc::new(Mutex::new(Registered::default()));
     let frame = Arc::new(Mutex::new(Frame::default()));
@@ -85,7 +86,7 @@ pub fn parse(file: &str, text: &str) -> Result<Logic<'static>, Mistakes> {
         .disable_symbol("eval")
         .on_print(|text| log::info!("script: {text}"))
         .on_debug(|text, _, place| log::info!("script, {place}: {text}"));
-    // Rhai's own would stop the run, and the server with it.
+    // Rhai's own `sleep` would stop the run, and the server with it.
     engine.register_fn("sleep", |_: i64| cannot_sleep());
     engine.register_fn("sleep", |_: f64| cannot_sleep());
     offer_registration(&mut engine, &registered);
@@ -145,7 +146,7 @@ impl Script {
     }
 }
 
-/// Lets a script say what it writes and when it is called.
+/// Offers the functions that declare variables and hooks.
 fn offer_registration(engine: &mut Engine, registered: &Arc<Mutex<Registered>>) {
     let into = Arc::clone(registered);
     engine.register_fn(
@@ -188,7 +189,7 @@ fn cannot_sleep() -> Result<(), Failed> {
     Err("a script cannot sleep; use time() to wait for a virtual time".into())
 }
 
-/// What was registered, as long as the script may add to it.
+/// The registrations, as long as the script may add to them.
 fn open(registered: &Mutex<Registered>) -> Result<MutexGuard<'_, Registered>, Failed> {
     let registered = locked(registered);
     if registered.is_complete {
@@ -199,7 +200,7 @@ fn open(registered: &Mutex<Registered>) -> Result<MutexGuard<'_, Registered>, Fa
     Ok(registered)
 }
 
-/// Lets hooks see and write variables.
+/// Offers the functions that read and write variables.
 fn offer_access(engine: &mut Engine, frame: &Arc<Mutex<Frame>>) {
     let of = Arc::clone(frame);
     engine.register_fn("get", move |name: &str| -> Result<Dynamic, Failed> {
@@ -227,11 +228,11 @@ fn offer_access(engine: &mut Engine, frame: &Arc<Mutex<Frame>>) {
 }
 
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // Each change is complete by itself.
+    // Every single change leaves the data consistent.
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Where the error is that others only passed on.
+/// The position of the innermost error, which the outer ones only pass on.
 fn innermost(error: &EvalAltResult) -> Position {
     match error.unwrap_inner().position() {
         place if place.is_none() => error.position(),
@@ -241,7 +242,7 @@ fn innermost(error: &EvalAltResult) -> Position {
 
 fn without_place(error: &EvalAltResult) -> String {
     let mut error = error.unwrap_inner().to_string();
-    // The message ends with its place, which is told in front.
+    // The message ends with its position, which is reported in front.
     if let Some(at) = error.rfind(" (line ") {
         error.truncate(at);
     }

@@ -20,16 +20,16 @@ use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
 
-/// How many states are passed in a row, where no client is due, before anything else is done.
+/// The most states without a due client to pass in a row before anything else is done.
 const EMPTY_STATES: usize = 1000;
 
-/// How long the clients may take to finish a step after the run was stopped.
+/// The time for the clients to finish a step after the run was stopped.
 const STOP_PATIENCE: Nanos = Nanos::from_secs(1);
 
 /// A server for one run.
 ///
-/// The owner of the connections gives each a seat by [`connected`](Self::connected), reports what arrives, fetches the
-/// messages by [`poll`](Self::poll) until there are none, and calls [`tick`](Self::tick) when
+/// The owner of the connections gives each a seat by [`connected`](Self::connected), reports everything that arrives,
+/// fetches the messages by [`poll`](Self::poll) until none are left, and calls [`tick`](Self::tick) when
 /// [`deadline`](Self::deadline) has come. A seat is free again when its client was [lost](Self::lost), or its
 /// [`ToClient::End`] was fetched; the owner then forgets the connection. The run is over when there is an
 /// [`outcome`](Self::outcome) and no message is left.
@@ -38,30 +38,30 @@ pub struct Server<'l> {
     settings: Settings,
     phase: Phase<'l>,
     seats: Vec<Seat>,
-    /// The seats whose clients are told that the server waits.
+    /// The seats whose clients learn that the server waits.
     informed: BTreeSet<usize>,
-    /// When they were told last.
+    /// When these clients were last informed.
     informed_at: Nanos,
     outbox: VecDeque<Out>,
     news: VecDeque<String>,
-    /// The end of a client that was refused, while its message is fetched.
+    /// The end of a refused client, while its message is fetched.
     refused: Result<Outcome, Ended>,
-    /// When the clients could begin to join, or were last asked for something.
+    /// When the clients could begin to join, or were last sent a request.
     asked: Nanos,
     is_paused: bool,
-    /// How many steps are run in spite of the pause.
+    /// The number of steps to run in spite of the pause.
     singles: u64,
-    /// By when the run has to have ended.
+    /// The deadline for the end of a stopped run.
     stop_by: Option<Nanos>,
     pace: Option<Pace>,
-    /// Who takes part, once somebody has looked at the running run.
+    /// The participants, once somebody has viewed the running run.
     shown: Option<Arc<Members>>,
 }
 
 #[derive(Debug)]
 enum Phase<'l> {
     Joining(Joining, Logic<'l>),
-    /// With the seats of the clients.
+    /// The barrier, and the seats of the clients.
     Running(Box<Barrier<'l>>, Vec<usize>),
     Ended(Result<Outcome, Ended>),
 }
@@ -69,13 +69,13 @@ enum Phase<'l> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Seat {
     Free,
-    /// Connected at this time, and has not joined.
+    /// Connected at this time, but has not joined.
     Silent(Nanos),
     /// Joined; the run has not started.
     Joined,
     /// The client of this number.
     Client(usize),
-    /// Gets its end next.
+    /// The next message is the end.
     Leaving,
 }
 
@@ -115,7 +115,7 @@ impl<'l> Server<'l> {
         })
     }
 
-    /// Where the run is.
+    /// The state of the run.
     pub fn state(&self) -> State {
         match &self.phase {
             Phase::Joining(..) => State::Start,
@@ -124,7 +124,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// The step that runs, or ran last; `None` before the start and after the end.
+    /// The current or last step; `None` before the start and after the end.
     pub fn step(&self) -> Option<Step> {
         match &self.phase {
             Phase::Running(barrier, _) => Some(barrier.step()),
@@ -132,12 +132,12 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Whether no further step begins.
+    /// True if no further step begins.
     pub fn is_paused(&self) -> bool {
         self.is_paused && self.singles == 0
     }
 
-    /// How the run ended, once it has.
+    /// The outcome of the run, once it has ended.
     pub fn outcome(&self) -> Option<&Result<Outcome, Ended>> {
         match &self.phase {
             Phase::Ended(outcome) => Some(outcome),
@@ -156,7 +156,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Whom the start waits for, for people; `None` once everyone has joined.
+    /// The clients that the start waits for, as text for people; `None` once everyone has joined.
     pub fn missing(&self) -> Option<String> {
         match &self.phase {
             Phase::Joining(joining, _) => Some(joining.missing()),
@@ -164,7 +164,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// The seat of the first client, in the order of their names, that owes an answer.
+    /// The seat of the first client, in the order of names, that owes an answer.
     pub fn awaited(&self) -> Option<usize> {
         match &self.phase {
             Phase::Running(barrier, seats) => barrier.owing().next().map(|client| seats[client]),
@@ -172,7 +172,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// The next line for people about what has happened: who joined, who was refused and why, that the run starts.
+    /// The next line for people about an event: a client joined or was refused and why, or the run starts.
     pub fn news(&mut self) -> Option<String> {
         self.news.pop_front()
     }
@@ -184,7 +184,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Somebody has connected; the answer is its seat.
+    /// A client has connected; returns its seat.
     pub fn connected(&mut self, now: Nanos) -> usize {
         let free = self.seats.iter().position(|seat| *seat == Seat::Free);
         let seat = free.unwrap_or_else(|| {
@@ -205,7 +205,7 @@ impl<'l> Server<'l> {
         self.informed.insert(seat);
     }
 
-    /// The client at `seat` declares what it writes and reads.
+    /// The client at `seat` declares its variables.
     pub fn join(&mut self, now: Nanos, seat: usize, mut declaration: Declaration) {
         match self.seats[seat] {
             Seat::Silent(_) => {}
@@ -259,7 +259,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// The client at `seat` says that it cannot, or need not, go on.
+    /// The client at `seat` reports that it cannot, or need not, continue.
     pub fn gave_up(&mut self, seat: usize, reason: &str) {
         match self.seats[seat] {
             Seat::Client(_) => self.blame(seat, Cause::Failed, &format!("gave up: {reason}")),
@@ -271,7 +271,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// The connection of the client at `seat` is gone, and so is the seat.
+    /// The connection of the client at `seat` is gone; frees the seat.
     pub fn lost(&mut self, seat: usize, reason: &str) {
         match std::mem::replace(&mut self.seats[seat], Seat::Free) {
             Seat::Client(client) => {
@@ -305,7 +305,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Pauses, steps, runs on or stops.
+    /// Pauses, steps, continues or stops.
     pub fn control(&mut self, now: Nanos, control: Control) {
         match control {
             Control::Pause => (self.is_paused, self.singles) = (true, 0),
@@ -329,15 +329,15 @@ impl<'l> Server<'l> {
         self.advance(now);
     }
 
-    /// All clients that are due were asked by `now`, and those on the server's own thread have run: from here on the others
-    /// have the time to answer. What the server took for itself is not theirs.
+    /// All clients that are due were sent their requests by `now`, and those on the server's own thread have run. The
+    /// time to answer starts here for the others, so that the server's own time does not count.
     pub fn sent(&mut self, now: Nanos) {
         if matches!(self.phase, Phase::Running(..)) {
             self.asked = now;
         }
     }
 
-    /// The next message, and the seat that it is for.
+    /// The next message, and the seat of its receiver.
     pub fn poll(&mut self) -> Option<(usize, ToClient<'_>)> {
         let out = self.outbox.pop_front()?;
         let seat = out.seat();
@@ -365,7 +365,7 @@ impl<'l> Server<'l> {
         Some((seat, message))
     }
 
-    /// Everyone has joined.
+    /// Starts the run: everyone has joined.
     fn start(&mut self, now: Nanos) {
         let ended = Phase::Ended(Err(Ended::before(Cause::Configuration, "")));
         let Phase::Joining(joining, logic) = std::mem::replace(&mut self.phase, ended) else {
@@ -392,7 +392,7 @@ impl<'l> Server<'l> {
         }
     }
 
-    /// Goes on as far as possible.
+    /// Advances as far as possible.
     fn advance(&mut self, now: Nanos) {
         for _ in 0..EMPTY_STATES {
             let Phase::Running(barrier, seats) = &mut self.phase else {
@@ -453,7 +453,7 @@ impl<'l> Server<'l> {
         }));
     }
 
-    /// Ends the run for everyone; a step that was not sent yet is sent to no one.
+    /// Ends the run for everyone; discards a step that was not sent yet.
     fn end(&mut self, outcome: Result<Outcome, Ended>) {
         self.outbox
             .retain(|out| matches!(out, Out::Refused(..) | Out::End(_)));
@@ -466,7 +466,7 @@ impl<'l> Server<'l> {
         self.phase = Phase::Ended(outcome);
     }
 
-    /// Lets a client that has not started take no part.
+    /// Refuses a client before the start.
     fn refuse(&mut self, seat: usize, client: Option<String>, reason: &str) {
         if let Phase::Joining(joining, _) = &mut self.phase {
             joining.remove(seat);
@@ -476,7 +476,7 @@ impl<'l> Server<'l> {
             Some(name) => format!("client \"{}\"", shown(name)),
             None => "a client without a name".to_owned(),
         };
-        // The reason may have a client's own words.
+        // The reason may contain a client's text.
         self.news
             .push_back(format!("{who} was refused: {}", printable(reason)));
         let ended = Ended {

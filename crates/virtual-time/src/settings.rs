@@ -1,24 +1,24 @@
-//! What a server is told before the run.
+//! The settings of a server.
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 
-/// How a server runs.
+/// The settings of a server.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// The virtual time of one step, above zero.
     pub step: Nanos,
     /// When the run begins.
     pub start: StartCondition,
-    /// How many steps the run has; `None` runs until it is stopped.
+    /// The number of steps; `None` runs until stopped.
     pub steps: Option<u64>,
-    /// How fast it runs at most.
+    /// The speed limit.
     pub pacing: Pacing,
-    /// Whether it begins paused.
+    /// True if the run begins paused.
     pub paused: bool,
-    /// How long a client may take to answer. Wall-clock time never changes a result: it only ends a run that hangs.
+    /// The time limit for a client's answer. Wall-clock time never changes a result: it only ends a run that hangs.
     pub hang: Nanos,
-    /// How long the clients may take to join, all in all.
+    /// The time limit for all clients to join.
     pub join: Nanos,
 }
 
@@ -31,18 +31,18 @@ pub enum StartCondition {
     Count(usize),
 }
 
-/// How fast virtual time passes at most.
+/// The speed limit of virtual time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Pacing {
     /// As fast as the clients can.
     Fast,
-    /// This many times as fast as the wall clock: 1 is real time. Above zero. Steps that come late are not made up for.
+    /// This many times as fast as the wall clock: 1 is real time. Above zero. Late steps are not made up for.
     Times(f64),
 }
 
 impl Settings {
-    /// A run as fast as possible, in steps of `step`, that begins under the condition `start` and ends when stopped; a
-    /// client may take ten seconds to answer, and any time to join.
+    /// A run as fast as possible, in steps of `step`. It begins under the condition `start` and ends when stopped; a
+    /// client has ten seconds to answer, and any time to join.
     pub const fn new(step: Nanos, start: StartCondition) -> Self {
         Self {
             step,
@@ -57,7 +57,7 @@ impl Settings {
 }
 
 impl Settings {
-    /// Checks what does not concern the clients.
+    /// Checks everything that does not concern the clients.
     pub(crate) fn check(&self) -> Result<(), Mistake> {
         for (name, span) in [
             ("step", self.step),

@@ -1,4 +1,4 @@
-//! The variables of a run, their committed values, and what is staged for the next commit.
+//! The variables of a run, their committed values, and the values staged for the next commit.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -8,18 +8,18 @@ use tickbus_base::toml_text::did_you_mean;
 
 use crate::{Declaration, Variable, is_raw};
 
-/// All variables, in the order of their clients, each client's in the order of its declaration; the logic's come last.
+/// All variables, in the order of their clients and of each client's declaration; the logic's come last.
 #[derive(Debug, Default)]
 pub(crate) struct SharedData {
     variables: Vec<Variable>,
     by_name: HashMap<String, usize>,
-    /// The variables of the logic begin here.
+    /// The index of the logic's first variable.
     logic_from: usize,
-    /// What every client of a step sees.
+    /// The values that every client of a step sees.
     committed: Vec<u64>,
-    /// What the next commit makes of it.
+    /// The values of the next commit.
     staged: Vec<u64>,
-    /// Whether a commit is going on, so that hooks see the new values.
+    /// True during a commit, when hooks see the new values.
     is_committing: bool,
 }
 
@@ -66,7 +66,7 @@ impl SharedData {
         Ok(data)
     }
 
-    /// Where the variable `name` is, or what may have been meant.
+    /// The index of the variable `name`, or a suggestion.
     pub(crate) fn find_for(&self, name: &str) -> Result<usize, String> {
         self.by_name.get(name).copied().ok_or_else(|| {
             let names: Vec<&str> = self.variables.iter().map(|v| v.name.as_str()).collect();
@@ -74,13 +74,13 @@ impl SharedData {
         })
     }
 
-    /// Where the variable `name` is.
+    /// The index of the variable `name`.
     pub(crate) fn find(&self, name: &str) -> Result<usize, String> {
         let unknown = |right| format!("there is no variable \"{name}\"; {right}");
         self.find_for(name).map_err(unknown)
     }
 
-    /// Whether the logic writes this variable, and no client.
+    /// True if the logic writes this variable, and no client.
     pub(crate) fn is_of_logic(&self, at: usize) -> bool {
         at >= self.logic_from
     }
@@ -107,7 +107,7 @@ impl SharedData {
         &self.variables
     }
 
-    /// Whether hooks see the values of a commit that is going on.
+    /// True if hooks see the values of the current commit.
     #[cfg(feature = "script")]
     pub(crate) fn is_committing(&self) -> bool {
         self.is_committing
@@ -120,7 +120,7 @@ impl SharedData {
         }
     }
 
-    /// Stages the values of a client, whose variables are at `range`; refuses the first that is no raw value.
+    /// Stages the values of a client, whose variables are at `range`; refuses the first invalid raw value.
     pub(crate) fn stage(
         &mut self,
         range: Range<usize>,
@@ -151,17 +151,17 @@ impl SharedData {
         Ok(())
     }
 
-    /// Begins a commit; until its end hooks see what is staged.
+    /// Begins a commit; until its end hooks see the staged values.
     pub(crate) fn begin_commit(&mut self) {
         self.is_committing = true;
     }
 
-    /// Whether the commit that has begun changes this variable.
+    /// True if the current commit changes this variable.
     pub(crate) fn changes(&self, at: usize) -> bool {
         self.committed[at] != self.staged[at]
     }
 
-    /// Ends a commit: what was staged is what everyone sees.
+    /// Ends a commit: everyone sees the staged values.
     pub(crate) fn end_commit(&mut self) {
         self.committed.copy_from_slice(&self.staged);
         self.is_committing = false;

@@ -1,8 +1,8 @@
-//! Clients in other processes of the same computer, through shared memory: the same messages as over TCP, but without
-//! a call of the system for each.
+//! Clients in other processes of the same computer, through shared memory: the same messages as over TCP, but without a
+//! system call for each.
 //!
-//! The memory has a seat for each client, with a mailbox each way that holds one frame. Who waits spins for a moment,
-//! then lets others run, and then sleeps until it is woken.
+//! The memory has a seat for each client, with a mailbox each way that holds one frame. A waiting thread spins for a
+//! moment, then yields, and then sleeps until it is woken.
 
 mod client;
 mod layout;

@@ -11,8 +11,8 @@ use tickbus_fieldbus::tcp::is_for_later;
 pub use client::{connect, join};
 pub use server::Listener;
 
-/// Whether a call that blocks for some time at most has done so. Windows calls that a time-out, which elsewhere is the end
-/// of a connection whose peer does not acknowledge anything.
+/// True if a call with a time limit has reached it. Windows reports that as a time-out, which elsewhere means that a
+/// peer does not acknowledge anything and the connection has ended.
 fn is_later(error: &io::Error) -> bool {
     is_for_later(error) || (cfg!(windows) && error.kind() == ErrorKind::TimedOut)
 }

@@ -1,4 +1,4 @@
-//! A run, as another thread sees it.
+//! A run as other threads see it.
 
 use std::sync::Arc;
 
@@ -10,25 +10,25 @@ use crate::{Pacing, State, Step};
 /// A run at one moment, copied by its server on its own thread.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunView {
-    /// Who takes part in it: the same one throughout, once everyone has joined.
+    /// The participants: the same object throughout, once everyone has joined.
     pub members: Arc<Members>,
-    /// Where the run is.
+    /// The state of the run.
     pub state: State,
-    /// The step that runs, or ran last; `None` before all clients have joined.
+    /// The current or last step; `None` before all clients have joined.
     pub step: Option<Step>,
     /// The virtual time of one step.
     pub length: Nanos,
-    /// How fast it runs at most.
+    /// The speed limit.
     pub pacing: Pacing,
-    /// Whether no further step begins.
+    /// True if no further step begins.
     pub is_paused: bool,
-    /// Whom the start waits for, in words; `None` once everyone has joined.
+    /// The clients that the start waits for, in words; `None` once everyone has joined.
     pub missing: Option<String>,
-    /// Per client, whether it owes the answer of this step.
+    /// Per client, true if it owes the answer of this step.
     pub owes: Vec<bool>,
-    /// How long those have had it by now.
+    /// How long these clients have had the request so far.
     pub waited: Nanos,
-    /// How long they may have it.
+    /// The time limit for their answers.
     pub hang: Nanos,
     /// The committed values, one per variable: raw values, see [`is_raw`](crate::is_raw).
     pub values: Vec<u64>,

@@ -1,7 +1,7 @@
-//! The messages as bytes; docs/sdsp.md has the format for everyone.
+//! The messages as bytes; docs/sdsp.md describes the format for all implementations.
 //!
-//! A frame is a length of four bytes, a kind of one, and what belongs to it; the length counts the kind, too. Numbers
-//! are little-endian.
+//! A frame is a length of four bytes, a kind of one byte, and the content; the length includes the kind. Numbers are
+//! little-endian.
 
 mod reader;
 #[cfg(test)]
@@ -17,7 +17,7 @@ use reader::Reader;
 /// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`].
 pub const VERSION: u16 = 2;
 
-/// The oldest version that a server takes.
+/// The oldest version that a server accepts.
 const OLDEST: u16 = 1;
 
 /// The longest frame, without the four bytes of its length.
@@ -29,7 +29,7 @@ pub const HEADER: usize = 4;
 /// The longest reason, in bytes; longer ones are cut.
 const LONGEST_REASON: usize = 4096;
 
-/// What a join begins with.
+/// The first bytes of a join.
 const MAGIC: [u8; 4] = *b"SDSP";
 
 const JOIN: u8 = 0x01;
@@ -55,21 +55,21 @@ impl<'a> Slots<'a> {
 /// A message of a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FromClient<'a> {
-    /// The first one: what it writes and reads.
+    /// The first message: the variables that the client writes and reads.
     Join {
-        /// What it declares.
+        /// The declaration.
         declaration: Declaration,
-        /// The version of the format that it speaks.
+        /// The client's version of the format.
         version: u16,
     },
-    /// It has run.
+    /// The client has run.
     Done {
         /// The step; 0 is the initial write.
         sequence: u64,
-        /// What it writes, in the order of its declaration.
+        /// The values that the client writes, in the order of its declaration.
         writes: Slots<'a>,
     },
-    /// It cannot go on, or will not.
+    /// The client cannot or will not continue.
     GiveUp(&'a str),
 }
 
@@ -80,14 +80,14 @@ pub enum FromServer<'a> {
     Start {
         /// The virtual time of one step of the server.
         step: Nanos,
-        /// The types of what the client reads.
+        /// The types of the variables that the client reads.
         reads: Vec<DataType>,
     },
     /// See [`ToClient::Step`].
     Step {
         /// The step.
         step: Step,
-        /// What the client reads.
+        /// The values that the client reads.
         reads: Slots<'a>,
     },
     /// See [`ToClient::End`].
@@ -96,11 +96,11 @@ pub enum FromServer<'a> {
     Waiting,
 }
 
-/// The length of the frame at the beginning of `bytes`, with its header, as far as that is known.
+/// The length of the frame at the beginning of `bytes`, with its header, if already known.
 ///
 /// # Errors
 ///
-/// There is no such frame.
+/// The frame is not valid.
 pub fn frame_length(bytes: &[u8]) -> Result<Option<usize>, String> {
     let Some(header) = bytes.first_chunk::<HEADER>() else {
         return Ok(None);
@@ -114,11 +114,11 @@ pub fn frame_length(bytes: &[u8]) -> Result<Option<usize>, String> {
     }
 }
 
-/// The frame at the beginning of `bytes`, without its header, if all of it is there.
+/// The frame at the beginning of `bytes`, without its header, if it is complete.
 ///
 /// # Errors
 ///
-/// There is no such frame.
+/// The frame is not valid.
 pub fn frame(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
     let length = frame_length(bytes)?;
     Ok(length.and_then(|length| bytes.get(HEADER..length)))
@@ -140,7 +140,7 @@ fn append(out: &mut Vec<u8>, kind: u8, content: impl FnOnce(&mut Vec<u8>)) {
 ///
 /// # Errors
 ///
-/// Its names are too long to be sent.
+/// The names are too long to be sent.
 pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> {
     let start = out.len();
     let name = |out: &mut Vec<u8>, name: &str| {
@@ -151,7 +151,7 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
         let count = u16::try_from(count).expect("their number has its limit");
         out.extend_from_slice(&count.to_le_bytes());
     };
-    // Written by hand: a long one is no broken invariant.
+    // Not by `append`: a frame that is too long is an error here, not a bug.
     out.extend_from_slice(&[0; HEADER]);
     out.push(JOIN);
     out.extend_from_slice(&MAGIC);
@@ -181,7 +181,7 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
     Ok(())
 }
 
-/// Appends what a client writes after its run of the step `sequence`.
+/// Appends the values that a client writes after its run of the step `sequence`.
 pub fn done(out: &mut Vec<u8>, sequence: u64, writes: &[u64]) {
     append(out, DONE, |out| {
         out.extend_from_slice(&sequence.to_le_bytes());
@@ -189,7 +189,7 @@ pub fn done(out: &mut Vec<u8>, sequence: u64, writes: &[u64]) {
     });
 }
 
-/// Appends that a client gives up for this reason.
+/// Appends a message that a client gives up for this reason.
 pub fn give_up(out: &mut Vec<u8>, reason: &str) {
     append(out, GIVE_UP, |out| {
         out.extend_from_slice(cut(reason).as_bytes());
@@ -219,7 +219,7 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
             out.push(place_code(cause));
             out.extend_from_slice(&ended.steps.to_le_bytes());
             let client = ended.client.as_deref().unwrap_or("");
-            // The name of one that was refused may be longer than allowed; then it is left out.
+            // The name of a refused client may be longer than allowed; then it is left out.
             let length = u8::try_from(client.len()).unwrap_or(0);
             out.push(length);
             out.extend_from_slice(&client.as_bytes()[..usize::from(length)]);
@@ -232,7 +232,7 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
 ///
 /// # Errors
 ///
-/// How it violates the format, as the continuation of "the client …".
+/// How the message violates the format, as the continuation of "the client …".
 pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
     let mut reader = Reader::new(frame);
     let message = match reader.byte()? {
@@ -294,7 +294,7 @@ fn read_join<'a>(reader: &mut Reader<'_>) -> Result<FromClient<'a>, String> {
 ///
 /// # Errors
 ///
-/// How it violates the format, as the continuation of "the server …".
+/// How the message violates the format, as the continuation of "the server …".
 pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
     let mut reader = Reader::new(frame);
     let nanos = |word: u64| Nanos(word.cast_signed());
@@ -355,7 +355,7 @@ fn slots(out: &mut Vec<u8>, slots: &[u64]) {
     }
 }
 
-/// At most the first [`LONGEST_REASON`] bytes.
+/// The first [`LONGEST_REASON`] bytes at most.
 fn cut(reason: &str) -> &str {
     let end = (0..=reason.len().min(LONGEST_REASON)).rev();
     let end = end.into_iter().find(|end| reason.is_char_boundary(*end));

@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_virtual_time::server::Server;
 use tickbus_virtual_time::{Logic, Settings, StartCondition, hear, wire};
 
-/// The lines of the example: who, whether it is sent to the server, the bytes.
+/// The lines of the example: client, true if sent to the server, bytes.
 fn lines(text: &str) -> Vec<(&str, bool, Vec<u8>)> {
     text.lines()
         .filter_map(|line| {
@@ -91,13 +91,13 @@ fn the_documented_example_is_what_the_server_does() {
     assert!(matches!(server.outcome(), Some(Ok(_))));
 }
 
-/// Plays the example, with the client's bytes as `change` makes them, to its end: what was sent in vain, then silence.
-/// Tells how the run ended, and whether it hung on a client.
+/// Plays the example to its end, with the client's bytes changed by `change`; frames for a client that has gone are
+/// dropped, and silence follows. Returns how the run ended, and whether it hung on a client.
 fn play(frames: &[(&str, bool, Vec<u8>)], mut change: impl FnMut(usize, &mut Vec<u8>)) -> Ending {
     let now = Nanos::ZERO;
     let mut server = server();
     let seats = ["tank", "plc"].map(|_| server.connected(now));
-    // What has arrived of each and is no whole frame yet; `None` when it has been told the end.
+    // The received bytes of each client that are no whole frame yet; `None` once the client got the end.
     let mut streams = [Some(Vec::new()), Some(Vec::new())];
     let sent = frames.iter().filter(|(_, up, _)| *up).enumerate();
     for (number, (who, _, bytes)) in sent {
@@ -153,7 +153,7 @@ fn any_bit_that_flips_changes_the_hash_or_ends_the_run_with_a_reason() {
             };
             match play(&frames, flip) {
                 Ok(outcome) => {
-                    // The multiple of a run of one step is in the hash; what a client reads is not.
+                    // The multiple in a run of one step is part of the hash; the client's reads are not.
                     let is_of_reads = number < 2 && bit / 8 > length - 6;
                     assert!(outcome.hash != right.hash || is_of_reads, "{number} {bit}");
                 }
@@ -178,7 +178,7 @@ fn a_client_that_breaks_off_anywhere_is_named() {
                 if at == number {
                     bytes.truncate(length);
                 } else if at > number {
-                    // Nobody is asked any more.
+                    // Nobody gets requests any more.
                     bytes.clear();
                 }
             };

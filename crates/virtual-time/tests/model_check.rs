@@ -1,4 +1,4 @@
-//! The barrier, searched exhaustively: every order in which the messages of two and three clients can arrive, with a
+//! Exhaustive search of the barrier: every order in which the messages of two and three clients can arrive, with a
 //! fault at every point of each.
 
 use std::num::NonZeroU32;
@@ -15,7 +15,7 @@ const HANG: Nanos = Nanos::from_secs(1);
 /// Makes the choices of one path after another, until all paths were taken.
 #[derive(Default)]
 struct Choices {
-    /// What was chosen, and of how many.
+    /// The choices taken, each with the number of alternatives.
     taken: Vec<(usize, usize)>,
     at: usize,
 }
@@ -31,7 +31,7 @@ impl Choices {
         chosen
     }
 
-    /// Goes to the next path; false after the last one.
+    /// Moves to the next path; false after the last one.
     fn next(&mut self) -> bool {
         self.at = 0;
         while let Some((chosen, of)) = self.taken.pop() {
@@ -48,17 +48,17 @@ impl Choices {
 enum Action {
     /// Connects and joins.
     Join(usize),
-    /// Answers what was asked.
+    /// Answers the request.
     Answer(usize),
     Lose(usize),
-    /// Answers the step before once more, or before anything was asked.
+    /// Repeats the previous answer, or answers before any request.
     Unasked(usize),
-    /// Answers what was asked, and at once what it may be asked next.
+    /// Answers the request, and at once the possible next one.
     Early(usize),
     GiveUp(usize),
     /// Nobody does anything any more.
     Silence,
-    /// Another one connects and joins.
+    /// Another client connects and joins.
     Stranger,
 }
 
@@ -67,9 +67,9 @@ struct Client {
     name: String,
     multiple: u32,
     seat: Option<usize>,
-    /// What it was asked last, and has not answered.
+    /// The last request without an answer.
     owes: Option<u64>,
-    /// How often it answered.
+    /// The steps that this client answered.
     answered: Vec<u64>,
     end: Option<Result<Outcome, Ended>>,
 }
@@ -164,7 +164,7 @@ impl World {
                 let seat = self.clients[at].seat.take().expect("enabled");
                 self.server.lost(seat, "cut");
                 if was_running {
-                    // It does not come again, and gets nothing.
+                    // A client that is gone does not come again, and gets nothing.
                     self.clients[at].seat = Some(usize::MAX);
                 }
             }
@@ -254,7 +254,7 @@ impl World {
             if let Some(end) = end {
                 let excluded = end.is_err() && !self.has_started();
                 if excluded {
-                    // It may come again.
+                    // The client may come again.
                     self.clients[at].seat = None;
                 } else {
                     self.clients[at].end = Some(end);
@@ -270,7 +270,7 @@ impl World {
         }
     }
 
-    /// A step begins only when everyone who was due has finished the one before, and shows exactly that.
+    /// Checks that a step begins only when every due client has finished the previous one, and shows exactly that.
     fn check_step(&self, at: usize, sequence: u64, reads: &[u64]) {
         let multiple = u64::from(self.clients[at].multiple);
         assert_eq!((sequence - 1) % multiple, 0, "it is due");
@@ -282,7 +282,7 @@ impl World {
         }
     }
 
-    /// Nothing can happen any more.
+    /// Checks the end, when nothing can happen any more.
     fn check_end(&self, expected: &mut Option<TraceHash>) {
         let outcome = self.server.outcome().expect("no run hangs");
         for client in &self.clients {
@@ -301,7 +301,7 @@ impl World {
     }
 
     fn check_broken_off(&self, ended: &Ended) {
-        // The steps that all who were due have finished.
+        // The steps that all due clients have finished.
         let is_finished = |sequence: &u64| {
             self.clients.iter().all(|client| {
                 let is_due = (sequence - 1).is_multiple_of(u64::from(client.multiple));
@@ -326,7 +326,7 @@ impl World {
     }
 }
 
-/// Takes every path; the answer is their number.
+/// Takes every path; returns their number.
 fn search(multiples: &[u32], steps: u64, with_stranger: bool) -> usize {
     let (mut choices, mut paths, mut hash) = (Choices::default(), 0, None);
     loop {

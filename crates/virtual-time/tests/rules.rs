@@ -87,7 +87,7 @@ fn the_order_of_the_clients_does_not_matter() {
     for turn in 1..5 {
         assert_eq!(hash(turn), first);
     }
-    // Pinned: the same on every machine, in every version.
+    // Pinned: equal on every machine, in every version.
     assert_eq!(first.hash.to_string(), "c368d732f6faaa2f");
 }
 

@@ -1,4 +1,4 @@
-//! Any sequence of events whatsoever: the server keeps its promises to every seat.
+//! Any sequence of events: the server keeps its promises to every seat.
 
 use std::collections::HashMap;
 
@@ -14,7 +14,7 @@ enum Event {
     Join(usize, usize, u32),
     /// The right answer, where one is due.
     Answer(usize),
-    /// The same, and at once the answer to the step after it.
+    /// The same, followed at once by the answer to the next step.
     Early(usize),
     Done(usize, u64, usize, u64),
     GiveUp(usize),
@@ -47,7 +47,7 @@ fn event() -> impl Strategy<Value = Event> {
     ]
 }
 
-/// What a seat was told.
+/// The messages to a seat.
 #[derive(Default)]
 struct Seat {
     owes: Option<u64>,
@@ -131,7 +131,7 @@ fn play(events: &[Event], pacing: Pacing, steps: Option<u64>) {
             assert!(seat.last < Some(asked), "steps come in order");
             (seat.owes, seat.last) = (Some(asked), Some(asked));
         }
-        // What is waited for has a limit in time.
+        // Every wait has a time limit.
         match server.state() {
             State::InitialWrite | State::Write => assert!(server.deadline() <= now + hang),
             State::PreRead => assert!(server.is_paused() || pacing != Pacing::Fast),
@@ -151,7 +151,7 @@ proptest! {
         pace in prop_oneof![Just(Pacing::Fast), Just(Pacing::Times(1.0))],
         steps in proptest::option::of(0..9_u64),
     ) {
-        // Most begin with a run that starts, so that there is something to break.
+        // Most sequences begin with a run that starts, so that there is something to break.
         let begin = [
             Event::Connect,
             Event::Connect,

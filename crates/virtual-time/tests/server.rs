@@ -1,4 +1,4 @@
-//! The server alone, on a clock that the test sets: who is refused and why, patience, pace, pause and stop.
+//! The server alone, on a clock that the test sets: refusals with reasons, patience, pace, pause and stop.
 
 mod common;
 
@@ -37,7 +37,7 @@ impl Bench {
         bench
     }
 
-    /// All have sent their initial values.
+    /// A bench in which all clients have sent their initial values.
     fn started(settings: Settings) -> Self {
         let mut bench = Self::new(settings);
         assert_eq!(bench.asked(), [0, 0]);
@@ -45,7 +45,7 @@ impl Bench {
         bench
     }
 
-    /// The steps that were asked for; 0 is the start.
+    /// The steps requested so far; 0 is the start.
     #[track_caller]
     fn asked(&mut self) -> Vec<u64> {
         let mut asked = Vec::new();
@@ -85,7 +85,7 @@ fn two() -> Settings {
     settings(9, &["a", "b"])
 }
 
-/// The end that a seat is sent.
+/// The end that a seat receives.
 fn refusal(server: &mut Server<'_>) -> (usize, Ended) {
     match server.poll() {
         Some((seat, ToClient::End(Err(ended)))) => (seat, ended.clone()),
@@ -131,7 +131,7 @@ fn an_answer_before_the_question_was_sent_is_none() {
     let mut server = Server::new(settings(9, &["a"]), Logic::new(), now).expect("right settings");
     let seat = server.connected(now);
     server.join(now, seat, declaration("a"));
-    // All of it in one piece, before the server has sent anything.
+    // All frames in one piece, before the server has sent anything.
     server.done(now, seat, 0, [1].into_iter());
     let ended = server.outcome().expect("it has ended").clone();
     let ended = ended.expect_err("it violates the protocol");
@@ -304,7 +304,7 @@ fn a_stop_waits_for_the_step_but_not_for_long() {
 
 #[test]
 fn an_answer_to_what_was_not_fetched_yet_is_a_violation() {
-    // All answers at once, as from a client that does not wait.
+    // All answers at once, like a client that does not wait.
     let mut bench = Bench::new(two());
     bench.server.done(bench.now, 0, 0, [1].into_iter());
     bench.ended("the run ended before its first step: client \"a\" answered before it was asked");
@@ -349,11 +349,11 @@ fn a_client_that_gives_up_before_the_start_is_named_with_its_reason() {
     assert_eq!(server.missing().as_deref(), Some("\"a\", \"b\""));
 }
 
-/// A client that joins by a frame, in this version of the format; the answer is its seat.
+/// A client that joins by a frame, in this version of the format; returns its seat.
 fn joined(server: &mut Server<'_>, name: &str, version: u8) -> usize {
     let mut frame = Vec::new();
     wire::join(&mut frame, &Declaration::new(name)).expect("short");
-    // The interval, behind kind, letters, version and multiple.
+    // The interval, after kind, letters, version and multiple.
     if version == 1 {
         frame[wire::HEADER + 5] = 1;
         frame.drain(wire::HEADER + 11..wire::HEADER + 19);
@@ -372,7 +372,7 @@ fn clients_that_have_nothing_to_do_are_told_every_second_that_the_server_waits()
     };
     let now = |seconds| Nanos::from_secs(seconds);
     let mut server = Server::new(settings, Logic::new(), now(0)).expect("right settings");
-    // The seats that are told, and nothing else.
+    // The seats that get a waiting message; there are no other messages.
     let told = |server: &mut Server<'_>| {
         let mut seats = Vec::new();
         while let Some((seat, message)) = server.poll() {

@@ -1,6 +1,6 @@
-//! Steps allocate nothing, neither at the server nor at its clients.
+//! Steps allocate nothing, neither in the server nor in its clients.
 //!
-//! All threads of the process are counted, so this test is alone in its file.
+//! The count covers all threads of the process, so this test is alone in its file.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
 mod common;
@@ -39,7 +39,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// A client that looks how much was allocated between its steps 100 and 1900.
+/// A client that checks how much was allocated between its steps 100 and 1900.
 struct Watcher(Mixer, u64, Option<u64>);
 
 impl Watcher {
@@ -80,14 +80,14 @@ fn hosting(controls: &Controls, run: impl FnOnce(Hosting<'_>)) {
 fn steps_allocate_nothing() {
     let in_this_process = || {
         let mut clients = mixers(3);
-        // The first one runs in every step.
+        // The first client runs in every step.
         let mut watcher = Watcher::new(clients.remove(0));
         let mut all: Vec<&mut dyn Participant> = vec![&mut watcher];
         all.extend(clients.iter_mut().map(|client| client as _));
         in_process::run(mixer_settings(2000, 3), all, Logic::new()).expect("it runs");
         watcher.2
     };
-    // On a busy machine the harness's own thread may still be at its start, and allocate.
+    // On a busy machine the harness's own thread may still be starting, and allocate.
     let counts: Vec<_> = (0..5).map(|_| in_this_process()).collect();
     assert!(counts.contains(&Some(0)), "in this process: {counts:?}");
 

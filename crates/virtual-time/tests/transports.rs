@@ -1,4 +1,4 @@
-//! One run is the same in this process and over every transport, whoever comes first.
+//! A run is the same in this process and over every transport, in any order of arrival.
 
 mod common;
 
@@ -18,7 +18,7 @@ fn clock() -> Arc<dyn Clock> {
     Monotonic::shared()
 }
 
-/// A run over TCP, with a thread for each client; the answers of the server, and of the clients in their order.
+/// A run over TCP, with a thread for each client; the results of the server, and of the clients in their order.
 fn over_tcp(
     settings: Settings,
     clients: Vec<Box<dyn Participant + Send>>,
@@ -56,7 +56,7 @@ fn a_browser_is_refused_in_words() {
             let request = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nany bytes";
             browser.write_all(request).expect("it reads");
             let mut answer = Vec::new();
-            // However it is closed.
+            // The way of closing does not matter.
             let _ = browser.read_to_end(&mut answer);
             controls.send(tickbus_virtual_time::server::Control::Stop);
         });
@@ -88,7 +88,7 @@ fn serve(
     listener.run(settings, Logic::new(), hosting)
 }
 
-/// As [`over_tcp`], through shared memory.
+/// Like [`over_tcp`], through shared memory.
 #[cfg(unix)]
 fn through_memory(
     settings: Settings,
@@ -122,7 +122,7 @@ fn serve_memory(listener: shared_memory::Listener, settings: Settings) -> Result
     listener.run(settings, Logic::new(), hosting)
 }
 
-/// A name for shared memory that no other test has.
+/// A unique name for shared memory.
 #[cfg(unix)]
 fn fresh_name() -> String {
     use std::sync::atomic::{AtomicU32, Ordering};
@@ -232,7 +232,7 @@ fn who_comes_late_or_second_to_shared_memory_is_refused() {
     assert_eq!(ended.cause, Cause::Lost);
 }
 
-/// Not a test by itself: the server that the next one starts.
+/// Not a test, but the server that the next test starts.
 #[cfg(unix)]
 #[test]
 fn a_server_that_kills_itself_in_step_5() {
@@ -285,15 +285,15 @@ fn a_server_that_crashes_at_shared_memory_is_noticed_and_replaced() {
         (Cause::Lost, "the server was lost: its process has ended")
     );
     assert_eq!(steps, 4);
-    // That the fourth was committed, the client does not know.
+    // The client does not know that the fourth step was committed.
     assert_eq!(ended.steps, 3);
     assert!(!child.wait().expect("it was started").success());
-    // Its file is still there.
+    // The file of the killed server is still there.
     let settings = settings(1, &["one"]);
     shared_memory::Listener::bind(&name, &settings).expect("it is replaced");
 }
 
-/// Not a test by itself: the client that the next one kills.
+/// Not a test, but the client that the next test kills.
 #[cfg(unix)]
 #[test]
 fn a_child_that_kills_itself_in_step_5() {
@@ -444,7 +444,7 @@ fn a_stop_ends_the_run_between_two_steps() {
 
 #[test]
 fn a_client_waits_for_a_silent_server_no_longer_than_its_limit() {
-    // Nobody accepts; the system lets the client connect all the same.
+    // Nobody accepts, but the system lets the client connect anyway.
     let listener = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = Address::local(listener.local_addr().expect("it is bound").port());
     let client = client("one", 1, &[], &[], |_, _, _| Ok(())).declaration;

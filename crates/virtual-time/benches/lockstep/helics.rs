@@ -1,5 +1,5 @@
-//! An empty co-simulation of HELICS: its broker and its federates as processes of their own. They are written
-//! against its C interface, so that no interpreter is in their way.
+//! An empty co-simulation of HELICS: its broker and its federates as separate processes. They use its C interface, so
+//! no interpreter slows them down.
 
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::io::{BufRead as _, BufReader, Read as _};
@@ -11,10 +11,10 @@ use std::time::{Duration, Instant};
 
 use libloading::Library;
 
-/// As fast as its other way over TCP, and faster than over `ZeroMQ`, its default; and the broker has the only port.
+/// As fast as HELICS's other way over TCP, and faster than its default, `ZeroMQ`; and only the broker has a port.
 const CORE: &str = "tcpss";
 
-/// For connecting and measuring; its federates have been seen to wait for ever.
+/// For connecting and measuring; federates have been seen to wait forever.
 const PATIENCE: Duration = Duration::from_secs(30);
 
 /// As in `helics_api.h`.
@@ -50,7 +50,7 @@ fn path() -> Option<PathBuf> {
     })
 }
 
-/// Whether it is installed; says so if not.
+/// True if HELICS is installed; prints a note if not.
 pub(crate) fn installed() -> bool {
     let installed = path().is_some();
     if !installed {
@@ -59,7 +59,7 @@ pub(crate) fn installed() -> bool {
     installed
 }
 
-/// Its processes: the broker, then the federates. None of them ends by itself.
+/// The processes of HELICS: the broker, then the federates. None of them ends on its own.
 struct Processes(Vec<Child>);
 
 impl Processes {
@@ -116,12 +116,12 @@ pub(crate) fn steps(count: usize, span: Duration) -> Option<f64> {
     rate
 }
 
-/// A process of it: the broker or a federate by its number.
+/// A process of HELICS: the broker or a federate by its number.
 pub(crate) fn client(arguments: &[String]) {
     let [role, port, count, seconds] = arguments else {
         panic!("unexpected arguments {arguments:?}");
     };
-    // Ends with the bench, whatever ends that.
+    // End with the bench, however that ends.
     std::thread::spawn(|| {
         let _ = std::io::stdin().read(&mut [0]);
         std::process::exit(0);
@@ -164,8 +164,8 @@ fn broker(library: &Library, port: &str, count: &str) -> ! {
     }
 }
 
-/// Without links between them, federates do not wait for each other: each is linked with the first one, both ways. More links
-/// would cost more messages per step.
+/// Federates without links do not wait for each other: link each with the first one, both ways. More links would cost
+/// more messages per step.
 fn description(at: usize, port: &str, count: usize) -> String {
     let others = if at == 0 { 1..count } else { 0..1 };
     let links: Vec<String> = others
@@ -180,7 +180,7 @@ fn description(at: usize, port: &str, count: usize) -> String {
     )
 }
 
-/// Steps for ever; the first one also prints the steps per second in `span`, after the first 100.
+/// Steps forever; the first federate also prints the steps per second in `span`, after the first 100.
 fn federate(library: &Library, at: usize, port: &str, count: usize, span: Duration) -> ! {
     let description = CString::new(description(at, port, count)).expect("no zero in it");
     // SAFETY: the types are those of helics_api.h, the text outlives the call, and the federate is used by
@@ -214,7 +214,7 @@ fn federate(library: &Library, at: usize, port: &str, count: usize, span: Durati
     loop {
         step();
         steps += 1;
-        // Reading the clock costs nothing that can be seen here, and ours and the bare coordinator do it, too.
+        // Reading the clock costs nothing measurable here, and our client and the bare coordinator do it, too.
         let elapsed = begun.elapsed();
         if !printed && elapsed >= span {
             println!("{}", f64::from(steps) / elapsed.as_secs_f64());

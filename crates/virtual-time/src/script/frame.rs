@@ -1,4 +1,4 @@
-//! What a hook of a script sees while it is called.
+//! The view of a script's hook during a call.
 
 use std::collections::HashMap;
 
@@ -22,7 +22,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// A hook begins.
+    /// Prepares the call of a hook.
     pub(super) fn enter(&mut self, access: &Access<'_>) {
         if self.variables.is_empty() {
             self.variables = access.data.variables().to_vec();
@@ -38,7 +38,7 @@ impl Frame {
         self.reader = access.reader().map(str::to_owned);
     }
 
-    /// It has ended: what it wrote is written.
+    /// The hook has ended: carries out its writes.
     pub(super) fn leave(&mut self, access: &mut Access<'_>) -> Result<(), String> {
         self.step = None;
         for (at, value) in self.writes.drain(..) {
@@ -79,7 +79,7 @@ impl Frame {
         })
     }
 
-    /// Writes a variable; a whole number may stand for a float.
+    /// Writes a variable; a whole number is accepted for a float.
     pub(super) fn set(&mut self, name: &str, value: &Dynamic) -> Result<(), String> {
         let at = self.find(name)?;
         let data_type = self.variables[at].data_type;

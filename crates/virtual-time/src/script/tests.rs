@@ -2,7 +2,7 @@ use super::*;
 use crate::{Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, in_process};
 use tickbus_base::time::Nanos;
 
-/// A tank that is filled by 1.5 a step, and notes what it reads.
+/// A tank that is filled by 1.5 a step, and records the values that it reads.
 struct Tank(Vec<[u64; 3]>);
 
 impl Participant for Tank {
@@ -58,7 +58,7 @@ fn a_script_sees_and_writes_what_rust_would() {
     let mut tank = Tank(Vec::new());
     let first = run(LOGIC, &mut tank).expect("it runs");
     assert_eq!(tank.0, [[0, 10, 0], [0, 11, 0], [0, 12, 1], [1, 13, 2]]);
-    // A script keeps nothing from run to run, and draws no lots.
+    // A script keeps nothing between runs, and has no random numbers.
     let again = run(LOGIC, &mut Tank(Vec::new())).expect("it runs");
     assert_eq!(again, first);
 }

@@ -1,4 +1,4 @@
-//! Who has joined, and who may.
+//! The clients that have joined, and the condition for joining.
 
 use tickbus_base::Mistake;
 
@@ -13,7 +13,7 @@ pub(crate) const MOST_CLIENTS: usize = 1000;
 #[derive(Debug)]
 pub(super) struct Joining {
     condition: StartCondition,
-    /// By seats, in the order in which they came: the run must not depend on it.
+    /// With their seats, in the order in which they came: the run must not depend on that.
     joined: Vec<(usize, Declaration)>,
 }
 
@@ -44,7 +44,7 @@ impl Joining {
         })
     }
 
-    /// Takes a client in, or tells why it may not join.
+    /// Accepts a client, or returns why it may not join.
     pub(super) fn join(&mut self, seat: usize, declaration: Declaration) -> Result<(), String> {
         declaration.check().map_err(|mistake| mistake.to_string())?;
         let name = &declaration.name;
@@ -65,7 +65,7 @@ impl Joining {
         Ok(())
     }
 
-    /// The client at `seat` is gone.
+    /// The client at `seat` has gone.
     pub(super) fn remove(&mut self, seat: usize) {
         self.joined.retain(|(other, _)| *other != seat);
     }
@@ -76,7 +76,7 @@ impl Joining {
         joined.map(|(_, declaration)| declaration.name.as_str())
     }
 
-    /// Whether the start condition is met.
+    /// True if the start condition is met.
     pub(super) fn is_complete(&self) -> bool {
         self.joined.len()
             == match &self.condition {
@@ -85,7 +85,7 @@ impl Joining {
             }
     }
 
-    /// Whom it waits for, for people.
+    /// The clients that the start waits for, as text for people.
     pub(super) fn missing(&self) -> String {
         match &self.condition {
             StartCondition::Names(names) => {
@@ -102,7 +102,7 @@ impl Joining {
         }
     }
 
-    /// Who has joined, in the order of their names; what they write is told when the run starts.
+    /// The joined clients, in the order of their names; their variables are reported when the run starts.
     pub(super) fn members(&self) -> Members {
         let client = |(_, declaration): &(usize, Declaration)| Client {
             name: declaration.name.clone(),

@@ -1,20 +1,20 @@
-//! What goes into the server and out of it, apart from what clients declare and write.
+//! The messages to and from the server, except for declarations and written values.
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
 use crate::{Ended, Outcome, Step};
 
-/// What a server may be asked to do while it runs.
+/// A request to a running server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Control {
     /// Begins no more steps.
     Pause,
-    /// Runs this many steps, and then pauses.
+    /// Runs this many steps, then pauses.
     Step(u64),
-    /// Runs on.
+    /// Continues the run.
     Run,
-    /// Ends the run after the step that is under way; a client that does not finish it within a second is not waited for.
+    /// Ends the run after the current step; the server waits at most a second for clients to finish it.
     Stop,
 }
 
@@ -25,19 +25,19 @@ pub enum ToClient<'a> {
     Start {
         /// The virtual time of one step of the server.
         step: Nanos,
-        /// The types of the variables that it reads, in the order of its declaration.
+        /// The types of the variables that the client reads, in the order of its declaration.
         reads: &'a [DataType],
     },
-    /// The client runs, and answers with what it writes.
+    /// The client runs, and answers with the values that it writes.
     Step {
         /// The step.
         step: Step,
-        /// What it reads, in the order of its declaration.
+        /// The values that the client reads, in the order of its declaration.
         reads: &'a [u64],
     },
-    /// The run goes on without this client for now: others have to join or to answer, or it is paused. For a client that has
-    /// nothing to do, once a second, so that it can tell a server that waits from one that hangs.
+    /// The server waits: for others to join or to answer, or it is paused. Idle clients get this once a second, so that
+    /// they can tell a waiting server from one that hangs.
     Waiting,
-    /// The run has ended, or the client does not take part in it. Nothing follows.
+    /// The run has ended, or the client does not take part in it. No message follows.
     End(&'a Result<Outcome, Ended>),
 }

@@ -1,15 +1,15 @@
-//! What depends on the wall clock: it paces the steps, and ends what takes too long.
+//! The parts that depend on the wall clock: pacing of steps, and timeouts.
 
 use tickbus_base::time::Nanos;
 
 use super::{Out, Phase, STOP_PATIENCE, Seat, Server};
 use crate::{Cause, State};
 
-/// How often those who have nothing to do are told that the server waits.
+/// How often idle clients learn that the server waits.
 const INFORM: Nanos = Nanos::from_secs(1);
 
 impl Server<'_> {
-    /// When [`tick`](Self::tick) has something to do, if nothing happens before; a time that has passed means at once.
+    /// The next time for [`tick`](Self::tick), unless something happens before; a time in the past means at once.
     pub fn deadline(&self) -> Nanos {
         let silent = self.seats.iter().filter_map(|seat| match seat {
             Seat::Silent(since) => Some(*since + self.settings.hang),
@@ -25,7 +25,7 @@ impl Server<'_> {
                 match (self.is_paused(), &self.pace) {
                     (true, _) => Nanos::MAX,
                     (false, Some(pace)) => pace.due(),
-                    // There were too many empty steps in a row.
+                    // Too many empty steps came in a row.
                     (false, None) => Nanos::ZERO,
                 }
             }
@@ -38,7 +38,7 @@ impl Server<'_> {
         })
     }
 
-    /// Does what is due at `now`: the next step, or the end of somebody's patience.
+    /// Does the work due at `now`: the next step, or a timeout.
     pub fn tick(&mut self, now: Nanos) {
         let hang = self.settings.hang;
         self.inform(now);
@@ -67,7 +67,7 @@ impl Server<'_> {
         self.advance(now);
     }
 
-    /// Tells those who have nothing to do that the server waits, once a second.
+    /// Tells idle clients once a second that the server waits.
     fn inform(&mut self, now: Nanos) {
         if now < self.informed_at + INFORM {
             return;

@@ -1,4 +1,4 @@
-//! What a server shows of its run.
+//! The server's view of its run, for other threads.
 
 use std::sync::Arc;
 
@@ -8,11 +8,11 @@ use super::{Phase, Server};
 use crate::RunView;
 
 impl Server<'_> {
-    /// A copy of the run as it is at `now`; `None` once it has ended.
+    /// A copy of the run at `now`; `None` once it has ended.
     pub fn view(&mut self, now: Nanos) -> Option<RunView> {
         let members = match &self.phase {
             Phase::Joining(joining, _) => Arc::new(joining.members()),
-            // They do not change any more, and may be many.
+            // The members do not change any more, and may be many.
             Phase::Running(barrier, _) => Arc::clone(
                 self.shown
                     .get_or_insert_with(|| Arc::new(barrier.members())),

@@ -12,13 +12,13 @@ use super::patience::Patience;
 use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
-/// How long a wait sleeps before it looks whether the server is alive.
+/// How long a wait sleeps before it checks that the server is alive.
 const NAP: Nanos = Nanos::from_millis(50);
 
 /// How long the server may leave a frame in the mailbox.
 const PATIENCE: Nanos = Nanos::from_secs(10);
 
-/// Lets `participant` take part in the run that a server on this computer offers under `name`, until its end.
+/// Runs `participant` in the run that a server on this computer offers under `name`, until its end.
 ///
 /// # Errors
 ///
@@ -32,7 +32,7 @@ pub fn join(name: &str, participant: &mut dyn Participant) -> Result<Outcome, En
 ///
 /// # Errors
 ///
-/// There is no server, or it has no seat free.
+/// There is no server, or it has no free seat.
 pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, Ended> {
     let lost = |reason: String| Ended::before(Cause::Lost, reason);
     let path = layout::path(name);
@@ -112,7 +112,8 @@ impl MemoryLine {
 
 impl Line for MemoryLine {
     fn send(&mut self, frame: &[u8]) {
-        // The server takes each frame as soon as it looks. If it does not, this one is lost, and receiving finds out why.
+        // The server takes each frame as soon as it looks. If it does not, this frame is lost, and `receive` finds out
+        // why.
         let memory = self.memory.memory();
         let clock = Monotonic::shared();
         let until = clock.now() + PATIENCE;

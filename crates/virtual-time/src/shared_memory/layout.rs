@@ -1,4 +1,4 @@
-//! What lies where in the memory. All places are numbers of words, of 8 bytes.
+//! The layout of the memory. All positions are numbers of words, of 8 bytes.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,10 @@ use tickbus_base::os::{NamedMemory, SharedMemory};
 
 use crate::wire::LONGEST_FRAME;
 
-/// What the memory begins with, once it is ready: the format and its version.
+/// The first word of ready memory: the format and its version.
 pub(super) const READY: u64 = u64::from_le_bytes(*b"SDSPshm2");
 
-/// The place of [`READY`].
+/// The position of [`READY`].
 pub(super) const MAGIC: usize = 0;
 
 /// The number of seats.
@@ -18,31 +18,31 @@ pub(super) const SEATS: usize = 1;
 /// How often a waiting client spins.
 pub(super) const SPINS: usize = 2;
 
-/// Counts what clients have posted while the server sleeps; the server waits for it.
+/// Counts the posts of clients while the server sleeps; the server waits for a change.
 pub(super) const BELL: usize = 8;
 
-/// Whether the server sleeps.
+/// True while the server sleeps.
 pub(super) const SERVER_SLEEPS: usize = 9;
 
-/// Counts how often the server has looked after all seats.
+/// Counts how often the server has checked all seats.
 pub(super) const PULSE: usize = 10;
 
-/// Where the seats begin.
+/// The position of the first seat.
 const FIRST: usize = 16;
 
 /// The words of one mailbox: its head, and the longest frame.
 const MAILBOX: usize = 16 + LONGEST_FRAME / 8;
 
-/// The words of one seat. Only those that are used take memory.
+/// The words of one seat. Only used seats take memory.
 const SEAT: usize = 16 + 2 * MAILBOX;
 
-/// A seat that nobody has.
+/// A free seat.
 pub(super) const FREE: u64 = 0;
 
-/// Its client has left; the server makes the seat free again.
+/// A seat whose client has left; the server frees it.
 pub(super) const LEFT: u64 = u64::MAX;
 
-/// The place of a seat's owner: the number of its process, or one of the above.
+/// The position of a seat's owner: the number of its process, or one of the above.
 pub(super) const fn owner(seat: usize) -> usize {
     FIRST + seat * SEAT
 }
@@ -62,7 +62,7 @@ pub(super) const fn bytes(seats: usize) -> usize {
     owner(seats) * 8
 }
 
-/// The number of seats in this memory, if it is such memory, and ready.
+/// The number of seats in this memory; `None` if it has another format or is not ready.
 pub(super) fn seats(memory: &SharedMemory) -> Option<usize> {
     use std::sync::atomic::Ordering::Acquire;
 
@@ -70,7 +70,7 @@ pub(super) fn seats(memory: &SharedMemory) -> Option<usize> {
         return None;
     }
     let seats = usize::try_from(memory.word(SEATS).load(Acquire)).ok()?;
-    // The file's length is what counts.
+    // The length of the file is decisive.
     (seats <= memory.len() / SEAT && memory.len() >= owner(seats)).then_some(seats)
 }
 

@@ -6,14 +6,14 @@ use tickbus_base::os::SharedMemory;
 
 use crate::wire::LONGEST_FRAME;
 
-/// Counts the frames that were put in; the reader waits for it.
+/// Counts the posted frames; the reader waits for a change.
 const POSTED: usize = 0;
 /// The bytes of the frame.
 const LENGTH: usize = 1;
-/// Counts the frames that were taken out of the mailbox the other way: so each cache line has one process that writes
-/// to it, and a short frame takes a single one.
+/// Counts the frames taken out of the mailbox of the other direction. So only one process writes to each cache line,
+/// and a short frame needs a single one.
 const TAKEN: usize = 2;
-/// Whether who posts here sleeps.
+/// True while the process that posts here sleeps.
 const SLEEPS: usize = 3;
 /// The frame.
 const FRAME: usize = 4;
@@ -22,19 +22,19 @@ const FRAME: usize = 4;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mailbox {
     at: usize,
-    /// Where the mailbox the other way is.
+    /// The position of the mailbox of the other direction.
     back: usize,
     /// The frames that this end has posted or taken.
     count: u64,
 }
 
 impl Mailbox {
-    /// The end of an empty mailbox at this place; the one the other way is at `back`.
+    /// The end of an empty mailbox at this position; that of the other direction is at `back`.
     pub(super) const fn new(at: usize, back: usize) -> Self {
         Self { at, back, count: 0 }
     }
 
-    /// Makes the mailbox as good as new.
+    /// Resets the mailbox.
     pub(super) fn clear(&mut self, memory: &SharedMemory) {
         memory.word(self.at + POSTED).store(0, SeqCst);
         memory.word(self.at + SLEEPS).store(0, SeqCst);
@@ -42,46 +42,46 @@ impl Mailbox {
         self.count = 0;
     }
 
-    /// Where the reader waits, and for what to change there.
+    /// Where the reader waits, and the value that has to change there.
     pub(super) const fn bell(&self) -> (usize, u64) {
         (self.at + POSTED, self.count)
     }
 
-    /// Says whether the reader of this mailbox sleeps.
+    /// Sets the sign that the reader of this mailbox sleeps.
     pub(super) fn set_sleeping(&self, memory: &SharedMemory, sleeps: bool) {
         memory
             .word(self.back + SLEEPS)
             .store(u64::from(sleeps), SeqCst);
     }
 
-    /// Whether the reader of this mailbox sleeps.
+    /// True if the reader of this mailbox sleeps.
     pub(super) fn is_reader_sleeping(&self, memory: &SharedMemory) -> bool {
         memory.word(self.back + SLEEPS).load(SeqCst) != 0
     }
 
-    /// Whether there is room for a frame: the other end has taken the one before.
+    /// True if there is room for a frame: the other end has taken the previous one.
     pub(super) fn has_room(&self, memory: &SharedMemory) -> bool {
         memory.word(self.back + TAKEN).load(Acquire) == self.count
     }
 
-    /// Puts in a frame, for which there is [room](Self::has_room).
+    /// Posts a frame; there must be [room](Self::has_room).
     pub(super) fn post(&mut self, memory: &SharedMemory, frame: &[u8]) {
         memory
             .word(self.at + LENGTH)
             .store(frame.len() as u64, Relaxed);
         memory.write(self.at + FRAME, frame);
         self.count += 1;
-        // Before the look at whether the other end sleeps: it first says so, and then looks here.
+        // Post before checking if the other end sleeps, since it first sets its sign and then looks here.
         memory.word(self.at + POSTED).store(self.count, SeqCst);
     }
 
-    /// Whether a frame has come.
+    /// True if a frame has come.
     pub(super) fn has_frame(&self, memory: &SharedMemory) -> bool {
-        // After this end has said that it sleeps; see `post`.
+        // Look only after this end has set its sign; see `post`.
         memory.word(self.at + POSTED).load(SeqCst) != self.count
     }
 
-    /// Takes out the frame that has come.
+    /// Takes the frame that has come.
     pub(super) fn take(
         &mut self,
         memory: &SharedMemory,

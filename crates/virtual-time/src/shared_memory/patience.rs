@@ -1,36 +1,37 @@
-//! Waiting for another process: spinning for a moment, then letting others run, then sleeping.
+//! Waiting for another process: spin for a moment, then yield, then sleep.
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 
-/// How often a wait looks again without letting others run, where every process has a core of its own.
+/// The number of spins before the first yield, where every process has its own core.
 const SPINS: u32 = 4000;
 
-/// How often others are let run before the wait sleeps.
+/// The number of yields before the wait sleeps.
 const YIELDS: u32 = 400;
 
-/// If others take the processor for longer than this, the computer is busy with something else: who sleeps then gets it
-/// back sooner than who lets others run.
+/// A yield longer than this means that the computer is busy with something else. A thread that sleeps then gets the
+/// processor back sooner than one that yields.
 const LONG: Nanos = Nanos::from_millis(1);
 
-/// For how many waits that is remembered at first, and at most: each time that it turns out to be so still, four times as many.
+/// The number of following waits that do not yield, at first and at most; it quadruples each time that the computer is
+/// still busy.
 const BUSY: u32 = 200;
 const BUSIEST: u32 = 51_200;
 
-/// How often a wait spins on a busy computer, some 2 µs: whom it waits for may need this very core.
+/// The number of spins on a busy computer, some 2 µs: the other process may need this very core.
 const FEW: u32 = 50;
 
 /// How a process waits for another one.
 #[derive(Clone, Debug)]
 pub(super) struct Patience {
     spins: u32,
-    /// For how many more waits others are not let run.
+    /// The number of further waits that do not yield.
     busy: u32,
-    /// How many that were when others last took long; 0 if they did not.
+    /// That number when a yield last took long; 0 if none did.
     was_busy: u32,
 }
 
 impl Patience {
-    /// The patience of those who spin this often.
+    /// The patience of a wait with this many spins.
     pub(super) const fn new(spins: u32) -> Self {
         Self {
             spins,
@@ -39,13 +40,13 @@ impl Patience {
         }
     }
 
-    /// How often a wait spins when this many processes take part.
+    /// The number of spins when this many processes take part.
     pub(super) fn spins(processes: usize) -> u32 {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         if processes <= cores { SPINS } else { 0 }
     }
 
-    /// Looks until `is_there`; false if it is time to sleep.
+    /// Looks until `is_there`; false when it is time to sleep.
     pub(super) fn look(&mut self, mut is_there: impl FnMut() -> bool) -> bool {
         let spins = if self.busy > 0 { FEW } else { self.spins };
         for _ in 0..spins {

@@ -14,16 +14,16 @@ use crate::local::Locals;
 use crate::server::ToClient;
 use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, StartCondition, server, wire};
 
-/// How often everything else is looked after while steps follow each other.
+/// How often to do everything else while steps follow each other.
 const ROUND: Nanos = Nanos::from_millis(10);
 
-/// How often processes are asked whether they are alive.
+/// How often to check that the processes are alive.
 const PULSE: Nanos = Nanos::from_millis(50);
 
-/// How long a client may take to read that the run has ended.
+/// The time for a client to read the end of the run.
 const FAREWELL: Nanos = Nanos::from_secs(1);
 
-/// Seats for those who come too late, so that they learn why they take no part.
+/// Seats for clients that come too late, so that they learn why they cannot take part.
 const SPARE: usize = 8;
 
 /// A server that waits for its clients in shared memory.
@@ -39,7 +39,7 @@ impl Listener {
     ///
     /// # Errors
     ///
-    /// [`io::ErrorKind::AddrInUse`] if another process offers it; or the system has no such memory.
+    /// [`io::ErrorKind::AddrInUse`] if another process offers that name; or the system has no such memory.
     pub fn bind(name: &str, settings: &Settings) -> io::Result<Self> {
         let clients = match &settings.start {
             StartCondition::Names(names) => names.len(),
@@ -73,12 +73,12 @@ impl Listener {
         self.run_with(settings, logic, hosting, Vec::new())
     }
 
-    /// As [`run`](Self::run), with `locals` as clients on the server's own thread: they run while the others do, and
-    /// no message goes to them and back.
+    /// Like [`run`](Self::run), with `locals` as clients on the server's own thread. They run while the others do,
+    /// without messages.
     ///
     /// # Errors
     ///
-    /// As [`run`](Self::run).
+    /// The same as for [`run`](Self::run).
     pub fn run_with(
         self,
         settings: Settings,
@@ -112,14 +112,14 @@ struct Host<'l, 'h, 'p> {
     locals: Locals<'p>,
     memory: NamedMemory,
     patience: Patience,
-    /// Those of the memory.
+    /// The seats of the memory.
     seats: Vec<Seat>,
-    /// The places in the memory of the seats that the server has given.
+    /// The memory's seats by the server's seats.
     by_seat: Vec<usize>,
     frame: Vec<u8>,
-    /// When everything was looked after last.
+    /// When everything was last checked.
     looked: Nanos,
-    /// When the processes were asked last whether they are alive.
+    /// When the processes were last checked for life.
     felt: Nanos,
 }
 
@@ -130,7 +130,7 @@ struct Seat {
     /// The server's seat of the client that is here.
     client: Option<usize>,
     watch: Option<ProcessWatch>,
-    /// A frame for which there was no room yet, and until when it is tried.
+    /// A frame without room so far, and the time when the server gives up.
     waiting: Option<(Vec<u8>, Nanos)>,
     is_taken: bool,
 }
@@ -204,7 +204,7 @@ impl Host<'_, '_, '_> {
                 break;
             };
             if matches!(message, ToClient::Waiting) {
-                // Clients look at the pulse instead: a mailbox has room for one frame.
+                // Clients watch the pulse instead: a mailbox has room for one frame.
                 continue;
             }
             has_asked |= !matches!(message, ToClient::End(_));
@@ -221,7 +221,7 @@ impl Host<'_, '_, '_> {
             if seat.waiting.is_none() && seat.down.has_room(self.memory.memory()) {
                 seat.post(&self.memory, frame);
             } else {
-                // Only the end of the run comes before the client has taken the message before it.
+                // Only the end of the run can come before the client has taken the previous message.
                 seat.waiting = Some((frame.to_vec(), now + FAREWELL));
             }
         }
@@ -230,7 +230,7 @@ impl Host<'_, '_, '_> {
         }
     }
 
-    /// Passes on the frame of a client.
+    /// Passes a client's frame on.
     fn hear(&mut self, at: usize) {
         let seat = &mut self.seats[at];
         let Some(client) = seat.client else {
@@ -247,12 +247,12 @@ impl Host<'_, '_, '_> {
         }
     }
 
-    /// Sleeps until a client rings, for some time at most; not if the client at `awaited` has posted.
+    /// Sleeps until a client rings, for some time at most; does not sleep if the client at `awaited` has posted.
     fn sleep(&self, until: Nanos, awaited: Option<usize>) {
         let memory = self.memory.memory();
         let seen = memory.word(layout::BELL).load(Acquire);
         memory.word(layout::SERVER_SLEEPS).store(1, SeqCst);
-        // Whoever came before this was not heard ringing.
+        // Clients that posted before the sign was set did not ring.
         let has_come = |seat: &Seat| {
             let owner = memory.word(layout::owner(seat.at)).load(SeqCst);
             (owner != layout::FREE) != seat.is_taken
@@ -270,7 +270,7 @@ impl Host<'_, '_, '_> {
         memory.word(layout::SERVER_SLEEPS).store(0, SeqCst);
     }
 
-    /// Looks after everything: all seats, controls, time.
+    /// Checks everything: all seats, controls, time.
     fn look_after_all(&mut self, now: Nanos) {
         let feels = now - self.felt >= PULSE;
         if feels {
@@ -311,7 +311,7 @@ impl Host<'_, '_, '_> {
                 seat.waiting = Some((frame, until));
             }
         }
-        // One frame in each turn: a client that posts without end, or posts what is no frame, holds nobody up.
+        // One frame per turn: a client that posts without end, or posts invalid frames, holds up nobody.
         if self.seats[at].client.is_some() && self.seats[at].up.has_frame(self.memory.memory()) {
             self.hear(at);
         }
@@ -338,7 +338,7 @@ impl Host<'_, '_, '_> {
         memory.word(layout::owner(at)).store(layout::FREE, SeqCst);
     }
 
-    /// Lets the clients take what was posted last.
+    /// Lets the clients take the last frames.
     fn say_farewell(&mut self, begun: Nanos) {
         let until = begun + FAREWELL;
         loop {
@@ -368,7 +368,7 @@ mod tests {
         let listener = Listener::bind(&name, &settings).expect("a free name");
         let memory = NamedMemory::open(&layout::path(&name)).expect("it is served");
         let word = |at: usize, value: u64| memory.memory().word(at).store(value, SeqCst);
-        // One frame of no bytes, and two at once.
+        // One empty frame, and two frames at once.
         for (seat, posted) in [(0, 1), (1, 2)] {
             word(layout::up(seat), posted);
             word(layout::owner(seat), std::process::id().into());

@@ -1,4 +1,4 @@
-//! The client: it blocks while it waits for the server.
+//! The client, which blocks while it waits for the server.
 
 use std::io::{self, Read as _, Write as _};
 use std::sync::Arc;
@@ -11,13 +11,13 @@ use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
-/// How long a read blocks before it is asked whether to stop.
+/// How long a read blocks before it checks for a stop.
 const LOOK: Nanos = Nanos::from_millis(50);
 
-/// How long the server's machine may be silent, on the level of TCP.
+/// The time without any TCP acknowledgement after which the server's machine counts as lost.
 const PATIENCE: Nanos = Nanos::from_secs(10);
 
-/// Lets `participant` take part in the run of the server at `address`, until its end.
+/// Runs `participant` in the run of the server at `address`, until its end.
 ///
 /// # Errors
 ///
@@ -28,7 +28,8 @@ pub fn join(address: &Address, participant: &mut dyn Participant) -> Result<Outc
     connect(address, client, &clock, &Stop::new())?.run(participant)
 }
 
-/// Connects with the server at `address`, and joins. Times are those of the clock. When `stop` is stopped, the client leaves the run.
+/// Connects with the server at `address`, and joins; `clock` provides the times. When `stop` is stopped, the client
+/// leaves the run.
 ///
 /// # Errors
 ///
@@ -78,12 +79,12 @@ fn lost(what: impl std::fmt::Display) -> Ended {
 
 impl Line for TcpLine {
     fn send(&mut self, frame: &[u8]) {
-        // If this fails, the server may have said why before: its last words are read next, or that it is lost.
+        // On failure, the next read returns the server's last words, or that the server is lost.
         let _ = (&self.stream).write_all(frame);
     }
 
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended> {
-        // The clock is looked at only when there is time for that.
+        // Read the clock only when there is time for that.
         let mut until = None;
         loop {
             let arrived = wire::frame_length(&self.buffer[self.start..self.end]);

@@ -10,26 +10,26 @@ use super::is_later;
 use crate::server::ToClient;
 use crate::wire;
 
-/// How long a read or write blocks at most.
+/// The time limit of a read or write.
 pub(super) const BLOCKED: Nanos = Nanos::from_millis(20);
 
-/// The buffer for what arrives, at first.
+/// The initial size of the buffer for received bytes.
 const BUFFER: usize = 4096;
 
-/// A connection with its buffers. The socket blocks, but for 20 ms at most: in the steady state the server then reads
-/// an answer by one call, without asking first whether it is there.
+/// A connection with its buffers. The socket blocks, for at most 20 ms: in the steady state the server then reads an
+/// answer with one call, without asking first if it is there.
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: BlockingStream,
     buffer: Vec<u8>,
-    /// What has arrived and was not taken yet.
+    /// The received bytes that were not taken yet.
     start: usize,
     end: usize,
     out: Vec<u8>,
     written: usize,
 }
 
-/// What a read brought.
+/// The result of a read.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Arrived {
     Something,
@@ -52,7 +52,7 @@ impl Connection {
         })
     }
 
-    /// What the server waits for.
+    /// The socket, for waiting.
     pub(super) const fn stream(&self) -> &TcpStream {
         self.stream.stream()
     }
@@ -66,7 +66,7 @@ impl Connection {
             (self.start, self.end) = (0, self.end - self.start);
         }
         if self.end == self.buffer.len() {
-            // Frames have a limit, so this ends; and it takes as many bytes of the peer as of ours.
+            // Frames have a limit, so this ends; and the peer has to send as many bytes as we allocate.
             self.buffer.resize(2 * self.end, 0);
         }
         match (&self.stream).read(&mut self.buffer[self.end..]) {
@@ -80,7 +80,7 @@ impl Connection {
         }
     }
 
-    /// Takes the next frame that is complete, without its header.
+    /// Takes the next complete frame, without its header.
     pub(super) fn frame(&mut self) -> Result<Option<&[u8]>, String> {
         let arrived = &self.buffer[self.start..self.end];
         let frame = wire::frame(arrived).map_err(|why| {
@@ -96,13 +96,13 @@ impl Connection {
         Ok(frame)
     }
 
-    /// Sends a message, or as much of it as the system takes.
+    /// Sends a message, or as much of it as the system accepts.
     pub(super) fn send(&mut self, message: &ToClient<'_>) -> io::Result<()> {
         wire::to_client(&mut self.out, message);
         self.write()
     }
 
-    /// Writes what is left.
+    /// Writes the rest.
     pub(super) fn write(&mut self) -> io::Result<()> {
         while self.is_blocked() {
             match (&self.stream).write(&self.out[self.written..]) {
@@ -117,14 +117,14 @@ impl Connection {
         Ok(())
     }
 
-    /// Whether something is left to be written.
+    /// True if there is a rest to write.
     pub(super) fn is_blocked(&self) -> bool {
         self.written < self.out.len()
     }
 
     /// Makes reads and writes return at once from now on.
     pub(super) fn never_block(&self) {
-        // If this fails, the connection has failed, and will say so.
+        // If this fails, the connection has failed, and will report that.
         let _ = self.stream.never_block();
     }
 }

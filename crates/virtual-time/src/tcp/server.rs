@@ -23,16 +23,16 @@ const MOST: usize = if cfg!(test) { 3 } else { 1100 };
 /// At most this many clients are accepted per turn.
 const ACCEPTS: usize = 32;
 
-/// How often everything else is looked after while steps follow each other.
+/// How often to do everything else while steps follow each other.
 const ROUND: Nanos = Nanos::from_millis(10);
 
-/// How long no client is accepted after the system had no socket.
+/// The pause in accepting after the system had no free socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// How long the system may wait for a client's machine to acknowledge data, at least: it repeats what was lost on the way.
+/// The least time for a client's machine to acknowledge data: the system repeats lost packets.
 const ACKNOWLEDGED: Nanos = Nanos::from_secs(10);
 
-/// How long a client may take to read that the run has ended.
+/// The time for a client to read the end of the run.
 const FAREWELL: Nanos = Nanos::from_secs(1);
 
 /// A server that listens for its clients.
@@ -52,17 +52,17 @@ impl Listener {
         Self::bind_in(address, None)
     }
 
-    /// As [`bind`](Self::bind), on the network of `simulation` if there is one.
+    /// Like [`bind`](Self::bind), on the network of `simulation` if there is one.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// The same as for `bind`.
     pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
         let (listener, address) = bind(address, simulation)?;
         Ok(Self { listener, address })
     }
 
-    /// The address that it listens on.
+    /// The address on which it listens.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
@@ -81,12 +81,12 @@ impl Listener {
         self.run_with(settings, logic, hosting, Vec::new())
     }
 
-    /// As [`run`](Self::run), with `locals` as clients on the server's own thread: they run while the others do, and
-    /// no message goes to them and back.
+    /// Like [`run`](Self::run), with `locals` as clients on the server's own thread. They run while the others do,
+    /// without messages.
     ///
     /// # Errors
     ///
-    /// As [`run`](Self::run).
+    /// The same as for [`run`](Self::run).
     pub fn run_with(
         self,
         settings: Settings,
@@ -136,12 +136,12 @@ struct Host<'l, 'h, 'p> {
     patience: Nanos,
     /// By seats.
     connections: Vec<Option<Connection>>,
-    /// Those that have to write their last words, and until when.
+    /// Connections with last words to write, and the time when the server gives up.
     leaving: Vec<(Connection, Nanos)>,
     accept_paused_until: Option<Nanos>,
     /// The last client that came was turned away.
     was_full: bool,
-    /// When all sockets were looked at last.
+    /// When all sockets were last checked.
     looked: Nanos,
 }
 
@@ -161,7 +161,7 @@ impl Host<'_, '_, '_> {
                     self.server.sent(self.hosting.clock.now());
                     continue;
                 }
-                // As long as answers are due, one is read by a call that blocks: all of them are needed anyway.
+                // While answers are due, read one with a blocking call: all of them are needed anyway.
                 if let Some(seat) = awaited {
                     self.read(seat);
                     continue;
@@ -208,7 +208,7 @@ impl Host<'_, '_, '_> {
         }
     }
 
-    /// Reads from a client, and passes on what is complete.
+    /// Reads from a client, and passes on complete frames.
     fn read(&mut self, seat: usize) {
         let Some(connection) = &mut self.connections[seat] else {
             return;
@@ -216,7 +216,7 @@ impl Host<'_, '_, '_> {
         match connection.read() {
             Arrived::Something => {}
             Arrived::NothingYet => {
-                // It is not in a hurry; there is time for the others.
+                // The client is in no hurry; there is time for the others.
                 self.looked = Nanos(i64::MIN);
                 return;
             }
@@ -232,7 +232,7 @@ impl Host<'_, '_, '_> {
         }
     }
 
-    /// Looks after everything: all sockets, controls, time. If `is_busy`, without waiting for long.
+    /// Checks everything: all sockets, controls, time. If `is_busy`, does not wait for long.
     fn look(&mut self, is_busy: bool) -> io::Result<()> {
         let clock = self.hosting.clock;
         let now = clock.now();
@@ -306,7 +306,7 @@ impl Host<'_, '_, '_> {
             if is_full {
                 continue;
             }
-            // If it broke at once, it will come again.
+            // A client whose connection broke at once will connect again.
             let Ok(connection) = Connection::new(stream, self.patience.max(ACKNOWLEDGED)) else {
                 continue;
             };
@@ -328,7 +328,7 @@ impl Host<'_, '_, '_> {
         }
     }
 
-    /// The connection at `seat` has got its last message, or will have.
+    /// The connection at `seat` has got its last message, or will get it.
     fn leave(&mut self, seat: usize, now: Nanos) {
         if let Some(connection) = self.connections[seat].take() {
             self.set.remove(seat, connection.stream());
@@ -339,7 +339,7 @@ impl Host<'_, '_, '_> {
     }
 }
 
-/// What is longer than a turn may take would keep the server from its other clients.
+/// A longer block would keep the server from its other clients.
 const _: () = assert!(BLOCKED.0 <= 2 * ROUND.0);
 
 #[cfg(test)]

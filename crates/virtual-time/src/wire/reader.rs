@@ -4,7 +4,7 @@ use tickbus_image::signal::DataType;
 
 use super::Slots;
 
-/// The rest of a frame that is being read.
+/// The rest of a frame.
 pub(super) struct Reader<'a>(&'a [u8]);
 
 impl<'a> Reader<'a> {

@@ -120,7 +120,7 @@ proptest! {
                 done(&mut out, sequence, &writes.iter().collect::<Vec<_>>());
             }
             Ok(FromClient::GiveUp(reason)) => give_up(&mut out, reason),
-            // Joins of version 1 are read, and not written.
+            // Joins of version 1 can be read, but not written.
             Ok(FromClient::Join { .. }) | Err(_) => return Ok(()),
         }
         prop_assert_eq!(content(&out), &*bytes);

@@ -8,7 +8,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{Declaration, Participant, Settings, StartCondition, Step, Variable};
 
-/// A client that is a function.
+/// A client made of a function.
 pub(crate) struct Client<F> {
     pub(crate) declaration: Declaration,
     run: F,
@@ -42,8 +42,8 @@ impl<F: FnMut(Step, &[u64], &mut [u64]) -> Result<(), String>> Participant for C
     }
 }
 
-/// A chaotic client: what it writes depends on every bit that it reads and has written, so that any difference between
-/// two runs stays.
+/// A chaotic client: its writes depend on every bit that it reads and has written, so that any difference between two
+/// runs persists.
 pub(crate) struct Mixer {
     declaration: Declaration,
     state: u64,
@@ -91,7 +91,7 @@ impl Participant for Mixer {
     }
 }
 
-/// Steps of 1 ms, this many, with clients of these names.
+/// Settings with this many steps of 1 ms, and clients of these names.
 pub(crate) fn settings(steps: u64, names: &[&str]) -> Settings {
     let names = names.iter().map(|name| (*name).to_owned()).collect();
     Settings {

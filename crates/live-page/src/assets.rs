@@ -5,7 +5,7 @@ use tickbus_web::Asset;
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
-/// The page itself, its styles and its scripts: what the report and the room have too comes from there.
+/// The page itself, its styles and its scripts; files shared with the report and the room come from there.
 pub(crate) const ASSETS: &[Asset] = &[
     Asset {
         path: "/",

@@ -1,4 +1,4 @@
-//! The page's own thread: it asks ticks for copies, answers requests, and lets go of what nobody forces any more.
+//! The page's own thread: it requests copies of the ticks, answers requests, and releases forces that nobody keeps.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -10,39 +10,39 @@ use crate::metrics;
 use crate::model::{Model, Shared};
 use crate::order::{Order, order};
 
-/// How often it looks when nobody else does: for the trends.
+/// How often it looks while there is no viewer: for the trends.
 const IDLE: Nanos = Nanos::from_millis(500);
 
 /// The shortest time between two copies of a tick: 60 in a second.
 const PERIOD: Nanos = Nanos(16_666_667);
 
-/// How long it waits for a tick that was asked for a copy.
+/// How long it waits for a tick after requesting a copy.
 const PATIENCE: Nanos = Nanos::from_millis(20);
 
-/// How long the answer to a single request waits for slow ticks: it is to have what is true then, and not what was half a
-/// second ago.
+/// How long the answer to a single request waits for slow ticks: the answer has to show current values, and not those
+/// of half a second ago.
 const LATE: Nanos = Nanos::from_millis(500);
 
-/// How often it looks whether a copy has come.
+/// How often it checks for a copy.
 const LOOK: Nanos = Nanos::from_micros(500);
 
-/// Where the pictures of the machines are.
+/// The path of the machines' pictures.
 const PICTURE: &str = "/picture/";
 
 const JSON: &str = "application/json";
 const SVG: &str = "image/svg+xml";
 const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-/// What the room wants.
+/// A request of the room.
 pub(crate) enum Wish {
     Look(Answer<State>),
     Get(String, Answer<Option<Document>>),
     Change(Change, Answer<Outcome>),
-    /// Somebody with the token was heard of, and there are so many viewers who have it.
+    /// A viewer with the token was active; carries the number of viewers who have it.
     Heard(usize),
 }
 
-/// Where wishes wait.
+/// The queue of requests.
 #[derive(Default)]
 pub(crate) struct Inbox {
     wishes: Mutex<Vec<Wish>>,
@@ -60,28 +60,28 @@ impl Inbox {
     }
 
     fn lock(&self) -> std::sync::MutexGuard<'_, Vec<Wish>> {
-        // A list is whole after each change.
+        // Every single change leaves the list consistent.
         self.wishes.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// What the thread has.
+/// The data of the thread.
 pub(crate) struct Keeper {
     pub(crate) inbox: Arc<Inbox>,
     pub(crate) model: Arc<Shared>,
     pub(crate) clock: Arc<dyn Clock>,
-    /// When somebody with the token was heard of last, and how many viewers have it.
+    /// When a viewer with the token was last active, and the number of viewers who have it.
     pub(crate) heard: Nanos,
     pub(crate) holders: usize,
 }
 
 impl Keeper {
-    /// Until the page is stopped.
+    /// Runs until the page is stopped.
     pub(crate) fn run(mut self) {
         let stop = self.inbox.stop.clone();
         let mut due = self.clock.now();
         let mut looked = due - PERIOD;
-        // Requests that wait for a tick, and when they came.
+        // Requests that wait for a tick, with the times when they came.
         let mut waiting: Vec<(Nanos, Wish)> = Vec::new();
         while !stop.is_stopped() {
             self.clock.wait_until(due, &stop);
@@ -100,7 +100,7 @@ impl Keeper {
                 self.grant(wish);
             }
             if !looks.is_empty() || now >= due {
-                // However many ask, a tick makes no more copies.
+                // However many requests come, a tick makes no more copies.
                 self.clock.wait_until(looked + PERIOD, &Stop::new());
                 looked = self.clock.now();
                 self.look(!looks.is_empty() || !waiting.is_empty());
@@ -120,30 +120,30 @@ impl Keeper {
         }
     }
 
-    /// Whether a tick is under way, as far as is known, with newer values than those of this time.
+    /// True if a tick is probably under way with newer values than those of this time.
     fn is_to_wait(&self, since: Nanos) -> bool {
         let now = self.clock.now();
         let is_late = |driver: &dyn Exhibit| {
             let sheet = driver.sheet();
-            // Who has not ticked for so long need not tick at all.
+            // A driver that has not ticked for this long may not tick at all.
             !sheet.is_known_at(since) && !sheet.is_missing_since(now - LATE)
         };
         now - since < LATE && self.model.with(|model| model.drivers().any(is_late))
     }
 
-    /// Has the ticks make copies, and takes them over.
+    /// Requests copies of the ticks, and takes them over.
     fn look(&self, with_line: bool) {
         let begin = self.clock.now();
         self.model.with(|model| {
             for driver in model.drivers_mut() {
-                // One that came late is there, and may be old by now: another one is waited for.
+                // A late copy has arrived and may be outdated; wait for the next.
                 take(&mut **driver);
                 let is_slow = driver.sheet().is_missing();
                 driver.ask(begin);
                 driver.sheet_mut().ask(begin, is_slow);
             }
         });
-        // Nobody wakes this: ticks do not, since it would take a system call.
+        // No tick wakes this, since that would take a system call.
         let nap = Stop::new();
         let end = begin + PATIENCE;
         loop {
@@ -169,7 +169,7 @@ impl Keeper {
         });
     }
 
-    /// Releases what is forced for nobody.
+    /// Releases forces when nobody keeps them.
     fn let_go(&self, now: Nanos) {
         if self.holders > 0 {
             return;
@@ -209,26 +209,26 @@ impl Keeper {
 
     fn obey(&self, order: &Order) -> Result<(), Refused> {
         self.model.with(|model| {
-            // Whoever has shown something since the last look is not silent.
+            // A server that has sent something since the last look is not silent.
             for driver in model.drivers_mut() {
                 take(&mut **driver);
             }
             let done = model.obey(order);
-            // What is forced shows at once, and not with the next tick.
+            // Show forced values at once, not only after the next tick.
             model.update(self.clock.now(), false);
             done
         })
     }
 }
 
-/// Takes over the copy that was asked for, if it has come.
+/// Takes over the requested copy, if it has come.
 fn take(driver: &mut dyn Exhibit) {
     if driver.take() {
         driver.sheet_mut().has_come();
     }
 }
 
-/// What there is at a path.
+/// The document at a path.
 fn document(model: &Model, path: &str, now: Nanos) -> Option<Document> {
     let (kind, text) = match path {
         "/signals" => (JSON, model.signals()),
@@ -260,7 +260,7 @@ fn of_driver(model: &Model, path: &str, now: Nanos) -> Option<(&'static str, Str
     let points = driver.sheet().trend.of(index, now);
     let millis: Vec<i64> = points.iter().map(|(at, _)| at.0 / 1_000_000).collect();
     let values: Vec<f64> = points.iter().map(|(_, value)| *value).collect();
-    // At the least: while a page is open it looks far more often.
+    // The minimum: with an open page, looks are far more frequent.
     let looks = 1_000_000_000 / IDLE.0;
     let json = serde_json::json!({ "ms": millis, "values": values, "samples_per_s": looks });
     Some((JSON, json.to_string()))
@@ -276,13 +276,13 @@ mod tests {
     use tickbus_fieldbus::LinkState;
     use tickbus_image::signal::Signal;
 
-    /// A driver that ticks only while it is let, and whose tick comes after the first look for it.
+    /// A driver that ticks only when allowed, and only after the first look.
     #[derive(Debug)]
     struct Fake {
         sheet: Sheet,
         statistics: Statistics,
         is_let: Arc<std::sync::atomic::AtomicBool>,
-        /// How often it was looked for since it was asked.
+        /// The number of looks since the request.
         looks: usize,
         is_asked: bool,
         taken: Arc<AtomicUsize>,

@@ -1,9 +1,10 @@
-//! The live page: what the drivers of this process do at this moment, as a web page for the web room.
+//! The live page: a web page, for the web room, with the current state of this process's drivers.
 //!
-//! A [`LivePage`] is joined by drivers and PLC programs, each as a [`Watch`](tickbus_driver::Watch). Its thread asks their
-//! ticks for copies while somebody looks, and compares them with what it knew: a viewer gets what has changed since it
-//! looked last. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by its
-//! [`Controls`](tickbus_virtual_time::Controls), and only shows. docs/live-page.md has it, for users and for programs.
+//! Drivers and PLC programs join a [`LivePage`], each as a [`Watch`](tickbus_driver::Watch). While somebody looks, the
+//! page's thread requests copies of the ticks, and compares them with the known state: a viewer gets only the changes
+//! since the last look. Signals are forced by faults of the kind "stuck". The server of a run on virtual time joins by
+//! its [`Controls`](tickbus_virtual_time::Controls), and is only shown. docs/live-page.md describes the page, for users
+//! and for programs.
 
 mod assets;
 mod exhibit;

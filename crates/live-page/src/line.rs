@@ -10,7 +10,7 @@ use tickbus_fieldbus::{Cause, Link, LinkState, is_stale};
 
 use crate::value::Number;
 
-/// What stands behind a distribution's name in its keys.
+/// The suffixes of a distribution's keys.
 const PARTS: [&str; 7] = [
     ".p50_us",
     ".p90_us",
@@ -21,10 +21,10 @@ const PARTS: [&str; 7] = [
     ".stdev_us",
 ];
 
-/// Edges of single signals as a hosted program saw them: as many as there are signals.
+/// Edges of single signals as a hosted program saw them: one key per signal.
 const RISES: &str = "plc.rises.";
 
-/// What stands elsewhere in the answer.
+/// Keys whose values appear elsewhere in the answer.
 const TOLD: [&str; 6] = [
     "state",
     "state.code",
@@ -46,7 +46,7 @@ pub(crate) struct Line<'a> {
     pub(crate) status: String,
     pub(crate) tick: u64,
     pub(crate) silence_ms: Option<i64>,
-    /// What stands first, as title and text.
+    /// The first rows, as title and text.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) facts: Vec<(&'static str, String)>,
     pub(crate) stations: Vec<Station<'a>>,
@@ -57,7 +57,7 @@ pub(crate) struct Line<'a> {
 }
 
 impl<'a> Line<'a> {
-    /// A line of which no more is known.
+    /// A line without further details so far.
     pub(crate) fn new(
         id: i32,
         name: &'a str,
@@ -84,7 +84,7 @@ impl<'a> Line<'a> {
         }
     }
 
-    /// It as JSON.
+    /// The line as JSON.
     pub(crate) fn text(&self) -> String {
         serde_json::to_string(self).expect("texts and numbers")
     }
@@ -102,7 +102,7 @@ pub(crate) struct Station<'a> {
 }
 
 impl<'a> Station<'a> {
-    /// One that has nothing to tell but its name.
+    /// A station with only a name.
     pub(crate) fn new(name: &'a str) -> Self {
         Self {
             name,
@@ -126,17 +126,17 @@ pub(crate) struct Fault<'a> {
     begun: u64,
 }
 
-/// How old the data of a station are now, of a copy that was made a while ago.
+/// The current age of a station's data, from a copy that was made `silence` ago.
 pub(crate) fn age_now(station: &StationView, silence: Nanos) -> Nanos {
     match (station.age, silence) {
         (Nanos::MAX, _) => Nanos::MAX,
-        // Before the first tick nothing was received, either.
+        // Before the first tick nothing was received.
         (age, Nanos::MAX) => age,
         (age, silence) => age + silence,
     }
 }
 
-/// Whether the data of a station do not count now.
+/// True if the data of a station are stale by now.
 pub(crate) fn is_stale_now(station: &StationView, silence: Nanos, max_age: Nanos) -> bool {
     is_stale(age_now(station, silence), max_age, station.is_valid)
 }
@@ -207,7 +207,7 @@ pub(crate) fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
             #[expect(clippy::cast_precision_loss, reason = "scripts have no more digits")]
             Value::Count(count) => Number::Real(*count as f64),
             Value::Number(number, _) => Number::Real(*number),
-            // Faults stand by themselves.
+            // Faults appear separately.
             _ if key.starts_with("fault.") => continue,
             Value::Time(time) => {
                 line.texts.insert(key, time.to_string());
@@ -228,7 +228,7 @@ pub(crate) fn sort<'a>(statistics: &'a Statistics, line: &mut Line<'a>) {
             line.counters.insert(key, number);
         }
     }
-    // How many there are stands before the rest of a distribution.
+    // The count precedes the rest of a distribution.
     for (name, times) in &mut line.times {
         if let Some(count) = line.counters.remove(&*format!("{name}.count")) {
             times.insert("count", count);

@@ -1,4 +1,4 @@
-//! What Prometheus and its like read of the page.
+//! The metrics of the page, for Prometheus and similar programs.
 
 use std::fmt::Write as _;
 
@@ -20,7 +20,7 @@ impl Labels {
             .and("id", &driver.id().to_string())
     }
 
-    /// With one more.
+    /// The same labels and one more.
     fn and(&self, name: &str, value: &str) -> Self {
         let mut text = self.0.clone();
         if !text.is_empty() {
@@ -44,7 +44,7 @@ impl Labels {
 /// The text of all metrics.
 pub(crate) fn text(model: &Model) -> String {
     let mut text = String::new();
-    // Into a text, which takes everything.
+    // Writing to a String cannot fail.
     let _ = write(model, &mut text);
     text.push_str("# EOF\n");
     text
@@ -122,7 +122,7 @@ fn write(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// The values that are live, and which ones are fail-safe.
+/// The live values, and the signals with fail-safe values.
 fn values(model: &Model, text: &mut String) -> std::fmt::Result {
     family(
         text,
@@ -158,7 +158,7 @@ fn values(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// How old the data of the stations are.
+/// The age of the stations' data.
 fn stations(model: &Model, text: &mut String) -> std::fmt::Result {
     for (name, help) in [
         (
@@ -189,7 +189,7 @@ fn stations(model: &Model, text: &mut String) -> std::fmt::Result {
     Ok(())
 }
 
-/// What says that a value is not one of now.
+/// The flags of values that are not live.
 const NOT_LIVE: u8 = FAIL_SAFE | STALE | UNKNOWN;
 
 /// The labels of a signal, with its station if there are several.

@@ -1,4 +1,4 @@
-//! All drivers on the page, and what viewers lack of them.
+//! All drivers on the page, and the updates for viewers.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,21 +10,21 @@ use tickbus_web::{Differences, Refused};
 use crate::exhibit::Exhibit;
 use crate::order::Order;
 
-/// The drivers and runs, and the number of the state that they are in.
+/// The drivers and runs, and the number of their current state.
 #[derive(Debug, Default)]
 pub(crate) struct Model {
     number: u64,
-    /// How often drivers came or went, and the number of the state since it is so.
+    /// The number of joins and leaves, and the number of the state of the last one.
     layout: u64,
     layout_number: u64,
-    /// When it was looked at last.
+    /// The time of the last update.
     now: Nanos,
     /// By their ids.
     drivers: BTreeMap<i32, Box<dyn Exhibit>>,
 }
 
 impl Model {
-    /// Adds what `make` makes of an id, which is the one that is asked for unless another has it; gives the id.
+    /// Adds the exhibit that `make` builds with an id, which is `asked` unless that is in use; returns the id.
     pub(crate) fn join(&mut self, asked: i32, make: impl FnOnce(i32) -> Box<dyn Exhibit>) -> i32 {
         let mut id = asked;
         while self.drivers.contains_key(&id) {
@@ -35,7 +35,7 @@ impl Model {
         id
     }
 
-    /// Removes a driver; tells whether it was the last one.
+    /// Removes a driver; returns true if it was the last one.
     pub(crate) fn leave(&mut self, id: i32) -> bool {
         self.drivers.remove(&id);
         self.has_new_layout();
@@ -63,7 +63,7 @@ impl Model {
         self.drivers.get(&id).map(|driver| &**driver)
     }
 
-    /// Takes over what is there at `now`.
+    /// Takes over the copies of `now`.
     pub(crate) fn update(&mut self, now: Nanos, with_line: bool) {
         self.now = now;
         let number = self.number + 1;
@@ -84,7 +84,7 @@ impl Model {
         match order {
             Order::ReleaseAll => {
                 let released = self.drivers.values_mut().map(|driver| driver.release_all());
-                // All of them, whatever becomes of one.
+                // Release all, even if one fails.
                 let released: Vec<_> = released.collect();
                 released.into_iter().collect()
             }
@@ -131,7 +131,7 @@ impl Model {
         let mut comma = "";
         for driver in self.drivers() {
             if let Some(changes) = driver.sheet().changes(driver.signals(), seen) {
-                // Into a text, which takes everything.
+                // Writing to a String cannot fail.
                 let _ = write!(json, "{comma}\"{}\":{changes}", driver.id());
                 comma = ",";
             }
@@ -155,7 +155,7 @@ pub(crate) struct Shared(Mutex<Model>);
 impl Shared {
     /// Works on the model.
     pub(crate) fn with<R>(&self, work: impl FnOnce(&mut Model) -> R) -> R {
-        // Whatever broke off, each driver is looked at anew by the next look.
+        // After a panic the next look updates every driver anyway.
         let mut model = self
             .0
             .lock()

@@ -1,14 +1,15 @@
-//! How a driver is shown.
+//! The options of a driver on the page.
 
 use tickbus_base::time::Nanos;
 
 use crate::picture::Picture;
 
-/// How a driver is shown.
+/// The options of a driver on the page.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// How long its signals stay forced when nobody with the token looks any more; `None` for as long as it runs.
+    /// How long signals stay forced after the last viewer with the token has gone; `None` for as long as the driver
+    /// runs.
     pub grace: Option<Nanos>,
-    /// The picture of its machine.
+    /// The picture of the machine.
     pub picture: Option<Picture>,
 }

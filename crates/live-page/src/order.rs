@@ -1,12 +1,12 @@
-//! What a request asks to be changed.
+//! The changes that a request can order.
 
 use tickbus_base::percent_decoded;
 use tickbus_web::{Change, Refused, Verb};
 
-/// A change that is asked for.
+/// A change ordered by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// To hold a signal to a value.
+    /// Force a signal to a value.
     Force {
         /// The driver's id.
         driver: i32,
@@ -15,23 +15,23 @@ pub enum Order {
         /// The value, as it was written.
         value: String,
     },
-    /// To hold a signal no longer.
+    /// End the force of a signal.
     Release {
         /// The driver's id.
         driver: i32,
         /// The signal's name.
         signal: String,
     },
-    /// To hold no signal of any driver any longer.
+    /// End the forces of all signals of all drivers.
     ReleaseAll,
 }
 
-/// The order that a request is: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, or
+/// The order in a request: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, or
 /// `DELETE /force`.
 ///
 /// # Errors
 ///
-/// It is none; with what would be one.
+/// Not a valid order; carries what would be.
 pub fn order(change: &Change) -> Result<Order, Refused> {
     const RIGHT: &str = "PUT or DELETE /force/ID/SIGNAL, with the driver's id and the signal's name in percent-encoding";
     let refused = |status, text: String| Err(Refused { status, text });

@@ -44,7 +44,7 @@ impl LivePage {
     ///
     /// # Errors
     ///
-    /// The system has no thread.
+    /// The system could not start a thread.
     pub fn open(clock: Arc<dyn Clock>) -> io::Result<Self> {
         let (inbox, model) = (Arc::<Inbox>::default(), Arc::<Shared>::default());
         let keeper = Keeper {
@@ -64,19 +64,19 @@ impl LivePage {
         })
     }
 
-    /// What the room serves.
+    /// The site that the room serves.
     pub fn site(&self) -> Arc<dyn Site> {
         Arc::new(LiveSite(Arc::clone(&self.inbox)))
     }
 
-    /// Shows a driver, or a PLC program, until what is returned is dropped.
+    /// Shows a driver, or a PLC program, until the returned value is dropped.
     pub fn join(&self, watch: Watch, options: Options) -> Member {
         let now = self.clock.now();
         let id = watch.config().id;
         self.add(id, |id| Box::new(Shown::new(id, watch, options, now)))
     }
 
-    /// Shows a run on virtual time, under this name, until what is returned is dropped.
+    /// Shows a run on virtual time, under this name, until the returned value is dropped.
     pub fn join_run(&self, name: &str, controls: Controls) -> Member {
         let now = self.clock.now();
         self.add(1, |id| Box::new(ShownRun::new(id, name, controls, now)))
@@ -84,7 +84,7 @@ impl LivePage {
 
     fn add(&self, id: i32, make: impl FnOnce(i32) -> Box<dyn Exhibit>) -> Member {
         let id = self.model.with(|model| model.join(id, make));
-        // What it has to show is looked at.
+        // Wake the thread, to look at the new exhibit.
         self.inbox.stop.wake();
         Member {
             model: Arc::clone(&self.model),
@@ -97,7 +97,7 @@ impl Drop for LivePage {
     fn drop(&mut self) {
         self.inbox.stop.stop();
         if let Some(thread) = self.thread.take() {
-            // A panic has been reported by itself.
+            // A panic has been reported already.
             let _ = thread.join();
         }
     }

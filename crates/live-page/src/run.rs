@@ -1,4 +1,4 @@
-//! A run on virtual time on the page: its variables, its clients, how fast it goes.
+//! A run on virtual time on the page: its variables, clients and speed.
 
 use std::sync::Arc;
 
@@ -13,13 +13,13 @@ use crate::exhibit::{Exhibit, Freshness};
 use crate::line::{self, Line, Station};
 use crate::sheet::{DriverJson, Row, STALE, Sheet, SignalJson, UNKNOWN};
 
-/// A step that takes longer than this, and longer than a tenth of what it may take, is told to be late.
+/// A step is shown as late if it takes longer than this, and longer than a tenth of its limit.
 const LATE: Nanos = Nanos::from_secs(1);
 
-/// How fast a run goes is not measured over less than this.
+/// The shortest interval for measuring the speed of a run.
 const SHORTEST: Nanos = Nanos::from_millis(250);
 
-/// What stands where a client's name would, for the variables of the server's logic.
+/// The station of the variables of the server's logic, in place of a client's name.
 const LOGIC: &str = "logic of the server";
 
 /// A run on the page.
@@ -30,7 +30,7 @@ pub(crate) struct ShownRun {
     controls: Controls,
     /// The newest copy; `None` before the first.
     view: Option<RunView>,
-    /// Who takes part, as it is shown.
+    /// The participants as shown.
     members: Arc<Members>,
     is_other: bool,
     /// The variables as signals; the stations are the clients.
@@ -42,21 +42,21 @@ pub(crate) struct ShownRun {
     statistics: Statistics,
 }
 
-/// The state of the run, in the words of a line.
+/// The state of the run, in the terms of a line.
 #[derive(Clone, Debug, PartialEq)]
 struct Told {
     state: LinkState,
     cause: Cause,
     reason: String,
-    /// Whether nothing is known of the server.
+    /// True if the server does not respond.
     is_hung: bool,
 }
 
-/// How fast the run went between the last two lines.
+/// The speed of the run between the last two lines.
 #[derive(Clone, Copy, Debug)]
 struct Pace {
     at: Nanos,
-    /// The last step then.
+    /// The last step at that time.
     step: Option<Step>,
     steps_per_second: f64,
     /// Virtual time per wall-clock time.
@@ -64,7 +64,7 @@ struct Pace {
 }
 
 impl Pace {
-    /// Goes on to this step, unless the last one was a moment ago.
+    /// Measures up to this step, unless the last measurement was a moment ago.
     fn go_on(&mut self, now: Nanos, step: Option<Step>) {
         if self.step.is_some() && now - self.at < SHORTEST {
             return;
@@ -83,7 +83,7 @@ impl Pace {
     }
 }
 
-/// The slot in which a signal of this type has a raw value of a run, see [`tickbus_virtual_time::is_raw`].
+/// The slot with a signal's raw value of a run, see [`tickbus_virtual_time::is_raw`].
 fn slot_of(signal: &Signal, value: u64) -> Slot {
     if signal.is_integer_slot() {
         return Slot::from_unsigned(value);
@@ -129,7 +129,7 @@ impl ShownRun {
         run
     }
 
-    /// Begins anew if others take part.
+    /// Restarts if the participants have changed.
     fn take_members(&mut self, now: Nanos) {
         self.is_other = false;
         let Some(view) = &self.view else {
@@ -145,7 +145,7 @@ impl ShownRun {
         }
         let variables = self.members.variables.iter().enumerate();
         let signals = variables.map(|(at, variable)| {
-            // It has no address: this place is nowhere shown.
+            // The variable has no address; this dummy is never shown.
             let signal = Signal::new(&*variable.name, Area::Output, 0, variable.data_type);
             Signal {
                 station: self.members.writer(at),
@@ -290,29 +290,29 @@ impl ShownRun {
             .collect()
     }
 
-    /// Whether there are variables of the server's logic.
+    /// True if there are variables of the server's logic.
     fn has_logic(&self) -> bool {
         let last = self.signals.last();
         last.is_some_and(|signal| signal.station == self.members.clients.len())
     }
 }
 
-/// Whether all initial values are there.
+/// True if all initial values are present.
 fn has_begun(view: &RunView) -> bool {
     view.step.is_some() && !matches!(view.state, State::Start | State::InitialWrite)
 }
 
-/// Whether a client has not answered yet; the logic of the server always has.
+/// True if a client has not answered yet; the logic of the server always has.
 fn owes(view: &RunView, client: usize) -> bool {
     view.owes.get(client) == Some(&true)
 }
 
-/// Whether those who have not answered yet are late.
+/// True if answers are late.
 fn is_late(view: &RunView) -> bool {
     view.waited > LATE.max(Nanos(view.hang.0 / 10))
 }
 
-/// What those who are late owe.
+/// The late answers, in words.
 fn owing(view: &RunView) -> String {
     let (waited, hang) = (view.waited.rounded(), view.hang);
     let what = match view.step {
@@ -322,7 +322,7 @@ fn owing(view: &RunView) -> String {
     format!("{what} for {waited}; the run ends after {hang}")
 }
 
-/// The state of a run whose server does not go on.
+/// The state of a run whose server has stopped responding.
 fn hung(silent: Nanos) -> Told {
     Told {
         state: LinkState::Stale,
@@ -335,7 +335,7 @@ fn hung(silent: Nanos) -> Told {
     }
 }
 
-/// The state of a run, of which there may be no copy yet.
+/// The state of a run; there may be no copy yet.
 fn told(view: Option<&RunView>) -> Told {
     let told = |state, cause, reason| Told {
         state,
@@ -459,7 +459,7 @@ impl Exhibit for ShownRun {
             let is_late = view.is_some_and(|view| is_late(view) && owes(view, at));
             Freshness {
                 name: &client.name,
-                // Data of virtual time have the age of the step.
+                // The age of data in virtual time is that of the step.
                 age_ms: None,
                 stale: is_late || is_hung || view.is_none_or(|view| !has_begun(view)),
             }
@@ -487,7 +487,7 @@ impl Exhibit for ShownRun {
     }
 
     fn release(&mut self, _signal: &str) -> Result<(), Refused> {
-        // None is forced.
+        // No signal is forced.
         Ok(())
     }
 }

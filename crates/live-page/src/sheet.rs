@@ -1,4 +1,4 @@
-//! What the page knows of the signals of one driver or run, and what viewers lack of it.
+//! The page's knowledge of the signals of one driver or run, and the updates for viewers.
 
 use serde::Serialize;
 use tickbus_base::time::Nanos;
@@ -7,34 +7,34 @@ use tickbus_image::signal::{Signal, Slot};
 use crate::trend::Trend;
 use crate::value::{Number, raw};
 
-/// The other end gets the fail-safe value, or this end sees it.
+/// The other end gets the fail-safe value, or this end does.
 pub(crate) const FAIL_SAFE: u8 = 1;
 /// The signal is forced.
 pub(crate) const FORCED: u8 = 2;
-/// The data of its station do not count: they are too old, or their PLC has stopped.
+/// The data of the station are stale: they are too old, or the PLC has stopped.
 pub(crate) const STALE: u8 = 4;
-/// No data have ever come, and nothing stands in for them.
+/// No data have ever come, and there is no substitute.
 pub(crate) const UNKNOWN: u8 = 8;
 
-/// How often the line is looked at in full.
+/// How often the line is made in full.
 const LINE: Nanos = Nanos::from_millis(500);
 
-/// A time that every line is overdue at.
+/// A time at which every line is overdue.
 const NEVER: Nanos = Nanos(i64::MIN / 2);
 
-/// A signal, as it was seen last.
+/// A signal, as last seen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Row {
     pub(crate) slot: Slot,
     pub(crate) bits: u64,
     pub(crate) edges: u32,
     pub(crate) flags: u8,
-    /// The number of the state in which this was new.
+    /// The number of the state in which this row was new.
     pub(crate) number: u64,
 }
 
 impl Row {
-    /// The value, which is none where nothing has ever come.
+    /// The value; no number if no data have ever come.
     pub(crate) fn value(&self, signal: &Signal) -> Number {
         if self.flags & UNKNOWN == 0 {
             Number::of(signal, self.slot)
@@ -52,7 +52,7 @@ impl Row {
         }
     }
 
-    /// The value as something that was measured: NaN where it does not count.
+    /// The value as a measurement: NaN if it is stale or unknown.
     pub(crate) fn live(&self, signal: &Signal) -> f64 {
         if self.flags & (STALE | UNKNOWN) == 0 {
             Number::of(signal, self.slot).real()
@@ -62,18 +62,18 @@ impl Row {
     }
 }
 
-/// All signals, as they were seen last, and the line as JSON.
+/// All signals as last seen, and the line as JSON.
 #[derive(Debug)]
 pub(crate) struct Sheet {
     pub(crate) rows: Vec<Row>,
     pub(crate) trend: Trend,
-    /// Since when a copy has been asked for that has not come.
+    /// The time of the request for the copy that has not come.
     asked: Option<Nanos>,
-    /// The one before that had not come when this one was asked for.
+    /// The previous copy had not come when this one was requested.
     is_slow: bool,
-    /// What is known is not older than this.
+    /// The known values are no older than this.
     known: Nanos,
-    /// The line; when that was made, and the number of the state in which it was new.
+    /// The line; when it was made, and the number of the state in which it was new.
     line: String,
     line_at: Nanos,
     line_number: u64,
@@ -83,7 +83,7 @@ pub(crate) struct Sheet {
 type ChangeJson = (usize, Number, String, Option<u32>, u8);
 
 impl Sheet {
-    /// Of signals with these values, which nobody has looked at yet.
+    /// A sheet of signals with these values, which have not been looked at yet.
     pub(crate) fn new(now: Nanos, values: &[Slot]) -> Self {
         let row = |slot: &Slot| Row {
             slot: *slot,
@@ -104,43 +104,43 @@ impl Sheet {
         }
     }
 
-    /// Whether a copy has been asked for that has not come.
+    /// True if a requested copy has not come.
     pub(crate) fn is_missing(&self) -> bool {
         self.asked.is_some()
     }
 
-    /// A copy is asked for; `is_slow` if the last one had not come until then.
+    /// A copy is requested; `is_slow` if the last one had not come by then.
     pub(crate) fn ask(&mut self, now: Nanos, is_slow: bool) {
         self.asked.get_or_insert(now);
         self.is_slow = is_slow;
     }
 
-    /// The copy that was asked for has come. It was made after that, nobody knows how long after.
+    /// The requested copy has come. It was made some unknown time after the request.
     pub(crate) fn has_come(&mut self) {
         self.known = self.asked.take().unwrap_or(self.known);
     }
 
-    /// Whether what is known is at least as new as this time.
+    /// True if the known values are at least as new as this time.
     pub(crate) fn is_known_at(&self, time: Nanos) -> bool {
         self.known >= time
     }
 
-    /// Whether a look that began then need not wait for it: its copy has come, or will not come soon.
+    /// True if a look that began at this time need not wait: the copy has come, or will not come soon.
     pub(crate) fn is_complete(&self, begin: Nanos) -> bool {
         self.is_slow || self.is_known_at(begin)
     }
 
-    /// Whether a copy has been asked for since before this time, and has not come.
+    /// True if a copy was requested before this time, and has not come.
     pub(crate) fn is_missing_since(&self, time: Nanos) -> bool {
         self.asked.is_some_and(|asked| asked < time)
     }
 
-    /// How long a copy has been asked for that has not come.
+    /// How long a requested copy has been missing.
     pub(crate) fn missing_for(&self, now: Nanos) -> Nanos {
         self.asked.map_or(Nanos::ZERO, |asked| now - asked)
     }
 
-    /// Takes a signal over as it was seen; tells whether that is new.
+    /// Stores the state of a signal; returns true if that is new.
     pub(crate) fn put(&mut self, index: usize, seen: Row) -> bool {
         let row = &mut self.rows[index];
         let is_same = (row.slot, row.bits, row.edges, row.flags)
@@ -151,7 +151,7 @@ impl Sheet {
         !is_same
     }
 
-    /// Adds what is new in the state with this number to the trends.
+    /// Adds the new values of the state with this number to the trends.
     pub(crate) fn go_on(&mut self, now: Nanos, number: u64, signals: &[Signal]) {
         for (index, (signal, row)) in signals.iter().zip(&self.rows).enumerate() {
             if row.number == number {
@@ -184,22 +184,22 @@ impl Sheet {
         &self.line
     }
 
-    /// Whether the line has to be made anew.
+    /// True if the line has to be made again.
     pub(crate) fn is_line_due(&self, now: Nanos) -> bool {
         now - self.line_at >= LINE
     }
 
-    /// Takes over the line that was made at `now`, in the state with this number.
+    /// Stores the line that was made at `now`, in the state with this number.
     pub(crate) fn set_line(&mut self, now: Nanos, number: u64, line: String) {
         (self.line, self.line_at, self.line_number) = (line, now, number);
     }
 
-    /// Whether the line is new since the state with this number.
+    /// True if the line is newer than the state with this number.
     pub(crate) fn has_new_line(&self, since: u64) -> bool {
         self.line_number > since
     }
 
-    /// Has the line made anew at the next occasion.
+    /// Has the line made again at the next opportunity.
     pub(crate) fn forget_line(&mut self) {
         self.line_at = NEVER;
     }
@@ -209,13 +209,13 @@ impl Sheet {
 #[derive(Serialize)]
 pub(crate) struct SignalJson<'a> {
     pub(crate) name: &'a str,
-    /// Empty without one.
+    /// Empty without an address.
     pub(crate) address: String,
     #[serde(rename = "type")]
     pub(crate) data_type: &'static str,
     pub(crate) unit: &'a str,
     pub(crate) station: usize,
-    /// Seen from a PLC, if there is one.
+    /// From the PLC's view, if there is one.
     pub(crate) direction: Option<&'static str>,
     pub(crate) latch: Option<&'static str>,
     pub(crate) writable: bool,

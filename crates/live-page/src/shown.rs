@@ -1,4 +1,4 @@
-//! One driver on the page: its signals as they were seen last, what is forced, its line.
+//! One driver on the page: its signals as last seen, the forces, the line.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::value::{Number, parse};
 /// A driver on the page.
 #[derive(Debug)]
 pub(crate) struct Shown {
-    /// The driver's id, unless another one on the page has it.
+    /// The driver's id, or a different one if another driver on the page has it.
     id: i32,
     watch: Watch,
     options: Options,
@@ -28,11 +28,11 @@ pub(crate) struct Shown {
     codec: Codec,
     /// By the index of the signal.
     forced: BTreeMap<usize, Force>,
-    /// Faults that were replaced, and whose end the simulation did not take over yet.
+    /// Replaced faults whose end the simulation has not taken over yet.
     ending: Vec<u32>,
     link: Link,
     statistics: Statistics,
-    /// Per station whether its data count, and whether that is new.
+    /// Per station, true if the data are stale, and if that is new.
     stale: Vec<bool>,
     is_turn: bool,
 }
@@ -105,7 +105,7 @@ impl Shown {
         driver
     }
 
-    /// Compares the values with those that were seen last.
+    /// Compares the values with those last seen.
     fn take_values(&mut self, number: u64) -> bool {
         let Self {
             watch,
@@ -119,9 +119,9 @@ impl Shown {
         let config = watch.config();
         let (table, writes) = (&config.table, watch.writes());
         let silence = watch.silence();
-        // A program behind its bus is not watched by it: it has a limit of its own, of its scans.
+        // The driver's watchdog does not watch a program behind its bus: the program's scans have their own limit.
         let watchdog = config.timing.watchdog.filter(|_| watch.is_driver());
-        // The other end gets fail-safe values of a simulation that has stopped.
+        // After a simulation has stopped, the other end gets fail-safe values.
         let has_stopped = watchdog.is_some_and(|limit| silence > limit);
         let mut is_new = false;
         let mut values = watch.view(|view| view.slots.to_vec());
@@ -155,7 +155,7 @@ impl Shown {
                     }
                 }
                 if forced.contains_key(&index) {
-                    // What is forced is known.
+                    // A forced value is known.
                     flags = flags & !(STALE | UNKNOWN) | FORCED;
                 }
                 let seen = Row {
@@ -165,7 +165,7 @@ impl Shown {
                     flags,
                     number,
                 };
-                // A pulse that was over before it was seen.
+                // A pulse that ended before it was seen.
                 let row = &sheet.rows[index];
                 let edges = seen.edges.wrapping_sub(row.edges);
                 if edges > 0 && (edges > 1 || seen.slot == row.slot) && row.flags & UNKNOWN == 0 {
@@ -269,7 +269,7 @@ impl Exhibit for Shown {
         &mut self.sheet
     }
 
-    /// Asks for a copy of the next tick.
+    /// Requests a copy of the next tick.
     fn ask(&mut self, now: Nanos) {
         self.watch.ask(self.sheet.is_line_due(now));
     }
@@ -343,7 +343,7 @@ impl Exhibit for Shown {
         };
         let fault = self.watch.force(index, value).map_err(refused)?;
         self.forced.insert(index, Force { fault, value });
-        // In one go with the new one, so that the signal is held throughout.
+        // End the old fault together with the new one, so that the signal is held throughout.
         if let Some(before) = before
             && self.watch.end_fault(before.fault).is_err()
         {
@@ -355,7 +355,7 @@ impl Exhibit for Shown {
     fn release(&mut self, name: &str) -> Result<(), Refused> {
         let index = self.position(name)?;
         let Some(force) = self.forced.get(&index) else {
-            // As it is asked for.
+            // The signal is not forced, as requested.
             return Ok(());
         };
         self.watch

@@ -4,36 +4,36 @@ use std::collections::VecDeque;
 
 use tickbus_base::time::Nanos;
 
-/// How far back a trend goes.
+/// The length of a trend.
 const SPAN: Nanos = Nanos::from_secs(300);
 
-/// The shortest step of time that is told apart.
+/// The shortest time step.
 const STEP: Nanos = Nanos::from_millis(500);
 
-/// The most entries of one driver, of 32 bytes each. More signals have longer steps.
+/// The most entries of one driver, of 32 bytes each. Drivers with more signals have longer steps.
 const ENTRIES: i64 = 1 << 20;
 
-/// The values of a driver's signals in steps of time: the least, the greatest and the last one in each, so that no pulse
-/// that was seen gets lost.
+/// The values of a driver's signals in time steps: the least, the greatest and the last one of each step, so that no
+/// pulse that was seen gets lost.
 #[derive(Debug)]
 pub(crate) struct Trend {
     step: Nanos,
     /// The closed steps, oldest first.
     steps: VecDeque<Step>,
     open: Step,
-    /// Per signal, where it is in the open step.
+    /// Per signal, its entry in the open step.
     places: Vec<Option<u32>>,
-    /// The values before the oldest step, and the newest ones.
+    /// The values before the oldest step, and the newest values.
     first: Vec<f64>,
     last: Vec<f64>,
     begin: Nanos,
 }
 
-/// The signals that changed in a step, in no order while it is open, then in that of their indices.
+/// The signals that changed in a step, unordered while it is open, later in the order of their indices.
 #[derive(Debug, Default)]
 struct Step {
     at: Nanos,
-    /// When it was closed, which is when the last of its values were seen.
+    /// When the step was closed, which is when the last of its values were seen.
     end: Nanos,
     changed: Vec<Changed>,
 }
@@ -50,7 +50,7 @@ struct Changed {
 pub(crate) type Point = (Nanos, f64);
 
 impl Trend {
-    /// Begins at `now`, with so many signals of which nothing is known.
+    /// Begins at `now`, with this many signals and no values.
     pub(crate) fn new(now: Nanos, signals: usize) -> Self {
         let values = vec![f64::NAN; signals];
         let signals = i64::try_from(signals).unwrap_or(i64::MAX);
@@ -70,7 +70,7 @@ impl Trend {
         }
     }
 
-    /// A signal has this value now; between the last call and now it also had `extremes`, if it had a pulse.
+    /// A signal has this value now; between the last call and now it also had `extremes`, if there was a pulse.
     pub(crate) fn add(&mut self, signal: usize, value: f64, extremes: Option<[f64; 2]>) {
         let before = self.last[signal];
         if before.total_cmp(&value).is_eq() && extremes.is_none() {
@@ -119,8 +119,8 @@ impl Trend {
         self.begin = self.begin.max(now - SPAN);
     }
 
-    /// The values of a signal, as a line that is drawn in steps; NaN where none counts. Of a step that has only a new value, that was
-    /// seen at its end; what was between is within the step, somewhere.
+    /// The values of a signal, as a step line; NaN without a valid value. If a step has just one new value, that was
+    /// seen at its end; other values lie somewhere within the step.
     pub(crate) fn of(&self, signal: usize, now: Nanos) -> Vec<Point> {
         let mut points = vec![(self.begin, self.first[signal])];
         let index = u32::try_from(signal).unwrap_or(u32::MAX);
@@ -141,7 +141,7 @@ impl Trend {
                     points.push((at.min(now), value));
                 }
             };
-            // It ends at its last value; the other extreme came before.
+            // The line ends at the last value; the other extreme precedes it.
             let ends_high = (entry.greatest - entry.last).abs() <= (entry.last - entry.least).abs();
             let (one, other) = if ends_high {
                 (entry.least, entry.greatest)

@@ -5,14 +5,14 @@ use tickbus_base::toml_text::shown;
 use tickbus_image::signal::section::{value_limits, value_range};
 use tickbus_image::signal::{DataType, Signal, Slot};
 
-/// Beyond this a double does not tell all whole numbers apart, and neither does a script.
+/// Beyond this, neither a double nor a script can distinguish all whole numbers.
 const WHOLE: f64 = 9e15;
 
-/// A value as JSON: a number; the digits of one of 64 bits; `null` if it is none.
+/// A value as JSON: a number; a string of digits for 64 bits; `null` for NaN and infinities.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Number {
     Real(f64),
-    /// What a REAL holds: written with as many digits as that has.
+    /// The value of a REAL, with as many digits as that type has.
     Single(f32),
     Signed(i64),
     Unsigned(u64),
@@ -37,7 +37,7 @@ impl Number {
         }
     }
 
-    /// As a double, which may lose digits of one of 64 bits.
+    /// The value as a double, which may lose digits of 64-bit values.
     #[expect(clippy::cast_precision_loss, reason = "said so")]
     pub(crate) fn real(self) -> f64 {
         match self {
@@ -74,11 +74,11 @@ pub(crate) fn raw(data_type: DataType, bits: u64) -> String {
     format!("16#{bits:0digits$X}")
 }
 
-/// The value of a signal that a text says: in its unit, or as a literal such as `16#6C00` for an integer without a scale.
+/// Parses the value of a signal: in its unit, or a literal such as `16#6C00` for an integer without a scale.
 ///
 /// # Errors
 ///
-/// What does not fit, and what would.
+/// The text does not fit; the message says what would.
 pub fn parse(text: &str, signal: &Signal) -> Result<Slot, String> {
     let refused = |right: &str| {
         let (name, text) = (shown(&signal.name), shown(text));
@@ -106,7 +106,7 @@ pub fn parse(text: &str, signal: &Signal) -> Result<Slot, String> {
     {
         return match whole(text).filter(|number| limits.contains(number)) {
             Some(number) if signal.is_integer_slot() => {
-                // Two's complement: the low 64 bits of either kind.
+                // Two's complement: the low 64 bits of both kinds.
                 let bytes = number.to_le_bytes();
                 let low = bytes.first_chunk().copied().unwrap_or_default();
                 Ok(Slot::from_unsigned(u64::from_le_bytes(low)))

@@ -22,11 +22,11 @@ use tickbus_image::signal::Slot;
 use tickbus_live_page::{LivePage, Member, Options};
 use tickbus_web::{Limits, Room, Serving};
 
-/// A simulation in a thread of its own: its driver's PLC is the mirror.
+/// A simulation in a separate thread: its driver's PLC is the mirror.
 struct Simulation {
     is_over: Arc<AtomicBool>,
     ticks: Arc<AtomicU64>,
-    /// What it writes, by index, from the next tick on; and what it reads.
+    /// The values to write, by index, from the next tick on; and the values read.
     writes: Sender<(usize, f64)>,
     reads: Receiver<Vec<f64>>,
     thread: Option<JoinHandle<()>>,
@@ -59,7 +59,7 @@ impl Simulation {
         Self::start_in(Duration::from_millis(1), page, id, name, grace)
     }
 
-    /// As [`start`](Self::start), with this time between two ticks.
+    /// Like [`start`](Self::start), with this time between two ticks.
     fn start_in(pause: Duration, page: &Page, id: i32, name: &str, grace: Option<Nanos>) -> Self {
         let text = format!(
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
@@ -92,7 +92,7 @@ impl Simulation {
                     ticks.fetch_add(1, Ordering::Relaxed);
                     if is_asked {
                         let seen = slots.iter().map(|slot| slot.real()).collect();
-                        // Not everybody wants to know.
+                        // Not every test receives these.
                         let _ = send.send(seen);
                     }
                     thread::sleep(pause);
@@ -121,7 +121,7 @@ impl Simulation {
         self.reads.recv().expect("it runs")
     }
 
-    /// Waits until so many more ticks have passed.
+    /// Waits until this many more ticks have passed.
     fn pass(&self, ticks: u64) {
         let end = self.ticks.load(Ordering::Relaxed) + ticks;
         while self.ticks.load(Ordering::Relaxed) < end {
@@ -224,7 +224,7 @@ impl Viewer {
         }
     }
 
-    /// The next event that has values.
+    /// The next event with values.
     fn values(&mut self) -> Value {
         loop {
             let event = self.event();
@@ -260,7 +260,7 @@ fn a_viewer_gets_everything_once_and_then_what_has_changed() {
     assert_eq!(signals[3]["name"], "bit back");
     assert_eq!(first["line"]["drivers"][0]["state"], "running");
     simulation.write(0, 7.0);
-    // The byte, and what comes back of it: at once, or a look later.
+    // The byte, and its echo: at once, or one look later.
     let mut seen = Vec::new();
     while seen.len() < 2 {
         let values = viewer.values();
@@ -271,7 +271,7 @@ fn a_viewer_gets_everything_once_and_then_what_has_changed() {
         }
     }
     assert_eq!(seen, [0, 1]);
-    // Who comes late gets all of it.
+    // A late viewer gets all of it.
     let late = page.view().event();
     assert_eq!(late["signals"]["drivers"][0]["signals"][1]["value"], 7);
 }
@@ -282,13 +282,13 @@ fn a_single_request_has_the_values_of_now_however_slow_the_ticks_are() {
     let pause = Duration::from_millis(150);
     let simulation = Simulation::start_in(pause, &page, 1, "Slow", EVER);
     for value in 1..=4 {
-        // The page looks by itself every half a second.
+        // The page looks on its own every half a second.
         let seen = simulation.slots(0, f64::from(value));
         assert_eq!(seen[0], f64::from(value));
         let signal = page.get("/signals")["drivers"][0]["signals"][0].take();
         assert_eq!(signal["value"], value);
     }
-    // It stands still, as in a debugger: nobody waits for long.
+    // The simulation stands still, as in a debugger: nobody waits for long.
     simulation.is_over.store(true, Ordering::Relaxed);
     let asked = Instant::now();
     page.get("/signals");
@@ -325,7 +325,7 @@ fn what_is_forced_holds_until_it_is_released() {
     let page = Page::open();
     let simulation = Simulation::start(&page, 1, "Cell", EVER);
     assert_eq!(page.change("PUT /force/1/in", "5").0, 200);
-    // The PLC gets it, and brings it back; the simulation's own value is left alone.
+    // The PLC gets the value and returns it; the simulation's own value is unchanged.
     eventually("it comes back", || simulation.slots(0, 9.0)[1] == 5.0);
     assert_eq!(simulation.slots(0, 9.0)[0], 9.0);
     let signal = page.get("/signals")["drivers"][0]["signals"][0].take();
@@ -333,7 +333,7 @@ fn what_is_forced_holds_until_it_is_released() {
         (&signal["value"], &signal["forced"]),
         (&5.into(), &5.into())
     );
-    // What the simulation reads.
+    // A value that the simulation reads.
     assert_eq!(page.change("PUT /force/1/out", "16#20").0, 200);
     eventually("it is read", || simulation.slots(0, 9.0)[1] == 32.0);
     assert_eq!(page.change("PUT /force/1/long", "9007199254740993").0, 200);
@@ -345,7 +345,7 @@ fn what_is_forced_holds_until_it_is_released() {
     eventually("nothing is forced", || simulation.slots(0, 9.0)[1] == 9.0);
     let signals = page.get("/signals")["drivers"][0]["signals"].take();
     assert!(signals[0]["forced"].is_null() && signals[4]["forced"].is_null());
-    // As often as one likes: faults that are over make room.
+    // Any number of times: ended faults make room.
     for value in 0..200 {
         let (status, text) = page.change("PUT /force/1/in", &value.to_string());
         assert_eq!(status, 200, "{text}");
@@ -441,7 +441,7 @@ fn forced_signals_are_released_when_the_last_viewer_has_been_gone_for_long_enoug
     let keeps = Simulation::start(&page, 2, "Keeps", EVER);
     page.change("PUT /force/1/in", "5");
     page.change("PUT /force/2/in", "5");
-    // Who has the token is there as long as it asks for something.
+    // A viewer with the token counts as long as it sends requests.
     let begun = Instant::now();
     let mut asked = begun;
     while begun.elapsed() < Duration::from_secs(3) {
@@ -450,7 +450,7 @@ fn forced_signals_are_released_when_the_last_viewer_has_been_gone_for_long_enoug
         thread::sleep(Duration::from_millis(100));
         assert_eq!(simulation.slots(0, 9.0)[1], 5.0);
     }
-    // Who looks without a token does not count.
+    // A viewer without a token does not count.
     let _viewer = page.view();
     eventually("it is released", || simulation.slots(0, 9.0)[1] == 9.0);
     let after = asked.elapsed();
@@ -499,7 +499,7 @@ fn a_simulation_that_does_not_tick_is_shown_as_it_was_and_says_so() {
     eventually("it is seen", || {
         page.get("/signals")["drivers"][0]["signals"][0]["value"] == 7
     });
-    // It ends without leaving the page, as in a debugger.
+    // The simulation stops without leaving the page, as in a debugger.
     simulation.is_over.store(true, Ordering::Relaxed);
     eventually("its tick stands still", || {
         let before = simulation.ticks.load(Ordering::Relaxed);

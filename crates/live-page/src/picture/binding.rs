@@ -1,7 +1,8 @@
-//! What of a picture is bound to signals.
+//! The bindings of a picture to signals.
 //!
-//! A binding is `NAME`, or `NAME: MAP`. A map is a factor (`0.5`, `90 - 45`), or cases: `0..250 -> 0..-180, else -> 0`. Of what is
-//! shown or hidden, cases have no arrow: `1, 3..5`. Of a text, a map without an arrow is a pattern: `lift 1 at {0} mm`.
+//! A binding is `NAME`, or `NAME: MAP`. A map is a factor (`0.5`, `90 - 45`), or cases: `0..250 -> 0..-180, else -> 0`.
+//! To show or hide an element, cases have no arrow: `1, 3..5`. For a text, a map without an arrow is a pattern: `lift 1
+//! at {0} mm`.
 
 mod map;
 
@@ -14,7 +15,7 @@ use self::map::Kind;
 use super::tree::{Child, Element};
 use super::{Notes, short};
 
-/// What can be bound, and what a map of it gives.
+/// The properties that can be bound, with the kind of their maps.
 const ACTIONS: &[(&str, Kind)] = &[
     ("fill", Kind::Colour),
     ("height", Kind::Share),
@@ -31,17 +32,17 @@ const ACTIONS: &[(&str, Kind)] = &[
     ("y", Kind::Number),
 ];
 
-/// What else an element may say about how it moves.
+/// The other attributes of a moving element.
 const PIVOT: &str = "pivot";
 const SMOOTH: &str = "smooth";
 
-/// The longest time in which something gets to its place, in seconds.
+/// The longest time for an element to reach its position, in seconds.
 const SLOWEST: f64 = 60.0;
 
-/// What every driver has, beside its signals.
+/// The names that every driver has besides its signals.
 const OF_BUS: &[&str] = &["bus.age", "bus.status"];
 
-/// Reads the bindings of all elements: they get the attributes `data-tb`, `data-tb-pivot` and `data-tb-smooth`.
+/// Reads the bindings of all elements: sets the attributes `data-tb`, `data-tb-pivot` and `data-tb-smooth`.
 pub(super) fn bind(root: &mut Element, signals: &[&str], notes: &mut Notes) {
     let names = signals.iter().enumerate().map(|(at, name)| (*name, at));
     let names = Names {
@@ -87,8 +88,8 @@ struct Names<'n> {
 }
 
 impl Names<'_> {
-    /// The name at the beginning of a binding, and what comes behind its colon. A name may have colons itself, so the longest
-    /// one that is known counts.
+    /// Splits a binding into the name and the part after the colon. A name may contain colons, so the longest known
+    /// name counts.
     fn split<'t>(&self, text: &'t str) -> Option<(&'t str, bool, Option<&'t str>)> {
         let colons = text.match_indices(':').map(|(at, _)| (at, Some(at + 1)));
         let ends = colons.chain([(text.len(), None)]);
@@ -108,7 +109,7 @@ impl Names<'_> {
         found
     }
 
-    /// What to write instead of a name that is not known.
+    /// The suggestion for an unknown name.
     fn advice(&self, name: &str) -> String {
         let all = self.signals.iter().copied().chain(OF_BUS.iter().copied());
         match nearest(name, all) {
@@ -118,7 +119,7 @@ impl Names<'_> {
     }
 }
 
-/// One binding, as the script on the page takes it.
+/// One binding, in the format for the page's script.
 fn binding(what: &str, text: &str, names: &Names<'_>) -> Result<Value, String> {
     let Some((_, kind)) = ACTIONS.iter().find(|(name, _)| *name == what) else {
         let all = ACTIONS.iter().map(|(name, _)| *name).chain([PIVOT, SMOOTH]);
@@ -170,7 +171,7 @@ fn smooth(text: &str) -> Result<String, String> {
     }
 }
 
-/// A number that is one: neither infinite nor none.
+/// A finite number.
 fn number(text: &str) -> Option<f64> {
     text.trim()
         .parse()

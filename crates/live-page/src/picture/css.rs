@@ -1,14 +1,14 @@
-//! Styles: what of them may stay.
+//! Styles: which parts of them may stay.
 
 use super::names;
 
-/// Whether a value, or a whole style sheet, loads nothing: it refers to nothing outside of the picture.
+/// True if a value, or a whole style sheet, loads nothing from outside the picture.
 pub(super) fn is_harmless(text: &str) -> bool {
-    // An escape can write any of what is looked for here; no drawing program needs one.
+    // An escape can spell anything that is searched for here; no drawing program needs one.
     if text.contains(['\\', '@', '<']) {
         return false;
     }
-    // What looks like a comment may be within a text, and then hides nothing: both readings count.
+    // An apparent comment may be part of a text, and then hides nothing: both readings count.
     [text, &without_comments(text)]
         .iter()
         .all(|text| loads_nothing(&text.to_ascii_lowercase()))
@@ -33,7 +33,7 @@ fn loads_nothing(text: &str) -> bool {
     local && !loads.iter().any(|word| text.contains(word))
 }
 
-/// What stands between the comments.
+/// The text without its comments.
 fn without_comments(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut rest = text;
@@ -45,7 +45,7 @@ fn without_comments(text: &str) -> String {
     kept
 }
 
-/// The names that a value refers to: those of `url(#name)`.
+/// The names that a value refers to by `url(#name)`.
 pub(super) fn references(value: &str) -> impl Iterator<Item = &str> {
     value.split("url(").skip(1).filter_map(|rest| {
         let name = rest.trim_start().trim_start_matches(['"', '\'']);
@@ -79,7 +79,7 @@ pub(super) fn declarations(style: &str) -> Vec<(&str, &str)> {
     found
 }
 
-/// What a style attribute says, as attributes. What was left out is handed to `leave_out`.
+/// The declarations of a style attribute as attributes. `leave_out` gets the rest.
 pub(super) fn attributes(
     style: &str,
     mut leave_out: impl FnMut(&str),
@@ -87,7 +87,7 @@ pub(super) fn attributes(
     let mut found = Vec::new();
     for (name, value) in declarations(style) {
         let name = name.to_ascii_lowercase();
-        // One word for all three, as Inkscape writes it.
+        // One property for all three, as Inkscape writes it.
         let names: &[&str] = if name == "marker" {
             &["marker-start", "marker-mid", "marker-end"]
         } else {

@@ -1,17 +1,17 @@
-//! How much a browser has to draw: elements that refer to each other multiply what they show.
+//! The drawing load for a browser: elements that refer to each other multiply the elements shown.
 
 use std::collections::HashMap;
 
 use super::tree::{Child, Element};
 use super::{Notes, css};
 
-/// The most elements that are drawn, with all that is shown several times.
+/// The most drawn elements, counting repeated ones each time.
 const MOST: u64 = 200_000;
 
 /// The longest chain of references.
 const LONGEST: usize = 40;
 
-/// Takes all references out of a picture that would draw more than a browser can.
+/// Removes all references from a picture that would overload a browser.
 pub(super) fn limit(root: &mut Element, notes: &mut Notes) {
     let is_small = {
         let mut load = Load {
@@ -44,7 +44,7 @@ fn cut(element: &mut Element) {
 
 struct Load<'t> {
     ids: HashMap<&'t str, &'t Element>,
-    /// What each named element draws; `None` while that is counted.
+    /// The load of each named element; `None` while that is counted.
     known: HashMap<&'t str, Option<u64>>,
 }
 
@@ -58,7 +58,7 @@ impl<'t> Load<'t> {
         }
     }
 
-    /// What an element draws; `None` if there is no end to it.
+    /// The load of an element; `None` if it is endless.
     fn of(&mut self, element: &'t Element, chain: usize) -> Option<u64> {
         let mut all = 1_u64;
         for child in element.elements() {

@@ -1,9 +1,9 @@
-//! Pictures that live: any SVG, made harmless, and what of it is bound to signals.
+//! Live pictures: any SVG, made harmless, with elements bound to signals.
 //!
-//! [`read`] takes an SVG apart and writes it anew from what it knows: elements and attributes that draw. Scripts, event
-//! handlers, references to other files, foreign objects, entities and whatever else is not known stay away, and
-//! [`Picture::left_out`] says what did. The attributes `data-tb-…` become bindings: each is read once, here, and stands in
-//! the result as JSON, so that the script on the page has nothing to parse. docs/live-page.md has their grammar.
+//! [`read`] parses an SVG and writes it again from known parts: elements and attributes that draw. Scripts, event
+//! handlers, references to other files, foreign objects, entities and everything unknown are left out, and listed in
+//! [`Picture::left_out`]. The attributes `data-tb-…` become bindings: each is parsed once, here, and appears in the
+//! result as JSON, so that the script on the page needs no parser. docs/live-page.md has their grammar.
 
 mod binding;
 mod css;
@@ -17,14 +17,14 @@ use tickbus_base::Mistake;
 /// The largest picture, in bytes.
 pub const LIMIT: usize = 4 << 20;
 
-/// A picture that can do no harm.
+/// A harmless picture.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// The SVG. Elements that are bound have a list of bindings in `data-tb`.
+    /// The SVG. Bound elements have a list of bindings in `data-tb`.
     pub svg: String,
-    /// What was left out of it, in words; nothing that only editors need.
+    /// The parts that were left out, in words; without those that only editors need.
     pub left_out: Vec<String>,
-    /// Bindings that are wrong, each with its line and with what would be right. They do nothing.
+    /// Wrong bindings, each with its line and the remedy. They have no effect.
     pub mistakes: Vec<String>,
 }
 
@@ -54,7 +54,7 @@ pub fn read(text: &str, signals: &[&str]) -> Result<Picture, Mistake> {
 /// The most notes of one kind.
 const MOST_NOTES: usize = 100;
 
-/// What is told about a picture.
+/// The notes about a picture.
 #[derive(Debug, Default)]
 struct Notes {
     left_out: Vec<String>,
@@ -79,7 +79,7 @@ fn note(notes: &mut Vec<String>, line: usize, what: &str) {
     }
 }
 
-/// The beginning of a text that may be long, to be quoted.
+/// The beginning of a text that may be long, for quoting.
 fn short(text: &str) -> String {
     const MOST: usize = 60;
     match text.char_indices().nth(MOST) {

@@ -1,6 +1,6 @@
-//! What draws: the elements and properties that a picture may have.
+//! The elements and properties that a picture may have.
 
-/// Elements that draw, or that what draws refers to.
+/// Elements that draw, or that drawing elements refer to.
 const ELEMENTS: &[&str] = &[
     "circle",
     "clipPath",
@@ -113,7 +113,7 @@ const PROPERTIES: &[&str] = &[
     "writing-mode",
 ];
 
-/// What a name that is known as such may be written, as it is written there: from the list, never from the file.
+/// The known name that equals `name`: a string of the list, never one of the file.
 fn find(list: &'static [&'static str], name: &str) -> Option<&'static str> {
     let at = list.binary_search(&name).ok()?;
     Some(list[at])
@@ -129,7 +129,7 @@ pub(super) fn property(name: &str) -> Option<&'static str> {
     find(PROPERTIES, name)
 }
 
-/// Elements whose text counts.
+/// True for elements whose text counts.
 pub(super) fn has_text(element: &str) -> bool {
     matches!(
         element,
@@ -137,8 +137,8 @@ pub(super) fn has_text(element: &str) -> bool {
     )
 }
 
-/// Whether an attribute without a prefix may stay: it can neither run anything nor load anything by itself. What its value
-/// refers to is looked at elsewhere.
+/// True if an attribute without a prefix may stay: it can neither run nor load anything on its own. References in its
+/// value are checked elsewhere.
 pub(super) fn is_attribute(name: &str) -> bool {
     let is_plain = name
         .bytes()
@@ -162,7 +162,7 @@ pub(super) fn is_attribute(name: &str) -> bool {
     is_plain && !is_kept_away
 }
 
-/// Whether a namespace is one of an editor's: what it says is for the editor alone.
+/// True if a namespace belongs to an editor: its contents concern only the editor.
 pub(super) fn is_editors(namespace: &str) -> bool {
     [
         "http://www.inkscape.org/",

@@ -1,4 +1,4 @@
-//! Pictures as a whole: what stays, what does not, and what is told.
+//! Whole pictures: the parts that stay or go, and the notes.
 
 use super::*;
 
@@ -27,7 +27,7 @@ fn what_draws_stays_as_it_was() {
     );
     assert_eq!(picture.left_out, [""; 0]);
     assert_eq!(picture.mistakes, [""; 0]);
-    // It is its own picture.
+    // A second reading changes nothing.
     assert_eq!(
         read(&picture.svg, &SIGNALS).expect("an SVG").svg,
         picture.svg
@@ -103,7 +103,7 @@ fn a_billion_laughs_are_none() {
             "line 14: the entity &lol9;"
         ]
     );
-    // The same by elements that show others.
+    // The same by elements that show other elements.
     let uses = (1..12).map(|n| {
         let ten = format!("<use href=\"#g{}\"/>", n - 1).repeat(10);
         format!("<g id=\"g{n}\">{ten}</g>")

@@ -1,4 +1,4 @@
-//! An SVG as a tree of what draws.
+//! An SVG as a tree of drawing elements.
 
 use std::collections::BTreeSet;
 
@@ -12,7 +12,7 @@ use super::{Notes, css, names, short};
 const SVG: &str = "http://www.w3.org/2000/svg";
 const XLINK: &str = "http://www.w3.org/1999/xlink";
 
-/// Elements within each other, and elements in all: browsers get slow beyond, or fail.
+/// The deepest nesting of elements, and the most elements: beyond these, browsers get slow or fail.
 const DEEPEST: usize = 100;
 const MOST: usize = 50_000;
 
@@ -21,10 +21,10 @@ const MOST: usize = 50_000;
 pub(super) struct Element {
     pub(super) name: &'static str,
     pub(super) attributes: Vec<(String, String)>,
-    /// The attributes `data-tb-…`: what is behind that, and their values.
+    /// The attributes `data-tb-…`: the rest of the name, and the value.
     pub(super) bound: Vec<(String, String)>,
     pub(super) children: Vec<Child>,
-    /// Where it begins, from 1.
+    /// The line where the element begins, from 1.
     pub(super) line: usize,
 }
 
@@ -46,7 +46,7 @@ impl Element {
         self.attributes.push((name.to_owned(), value));
     }
 
-    /// The elements within it.
+    /// The child elements.
     pub(super) fn elements(&self) -> impl Iterator<Item = &Self> {
         self.children.iter().filter_map(|child| match child {
             Child::Element(element) => Some(element),
@@ -55,7 +55,7 @@ impl Element {
     }
 }
 
-/// Reads an SVG, and leaves out what does not draw.
+/// Reads an SVG, and leaves out everything that does not draw.
 pub(super) fn read(text: &str, notes: &mut Notes) -> Result<Element, Mistake> {
     let mut reader = NsReader::from_str(text);
     let mut lines = Lines {
@@ -112,7 +112,7 @@ pub(super) fn read(text: &str, notes: &mut Notes) -> Result<Element, Mistake> {
     })
 }
 
-/// Where the places of a text are, asked for in their order.
+/// Finds the lines of byte offsets, which must be requested in ascending order.
 struct Lines<'t> {
     text: &'t str,
     at: usize,
@@ -136,18 +136,18 @@ impl Lines<'_> {
     }
 }
 
-/// Whose an element is.
+/// The owner of an element.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Owner {
     Svg,
-    /// An editor's, for the editor alone.
+    /// An editor: only the editor needs the element.
     Editor,
     Other,
 }
 
 fn of(namespace: &ResolveResult<'_>) -> Owner {
     match namespace {
-        // Without a namespace, and with one that is written as an entity, it is meant to be SVG.
+        // Without a namespace, or with one written as an entity, SVG is meant.
         ResolveResult::Unbound => Owner::Svg,
         ResolveResult::Bound(Namespace(name)) if *name == SVG || name.starts_with('&') => {
             Owner::Svg
@@ -159,13 +159,13 @@ fn of(namespace: &ResolveResult<'_>) -> Owner {
 
 struct Building<'n> {
     notes: &'n mut Notes,
-    /// From the root to where it is read.
+    /// The open elements, from the root to the current one.
     open: Vec<Element>,
     root: Option<Element>,
-    /// How many elements are open that are left out, with all that is in them.
+    /// The number of open elements that are left out, with their contents.
     skipped: usize,
     elements: usize,
-    /// Entities that were told.
+    /// Entities noted so far.
     entities: BTreeSet<String>,
 }
 
@@ -191,7 +191,7 @@ impl Building<'_> {
             ));
         }
         let local = start.local_name();
-        // What a link leads to is left out, and what it shows stays.
+        // A link's target is left out, but its content stays.
         let name = if local.as_ref() == "a" {
             Some("g")
         } else {
@@ -244,7 +244,7 @@ impl Building<'_> {
             let is_reference = local.as_ref() == "href"
                 && (is_xlink || is_own || attribute.key.as_ref() == "xlink:href");
             if is_reference {
-                // The newer attribute counts before the older one.
+                // The newer attribute takes precedence over the older one.
                 if is_own || reference.is_none() {
                     reference = Some(value);
                 }
@@ -259,7 +259,7 @@ impl Building<'_> {
         Ok(())
     }
 
-    /// An attribute's value, without what is escaped in it; `None` if that cannot be told.
+    /// An attribute's value with escapes resolved; `None` if that fails.
     fn value(&mut self, raw: &str, line: usize) -> Option<String> {
         let mut unknown = None;
         let value = quick_xml::escape::unescape_with(raw, |entity| {
@@ -284,7 +284,7 @@ impl Building<'_> {
                 let what = format!("a style that loads something: {}", short(value));
                 self.notes.leave_out(line, &what);
             });
-            // A style counts before an attribute of the same name.
+            // A style takes precedence over an attribute of the same name.
             for (name, value) in found {
                 element.set(name, value);
             }
@@ -302,7 +302,7 @@ impl Building<'_> {
         }
     }
 
-    /// A reference within the picture, or an image that the picture itself has.
+    /// A reference within the picture, or an embedded image.
     fn refer(&mut self, element: &mut Element, reference: String) {
         let is_image = element.name == "image" && {
             let begins = ["png", "jpeg", "jpg", "gif", "webp"];
@@ -371,7 +371,7 @@ impl Building<'_> {
         }
     }
 
-    /// A character that is written by its number or name; what is declared in the DOCTYPE is none.
+    /// A character written by its number or name; entities that the DOCTYPE declares are not accepted.
     fn entity(&mut self, entity: &quick_xml::events::BytesRef<'_>, line: usize) {
         let known = quick_xml::escape::resolve_predefined_entity(entity);
         if let Some(text) = known {

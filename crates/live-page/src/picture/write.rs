@@ -4,7 +4,7 @@ use quick_xml::escape::{escape, partial_escape};
 
 use super::tree::{Child, Element};
 
-/// The SVG, of which nothing is taken over as it was written.
+/// The SVG, newly written without any part of the original text.
 pub(super) fn svg(root: &Element) -> String {
     let mut text = String::new();
     write(root, true, &mut text);

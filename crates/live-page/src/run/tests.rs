@@ -1,4 +1,4 @@
-//! Which variables of a run count.
+//! Which variables of a run are valid.
 
 use std::num::NonZeroU32;
 
@@ -6,11 +6,12 @@ use tickbus_virtual_time::{Client, Variable};
 
 use super::*;
 
-/// A run of a machine and a PLC, each with one variable, in the step with this number; the PLC has owed its answer for so long.
+/// A run of a machine and a PLC, each with one variable, in the step with this number; the PLC has owed its answer for
+/// `waited`.
 fn view(members: &Arc<Members>, sequence: u64, waited: Nanos) -> RunView {
     RunView {
         members: Arc::clone(members),
-        // The first step is that in which the clients write their initial values.
+        // The first step is the one in which the clients write their initial values.
         state: if sequence == 0 {
             State::InitialWrite
         } else {
@@ -45,7 +46,7 @@ fn members() -> Arc<Members> {
     })
 }
 
-/// What is shown of the two variables, and which of the two clients is stale.
+/// The shown flags of the two variables, and which of the two clients is stale.
 fn shown(run: &ShownRun) -> ([u8; 2], [bool; 2]) {
     let flags: Vec<u8> = run.sheet.rows.iter().map(|row| row.flags).collect();
     let stale: Vec<bool> = run.stations().iter().map(|it| it.stale).collect();

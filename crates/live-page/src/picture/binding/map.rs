@@ -1,24 +1,24 @@
-//! What a value becomes.
+//! The maps from a signal's value to a property.
 
 use serde_json::{Value, json};
 
 use super::super::{css, short};
 use super::number;
 
-/// What a map gives.
+/// The result of a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// A length, an angle.
     Number,
-    /// A share of what was drawn: a range alone means from 0 to 1.
+    /// A share of the drawn size: a range alone means from 0 to 1.
     Share,
     Colour,
-    /// Whether it is one of these values.
+    /// True for one of these values.
     Condition,
     Text,
 }
 
-/// Reads a map: `{ factor, offset }`, or `{ cases: [[from, to, out], …] }` as picture.js takes them.
+/// Reads a map: `{ factor, offset }`, or `{ cases: [[from, to, out], …] }` as picture.js expects them.
 pub(super) fn read(text: &str, kind: Kind) -> Result<Value, String> {
     let parts = split(text, ',');
     if text.trim().is_empty() {
@@ -84,7 +84,7 @@ pub(super) fn read(text: &str, kind: Kind) -> Result<Value, String> {
     Ok(json!({ "cases": cases }))
 }
 
-/// How it is written.
+/// How to write a map.
 const fn advice(kind: Kind) -> &'static str {
     match kind {
         Kind::Number => "write a factor such as 0.5, or ranges such as 0..250 -> 0..-180",
@@ -110,7 +110,7 @@ fn factor(text: &str) -> Option<Value> {
     Some(json!({ "factor": factor, "offset": offset }))
 }
 
-/// A value or a range. BOOLs are written as people say them.
+/// A value or a range. BOOLs may be words.
 fn span(text: &str) -> Option<(f64, f64)> {
     if let Some((from, to)) = text.split_once("..") {
         return Some((number(from)?, number(to)?));
@@ -123,7 +123,7 @@ fn span(text: &str) -> Option<(f64, f64)> {
     Some((value, value))
 }
 
-/// A colour, a gradient or pattern of the picture, or two colours with all between them.
+/// A colour, a gradient or pattern of the picture, or a range between two colours.
 fn colour(text: &str) -> Option<Value> {
     if let Some((from, to)) = text.split_once("..") {
         return Some(json!([hex(from.trim())?, hex(to.trim())?]));
@@ -175,7 +175,7 @@ fn split(text: &str, separator: char) -> Vec<&str> {
     parts
 }
 
-/// Whether a quote here begins a text: an apostrophe within a word does not.
+/// True if a quote here begins a text: an apostrophe within a word does not.
 fn begins_word(before: &str) -> bool {
     let before = before.trim_end();
     before.is_empty() || before.ends_with("->")

@@ -1,11 +1,11 @@
-//! What every room of tickbus stands on: time that is handed in, the operating system's corner, and reading TOML.
+//! The base of all tickbus crates: injected time, the operating system's corner, and reading TOML.
 //!
-//! | room | what lives there |
+//! | room | contents |
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`net`] | TCP sockets, of the operating system or simulated |
-//! | [`os`] | what only the operating system can do: waiting for sockets, and time |
-//! | [`thread`] | threads whose end can be waited for with a limit |
+//! | [`os`] | what only the operating system can do, such as waiting for sockets and time |
+//! | [`thread`] | threads whose end can be awaited with a time limit |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 

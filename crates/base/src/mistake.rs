@@ -1,12 +1,12 @@
-//! The one form of errors that an author can correct.
+//! The common form of errors that an author can correct.
 
-/// What is wrong, and what would be right.
+/// A mistake and its remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}; {right}")]
 pub struct Mistake {
-    /// What is wrong.
+    /// The mistake.
     pub what: String,
-    /// What would be right.
+    /// The remedy.
     pub right: String,
 }
 

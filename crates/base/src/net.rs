@@ -19,7 +19,7 @@ pub enum TcpStream {
 #[derive(Debug)]
 pub struct BlockingStream {
     stream: TcpStream,
-    /// How long a read and a write of a simulated one block.
+    /// The time limits of reads and writes, for a simulated stream.
     limits: (Nanos, Nanos),
     blocks: AtomicBool,
 }
@@ -48,11 +48,11 @@ impl TcpStream {
         }
     }
 
-    /// The same, for a room that knows no simulation.
+    /// The operating system's socket, for code that supports no simulation.
     ///
     /// # Errors
     ///
-    /// It is simulated.
+    /// The socket is simulated.
     pub fn into_os(self) -> io::Result<net::TcpStream> {
         match self {
             Self::Os(stream) => Ok(stream),
@@ -96,7 +96,7 @@ impl TcpStream {
         }
     }
 
-    /// Lets reads block for up to `read`, and writes for up to `write`, or as long as it takes.
+    /// Lets reads block for up to `read`, and writes for up to `write`, or without a limit.
     ///
     /// # Errors
     ///
@@ -114,7 +114,7 @@ impl TcpStream {
         })
     }
 
-    /// Never to block; a simulated one never does.
+    /// Switches to non-blocking; a simulated stream never blocks.
     ///
     /// # Errors
     ///
@@ -191,12 +191,12 @@ impl Write for TcpStream {
 }
 
 impl BlockingStream {
-    /// The connection itself, to be waited for.
+    /// The connection itself, for waiting.
     pub const fn stream(&self) -> &TcpStream {
         &self.stream
     }
 
-    /// Lets no call block any more.
+    /// Makes all further calls non-blocking.
     ///
     /// # Errors
     ///
@@ -206,7 +206,7 @@ impl BlockingStream {
         self.stream.set_nonblocking()
     }
 
-    /// The system waits within its calls; a simulation before them.
+    /// The system waits within its calls; a simulation waits before them.
     fn wait(&self, interest: Interest, limit: Nanos) {
         if let TcpStream::Simulated(stream) = &self.stream
             && self.blocks.load(Ordering::Relaxed)
@@ -247,7 +247,7 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// None of them can be listened on.
+    /// None of the addresses is free.
     pub fn bind(addresses: &[SocketAddr], simulation: Option<&dyn Simulation>) -> io::Result<Self> {
         if let Some(simulation) = simulation {
             return Ok(Self::Simulated(simulation.listen(addresses)?));
@@ -261,7 +261,7 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// It is simulated.
+    /// The socket is simulated.
     pub fn into_os(self) -> io::Result<net::TcpListener> {
         match self {
             Self::Os(listener) => Ok(listener),

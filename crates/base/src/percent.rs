@@ -1,6 +1,6 @@
-//! Percent-encoding, as addresses have it.
+//! Percent-encoding, as in URLs.
 
-/// The bytes that a percent-encoded text stands for; a `%` without two hexadecimal digits stands for itself.
+/// The decoded bytes of a percent-encoded text; a `%` without two hexadecimal digits is kept.
 pub fn percent_decoded(text: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();

@@ -1,39 +1,40 @@
-//! A clock for who looks at it millions of times per second.
+//! A clock for code that reads it millions of times per second.
 
 use std::sync::Arc;
 
 use crate::os::TimeStampCounter;
 use crate::time::{Clock, Nanos};
 
-/// The longest span between two looks at the clock.
+/// The longest span between two reads of the system's clock.
 const SPAN: u64 = 1_000_000;
 
-/// The shortest span from which the counter's pace is learnt.
+/// The shortest span for measuring the counter's pace.
 const SHORTEST: u64 = SPAN / 2;
 
-/// The longest span from which the counter's pace is learnt: in a longer one the computer may have slept.
+/// The longest span for measuring the counter's pace: in a longer one the computer may have slept.
 const LONGEST: u64 = 1_000_000_000;
 
-/// The most counts that a look at the clock may take, some ten times as many as it does. If it takes longer, the thread was
-/// interrupted, and clock and counter do not belong together: the pace would be taken too fast by as much.
+/// The most counts that a read of the clock may take, some ten times the usual number. In a longer read the thread was
+/// interrupted, so clock and counter do not belong together: the measured pace would be too fast by as much.
 const MOST: u64 = 1_000;
 
-/// The share by which the counter is taken to be slower than it was, as a power of two: a system that corrects its clock makes
-/// it faster by less.
+/// The share by which the counter is assumed slower than measured, as a power of two: a system that corrects its clock
+/// speeds it up by less.
 const MARGIN: u32 = 10;
 
-/// The share by which the pace of the counter may differ between two spans, as a power of two.
+/// The share by which the counter's pace may differ between two spans, as a power of two.
 const TOLERANCE: u32 = 6;
 
-/// A clock for who looks at it millions of times per second: between two looks at the system's, which are a millisecond
-/// apart or less, it takes the time from the processor's counter, in a third of the time.
+/// A clock for code that reads it millions of times per second: between two reads of the system's clock, which are a
+/// millisecond apart or less, the time comes from the processor's counter, which takes a third of the time.
 ///
-/// It is never behind the clock that it was made of, and about 2 us ahead of it at most: ages that are measured with it are not
-/// understated. It never goes back. A system that corrects its clock by more than one part in a thousand can put it
-/// behind by as much of one millisecond; systems correct theirs by half of that, unless they are made to set the time
-/// right in a hurry.
+/// The time is never behind the underlying clock, and at most about 2 us ahead of it, so measured ages are not
+/// understated. The time never goes back. A system that corrects its clock by more than one part in a thousand can put
+/// the time behind by as much of one millisecond; systems correct their clocks by half of that, unless they have to set
+/// the time quickly.
 ///
-/// It belongs to one thread. Times of the clock that it was made of, read by others, can be compared with its own.
+/// Each clock belongs to one thread. Its times can be compared with times that other threads read from the underlying
+/// clock.
 #[derive(Debug)]
 pub struct QuickClock {
     clock: Arc<dyn Clock>,
@@ -52,7 +53,7 @@ impl QuickClock {
         }
     }
 
-    /// The time now.
+    /// The current time.
     #[inline]
     pub fn now(&mut self) -> Nanos {
         let Some(counter) = self.counter else {
@@ -64,7 +65,7 @@ impl QuickClock {
         }
     }
 
-    /// Looks at the clock.
+    /// Reads the underlying clock.
     #[cold]
     fn look(&mut self, counter: TimeStampCounter) -> Nanos {
         let before = counter.read();
@@ -73,27 +74,27 @@ impl QuickClock {
     }
 }
 
-/// What is known of the counter.
+/// The measured course of the counter.
 #[derive(Debug, Default)]
 struct Course {
-    /// The last look at the clock: the counter before it, and the time.
+    /// The last read of the clock: the counter before it, and the time.
     count: u64,
     time: Nanos,
-    /// The counter after it.
+    /// The counter after that read.
     count_after: u64,
-    /// For how many counts the time is taken from the counter.
+    /// The number of counts for which the counter gives the time.
     limit: u64,
-    /// Nanoseconds per count, not less than they are, in 2^32nds; in the last span, whether that is used or not.
+    /// Nanoseconds per count in the last span, rounded up, in 2^32nds; kept even if unused.
     rate: u64,
-    /// The latest time that was given: no earlier one is given after it.
+    /// The latest time returned: no earlier one may follow.
     latest: Nanos,
 }
 
 impl Course {
-    /// The time at `count`; `None` if the clock has to be looked at.
+    /// The time at `count`; `None` if the clock has to be read.
     #[inline]
     fn time_at(&mut self, count: u64) -> Option<Nanos> {
-        // Also none if the counter went back.
+        // Also `None` if the counter went back.
         let since = count.wrapping_sub(self.count);
         if since >= self.limit {
             return None;
@@ -104,7 +105,7 @@ impl Course {
         Some(self.latest)
     }
 
-    /// The clock showed `now`, and the counter `counts` before and after that. Returns the time to be given.
+    /// The clock showed `now`, with the counter at `counts` before and after that. Returns the time to use.
     fn learn(&mut self, counts: [u64; 2], now: Nanos) -> Nanos {
         self.latest = self.latest.max(now);
         let [before, after] = counts;
@@ -114,7 +115,7 @@ impl Course {
             return self.latest;
         }
         let rate = Self::rate_of(before.wrapping_sub(self.count_after), span);
-        // Two spans in a row have to agree before the counter is used.
+        // Two spans in a row must agree before the counter is used.
         let is_even = rate > 0 && rate.abs_diff(self.rate) <= rate >> TOLERANCE;
         self.limit = if is_even { (SPAN << 32) / rate } else { 0 };
         self.rate = rate;
@@ -123,7 +124,7 @@ impl Course {
         self.latest
     }
 
-    /// The rate of a counter that counted so far in a span; zero if that cannot be.
+    /// The rate of a counter that counted this many in a span; zero if that is impossible.
     fn rate_of(counts: u64, span: u64) -> u64 {
         // From 16 MHz to 64 GHz.
         if span > LONGEST || counts < span >> 6 || counts > span << 6 {
@@ -139,13 +140,13 @@ mod tests {
     use super::*;
     use crate::time::{Manual, Monotonic};
 
-    /// A computer with a counter of 3 counts per nanosecond, and a clock of its own.
+    /// A computer with a counter of 3 counts per nanosecond, and a separate clock.
     struct Computer {
         course: Course,
         nanos: u64,
         count: u64,
         looks: usize,
-        /// How long it takes to the clock, and back.
+        /// The time for a read of the clock, one way.
         way: u64,
     }
 
@@ -180,7 +181,7 @@ mod tests {
             })
         }
 
-        /// Looks until the counter is used.
+        /// Reads the clock until the counter is used.
         fn learnt() -> Self {
             let mut computer = Self::new();
             for _ in 0..4 {

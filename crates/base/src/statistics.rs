@@ -1,7 +1,7 @@
-//! What a driver or a PLC program knows of itself: counts, measured numbers, times and facts, each under its key.
+//! The statistics of a driver or a PLC program: counts, measured numbers, times and facts, each with a key.
 //!
-//! As text an entry is a line `key=value`, in which a name within the key has a `\` before each `=` and each `\`.
-//! This text goes to people, to files, and to Java; [`entries`] reads it.
+//! In text form an entry is a line `key=value`; a name within the key has a `\` before each `=` and each `\`. People,
+//! files and Java read this text; [`entries`] parses it.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -42,7 +42,7 @@ impl From<String> for Key {
     }
 }
 
-/// Writes it as it stands before the `=` of its line.
+/// Writes the key as it appears before the `=` of its line.
 impl fmt::Display for Key {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
@@ -52,13 +52,13 @@ impl fmt::Display for Key {
 /// The value of an entry.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Value {
-    /// How many.
+    /// A number of things.
     Count(u64),
-    /// A number in the unit that the key names, and how many decimal places are shown.
+    /// A number in the unit that the key names, and its number of decimal places.
     Number(f64, usize),
     /// A time, shown with its unit.
     Time(Nanos),
-    /// Words, in one line.
+    /// Text in one line.
     Text(String),
 }
 
@@ -73,7 +73,7 @@ impl fmt::Display for Value {
     }
 }
 
-/// Statistics at one moment, in an order fit for printing.
+/// Statistics at one moment, in the order for printing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Statistics(Vec<(Key, Value)>);
 
@@ -98,7 +98,7 @@ impl Statistics {
         self.0.push((key.into(), Value::Time(time)));
     }
 
-    /// Adds words; what would end their line is replaced by a space.
+    /// Adds text; characters that would end the line are replaced by a space.
     pub fn text(&mut self, key: impl Into<Key>, text: &str) {
         let ends_line = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
         let text = text.replace(ends_line, " ");
@@ -141,8 +141,8 @@ impl fmt::Display for Statistics {
     }
 }
 
-/// The statistics in a text, as keys and values; other lines are skipped, so that the complete output of a command
-/// may be given.
+/// The statistics in a text, as keys and values; other lines are skipped, so the complete output of a command may be
+/// passed.
 pub fn entries(text: &str) -> impl Iterator<Item = (String, &str)> {
     text.lines().filter_map(|line| entry(line.trim()))
 }

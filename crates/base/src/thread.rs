@@ -6,10 +6,10 @@ use std::thread::JoinHandle;
 
 use crate::time::{Clock, Nanos};
 
-/// A thread of a driver, whose end can be waited for with a limit.
+/// A driver's thread, whose end can be awaited with a time limit.
 #[derive(Debug)]
 pub struct Thread {
-    /// Disconnected when the thread has dropped all that it had.
+    /// Disconnected once the thread has dropped everything that it had.
     ended: Receiver<()>,
     /// `None` in a simulation.
     handle: Option<JoinHandle<()>>,
@@ -20,7 +20,7 @@ impl Thread {
     ///
     /// # Errors
     ///
-    /// The system has no further one.
+    /// The system could not start a thread.
     pub fn spawn(
         clock: &dyn Clock,
         name: &str,
@@ -45,12 +45,13 @@ impl Thread {
         Ok(Self { ended, handle })
     }
 
-    /// Whether it is still running.
+    /// True if the thread is still running.
     pub fn is_running(&self) -> bool {
         self.ended.try_recv() == Err(TryRecvError::Empty)
     }
 
-    /// Waits for its end; after `limit` it is left behind with everything it uses. Returns whether it has ended.
+    /// Waits for the end of the thread; returns whether it came within `limit`. Otherwise the thread is abandoned with
+    /// everything it uses.
     pub fn join_within(self, clock: &dyn Clock, limit: Nanos) -> bool {
         let has_ended = self.ends_within(clock, limit);
         if has_ended {
@@ -60,18 +61,18 @@ impl Thread {
         has_ended
     }
 
-    /// Waits for its end; returns whether that came within `limit`.
+    /// Waits for the end of the thread; returns whether it came within `limit`.
     pub fn ends_within(&self, clock: &dyn Clock, limit: Nanos) -> bool {
         wait_for(clock, &self.ended, limit)
     }
 
-    /// Waits for its end without a limit; returns false if it panicked.
+    /// Waits for the end of the thread without a limit; returns false if the thread panicked.
     pub fn join(self) -> bool {
         self.handle.is_none_or(|handle| handle.join().is_ok())
     }
 }
 
-/// Waits until there is news on `receiver`, or its sender is gone; returns whether that was within `limit`.
+/// Waits for news on `receiver`, or the loss of its sender; returns whether that came within `limit`.
 pub fn wait_for(clock: &dyn Clock, receiver: &Receiver<()>, limit: Nanos) -> bool {
     match clock.simulation() {
         Some(simulation) => simulation.wait_for(limit, &mut || {

@@ -6,7 +6,7 @@ use std::ffi::c_int;
 use std::panic::catch_unwind;
 use std::sync::{Mutex, PoisonError};
 
-/// What to call, with the process that asked for it: a forked child inherits the list, but none of the threads.
+/// A function to call, with the process that registered it: a forked child inherits the list, but none of the threads.
 type Call = (u32, fn());
 
 static CALLS: Mutex<Vec<Call>> = Mutex::new(Vec::new());
@@ -19,7 +19,7 @@ extern "C" fn exiting() {
     let calls = std::mem::take(&mut *CALLS.lock().unwrap_or_else(PoisonError::into_inner));
     for (process, call) in calls {
         if process == std::process::id() {
-            // A panic must not unwind into the C library, and nobody is left who could be told.
+            // A panic must not unwind into the C library, and nobody is left to report it to.
             drop(catch_unwind(call));
         }
     }

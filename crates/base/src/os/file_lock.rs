@@ -1,4 +1,4 @@
-//! Locks on files, which processes respect that ask for them.
+//! Locks on files, respected by processes that use them.
 
 use std::fs::File;
 use std::io;
@@ -6,14 +6,14 @@ use std::io;
 /// How a file is locked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lock {
-    /// Several may read.
+    /// Several readers.
     Shared,
-    /// One writes.
+    /// One writer.
     Exclusive,
 }
 
-/// Locks a file until it is unlocked or closed, in all of its clones; false if that had to wait. Another process can hold
-/// the other lock, or this process through another handle.
+/// Locks a file, in all of its clones, until it is unlocked or closed; false if that would have to wait. The other lock
+/// may be held by another process, or by this process through another handle.
 ///
 /// # Errors
 ///
@@ -40,17 +40,17 @@ pub fn unlock_file(file: &File) {
     let _ = rustix::fs::flock(file, rustix::fs::FlockOperation::Unlock);
 }
 
-/// No locks are asked for here.
+/// This system has no locks.
 #[cfg(not(unix))]
 pub fn lock_file(_file: &File, _lock: Lock) -> io::Result<bool> {
     Err(io::ErrorKind::Unsupported.into())
 }
 
-/// Nothing is locked here.
+/// Nothing is locked on this system.
 #[cfg(not(unix))]
 pub fn unlock_file(_file: &File) {}
 
-/// The process that holds a lock on this file, if the system tells.
+/// The process that holds a lock on this file, if the system reports it.
 pub fn lock_holder(file: &File) -> Option<u32> {
     #[cfg(target_os = "linux")]
     {

@@ -13,9 +13,9 @@ use crate::Mistake;
 pub struct Library(Loaded);
 
 impl Library {
-    /// Loads the library at `path`; a name without a folder is searched for as the system does it. Its initialisers run: the caller vouches for the file, as for any program
-    /// that they start. All symbols that it imports are resolved at once, so that a missing one is an error
-    /// here and not a crash later; its exports are not visible to other libraries.
+    /// Loads the library at `path`; the system searches for a name without a folder. The library's initialisers run:
+    /// the caller vouches for the file, as for any program that it starts. All imported symbols are resolved at once,
+    /// so that a missing one is an error here and not a crash later; the exports are not visible to other libraries.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// The library exports none of these names: says the first one, and what to do.
+    /// The library exports none of these names: the message has the first one, and the remedy.
     ///
     /// # Safety
     ///
@@ -60,7 +60,7 @@ impl Library {
         })
     }
 
-    /// Whether it exports this symbol.
+    /// True if the library exports this symbol.
     pub fn has(&self, name: &str) -> bool {
         // SAFETY: any symbol is an address, and nothing is done with it.
         unsafe { self.symbol::<*const ()>(name) }.is_ok()
@@ -70,7 +70,7 @@ impl Library {
 /// Declares a struct of the functions of a vendor's library, with `load`, which finds all of them; further names of a
 /// function are tried in their order. The struct keeps the library loaded.
 ///
-/// The file that uses it answers for the types, so it is one that may have unsafe code.
+/// The file that uses the macro answers for the types, so it must be one that may have unsafe code.
 #[macro_export]
 macro_rules! vendor_functions {
     ($(#[$doc:meta])* struct $name:ident { $($field:ident: $type:ty = $($symbol:literal)or+,)+ }) => {
@@ -113,7 +113,7 @@ fn open(path: &Path) -> Result<Loaded, libloading::Error> {
 #[cfg(windows)]
 fn open(path: &Path) -> Result<Loaded, libloading::Error> {
     use libloading::os::windows::{LOAD_WITH_ALTERED_SEARCH_PATH, Library};
-    // Libraries that it imports are also looked for in its own folder; one without a folder is looked for itself.
+    // Imported libraries are also searched for in the library's own folder; a name without a folder is searched for.
     let flags = if path.is_absolute() {
         LOAD_WITH_ALTERED_SEARCH_PATH
     } else {

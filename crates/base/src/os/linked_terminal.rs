@@ -11,8 +11,8 @@ use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use super::PseudoTerminal;
 use super::pseudo_terminal::names_pseudo_terminal;
 
-/// The far end of a pseudo-terminal whose near end has a stable name: a symbolic link, which goes with it. Reading and
-/// writing never block; a [`PollSet`](super::PollSet) can wait for it.
+/// The far end of a pseudo-terminal whose near end has a stable name: a symbolic link that is removed with this value.
+/// Reading and writing never block; a [`PollSet`](super::PollSet) can wait for it.
 #[derive(Debug)]
 pub struct LinkedTerminal {
     terminal: PseudoTerminal,
@@ -21,18 +21,18 @@ pub struct LinkedTerminal {
 }
 
 impl LinkedTerminal {
-    /// A new one, to be opened as the serial port `link`. A link to another pseudo-terminal is replaced, even if that is
-    /// in use.
+    /// Opens a pseudo-terminal that other programs can open as the serial port `link`. An existing link to a
+    /// pseudo-terminal is replaced, even one in use.
     ///
     /// # Errors
     ///
-    /// There is something else in its place, its folder cannot be written, or the system has no more pseudo-terminals.
+    /// The path is occupied by something else, the folder is not writable, or the system has no free pseudo-terminals.
     pub fn open(link: &Path) -> io::Result<Self> {
         let (terminal, near) = PseudoTerminal::open()?;
         let far = terminal.far();
         fcntl_setfl(far, fcntl_getfl(far)? | OFlags::NONBLOCK)?;
         match link.symlink_metadata() {
-            // Another program may have ended without a chance to remove it.
+            // Another program may have ended without removing the link.
             Ok(_) if std::fs::read_link(link).is_ok_and(|old| names_pseudo_terminal(&old)) => {
                 std::fs::remove_file(link)?;
             }
@@ -54,7 +54,7 @@ impl LinkedTerminal {
 
 impl Drop for LinkedTerminal {
     fn drop(&mut self) {
-        // Another one may have replaced it.
+        // Another program may have replaced the link.
         if std::fs::read_link(&self.link).is_ok_and(|near| near == self.near) {
             let _ = std::fs::remove_file(&self.link);
         }
@@ -62,7 +62,7 @@ impl Drop for LinkedTerminal {
 }
 
 impl Read for LinkedTerminal {
-    /// Reads what has arrived. Fails with [`WouldBlock`](io::ErrorKind::WouldBlock) if nothing has.
+    /// Reads the bytes that have arrived; without any, fails with [`WouldBlock`](io::ErrorKind::WouldBlock).
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         self.far().read(bytes)
     }

@@ -19,10 +19,10 @@ static QUEUE: OnceLock<Queue> = OnceLock::new();
 /// The number of messages of one kind that are always logged.
 const TOLD: u64 = 20;
 
-/// Sends log messages to stderr, from the level in the variable `TICKBUS_LOG` (`off`, `error`, `warn`,
-/// `info`, `debug`), or else from `level` on. That is the level of tickbus' own messages; of the crates that
-/// it uses only warnings and errors are shown, unless the variable names them (`info,opcua_client=debug`). If
-/// the host already has a logger in this process, that one stays.
+/// Sends log messages to stderr, from the level in the variable `TICKBUS_LOG` (`off`, `error`, `warn`, `info`,
+/// `debug`), or else from `level` on. The level applies to tickbus' own messages; other crates show only warnings and
+/// errors, unless the variable names them (`info,opcua_client=debug`). If the host already has a logger in this
+/// process, that one stays.
 ///
 /// Logging never blocks: a thread writes to stderr, and messages that do not fit into its queue are dropped
 /// and counted, see [`dropped_log_lines`].
@@ -40,7 +40,7 @@ pub fn log_to_stderr(level: LevelFilter) {
         let queue = QUEUE.get_or_init(|| queue);
         builder.target(Target::Pipe(Box::new(queue.clone())));
     }
-    // Fails if there is a logger already; then that one is to be used.
+    // Fails if there is already a logger, which is then used.
     let _ = builder.try_init();
 }
 
@@ -57,13 +57,13 @@ pub fn dropped_log_lines() -> u64 {
     QUEUE.get().map_or(0, Queue::dropped)
 }
 
-/// Whether the `times`-th message of a kind is logged: the first 20 are, then those whose number is a power
-/// of two. So a recurring event cannot fill the log.
+/// True if the `times`-th message of a kind is logged: the first 20 are, then those whose number is a power of two. So
+/// a recurring event cannot fill the log.
 pub const fn is_told(times: u64) -> bool {
     times <= TOLD || times.is_power_of_two()
 }
 
-/// Whether from the `times`-th message on some of the same kind are left out.
+/// True if some messages of a kind are left out from the `times`-th on.
 pub const fn is_rarely_logged(times: u64) -> bool {
     times >= TOLD
 }
@@ -80,7 +80,7 @@ fn set_levels(builder: &mut Builder, variable: Option<&str>, level: LevelFilter)
     }
     builder.filter_level(own.min(LevelFilter::Warn));
     builder.filter_module("tickbus", own);
-    // The OPC UA crates log their internals; the bus itself logs what matters to the user.
+    // The OPC UA crates log their internals; the bus itself logs everything that matters to the user.
     builder.filter_module("opcua", LevelFilter::Off);
     if !rest.is_empty() {
         builder.parse_filters(&rest.join(","));

@@ -1,16 +1,16 @@
-//! What a serial port hands over that marks damaged characters.
+//! The encoding of damaged characters by a serial port.
 
-/// Characters off a line, and which of them were damaged there.
+/// Characters off a line, with the damaged ones marked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Characters<'a> {
-    /// All of them, a damaged one with the value that was read.
+    /// All characters; a damaged one has the value that was read.
     pub bytes: &'a [u8],
-    /// The indices of those with wrong parity, without a stop bit, or of a break; ascending.
+    /// The indices of characters with wrong parity, without a stop bit, or of a break; ascending.
     pub damaged: &'a [usize],
 }
 
 impl<'a> From<&'a [u8]> for Characters<'a> {
-    /// Sound ones.
+    /// Sound characters.
     fn from(bytes: &'a [u8]) -> Self {
         Self {
             bytes,
@@ -19,8 +19,8 @@ impl<'a> From<&'a [u8]> for Characters<'a> {
     }
 }
 
-/// Reads the code of [`SerialPort::mark_damaged`](super::SerialPort::mark_damaged): `FF FF` is the character FF, `FF 00 x` a damaged
-/// x, and any other byte itself. A code may be cut anywhere between two reads.
+/// Decodes the output of [`SerialPort::mark_damaged`](super::SerialPort::mark_damaged): `FF FF` is the character FF,
+/// `FF 00 x` a damaged x, and any other byte is itself. A code may be split anywhere between two reads.
 #[derive(Debug, Default)]
 pub struct Marks {
     code: Code,
@@ -28,7 +28,7 @@ pub struct Marks {
     damaged: Vec<usize>,
 }
 
-/// What has arrived of a code.
+/// The part of a code that has arrived.
 #[derive(Clone, Copy, Debug, Default)]
 enum Code {
     #[default]
@@ -49,7 +49,7 @@ impl Marks {
                 (Code::None, 0xFF) => Code::Begun,
                 (Code::Begun, 0) => Code::Damaged,
                 (code, _) => {
-                    // No port hands over FF and anything else: some character was lost.
+                    // A port sends no other code after FF: a character was lost.
                     if matches!(code, Code::Damaged) || matches!(code, Code::Begun) && byte != 0xFF
                     {
                         self.damaged.push(self.bytes.len());

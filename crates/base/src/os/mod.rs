@@ -27,7 +27,7 @@ mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
-/// What a [`PollSet`] is asked, and what it says.
+/// The questions to a [`PollSet`], and its answers.
 pub use crate::time::{Interest, Ready};
 #[cfg(unix)]
 pub use at_exit::at_exit;

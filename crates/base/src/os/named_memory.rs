@@ -10,23 +10,24 @@ use rustix::fs::OFlags;
 use super::{Lock, SharedMemory, lock_file, unlock_file};
 use crate::time::{Clock as _, Monotonic, Nanos, Stop};
 
-/// How often the file may be taken away while it is made.
+/// How many times to retry if the file disappears during its creation.
 const ATTEMPTS: usize = 8;
 
 /// [Shared memory](SharedMemory) in a file, which one process serves and others open.
 ///
-/// While it is served, its file is locked; the system releases the lock when the process ends, however that happens. So a
-/// second server is refused, what a crashed one has left behind is replaced, and its peers learn that it is gone.
+/// While the memory is served, its file is locked; the system releases the lock when the process ends, however that
+/// happens. So a second server is refused, a crashed server's file is replaced, and peers learn that their server is
+/// gone.
 #[derive(Debug)]
 pub struct NamedMemory {
     memory: SharedMemory,
     file: File,
-    /// The server removes it.
+    /// The path to remove, if this process is the server.
     served: Option<PathBuf>,
 }
 
 impl NamedMemory {
-    /// The file for a name, in memory where the system has a folder for that.
+    /// The file for a name, in the system's folder for memory if there is one.
     pub fn path(name: &str) -> PathBuf {
         let shared = Path::new("/dev/shm");
         let folder = if shared.is_dir() {
@@ -41,17 +42,17 @@ impl NamedMemory {
     ///
     /// # Errors
     ///
-    /// [`ErrorKind::AddrInUse`] if another process serves it; or the file cannot be made.
+    /// [`ErrorKind::AddrInUse`] if another process serves it; or the file cannot be created.
     pub fn serve(path: &Path, bytes: usize) -> io::Result<Self> {
         let in_use = || io::Error::new(ErrorKind::AddrInUse, "another process serves it");
         for _ in 0..ATTEMPTS {
             match opened(path) {
                 Ok(left) => {
-                    // Someone who only looks whether it is served has it locked for a moment.
+                    // A process that only checks for a server locks the file for a moment.
                     if !lock_soon(&left)? {
                         return Err(in_use());
                     }
-                    // Nobody serves it. Processes that still have it keep the old one.
+                    // There is no server. Processes that still have the file keep the old memory.
                     if is_at(&left, path) {
                         fs::remove_file(path)?;
                     }
@@ -70,7 +71,7 @@ impl NamedMemory {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => continue,
                 Err(error) => return Err(error),
             };
-            // Until it is locked it looks as if it had been left behind.
+            // Until it is locked, the file looks like a leftover.
             if !lock_file(&file, Lock::Exclusive)? || !is_at(&file, path) {
                 continue;
             }
@@ -96,7 +97,7 @@ impl NamedMemory {
         let file = opened(path)?;
         let length = file.metadata()?.len();
         if length == 0 {
-            // Its server is just making it.
+            // The server is still creating it.
             return Err(ErrorKind::NotFound.into());
         }
         let bytes = usize::try_from(length).map_err(|_| ErrorKind::OutOfMemory)?;
@@ -117,7 +118,7 @@ impl NamedMemory {
         &self.memory
     }
 
-    /// Whether the process that serves it is alive.
+    /// True if the serving process is alive.
     pub fn is_served(&self) -> bool {
         if self.served.is_some() {
             return true;
@@ -135,13 +136,13 @@ impl Drop for NamedMemory {
         if let Some(path) = &self.served
             && is_at(&self.file, path)
         {
-            // The next server replaces it otherwise.
+            // Otherwise the next server replaces it.
             let _ = fs::remove_file(path);
         }
     }
 }
 
-/// Opens the file at `path`, which nobody may have replaced by a link to another one.
+/// Opens the file at `path`, which must not be a link to another file.
 fn opened(path: &Path) -> io::Result<File> {
     let no_link = OFlags::NOFOLLOW.bits().cast_signed();
     OpenOptions::new()
@@ -151,7 +152,7 @@ fn opened(path: &Path) -> io::Result<File> {
         .open(path)
 }
 
-/// Locks a file as its server, trying for some 50 ms; false if another one has.
+/// Locks a file as its server, trying for some 50 ms; false if another process holds the lock.
 fn lock_soon(file: &File) -> io::Result<bool> {
     let clock = Monotonic::shared();
     for _ in 0..50 {
@@ -163,7 +164,7 @@ fn lock_soon(file: &File) -> io::Result<bool> {
     Ok(false)
 }
 
-/// Whether `path` still leads to this file.
+/// True if `path` still leads to this file.
 fn is_at(file: &File, path: &Path) -> bool {
     match (file.metadata(), fs::symlink_metadata(path)) {
         (Ok(own), Ok(found)) => (own.dev(), own.ino()) == (found.dev(), found.ino()),
@@ -205,7 +206,7 @@ mod tests {
         assert_eq!(error.kind(), ErrorKind::AddrInUse);
         assert!(client.is_served(), "asking changes nothing");
         drop(server);
-        // What a crash leaves behind.
+        // The leftover of a crash.
         fs::write(&path, [1; 64]).expect("it can be written");
         let error = NamedMemory::open(&path).expect_err("nobody serves it");
         assert_eq!(error.kind(), ErrorKind::NotFound);

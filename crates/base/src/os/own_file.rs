@@ -7,7 +7,7 @@ use std::path::PathBuf;
 ///
 /// # Errors
 ///
-/// The system does not tell, or the file no longer exists.
+/// The system does not provide it, or the file no longer exists.
 pub fn own_file() -> io::Result<PathBuf> {
     #[cfg(target_os = "linux")]
     {
@@ -16,8 +16,7 @@ pub fn own_file() -> io::Result<PathBuf> {
         let address = own_file as fn() -> io::Result<PathBuf> as usize;
         let maps = std::fs::read("/proc/self/maps")?;
         match mapped_file(&maps, address) {
-            // Its folder is often world-writable, such as /tmp: files beside it cannot be trusted to belong
-            // to it.
+            // The folder is often world-writable, such as /tmp: files in it cannot be trusted.
             Some(file) if file.ends_with(DELETED) => {
                 let text = "its file came out of a jar, and is deleted since";
                 return Err(io::Error::other(text));
@@ -33,7 +32,7 @@ pub fn own_file() -> io::Result<PathBuf> {
 #[cfg(target_os = "linux")]
 const DELETED: &[u8] = b" (deleted)";
 
-/// The file behind the mapping that `address` lies in, as `/proc/PID/maps` lists it.
+/// The file of the mapping around `address`, as `/proc/PID/maps` lists it.
 #[cfg(target_os = "linux")]
 fn mapped_file(maps: &[u8], address: usize) -> Option<&[u8]> {
     maps.split(|byte| *byte == b'\n').find_map(|line| {

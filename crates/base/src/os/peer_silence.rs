@@ -1,4 +1,4 @@
-//! How long the other computer of a TCP connection has acknowledged nothing.
+//! How long the other computer of a TCP connection has sent no acknowledgement.
 #![allow(
     unsafe_code,
     reason = "the system is asked for the state of a connection"
@@ -8,10 +8,10 @@ use std::net::TcpStream;
 
 use crate::time::Nanos;
 
-/// How long the peer's computer has acknowledged nothing, although the system repeats what was sent; none at all while nothing had
-/// to be repeated, and `None` if all is acknowledged, or where the system does not tell.
+/// How long the peer's computer has sent no acknowledgement although the system retransmits; zero as long as nothing
+/// had to be retransmitted. `None` if everything is acknowledged, or where the system does not provide this.
 ///
-/// A program that does not read is another thing: its computer answers, and takes no more.
+/// A program that does not read is a different case: its computer answers, but accepts no more.
 pub fn peer_silence(stream: &TcpStream) -> Option<Nanos> {
     #[cfg(target_os = "linux")]
     return linux::peer_silence(stream);
@@ -39,11 +39,11 @@ mod linux {
     struct Info {
         state: u8,
         ca_state: u8,
-        /// How often the oldest segment that is not acknowledged was repeated.
+        /// How often the oldest unacknowledged segment was retransmitted.
         retransmits: u8,
         others: [u8; 5],
         times_and_sizes: [u32; 4],
-        /// Segments that are on their way.
+        /// Segments on their way.
         unacknowledged: u32,
         counts: [u32; 7],
         /// In milliseconds.

@@ -1,4 +1,4 @@
-//! What all ways to wait for sockets have in common.
+//! The common parts of all ways to wait for sockets.
 
 use std::io::{self, ErrorKind};
 use std::time::Duration;
@@ -17,7 +17,7 @@ pub(super) fn poll_once(fds: &mut [PollFd<'_>], patience: Option<Duration>) -> i
     let patience = patience.map(timespec);
     match poll(fds, patience.as_ref()) {
         Ok(_) => Ok(()),
-        // A signal interrupted the wait: nothing is ready, and the caller looks again.
+        // A signal interrupted the wait: nothing is ready, and the caller checks again.
         Err(error) if io::Error::from(error).kind() == ErrorKind::Interrupted => {
             fds.iter_mut().for_each(PollFd::clear_revents);
             Ok(())

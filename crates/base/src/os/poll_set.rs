@@ -11,13 +11,12 @@ use super::poll::wake;
 use super::pollable::{Pollable, Source};
 use crate::time::{Clock, Interest, Nanos, Ready, Stop};
 
-/// Lets one thread wait for sockets, for a deadline, and for its [`Stop`], whichever is first.
+/// Lets one thread wait for sockets, a deadline, and its [`Stop`], whichever comes first.
 ///
-/// A socket is identified by the key that it was added with. While the set exists it is the waker of its
-/// token.
+/// A socket is identified by the key that it was added with. The set is the waker of its token as long as it exists.
 pub struct PollSet {
     stop: Stop,
-    /// `None` until it is needed: a simulation has none.
+    /// `None` until needed: a simulation has none.
     system: Option<System>,
     /// Sockets of a simulation: key, identity, and what to wait for.
     simulated: Vec<(usize, u64, Interest)>,
@@ -44,7 +43,7 @@ impl System {
         let (sender, wake) = wake::pair()?;
         let mut watch = watch::Watch::new()?;
         watch.add(WAKE, &wake, Interest::Read)?;
-        // If the buffer is full, a wake-up is already pending; nothing else can fail within one pair.
+        // If the buffer is full, a wake-up is already pending; nothing else can fail between the two ends of a pair.
         stop.set_waker(Some(Arc::new(move || drop(sender.send()))));
         Ok(Self { wake, watch })
     }
@@ -93,7 +92,7 @@ impl PollSet {
         }
     }
 
-    /// Changes what the set waits for on a socket.
+    /// Changes the interest in a socket.
     ///
     /// # Errors
     ///
@@ -174,7 +173,7 @@ impl Drop for PollSet {
     }
 }
 
-/// Linux reports which of many sockets are ready without looking at each of them.
+/// Linux reports the ready sockets without checking each of them.
 #[cfg(any(target_os = "linux", target_os = "android"))]
 mod watch {
     use rustix::buffer::spare_capacity;
@@ -193,7 +192,7 @@ mod watch {
     /// Waits from this span on need not be exact, since they end early.
     const LONG: Duration = Duration::from_millis(100);
 
-    /// How much early: more than what epoll rounds up.
+    /// The margin: more than epoll rounds up.
     const EARLY: Duration = Duration::from_millis(2);
 
     pub(super) struct Watch {
@@ -255,9 +254,9 @@ mod watch {
             ready: &mut Vec<Ready>,
         ) -> io::Result<()> {
             let patience = match patience {
-                // Nobody notices that a long wait ends a little early, and one system call does.
+                // Nobody notices that a long wait ends a little early, and this takes only one system call.
                 Some(span) if span >= LONG => Some(span.saturating_sub(EARLY)),
-                // epoll counts whole milliseconds; `ppoll`, which waits for it, has a finer resolution.
+                // epoll counts whole milliseconds; `ppoll`, which waits for epoll, has a finer resolution.
                 Some(span) => {
                     if !span.is_zero() {
                         let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
@@ -294,7 +293,7 @@ mod watch {
     }
 }
 
-/// Other systems look at every socket, through the set's own handles.
+/// Other systems check every socket, through the set's own handles.
 #[cfg(not(any(target_os = "linux", target_os = "android")))]
 mod watch {
     use rustix::event::{PollFd, PollFlags};

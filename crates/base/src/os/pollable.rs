@@ -1,10 +1,10 @@
-//! What a [`PollSet`](super::PollSet) can wait for.
+//! The objects that a [`PollSet`](super::PollSet) can wait for.
 
 use rustix::fd::{AsFd as _, BorrowedFd};
 
 use crate::net::{TcpListener, TcpStream};
 
-/// A socket as a [`PollSet`](super::PollSet) knows it.
+/// A socket as a [`PollSet`](super::PollSet) sees it.
 #[derive(Debug)]
 pub enum Source<'a> {
     /// Of the operating system.
@@ -13,9 +13,9 @@ pub enum Source<'a> {
     Simulated(u64),
 }
 
-/// What a [`PollSet`](super::PollSet) can wait for.
+/// An object that a [`PollSet`](super::PollSet) can wait for.
 pub trait Pollable {
-    /// The socket behind it.
+    /// The socket of the object.
     fn source(&self) -> Source<'_>;
 }
 

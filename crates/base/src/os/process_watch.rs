@@ -1,8 +1,8 @@
-//! Whether another process is still there.
+//! Checks if another process is still alive.
 
 use rustix::process::{Pid, test_kill_process};
 
-/// Watches another process of this computer. On Linux a process that gets the same number later is not mistaken for it.
+/// Watches another process of this computer. On Linux, a later process with the same number is not mistaken for it.
 #[derive(Debug)]
 pub struct ProcessWatch {
     pid: Pid,
@@ -23,7 +23,7 @@ impl ProcessWatch {
         (!watch.has_ended()).then_some(watch)
     }
 
-    /// Whether it has ended, even if nobody has asked for its exit code yet.
+    /// True if the process has ended, even if nobody has fetched its exit code yet.
     pub fn has_ended(&self) -> bool {
         #[cfg(target_os = "linux")]
         if let Some(file) = &self.file {
@@ -33,7 +33,7 @@ impl ProcessWatch {
             let asked = super::poll::poll_once(&mut ended, Some(std::time::Duration::ZERO));
             return asked.is_ok() && ended[0].revents().contains(PollFlags::IN);
         }
-        // A process of another user is there, too, although it may not be signalled.
+        // A process of another user exists, too, although it may not be signalled.
         test_kill_process(self.pid) == Err(rustix::io::Errno::SRCH)
     }
 }

@@ -15,19 +15,19 @@ use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 #[derive(Debug)]
 pub struct PseudoTerminal {
     far: File,
-    /// Kept open, so that the line does not hang up before another one opens it.
+    /// Kept open, so that the line does not hang up before another program opens it.
     _near: OwnedFd,
 }
 
 impl PseudoTerminal {
-    /// A new one, and the system's name of its near end.
+    /// Opens a pseudo-terminal; also returns the system's name of its near end.
     ///
     /// # Errors
     ///
-    /// The system has no more.
+    /// The system has no free pseudo-terminals.
     pub fn open() -> io::Result<(Self, PathBuf)> {
         let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY;
-        // A program that is started from here would keep the line from hanging up.
+        // A child process that inherits the end would keep the line from hanging up.
         #[cfg(target_os = "linux")]
         let flags = flags | OpenptFlags::CLOEXEC;
         let far = openpt(flags)?;
@@ -53,7 +53,7 @@ impl PseudoTerminal {
         &self.far
     }
 
-    /// Reads what arrives within `patience`; 0 bytes if nothing does.
+    /// Reads the bytes that arrive within `patience`; 0 if nothing arrives.
     ///
     /// # Errors
     ///
@@ -71,7 +71,7 @@ impl PseudoTerminal {
     }
 }
 
-/// Whether the system calls a pseudo-terminal so.
+/// True if the path is a name that the system gives to pseudo-terminals.
 pub(super) fn names_pseudo_terminal(path: &Path) -> bool {
     if cfg!(target_os = "macos") {
         let name = path

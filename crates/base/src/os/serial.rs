@@ -68,15 +68,14 @@ mod unix {
         ///
         /// # Errors
         ///
-        /// It does not exist, is not a serial port, is in use by another program, or does not support the
-        /// settings.
+        /// The port does not exist, is no serial port, is in use by another program, or does not support the settings.
         pub fn open(device: &Path, settings: SerialSettings) -> io::Result<Self> {
             let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
             let port = open(device, flags, Mode::empty())?;
             let is_pseudo = is_pseudo_terminal(device);
             if is_pseudo {
-                // The flag of exclusive use would outlive a program that is killed, since the far end keeps the near one
-                // open; a lock goes with its program.
+                // The flag of exclusive use would outlive a killed program, since the far end keeps the near one open;
+                // a lock ends with its program.
                 flock(&port, FlockOperation::NonBlockingLockExclusive).map_err(
                     |error| match error {
                         Errno::WOULDBLOCK => Errno::BUSY,
@@ -125,8 +124,8 @@ mod unix {
             Ok(Self(File::from(port)))
         }
 
-        /// Marks characters that were damaged on the line in what is read from now on, in the code that
-        /// [`Marks`](crate::os::Marks) reads. Without this, they are read as zero, which only a strong checksum finds.
+        /// From now on, marks characters that were damaged on the line, in the code that [`Marks`](crate::os::Marks)
+        /// decodes. Without this, they are read as zero, which only a strong checksum detects.
         ///
         /// # Errors
         ///
@@ -136,14 +135,14 @@ mod unix {
             attributes.input_modes -= InputModes::IGNBRK | InputModes::BRKINT | InputModes::IGNPAR;
             attributes.input_modes |= InputModes::INPCK | InputModes::PARMRK;
             tcsetattr(&self.0, OptionalActions::Now, &attributes)?;
-            // What came before is not in this code.
+            // Earlier bytes are not in this code.
             tcflush(&self.0, QueueSelector::IFlush)?;
             Ok(())
         }
     }
 
-    /// Checks what the port's driver has made of the settings: some round a rate, or leave the parity bit out, without an
-    /// error. A pseudo-terminal has neither.
+    /// Checks how the port's driver has applied the settings: some drivers round a rate, or leave the parity bit out,
+    /// without an error. A pseudo-terminal has neither.
     fn check(has: &Termios, settings: SerialSettings, is_pseudo: bool) -> io::Result<()> {
         if is_pseudo {
             return Ok(());
@@ -171,8 +170,8 @@ mod unix {
             .is_ok_and(|path| names_pseudo_terminal(&path))
     }
 
-    /// Asks the port's driver to hand bytes over as they come: those of some USB adapters collect them for 16 ms otherwise.
-    /// A port that does not know of this works all the same.
+    /// Asks the port's driver to deliver bytes at once: those of some USB adapters otherwise collect them for 16 ms. A
+    /// port without this setting works anyway.
     #[cfg(target_os = "linux")]
     #[allow(unsafe_code, reason = "no crate of ours wraps these requests")]
     fn ask_for_low_latency(port: &impl AsFd) {
@@ -226,7 +225,7 @@ mod unix {
     #[cfg(not(target_os = "linux"))]
     fn ask_for_low_latency(_port: &impl AsFd) {}
 
-    /// Lets the port's driver switch the direction with RTS, which is on while it sends.
+    /// Lets the port's driver switch the direction by RTS, which is on while it sends.
     #[cfg(target_os = "linux")]
     #[allow(unsafe_code, reason = "no crate of ours wraps this request")]
     fn switch_direction(port: &impl AsFd) -> io::Result<()> {
@@ -263,8 +262,8 @@ mod unix {
     }
 
     impl Read for SerialPort {
-        /// Reads what has arrived. Fails with [`WouldBlock`](io::ErrorKind::WouldBlock) if nothing has; returns 0 once
-        /// the port is gone.
+        /// Reads the bytes that have arrived; without any, fails with [`WouldBlock`](io::ErrorKind::WouldBlock).
+        /// Returns 0 once the port is gone.
         fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
             self.0.read(bytes)
         }
@@ -312,7 +311,7 @@ mod unix {
             let port = SerialPort::open(&near, SETTINGS).expect("a port");
             let refused = SerialPort::open(&near, SETTINGS).expect_err("another one has it");
             assert_eq!(refused.kind(), io::ErrorKind::ResourceBusy);
-            // A mark of exclusive use would keep out everybody but root, also when the program that set it was killed.
+            // A mark of exclusive use would lock out everybody but root, even after the program that set it was killed.
             let opened = File::open(&near);
             assert!(opened.is_ok(), "{opened:?}");
             drop(port);

@@ -89,7 +89,7 @@ impl SharedMemory {
     ///
     /// # Panics
     ///
-    /// When they would reach beyond the memory.
+    /// When the bytes would extend beyond the memory.
     pub fn write(&self, at: usize, bytes: &[u8]) {
         let words = &self.words()[at..at + Self::words_for(bytes.len())];
         for (word, chunk) in words.iter().zip(bytes.chunks(WORD)) {
@@ -105,7 +105,7 @@ impl SharedMemory {
     ///
     /// # Panics
     ///
-    /// When that would reach beyond the memory.
+    /// When the bytes would extend beyond the memory.
     pub fn read(&self, at: usize, bytes: &mut [u8]) {
         // The message that gave us the turn came before the words.
         fence(Ordering::Acquire);
@@ -116,27 +116,27 @@ impl SharedMemory {
         }
     }
 
-    /// The number of its words.
+    /// The number of words.
     #[expect(clippy::len_without_is_empty, reason = "never empty")]
     pub const fn len(&self) -> usize {
         self.count
     }
 
-    /// One of its words.
+    /// The word at `at`.
     ///
     /// # Panics
     ///
-    /// When the memory ends before.
+    /// When the memory ends before that word.
     pub fn word(&self, at: usize) -> &AtomicU64 {
         &self.words()[at]
     }
 
-    /// Waits until another process [wakes](Self::wake) those who wait for the word `at`, for `limit` at most. It returns at
-    /// once if that word is no longer `seen`, in its lower 32 bits; and it may return early for no reason.
+    /// Waits until another process [wakes](Self::wake) the waiters for the word `at`, for `limit` at most. Returns at
+    /// once if the lower 32 bits of that word are no longer those of `seen`, and may return early without a reason.
     ///
     /// # Panics
     ///
-    /// When the memory ends before.
+    /// When the memory ends before that word.
     pub fn wait(&self, at: usize, seen: u64, limit: Duration) {
         #[cfg(target_os = "linux")]
         {
@@ -145,7 +145,7 @@ impl SharedMemory {
             #[expect(clippy::cast_possible_truncation, reason = "the lower half is meant")]
             let seen = seen as u32;
             let limit = timespec(limit);
-            // It has changed, time is up, or a signal came: the caller looks again in any case.
+            // The word changed, the time is up, or a signal came: the caller checks again in any case.
             let _ = futex::wait(
                 self.lower_half(at),
                 futex::Flags::empty(),
@@ -155,23 +155,23 @@ impl SharedMemory {
         }
         #[cfg(not(target_os = "linux"))]
         {
-            // Without such a wait: look again soon.
+            // Without such a wait, check again soon.
             let _ = (self.word(at), seen);
             let _ = super::poll::poll_once(&mut [], Some(limit.min(Duration::from_millis(1))));
         }
     }
 
-    /// Wakes every process that [waits](Self::wait) for the word `at`, which was changed before.
+    /// Wakes every process that [waits](Self::wait) for the word `at`, which must have been changed before.
     ///
     /// # Panics
     ///
-    /// When the memory ends before.
+    /// When the memory ends before that word.
     pub fn wake(&self, at: usize) {
         #[cfg(target_os = "linux")]
         {
             use rustix::thread::futex;
 
-            // It can only fail for an invalid address, and this one is mapped.
+            // Can only fail for an invalid address, and this one is mapped.
             let everyone = i32::MAX.unsigned_abs();
             let _ = futex::wake(self.lower_half(at), futex::Flags::empty(), everyone);
         }
@@ -179,7 +179,7 @@ impl SharedMemory {
         let _ = self.word(at);
     }
 
-    /// The lower half of a word, as the system's waits need it: they look at 32 bits.
+    /// The lower half of a word: the system's waits compare 32 bits.
     #[cfg(target_os = "linux")]
     fn lower_half(&self, at: usize) -> &AtomicU32 {
         let halves = std::ptr::from_ref(self.word(at)).cast::<AtomicU32>();
@@ -189,7 +189,7 @@ impl SharedMemory {
         unsafe { &*halves.add(lower) }
     }
 
-    /// How many words hold `bytes` bytes.
+    /// The number of words for `bytes` bytes.
     pub fn words_for(bytes: usize) -> usize {
         bytes.div_ceil(WORD)
     }
@@ -203,7 +203,7 @@ impl Drop for SharedMemory {
     }
 }
 
-/// How many words hold `bytes` bytes: at least one, since an empty mapping is not allowed.
+/// The number of words for `bytes` bytes: at least one, since an empty mapping is not allowed.
 fn words(bytes: usize) -> usize {
     SharedMemory::words_for(bytes).max(1)
 }

@@ -1,10 +1,10 @@
 //! The processor's time stamp counter.
 
-/// The processor's counter of time stamps, on a computer whose system takes its own time from it.
+/// The processor's time stamp counter, on a computer whose system takes its own time from it.
 ///
-/// Linux does so only where the counter runs evenly, on all processors alike and while they idle; it keeps checking, and
-/// changes to another source of time if it finds otherwise. In a virtual machine it is the host that has to promise this.
-/// On other systems the counter is not used: the system's clock is read instead.
+/// Linux does so only if the counter runs evenly, equally on all processors and while they idle; Linux keeps checking,
+/// and otherwise changes to another source of time. In a virtual machine the host has to promise this. Other systems do
+/// not use the counter, but read the system's clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TimeStampCounter(());
 
@@ -19,11 +19,11 @@ mod x86_64 {
 
     use super::TimeStampCounter;
 
-    /// Where Linux says what it takes its time from.
+    /// The file in which Linux names its source of time.
     const SOURCE: &str = "/sys/devices/system/clocksource/clocksource0/current_clocksource";
 
     impl TimeStampCounter {
-        /// The counter, if the system trusts it. It is asked once per process.
+        /// The counter, if the system trusts it. The system is asked once per process.
         pub fn trusted() -> Option<Self> {
             static IS_TRUSTED: LazyLock<bool> = LazyLock::new(|| {
                 std::fs::read_to_string(SOURCE).is_ok_and(|source| source.trim() == "tsc")
@@ -31,7 +31,7 @@ mod x86_64 {
             IS_TRUSTED.then_some(Self(()))
         }
 
-        /// What it counts now. It may wrap, and is not the same after the computer has slept.
+        /// The current count. The count may wrap, and jumps while the computer sleeps.
         #[inline]
         pub fn read(self) -> u64 {
             // SAFETY: every processor of this architecture has the instruction, and it touches no memory. A system can

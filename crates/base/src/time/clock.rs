@@ -9,33 +9,33 @@ use super::simulation::Simulation;
 use super::stop::Shared;
 use super::{Nanos, Stop};
 
-/// A source of time that can also be waited on.
+/// A source of time that threads can also wait on.
 pub trait Clock: Send + Sync + fmt::Debug {
-    /// The time now.
+    /// The current time.
     fn now(&self) -> Nanos;
 
     /// Waits until `deadline`, or until `stop` is stopped or woken, whichever is first.
     fn wait_until(&self, deadline: Nanos, stop: &Stop);
 
-    /// Lets `sleep` wait in the operating system, for a thread that also waits for something other than the
-    /// time, such as a socket.
+    /// Lets `sleep` wait in the operating system, for a thread that also waits for something other than the time, such
+    /// as a socket.
     ///
-    /// `sleep` is given the longest time that it may wait; `None` means until the [waker](Stop::set_waker) of
-    /// `stop` wakes it. It may return early; the caller then looks at the clock again.
+    /// `sleep` gets the longest time that it may wait; `None` means until the [waker](Stop::set_waker) of `stop` wakes
+    /// it. `sleep` may return early; the caller then reads the clock again.
     fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>));
 
-    /// Whether it advances by itself, at the pace of the computer's clock, so that its time between two looks at it can be
-    /// told by a counter.
+    /// True if the clock advances on its own, at the pace of the computer's clock, so that a counter can tell the time
+    /// between two reads.
     fn is_steady(&self) -> bool {
         false
     }
 
-    /// Whether its time passes without being set, by whoever ticks, between two calls of the simulation.
+    /// True if the time passes without being set, by the ticking thread, between two calls of the simulation.
     fn passes_alone(&self) -> bool {
         self.is_steady()
     }
 
-    /// What replaces the operating system where a whole run is simulated.
+    /// The replacement of the operating system when a whole run is simulated.
     fn simulation(&self) -> Option<&dyn Simulation> {
         None
     }
@@ -49,11 +49,11 @@ pub trait Clock: Send + Sync + fmt::Debug {
 
 /// The operating system's monotonic clock; its epoch is the first use in the process.
 ///
-/// The tick looks at it as well, by a [`QuickClock`](crate::QuickClock): on the systems that tickbus runs on that is not a
-/// system call (on Linux some 25 ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy
+/// The tick reads this clock as well, by a [`QuickClock`](crate::QuickClock): on tickbus' platforms that is no system
+/// call (on Linux some 25 ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy
 /// machine it would lag by the tens of milliseconds for which that thread is not scheduled.
 ///
-/// It stands still while the computer sleeps.
+/// The clock stands still while the computer sleeps.
 #[derive(Debug)]
 pub struct Monotonic(());
 
@@ -102,12 +102,12 @@ impl Clock for Monotonic {
     }
 }
 
-/// A clock that stands still until it is told to advance: for tests, and for simulation time.
+/// A clock that stands still until it is advanced: for tests, and for simulation time.
 #[derive(Debug, Default)]
 pub struct Manual {
     now: AtomicI64,
     waiters: Mutex<Vec<Waiter>>,
-    /// How many there are: mostly none where simulation time is the clock, and then the tick takes no lock.
+    /// The number of waiters: usually zero where simulation time is the clock, so the tick takes no lock.
     waiting: AtomicUsize,
 }
 
@@ -153,8 +153,8 @@ impl Manual {
         }
     }
 
-    /// Whether at least `threads` threads wait on this clock and none of them has reached its deadline:
-    /// everything that was due by now is then done.
+    /// True if at least `threads` threads wait on this clock and none of them has reached its deadline: then everything
+    /// due so far is done.
     pub fn is_settled(&self, threads: usize) -> bool {
         let waiters = self.lock();
         let now = self.now();
@@ -186,7 +186,7 @@ impl Clock for Manual {
 }
 
 impl Manual {
-    /// Waits as a thread known to the clock. It enters the list before it looks at the time, so it misses no
+    /// Waits as a thread known to the clock. The thread enters the list before it reads the time, so it misses no
     /// advance.
     fn wait_listed(&self, deadline: Nanos, stop: &Stop, wait: impl FnOnce()) {
         let me = stop.downgrade();

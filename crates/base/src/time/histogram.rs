@@ -6,9 +6,9 @@ use hdrhistogram::Histogram;
 
 use super::Nanos;
 
-/// The resolution at the lower end, in nanoseconds: shorter spans are not told apart.
+/// The resolution at the lower end, in nanoseconds: shorter spans are not distinguished.
 const SHORTEST: u64 = 100;
-/// The longest span that is told apart: an hour. Longer ones count as this.
+/// The longest distinguished span: an hour. Longer ones count as this.
 const LONGEST: i64 = 3_600_000_000_000;
 /// Significant decimal digits of the figures.
 const DIGITS: u8 = 2;
@@ -16,12 +16,12 @@ const DIGITS: u8 = 2;
 /// A histogram of time spans from 100 ns to an hour, accurate to 1 %; mean, standard deviation and the
 /// shortest span are exact.
 ///
-/// Its size is fixed, some 15 kB; recording allocates nothing.
+/// The size is fixed, some 15 kB; recording allocates nothing.
 #[derive(Clone, Debug)]
 pub struct TimeHistogram {
     histogram: Histogram<u32>,
     shortest: Nanos,
-    /// The sum of all spans, and that of their squares, in nanoseconds: 10^13 spans of an hour fit.
+    /// The sum of all spans, and of their squares, in nanoseconds: 10^13 spans of an hour fit.
     sum: u128,
     squares: u128,
 }
@@ -38,12 +38,12 @@ impl TimeHistogram {
         }
     }
 
-    /// Counts one span; one below zero counts as zero.
+    /// Counts one span; a negative one counts as zero.
     pub fn record(&mut self, span: Nanos) {
         self.record_times(span, 1);
     }
 
-    /// Counts a span that came this many times.
+    /// Counts a span that occurred this many times.
     pub fn record_times(&mut self, span: Nanos, times: u64) {
         if times == 0 {
             return;
@@ -52,7 +52,7 @@ impl TimeHistogram {
         let nanos = span.0.unsigned_abs();
         let mut rest = times;
         while rest > 0 {
-            // Its bins count in 32 bits.
+            // The bins count in 32 bits.
             let some = u32::try_from(rest).unwrap_or(u32::MAX);
             self.histogram.saturating_record_n(nanos, some);
             rest -= u64::from(some);
@@ -100,7 +100,7 @@ impl TimeHistogram {
         if count == 0 {
             return 0.0;
         }
-        // Distances from the mean rounded down, and what that is off: whole numbers, of which nothing is lost where the
+        // Distances from the mean rounded down, and a correction for that: whole numbers, which lose nothing where the
         // spans are long and their scatter is small.
         let mean = self.sum / count;
         let squares = self.squares + count * mean * mean - 2 * mean * self.sum;
@@ -123,7 +123,7 @@ impl TimeHistogram {
         Nanos(i64::try_from(self.histogram.max()).unwrap_or(i64::MAX))
     }
 
-    /// The bins of the histogram that are not empty: the longest span of each, and its count.
+    /// The non-empty bins of the histogram: the longest span of each, and its count.
     pub fn steps(&self) -> impl Iterator<Item = (Nanos, u64)> + '_ {
         self.histogram.iter_recorded().map(|step| {
             let longest = i64::try_from(step.value_iterated_to()).unwrap_or(i64::MAX);

@@ -1,8 +1,8 @@
 //! Time: integer nanoseconds, the injected [`Clock`], and the [`Stop`] token.
 //!
-//! Nothing outside this room reads a clock of the operating system. Protocol cores take `now` as an
-//! argument; adapters and supervision take a [`Clock`], which is [`Monotonic`] in production and
-//! [`Manual`] in tests and wherever simulation time rules.
+//! Nothing outside this room reads a clock of the operating system. Protocol cores take `now` as an argument; adapters
+//! and supervision take a [`Clock`], which is [`Monotonic`] in production, and [`Manual`] in tests and with simulation
+//! time.
 
 mod clock;
 mod histogram;

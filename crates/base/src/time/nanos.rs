@@ -8,8 +8,8 @@ use crate::Mistake;
 
 /// A point in time or a span, in signed 64-bit nanoseconds (±292 years).
 ///
-/// As a point it counts from the epoch of the [`Clock`](super::Clock) that gave it. Arithmetic
-/// saturates: a deadline of "never" stays "never".
+/// A point counts from the epoch of its [`Clock`](super::Clock). Arithmetic saturates: a deadline of "never" stays
+/// "never".
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Nanos(pub i64);
 

@@ -4,8 +4,7 @@ use super::Nanos;
 
 /// Deadlines at even intervals; a deadline met late does not delay the next one.
 ///
-/// After a stall the missed ones are skipped, because a burst would only carry outdated data. The phase
-/// stays.
+/// After a stall the missed deadlines are skipped, because a burst would only carry outdated data. The phase is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pace {
     due: Nanos,
@@ -31,7 +30,7 @@ impl Pace {
         self.due
     }
 
-    /// If the deadline has come by `now`, moves on to the first one after `now`; tells whether it had come.
+    /// If the deadline has come by `now`, advances to the first one after `now`; returns whether it had come.
     pub fn take(&mut self, now: Nanos) -> bool {
         if now < self.due {
             return false;

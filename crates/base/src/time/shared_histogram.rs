@@ -7,12 +7,12 @@ use super::{Nanos, TimeHistogram};
 
 /// A [`TimeHistogram`] that one thread at a time records into while others read it.
 ///
-/// A bus that runs in steps has the same span in every cycle: a span like the last one is counted, and takes neither the lock
-/// nor the search for its bin.
+/// A bus that runs in steps has the same span in every cycle: a span equal to the last one is only counted, without the
+/// lock and the search for its bin.
 #[derive(Debug)]
 pub struct SharedHistogram {
-    /// The last span, and how many times in a row it came: these are not in `spans` yet. Both are changed together under the
-    /// lock; the count alone also without it.
+    /// The last span, and the number of its repetitions not yet in `spans`. Both change together under the lock; the
+    /// count alone also without it.
     span: AtomicI64,
     times: AtomicU64,
     spans: Mutex<TimeHistogram>,
@@ -28,11 +28,11 @@ impl SharedHistogram {
         }
     }
 
-    /// Counts one span. Of two threads that record at once, spans may be lost.
+    /// Counts one span. If two threads record at once, spans may be lost.
     #[inline]
     pub fn record(&self, span: Nanos) {
         if span.0 == self.span.load(Ordering::Relaxed) {
-            // One thread counts, others only look.
+            // One thread counts, others only read.
             let times = self.times.load(Ordering::Relaxed);
             self.times.store(times + 1, Ordering::Relaxed);
         } else {
@@ -48,7 +48,7 @@ impl SharedHistogram {
         self.times.store(1, Ordering::Relaxed);
     }
 
-    /// A copy of the distribution as it is now.
+    /// A copy of the current distribution.
     pub fn read(&self) -> TimeHistogram {
         let spans = self.lock();
         let mut copy = spans.clone();
@@ -56,7 +56,7 @@ impl SharedHistogram {
         copy
     }
 
-    /// Adds what is not in the histogram yet; under its lock, so that span and count belong together.
+    /// Adds the repetitions to the histogram; under its lock, so that span and count match.
     fn settle(&self, spans: &mut TimeHistogram) {
         let span = Nanos(self.span.load(Ordering::Relaxed));
         spans.record_times(span, self.times.load(Ordering::Relaxed));

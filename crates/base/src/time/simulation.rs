@@ -1,8 +1,8 @@
-//! The operating system's part in a run that is simulated as a whole: threads, connections and waiting, all on one clock.
+//! The operating system's part in a fully simulated run: threads, connections and waiting, all on one clock.
 //!
-//! A program that simulates whole runs implements [`Simulation`] and hands it in with its [`Clock`](super::Clock).
-//! Adapters and supervision then run unchanged: they spawn, connect, listen and wait through this trait where the clock has
-//! one, and through the operating system where it has none. No product has one.
+//! A program that simulates whole runs implements [`Simulation`] and passes it in with its [`Clock`](super::Clock).
+//! Adapters and supervision then run unchanged: they spawn, connect, listen and wait through this trait if the clock
+//! has one, and otherwise through the operating system. No product has one.
 
 use std::fmt;
 use std::fs::File;
@@ -12,7 +12,7 @@ use std::path::Path;
 
 use super::{Nanos, Stop};
 
-/// What to wait for on a socket.
+/// The events to wait for on a socket.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interest {
     /// There is something to read, the peer has closed, or an error is pending.
@@ -34,7 +34,7 @@ pub struct Ready {
     pub is_writable: bool,
 }
 
-/// What replaces the operating system.
+/// The replacement of the operating system.
 pub trait Simulation {
     /// Starts a thread.
     fn spawn(&self, name: &str, body: Box<dyn FnOnce() + Send>);
@@ -42,8 +42,8 @@ pub trait Simulation {
     /// Lets other threads run until `done` holds, or for `limit`; returns whether it held in time.
     fn wait_for(&self, limit: Nanos, done: &mut dyn FnMut() -> bool) -> bool;
 
-    /// Waits until one of these sockets (key, [identity](SimulatedSocket::identity), interest) is ready, until `deadline`, or
-    /// until `stop` is stopped or woken, and adds the sockets that are ready.
+    /// Waits until one of these sockets (key, [identity](SimulatedSocket::identity), interest) is ready, until
+    /// `deadline`, or until `stop` is stopped or woken, and adds the ready sockets.
     fn poll(
         &self,
         sockets: &[(usize, u64, Interest)],
@@ -56,22 +56,22 @@ pub trait Simulation {
     ///
     /// # Errors
     ///
-    /// None of them is.
+    /// No address is free.
     fn listen(&self, addresses: &[SocketAddr]) -> io::Result<Box<dyn SimulatedListener>>;
 
-    /// Begins to connect: the stream is writable once that is decided, and then tells by
-    /// [`take_error`](SimulatedStream::take_error) whether it failed.
+    /// Begins to connect: the stream becomes writable once the outcome is known;
+    /// [`take_error`](SimulatedStream::take_error) then returns the error, if any.
     ///
     /// # Errors
     ///
-    /// The failure is known at once.
+    /// The connection fails at once.
     fn connect(&self, address: SocketAddr) -> io::Result<Box<dyn SimulatedStream>>;
 
-    /// Writes to a file, as [`std::io::Write::write`]: the disk may be full, and a process that was killed writes nothing.
+    /// Writes to a file, as [`std::io::Write::write`]: the disk may be full, and a killed process writes nothing.
     ///
     /// # Errors
     ///
-    /// As of a file of the operating system.
+    /// The same as of a file of the operating system.
     fn write(&self, mut file: &File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
         let _ = path;
         file.write(bytes)
@@ -80,10 +80,10 @@ pub trait Simulation {
 
 /// A socket of a [`Simulation`].
 pub trait SimulatedSocket: Send + Sync + fmt::Debug {
-    /// What [`Simulation::poll`] knows it by.
+    /// The identity for [`Simulation::poll`].
     fn identity(&self) -> u64;
 
-    /// Its own address.
+    /// The socket's own address.
     ///
     /// # Errors
     ///
@@ -97,7 +97,7 @@ pub trait SimulatedListener: SimulatedSocket {
     ///
     /// # Errors
     ///
-    /// As of a socket of the operating system; `WouldBlock` if none waits.
+    /// As of a socket of the operating system; `WouldBlock` if no connection waits.
     fn accept(&self) -> io::Result<(Box<dyn SimulatedStream>, SocketAddr)>;
 }
 
@@ -117,7 +117,7 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn write(&self, bytes: &[u8]) -> io::Result<usize>;
 
-    /// Waits until it is ready, or for `limit`; returns whether it is.
+    /// Waits until the socket is ready, or for `limit`; returns whether it is.
     fn wait(&self, interest: Interest, limit: Nanos) -> bool;
 
     /// Closes the sending direction.
@@ -127,7 +127,7 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn shutdown_write(&self) -> io::Result<()>;
 
-    /// Closing it will break the connection, and drop what the other end has not got.
+    /// Makes closing break the connection, and drop everything that the other end has not received.
     fn close_by_reset(&self);
 
     /// The address of the other end.
@@ -137,7 +137,7 @@ pub trait SimulatedStream: SimulatedSocket {
     /// As of a socket of the operating system.
     fn peer_addr(&self) -> io::Result<SocketAddr>;
 
-    /// The error of connecting, once.
+    /// The error of connecting, returned once.
     ///
     /// # Errors
     ///

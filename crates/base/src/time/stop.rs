@@ -1,4 +1,4 @@
-//! The token that tells a thread to stop, and wakes it for that.
+//! The token that stops a thread, and wakes it for that.
 
 use std::fmt;
 use std::sync::{Arc, Condvar, Mutex, PoisonError, Weak};
@@ -7,7 +7,7 @@ use std::time::Duration;
 /// Wakes a thread that waits in the operating system.
 pub type Waker = Arc<dyn Fn() + Send + Sync>;
 
-/// Tells a thread to stop, and wakes it if it waits.
+/// Stops a thread, and wakes it if it waits.
 ///
 /// Clones share one state. A thread that waits on a [`Clock`](super::Clock) passes its token, so that
 /// stopping never has to wait for a deadline.
@@ -43,13 +43,13 @@ impl Stop {
         Self::default()
     }
 
-    /// Stops, for good, and wakes every thread that waits.
+    /// Stops for good, and wakes every waiting thread.
     pub fn stop(&self) {
         self.0.lock().stopped = true;
         self.0.rouse();
     }
 
-    /// Whether [`stop`](Self::stop) was called.
+    /// True if [`stop`](Self::stop) was called.
     pub fn is_stopped(&self) -> bool {
         self.0.lock().stopped
     }
@@ -68,7 +68,7 @@ impl Stop {
         self.0.lock().waker = waker;
     }
 
-    /// Whether the current wait is over: stopped, or woken. A wake counts once.
+    /// True if the current wait is over: stopped, or woken. A wake counts once.
     pub fn is_woken(&self) -> bool {
         let mut state = self.0.lock();
         state.stopped || std::mem::take(&mut state.wake)
@@ -108,17 +108,16 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Makes a waiting thread look at its deadline again.
+    /// Makes a waiting thread check its deadline again.
     pub(super) fn nudge(&self) {
-        // Locked and released at once, so that the nudge cannot fall between a thread's look at its deadline
-        // and its wait.
+        // Lock and release, so that the nudge cannot fall between a thread's check of its deadline and its wait.
         drop(self.lock());
         self.rouse();
     }
 
     fn rouse(&self) {
         self.woken.notify_all();
-        // Called without the lock: a waker may look at the token.
+        // Called without the lock: a waker may use the token.
         let waker = self.lock().waker.clone();
         if let Some(waker) = waker {
             waker();

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
-/// Gives the time of day as the time since 1970-01-01, UTC. Code that judges or stamps dates takes one as an argument;
-/// production hands in [`system_time`].
+/// Returns the time of day as the time since 1970-01-01, UTC. Code that checks or writes dates takes one as an
+/// argument; production passes [`system_time`].
 pub type WallClock = fn() -> Duration;
 
 /// The time of day of the operating system. It may jump, so it must not be used to measure spans.

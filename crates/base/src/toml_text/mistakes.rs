@@ -9,8 +9,8 @@ use crate::Mistake;
 /// A mistake, and where it is.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PlacedMistake {
-    /// Line and column, both from 1; columns count characters. `None` when the file as a whole is wrong, such
-    /// as one that does not exist.
+    /// Line and column, both from 1; columns count characters. `None` if the file as a whole is wrong, for instance if
+    /// it does not exist.
     pub place: Option<(usize, usize)>,
     /// The mistake.
     pub mistake: Mistake,
@@ -18,7 +18,7 @@ pub struct PlacedMistake {
 
 /// All mistakes of one file, in line order; at least one.
 ///
-/// Its text has one line for each: `file:line:column: what; what would be right`.
+/// The text has one line for each: `file:line:column: what; what would be right`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistakes {
     file: String,
@@ -31,7 +31,7 @@ impl Mistakes {
         Self::of(file, Mistake::new(what, right))
     }
 
-    /// As [`of_file`](Self::of_file), for a mistake that something else has found.
+    /// Like [`of_file`](Self::of_file), for an existing mistake.
     pub fn of(file: &str, mistake: Mistake) -> Self {
         let place = None;
         Self::of_list(file, vec![PlacedMistake { place, mistake }])
@@ -108,7 +108,7 @@ pub struct Collector<'t> {
 }
 
 impl<'t> Collector<'t> {
-    /// For `text`, which came from `file`.
+    /// A collector for `text`, which came from `file`.
     pub fn new(file: &str, text: &'t str) -> Self {
         let ends = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
         let line_starts = std::iter::once(0)
@@ -128,7 +128,7 @@ impl<'t> Collector<'t> {
         self.collect(at, Mistake::new(what, right));
     }
 
-    /// As [`report`](Self::report), for a mistake that something else has found.
+    /// Like [`report`](Self::report), for an existing mistake.
     pub fn collect(&self, at: usize, mistake: Mistake) {
         self.found.borrow_mut().push(Found { at, mistake });
     }
@@ -150,12 +150,12 @@ impl<'t> Collector<'t> {
         self.broken_lines.insert(self.line(at));
     }
 
-    /// Whether any line was left out. A key that seems to be missing may have been in it.
+    /// True if any line was left out. A key that seems to be missing may have been in that line.
     pub fn is_broken(&self) -> bool {
         !self.broken_lines.is_empty()
     }
 
-    /// Whether no line is left out between byte offset `at` and the next table header.
+    /// True if no line is left out between byte offset `at` and the next table header.
     pub(super) fn is_whole_from(&self, at: usize) -> bool {
         let first = self.line(at);
         let header = |line: usize| {
@@ -167,7 +167,7 @@ impl<'t> Collector<'t> {
         broken.is_none_or(|broken| (first..*broken).any(header))
     }
 
-    /// Whether nothing was reported.
+    /// True if nothing was reported.
     pub fn is_empty(&self) -> bool {
         self.found.borrow().is_empty()
     }
@@ -177,8 +177,8 @@ impl<'t> Collector<'t> {
         let mut found = self.found.take();
         found.sort_by_key(|found| found.at);
         let mut list = Vec::with_capacity(found.len());
-        // Counted on from the previous mistake: a long line with many mistakes must not be counted from its
-        // start each time.
+        // Continue from the previous mistake: a long line with many mistakes must not be counted from its start each
+        // time.
         let (mut line, mut column, mut counted) = (0, 0, 0);
         for Found { at, mistake } in found {
             let at = at.min(self.text.len());
@@ -217,8 +217,8 @@ pub fn printable(text: &str) -> String {
     text.chars().flat_map(escaped).collect()
 }
 
-/// Whether a character is shown as nothing: a control character, or one that turns the direction of the text around it, so that a name
-/// reads as another.
+/// True if a character has no visible form: a control character, or one that reverses the direction of the text around
+/// it, so that a name reads as another.
 pub(super) fn is_unprintable(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')

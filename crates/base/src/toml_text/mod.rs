@@ -1,8 +1,8 @@
 //! Reading configuration text: spans, collected mistakes, nearest names.
 //!
-//! [`read_text`] parses TOML and hands over its root [`Table`]. A reader takes the keys one by one and
-//! reports each mistake to the text's [`Collector`] at its position, so that the user sees all of them at
-//! once. Nothing here knows what the keys mean.
+//! [`read_text`] parses TOML and passes its root [`Table`] on. A reader takes the keys one by one and reports each
+//! mistake to the text's [`Collector`] at its position, so that the user sees all of them at once. Nothing here knows
+//! the meaning of the keys.
 
 mod mistakes;
 mod nearest;

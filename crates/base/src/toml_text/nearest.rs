@@ -27,8 +27,8 @@ pub fn nearest<'c>(word: &str, candidates: impl IntoIterator<Item = &'c str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// What to write instead of `word`: the nearest candidate, or those that start like it, else all of them;
-/// `kinds` is their collective name.
+/// The suggestion for `word`: the nearest candidate, or those that start like it, else all of them; `kinds` is their
+/// collective name.
 pub fn did_you_mean(word: &str, kinds: &str, candidates: &[&str]) -> String {
     if let Some(near) = nearest(word, candidates.iter().copied()) {
         return format!("did you mean \"{near}\"?");

@@ -1,4 +1,4 @@
-//! Reading TOML text: every syntax error once, and a tree of what can still be read.
+//! Reading TOML text: every syntax error once, and a tree of the readable rest.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -42,7 +42,7 @@ pub fn load_text(path: &Path) -> Result<String, Mistakes> {
             "check the path and the disk",
         ),
     };
-    // A pipe would block, and a device can have no end: both are refused before they are opened.
+    // A pipe would block, and a device may be endless: both are refused before they are opened.
     if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(refused(
             "this is no regular file".to_owned(),
@@ -134,7 +134,7 @@ fn repaired<'t>(collector: &mut Collector<'t>, text: &'t str) -> Option<Cow<'t, 
 mod tests {
     use super::*;
 
-    /// Reads a text; gives its mistakes and the top-level keys that survived.
+    /// Reads a text; returns its mistakes and the remaining top-level keys.
     fn read(text: &str) -> (Vec<String>, Option<Vec<String>>) {
         let mut collector = Collector::new("f", text);
         let keys = read_text(&mut collector, text, |root| {

@@ -6,14 +6,14 @@ use toml::de::{DeTable, DeValue, Error};
 use super::shown;
 use crate::Mistake;
 
-/// What a syntax error does to the rest of the text.
+/// The effect of a syntax error on the rest of the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     /// The grammar of its line is broken, and perhaps that of the lines below it.
     Grammar,
-    /// A list, table or string is not closed and swallows what follows.
+    /// A list, table or string is not closed and swallows the following text.
     Endless,
-    /// The lines can be told apart, but a key or a value is invalid.
+    /// The lines can be separated, but a key or a value is invalid.
     Content,
     /// A key or a table appears twice.
     Double,
@@ -25,7 +25,7 @@ pub(super) struct SyntaxError {
     /// Byte offset of the error.
     pub(super) at: usize,
     pub(super) kind: Kind,
-    /// Whether it makes a table header unreadable, so that the keys below it belong nowhere.
+    /// True if the error makes a table header unreadable, so that the keys below it belong nowhere.
     pub(super) header: bool,
     pub(super) mistake: Mistake,
 }
@@ -54,7 +54,7 @@ pub(super) fn faults(text: &str) -> Vec<SyntaxError> {
         faults.push(translate(error, text));
     }
     if let Some(endless) = endless {
-        // Whatever precedes it in its own line is only its key.
+        // Everything before it in the same line is just its key.
         let line = line_around(text, endless.at);
         faults.retain(|fault| fault.at < line.start);
         faults.push(endless);
@@ -229,7 +229,7 @@ fn translate(error: &Error, text: &str) -> SyntaxError {
     }
 }
 
-/// The piece of text that a parser blames, as messages quote it; a character that nobody sees by its number.
+/// The piece of text that a parser blames, for quoting in messages; an invisible character by its number.
 fn named(piece: &str) -> String {
     let invisible = |c: char| {
         !c.is_ascii()
@@ -241,8 +241,8 @@ fn named(piece: &str) -> String {
     }
 }
 
-/// What is wrong and what would be right, derived from the parser's message and what it expected, the piece
-/// of text that it blames, and the line around that.
+/// The mistake and its remedy, derived from the parser's message and expectation, the piece of text that it blames, and
+/// the line around that.
 fn words(message: &str, expected: &str, piece: &str, line: &str) -> Mistake {
     let foreign_comment = ["//", ";", "--", "/*"]
         .iter()

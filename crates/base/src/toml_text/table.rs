@@ -10,7 +10,7 @@ use super::{Collector, did_you_mean, nearest, shown};
 use crate::Mistake;
 use crate::time::Nanos;
 
-/// What messages call the root table.
+/// The name of the root table in messages.
 const ROOT: &str = "the file";
 
 /// One table, read key by key; [`finish`](Self::finish) then reports missing and unknown keys.
@@ -107,18 +107,18 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Whether none of its lines was left out for a syntax error. If one was, a missing key may be in that
+    /// True if none of the table's lines was left out for a syntax error. Otherwise a missing key may be in such a
     /// line, and rules that involve several keys cannot be checked.
     pub fn is_whole(&self) -> bool {
         self.whole
     }
 
-    /// Byte offset of its start.
+    /// Byte offset of the table's start.
     pub fn at(&self) -> usize {
         self.at
     }
 
-    /// The collector for mistakes in its text.
+    /// The collector for mistakes in the table's text.
     pub fn collector(&self) -> &'a Collector<'a> {
         self.collector
     }
@@ -188,17 +188,17 @@ pub struct Value<'a> {
 }
 
 impl<'a> Value<'a> {
-    /// Byte offset of its start.
+    /// Byte offset of the value's start.
     pub fn at(&self) -> usize {
         self.node.span().start
     }
 
-    /// The line, from 1, on which it starts.
+    /// The line, from 1, on which the value starts.
     pub fn line(&self) -> usize {
         self.collector.line(self.at())
     }
 
-    /// Line and column, both from 1, at which it starts.
+    /// Line and column, both from 1, at which the value starts.
     pub fn place(&self) -> (usize, usize) {
         self.collector.place(self.at())
     }
@@ -208,7 +208,7 @@ impl<'a> Value<'a> {
         self.refuse(Mistake::new(what, right));
     }
 
-    /// As [`wrong`](Self::wrong), for a mistake that something else has found.
+    /// Like [`wrong`](Self::wrong), for an existing mistake.
     pub fn refuse(&self, mistake: Mistake) {
         self.collector.collect(self.at(), mistake);
     }
@@ -228,7 +228,7 @@ impl<'a> Value<'a> {
         matches!(self.node.get_ref(), DeValue::Integer(_))
     }
 
-    /// A number as the text has it; empty for everything else.
+    /// A number as written; empty for everything else.
     pub fn written(&self) -> String {
         match self.node.get_ref() {
             DeValue::Integer(digits) => shown(&digits.to_string()),
@@ -237,7 +237,7 @@ impl<'a> Value<'a> {
         }
     }
 
-    /// The text if this is one; anything else is not a mistake here.
+    /// The text of a string; other types are no mistake here.
     pub fn as_text(&self) -> Option<&'a str> {
         self.node.get_ref().as_str()
     }
@@ -362,7 +362,7 @@ impl<'a> Value<'a> {
         Some(span)
     }
 
-    /// As [`duration_from`](Self::duration_from), and not longer than `most`.
+    /// Like [`duration_from`](Self::duration_from), and not longer than `most`.
     pub fn duration_between(&self, least: Nanos, why: &str, most: Nanos) -> Option<Nanos> {
         let span = self.duration_from(least, why)?;
         if span > most {

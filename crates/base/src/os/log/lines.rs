@@ -1,4 +1,4 @@
-//! Log messages for a host that has a log of its own.
+//! Log messages for a host with its own log.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,16 +7,16 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use env_logger::{Builder, Target};
 use log::{Level, LevelFilter};
 
-/// The most lines that wait. Older ones give way to newer ones, and are counted.
+/// The most waiting lines. Newer lines displace older ones, which are counted.
 const MOST: usize = 1000;
 
-/// What waits to be taken.
+/// The waiting lines.
 static WAITING: Mutex<Waiting> = Mutex::new(Waiting {
     lines: VecDeque::new(),
     lost: 0,
 });
 
-/// Whether anything waits: asked far more often than anything happens.
+/// True if lines are waiting: checked far more often than lines arrive.
 static ANY: AtomicBool = AtomicBool::new(false);
 
 struct Waiting {
@@ -25,12 +25,12 @@ struct Waiting {
 }
 
 fn waiting() -> MutexGuard<'static, Waiting> {
-    // The queue is whole after every single change.
+    // The queue is consistent after every single change.
     WAITING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Keeps log messages for [`take_log`], from the level `info` on, or from that in the variable `TICKBUS_LOG`. If this process
-/// has a logger already, that one stays, and nothing is kept.
+/// Keeps log messages for [`take_log`], from the level `info` on, or from the level in the variable `TICKBUS_LOG`. If
+/// this process already has a logger, that one stays, and no messages are kept.
 pub fn collect_log() {
     let mut builder = Builder::new();
     let variable = std::env::var("TICKBUS_LOG").ok();
@@ -50,13 +50,13 @@ pub fn collect_log() {
     let _ = builder.try_init();
 }
 
-/// Whether there are lines for [`take_log`]; this costs next to nothing.
+/// True if there are lines for [`take_log`]; costs almost nothing.
 #[inline]
 pub fn has_log() -> bool {
     ANY.load(Ordering::Relaxed)
 }
 
-/// Takes all messages that wait, oldest first.
+/// Takes all waiting messages, oldest first.
 pub fn take_log() -> Vec<(Level, String)> {
     let mut waiting = waiting();
     ANY.store(false, Ordering::Release);

@@ -23,17 +23,17 @@ struct Shared {
 #[derive(Debug, Default)]
 struct State {
     messages: VecDeque<Box<[u8]>>,
-    /// Their size in bytes.
+    /// The total size of the messages in bytes.
     bytes: usize,
-    /// Whether the thread holds messages that are not written yet.
+    /// True if the thread holds messages that are not written yet.
     writes: bool,
-    /// How many messages were dropped; and how many of these the log has not reported yet.
+    /// The number of dropped messages, and of those that the log has not reported yet.
     dropped: u64,
     untold: u64,
 }
 
 impl Queue {
-    /// An empty queue, and a thread that writes what arrives to `to` for the rest of the process.
+    /// An empty queue, and a thread that writes all messages to `to` for the rest of the process.
     ///
     /// # Errors
     ///
@@ -84,7 +84,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Writes what arrives, forever.
+    /// Writes messages as they arrive, forever.
     fn write_all(&self, mut to: impl Write) {
         loop {
             let mut state = self.lock();
@@ -122,7 +122,7 @@ mod tests {
 
     use super::*;
 
-    /// A writer that takes a message only when the test lets it.
+    /// A writer that takes a message only when the test allows it.
     struct Slow {
         may_read: Receiver<()>,
         read: Sender<Vec<u8>>,

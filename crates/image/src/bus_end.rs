@@ -7,14 +7,15 @@ use super::sync::{Arc, AtomicI64, Ordering};
 use super::{EdgeCounter, LatchedBit, Producer, PulseShaper, Reader, Told, Writer, copy_frame};
 use tickbus_base::time::Nanos;
 
-/// The bus's end of a driver's image: of all its stations. What [`received`](Self::received), [`touch`](Self::touch) and
-/// [`set_valid`](Self::set_valid) say reaches the tick with the next [`hand_over`](Self::hand_over), all at once.
+/// The bus's end of a driver's image, for all its stations. The effects of [`received`](Self::received),
+/// [`touch`](Self::touch) and [`set_valid`](Self::set_valid) reach the tick together, with the next
+/// [`hand_over`](Self::hand_over).
 #[derive(Debug)]
 pub struct BusEnd {
     rx: Writer<Frame>,
     /// The frame to hand over next.
     staged: Frame,
-    /// Whether it differs from the one handed over last, and whether in received data.
+    /// True if the frame differs from the one handed over last, and if it differs in received data.
     is_news: bool,
     is_cycle: bool,
     tx: Reader<Frame>,
@@ -78,11 +79,12 @@ impl BusEnd {
         self.stations.len()
     }
 
-    /// Takes over what the simulation wrote last: all stations of one tick. From now on stations send the fail-safe bytes
+    /// Takes over the simulation's last values: all stations of one tick. From now on stations send the fail-safe bytes
     /// if the simulation has not ticked for longer than `watchdog`, or never.
     #[inline]
     pub fn attend(&mut self, now: Nanos, watchdog: Option<Nanos>) {
-        // Before the frame, which the tick publishes first: no old frame passes for one of a simulation that ticks again.
+        // Before the frame, which the tick publishes first: so no old frame passes for one of a simulation that ticks
+        // again.
         self.ticked = self.alive.load(Ordering::Acquire);
         self.tx.update();
         self.is_dead = watchdog.is_some_and(|limit| age(now, self.ticked) > limit);
@@ -140,13 +142,13 @@ impl BusEnd {
         age(now, self.alive.load(Ordering::Relaxed))
     }
 
-    /// Time since the peer of a station was last heard from; [`Nanos::MAX`] if it never was.
+    /// Time since the peer of a station was last heard; [`Nanos::MAX`] if it never was.
     #[inline]
     pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
         age(now, self.staged.heads[station].heard)
     }
 
-    /// Whole bytes of a station have arrived, of a peer whose data are valid or not: counts the edges of those that are.
+    /// Whole bytes of a station have arrived, from a peer with valid data or not: counts the edges of valid data.
     ///
     /// # Panics
     ///
@@ -187,7 +189,7 @@ impl BusEnd {
         head.is_valid = is_valid;
     }
 
-    /// Hands everything over that was said since the last time, if there was anything.
+    /// Hands over all changes since the last time, if there were any.
     #[inline]
     pub fn hand_over(&mut self) {
         if !std::mem::take(&mut self.is_news) {

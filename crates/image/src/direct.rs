@@ -4,8 +4,8 @@ use tickbus_base::time::Nanos;
 
 use crate::{EdgeCounter, LatchedBit, PulseShaper, copy_frame};
 
-/// A stream of frames whose writer and reader take turns on one thread: as through the two ends of an
-/// [`image`](fn@crate::image), no edge of a latched signal is lost, but nothing has to be handed over.
+/// A stream of frames whose writer and reader take turns on one thread. As through the two ends of an
+/// [`image`](fn@crate::image), no edge of a latched signal is lost, but no hand-over is needed.
 #[derive(Debug)]
 pub struct DirectStream {
     bytes: Box<[u8]>,
@@ -26,7 +26,7 @@ impl DirectStream {
         }
     }
 
-    /// Lets `write` change the frame, and counts the edges of that.
+    /// Lets `write` change the frame, and counts the resulting edges.
     #[inline]
     pub fn write<R>(&mut self, write: impl FnOnce(&mut [u8]) -> R) -> R {
         let result = write(&mut self.bytes);
@@ -36,18 +36,18 @@ impl DirectStream {
         result
     }
 
-    /// Takes over a frame whose edges do not count, since its writer's data are not valid.
+    /// Takes over a frame whose edges do not count, since the writer's data are invalid.
     pub fn pass(&mut self, bytes: &[u8]) {
         copy_frame(&mut self.bytes, bytes);
         self.edges.pass(bytes);
     }
 
-    /// The frame as it was written, for a reader to which its edges do not count: they wait.
+    /// The frame as written, for a reader to which its edges do not count: the edges wait.
     pub fn latest(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// What the reader sees at `now`: the frame, with every edge since the last call made visible.
+    /// The reader's view at `now`: the frame, with every edge since the last call made visible.
     #[inline]
     pub fn read(&mut self, now: Nanos) -> &[u8] {
         if !self.has_latched() {
@@ -65,7 +65,7 @@ impl DirectStream {
         if shapes { &self.shaped } else { &self.bytes }
     }
 
-    /// Whether there is an edge to count and to show.
+    /// True if there is an edge to count and to show.
     #[inline]
     fn has_latched(&self) -> bool {
         !self.shaper.bits().is_empty()

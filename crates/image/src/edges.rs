@@ -14,9 +14,9 @@ use tickbus_base::time::Nanos;
 pub struct LatchedBit {
     /// Position of its signal in the signal table.
     pub signal: usize,
-    /// Its byte in the frame.
+    /// The byte in the frame.
     pub byte: usize,
-    /// Its bit, as a mask.
+    /// The bit, as a mask.
     pub mask: u8,
     /// The edges that count.
     pub latch: Latch,
@@ -43,22 +43,22 @@ pub fn latched_bits(table: &SignalTable, station: usize, area: Area) -> Box<[Lat
     bits
 }
 
-/// Eight bytes of a frame in which bits are latched: 64 of them are worked on at a time, as masks. Bit n of the frame's
-/// byte k is bit 8 × (k modulo 8) + n here.
+/// Eight bytes of a frame with latched bits: 64 bits are processed at a time, as masks. Bit n of the frame's byte k is
+/// bit 8 × (k modulo 8) + n here.
 #[derive(Clone, Debug)]
 struct Word {
     /// The first of its bytes.
     byte: usize,
     latched: u64,
-    /// The bits whose rising edges count, and those whose falling ones do.
+    /// The bits whose rising edges count, and those whose falling edges count.
     rising: u64,
     falling: u64,
-    /// Which of the latched bits they are.
+    /// The range of these bits among the latched bits.
     bits: Range<usize>,
 }
 
 impl Word {
-    /// The words of latched bits that stand byte by byte.
+    /// The words of latched bits, which are in the order of their bytes.
     fn all(bits: &[LatchedBit]) -> Box<[Self]> {
         let mut begin = 0;
         let of_a_word = bits.chunk_by(|one, next| one.byte / 8 == next.byte / 8);
@@ -81,7 +81,7 @@ impl Word {
             .collect()
     }
 
-    /// The levels of its latched bits.
+    /// The levels of the latched bits.
     #[inline]
     fn levels(&self, bytes: &[u8]) -> u64 {
         let rest = &bytes[self.byte..];
@@ -93,7 +93,7 @@ impl Word {
         u64::from_le_bytes(word) & self.latched
     }
 
-    /// Changes those of its latched bits that are in `changes`.
+    /// Toggles the latched bits in `changes`.
     #[inline]
     fn change(&self, bytes: &mut [u8], changes: u64) {
         if changes == 0 {
@@ -104,13 +104,13 @@ impl Word {
         }
     }
 
-    /// Those of `bits` that are an edge of interest if they change to `levels`.
+    /// The bits among `bits` for which a change to `levels` is an edge that counts.
     #[inline]
     fn edges(&self, bits: u64, levels: u64) -> u64 {
         bits & (levels & self.rising | !levels & self.falling)
     }
 
-    /// Its bits that are among `bits` of the frame.
+    /// The latched bits that are among `bits` of the frame.
     fn among(&self, bits: &Range<usize>) -> u64 {
         let below = |end: usize| match end.saturating_sub(self.byte * 8) {
             end @ 0..64 => (1 << end) - 1,
@@ -121,7 +121,7 @@ impl Word {
 }
 
 impl LatchedBit {
-    /// Its place in its [`Word`].
+    /// The bit's place in its [`Word`].
     fn place(&self) -> usize {
         8 * (self.byte % 8) + self.mask.trailing_zeros() as usize
     }
@@ -138,7 +138,7 @@ fn places(bits: &[LatchedBit]) -> Box<[u8]> {
 pub struct EdgeCounter {
     words: Box<[Word]>,
     places: Box<[u8]>,
-    /// The levels of the words as they were last.
+    /// The last levels of the words.
     last: Box<[u64]>,
     counts: Box<[u32]>,
 }
@@ -166,7 +166,7 @@ impl EdgeCounter {
         }
     }
 
-    /// Takes over the levels in `bytes`, whose edges do not count.
+    /// Takes over the levels in `bytes` without counting edges.
     pub fn pass(&mut self, bytes: &[u8]) {
         for (word, last) in self.words.iter().zip(&mut self.last) {
             *last = word.levels(bytes);
@@ -195,7 +195,7 @@ impl EdgeCounter {
     }
 }
 
-/// What the receiver has been shown of the latched bits of a word, or is about to be shown.
+/// The receiver's last or next view of a word's latched bits.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shown {
     levels: u64,
@@ -204,7 +204,7 @@ struct Shown {
 }
 
 impl Shown {
-    /// Takes over from `next` what concerns these bits.
+    /// Takes over these bits from `next`.
     fn merge(&mut self, next: Self, bits: u64) {
         self.levels = self.levels & !bits | next.levels & bits;
         self.waiting = self.waiting & !bits | next.waiting & bits;
@@ -214,36 +214,36 @@ impl Shown {
 /// A bit whose pulses are held.
 #[derive(Debug)]
 struct Hold {
-    /// Its word, and itself as a mask in there.
+    /// The bit's word, and the bit as a mask in that word.
     word: usize,
     mask: u64,
     span: Nanos,
-    /// Until when its level stays as it is, as the receiver knows it, and as it is about to.
+    /// How long its level is held: in the receiver's last view, and in the next.
     until: Nanos,
     next_until: Nanos,
 }
 
 /// Shapes the levels on the reading side so that every edge is seen as an edge.
 ///
-/// Where the counters report edges that the levels no longer show, the level is forced for one exchange: a
-/// pulse that is over is shown late, and a level that fell and rose again in between is shown low once.
-/// Several edges between two exchanges merge into one. What was shaped counts as seen only when
-/// [`confirm`](Self::confirm) reports that the exchange was completed.
+/// Where the counters report edges that the levels no longer show, the level is forced for one exchange: a pulse that
+/// has ended is shown late, and a level that fell and rose again in between is shown low once. Several edges between
+/// two exchanges merge into one. Shaped levels count as seen only when [`confirm`](Self::confirm) reports that the
+/// exchange was completed.
 #[derive(Debug)]
 pub struct PulseShaper {
     bits: Box<[LatchedBit]>,
     words: Box<[Word]>,
     places: Box<[u8]>,
-    /// Per word, what the receiver has seen last, and what it is about to see.
+    /// Per word, the receiver's last view and the next one.
     shown: Box<[Shown]>,
     next: Box<[Shown]>,
-    /// The bits that are held for longer than one exchange; mostly none.
+    /// The bits that are held for longer than one exchange; usually none.
     holds: Box<[Hold]>,
-    /// Per word, the bits whose level stays as it is.
+    /// Per word, the bits whose level is held.
     held: Box<[u64]>,
     /// Counters of the frame looked at last.
     counts: Box<[u32]>,
-    /// Whether any level is forced or held, or any edge still waits.
+    /// True if any level is forced or held, or any edge still waits.
     busy: bool,
 }
 
@@ -280,16 +280,15 @@ impl PulseShaper {
         }
     }
 
-    /// The latched bits that it shapes.
+    /// The latched bits that this shaper shapes.
     pub fn bits(&self) -> &[LatchedBit] {
         &self.bits
     }
 
-    /// Whether the levels of a frame with the counters `edges` need shaping; if not, they
-    /// [`pass`](Self::pass).
+    /// True if the levels of a frame with the counters `edges` need shaping; otherwise, [`pass`](Self::pass) them.
     #[inline]
     pub fn needs_shaping(&self, edges: &[u32]) -> bool {
-        // Without latched signals nothing is compared: comparing zero bytes reads at a dangling address, and on processors
+        // Without latched signals, compare nothing: comparing zero bytes reads at a dangling address, and on processors
         // with masked loads that takes longer than the rest of a tick.
         self.busy || (!self.words.is_empty() && *edges != *self.counts)
     }
@@ -374,7 +373,7 @@ impl PulseShaper {
         self.counts.copy_from_slice(edges);
     }
 
-    /// Records that the receiver has seen what was shaped or passed last.
+    /// Records that the receiver has seen the levels shaped or passed last.
     #[inline]
     pub fn confirm(&mut self) {
         self.confirm_words(|_| u64::MAX);
@@ -386,7 +385,7 @@ impl PulseShaper {
         self.confirm_words(|word| word.among(bits));
     }
 
-    /// Confirms those bits of each word that `seen` gives.
+    /// Confirms the bits of each word that `seen` returns.
     #[inline]
     fn confirm_words(&mut self, seen: impl Fn(&Word) -> u64) {
         if self.words.is_empty() {

@@ -164,7 +164,7 @@ fn the_bytes_sent_last_stay_at_hand_however_they_came_about() {
     for level in [1, 0] {
         write(&mut tick, 1, level);
     }
-    // The pulse, what the tick writes meanwhile, and the fail-safe bytes at the end.
+    // The pulse, later writes of the tick, and the fail-safe bytes at the end.
     for (now, expected, next) in [(2, 1, 0x42), (3, 0x42, 0x44), (20, 0x80, 0x46)] {
         assert_eq!(outgoing(&mut bus, now, Some(Nanos(10))), expected);
         bus.sent(0);
@@ -210,7 +210,7 @@ fn a_level_that_is_on_by_its_fail_safe_value_does_not_drop_when_the_peer_switche
     let (mut tick, mut bus) = one_latched_byte();
     receive(&mut bus, 0, 0);
     read(&mut tick, 0);
-    // The peer is silent, and the simulation is shown the bit on in its place.
+    // The peer is silent, and the simulation sees the bit on instead.
     tick.shown_instead(0, &mut Seen::default());
     receive(&mut bus, 90, 1);
     let (_, shown, edges) = read(&mut tick, 90);
@@ -298,7 +298,7 @@ fn one_message_of_several_stations_is_one_cycle_and_is_seen_whole() {
         assert_eq!((arrival.fresh, arrival.sequence), (true, 1));
         assert_eq!(tick.received(station), 1);
     }
-    // One of them alone leaves the others as they are.
+    // A change of one station leaves the others unchanged.
     bus.received(1, Nanos(2), &[6], true);
     bus.hand_over();
     tick.update();
@@ -334,7 +334,7 @@ fn a_frame_of_the_wrong_size_never_gets_in() {
     bus.received(0, Nanos(0), &[0, 0], true);
 }
 
-/// The stations' counters agree in every look, in both directions, between two threads that never wait.
+/// The stations' counters agree at every look, in both directions, between two threads that never wait.
 #[test]
 fn nothing_is_torn_or_young_again_between_threads() {
     const LAST: u32 = if cfg!(miri) { 100 } else { 20_000 };

@@ -12,7 +12,7 @@ pub struct Event {
     pub signal: u32,
     /// The value written, as the signal's slot holds it.
     pub value: Slot,
-    /// When it was written, on the driver's clock.
+    /// The time of the write, on the driver's clock.
     pub time: Nanos,
 }
 

@@ -31,14 +31,14 @@ pub(super) fn age(now: Nanos, then: i64) -> Nanos {
     }
 }
 
-/// Whether received data are stale: the rule of the tick, which then delivers fail-safe values, of the line's state and
-/// of the statistics. Data that are exactly as old as `max_age` are fresh.
+/// True if received data are stale. This rule applies to the tick, which then delivers fail-safe values, to the line's
+/// state and to the statistics. Data of exactly the age `max_age` are fresh.
 #[inline]
 pub const fn is_stale(age: Nanos, max_age: Nanos, is_valid: bool) -> bool {
     !is_valid || age.0 > max_age.0
 }
 
-/// What a frame says of one station's bytes: handed over with them, so that no reader takes old bytes for young ones.
+/// The state of one station's bytes: handed over with them, so that no reader takes old bytes for young ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Head {
     /// When the peer was last heard from.
@@ -71,7 +71,7 @@ pub(super) struct Frame {
     pub(super) cycles: u64,
 }
 
-/// Where a station stands in a frame.
+/// The place of a station in a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) bytes: Range<usize>,

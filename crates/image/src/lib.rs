@@ -2,8 +2,8 @@
 //!
 //! Two clocks meet here: the simulation's tick and the bus's cycle. Two streams of frames, one per direction, each pass
 //! through a [triple buffer](triple_buffer), so that neither side ever waits for the other and no frame is ever torn. A
-//! frame carries all that belongs together: the bytes and edge counters of all stations, and for each of them when its
-//! peer was heard from, and whether its data are valid. The two sides are [`TickEnd`] and [`BusEnd`].
+//! frame carries all data that belong together: the bytes and edge counters of all stations, and for each station when
+//! its peer was last heard, and whether its data are valid. The two sides are [`TickEnd`] and [`BusEnd`].
 //!
 //! ```text
 //!   tick thread                                          bus thread
@@ -12,8 +12,8 @@
 //!   TickEnd::events ◀──────────── event ring ───────────────── BusEnd::events
 //! ```
 //!
-//! "tx" and "rx" are as seen from the tick. In a Device tx is `%I` and rx is `%Q`; in a Controller it
-//! is the other way round. Where both sides are on one thread, a [`DirectStream`] does for each of them.
+//! "tx" and "rx" are as seen from the tick. In a Device tx is `%I` and rx is `%Q`; in a Controller it is the other way
+//! round. If both sides are on one thread, one [`DirectStream`] per direction is enough.
 
 mod bus_end;
 mod direct;
@@ -75,8 +75,7 @@ pub fn copy_frame(to: &mut [u8], from: &[u8]) {
 /// Capacity of a driver's event ring.
 pub const EVENT_CAPACITY: usize = 4096;
 
-/// What the bus says of each station, for statistics, which are asked for between ticks. A tick takes the same from its
-/// frame.
+/// The bus's state of each station, for statistics, which are read between ticks. A tick reads the same from its frame.
 type Told = std::sync::Arc<[ToldStation]>;
 
 /// See [`Told`].

@@ -39,8 +39,8 @@ impl Receiver for Seen {
     }
 }
 
-/// The peer is silent for longer than data count, and returns with another value and a pulse: no tick shows the value from
-/// before the outage with the time of after it, no tick sees two cycles, and each edge is counted once.
+/// The peer is silent for longer than data count, and returns with another value and a pulse: no tick shows the value
+/// from before the outage with the time after it, no tick sees two cycles, and each edge is counted once.
 #[test]
 fn loom_no_old_data_are_young_no_cycle_is_torn_and_no_edge_is_lost() {
     loom::model(|| {
@@ -88,7 +88,7 @@ fn loom_no_old_data_are_young_no_cycle_is_torn_and_no_edge_is_lost() {
     });
 }
 
-/// The simulation pauses for longer than the watchdog, and returns: no exchange sends what it wrote before the pause.
+/// The simulation pauses for longer than the watchdog, and returns: no exchange sends values from before the pause.
 #[test]
 fn loom_no_exchange_sends_the_values_from_before_a_pause_or_those_of_two_ticks() {
     loom::model(|| {

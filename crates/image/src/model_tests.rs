@@ -1,4 +1,4 @@
-//! The hand-over against a model: slow, one bit at a time, and without any part of what it judges.
+//! The hand-over against a model: slow, one bit at a time, and sharing no code with the hand-over.
 
 use super::*;
 use crate::signal::Latch;
@@ -12,9 +12,9 @@ struct Bit {
     /// At the writing end: the level, and the edges so far.
     level: bool,
     edges: u32,
-    /// What the reader took over last.
+    /// The state that the reader took over last.
     taken: (bool, u32),
-    /// What the reader has seen, and what it is about to see if the exchange completes.
+    /// The reader's last view, and its next one if the exchange completes.
     seen: Reading,
     next: Reading,
     counted: u32,
@@ -69,7 +69,7 @@ impl Bit {
         self.taken = (self.level, self.edges);
     }
 
-    /// The level that the reader is about to see, and how many edges are new.
+    /// The level in the reader's next view, and the number of new edges.
     fn read(&mut self, now: i64) -> (bool, u32) {
         let (level, edges) = self.taken;
         let news = edges - self.counted;
@@ -182,7 +182,7 @@ impl Receiver for Shown {
     }
 }
 
-/// What came from the peer of a station, as the model has it.
+/// The data of a station's peer, as the model has it.
 #[derive(Clone, Copy, Debug)]
 struct Peer {
     bytes: [u8; 2],
@@ -212,7 +212,7 @@ fn received(mut random: Random) {
         heard: None,
         is_valid: true,
     };
-    // What is staged, what was handed over, and what the tick has.
+    // The staged values, the values handed over, and the tick's values.
     let (mut staged, mut handed) = ([first; STATIONS], [first; STATIONS]);
     let mut shown = [(); STATIONS].map(|()| Shown {
         bytes: FAIL_SAFE,
@@ -290,7 +290,7 @@ fn received(mut random: Random) {
 
 const STALE: usize = 1;
 
-/// Lets a tick look at a station, and compares with the model; 0 if it finds a new frame, 2 if it finds none.
+/// Lets a tick look at a station, and compares with the model; 0 if it finds a new frame, 2 if it finds nothing.
 fn look(
     tick: &mut TickEnd,
     (station, now): (usize, i64),
@@ -300,7 +300,7 @@ fn look(
 ) -> usize {
     let age = peer.heard.map_or(Nanos::MAX, |heard| Nanos(now - heard));
     let is_stale = !peer.is_valid || age.0 > MAX_AGE;
-    // What is said to be unchanged must be what is shown already.
+    // If `unchanged` says so, the same must have been shown already.
     let unchanged = tick.unchanged(station, Nanos(now));
     assert!(unchanged.is_none_or(|told| told == (age, peer.is_valid)));
     if unchanged.is_some() && !is_stale {
@@ -319,7 +319,7 @@ fn look(
     if arrival.fresh { 0 } else { 2 }
 }
 
-/// Lets the model read and confirm, and compares what the tick is shown.
+/// Lets the model read and confirm, and compares with the tick's view.
 fn assert_seen(models: &mut [Bit], now: i64, bits: &[LatchedBit], (raw, shown): ([u8; 2], &Shown)) {
     let expected: Vec<_> = models.iter_mut().map(|model| model.read(now)).collect();
     models.iter_mut().for_each(Bit::confirm);
@@ -341,13 +341,13 @@ fn what_the_peer_gets_is_what_the_model_says() {
 fn next_written(before: [u8; 2], random: &mut Random) -> [u8; 2] {
     match random.below(6) {
         0..=2 => before,
-        // Back to where it began.
+        // Back to the start.
         3 => FAIL_SAFE,
         _ => [0, 1].map(|_| random.below(256).to_le_bytes()[0]),
     }
 }
 
-/// Writes these bytes of all stations in one of the ways that there are; returns whether they were published already.
+/// Writes these bytes of all stations in one of the possible ways; returns whether they were published already.
 fn write_somehow(tick: &mut TickEnd, now: Nanos, bytes: &[[u8; 2]], way: u64) -> bool {
     let words = bytes.iter().map(|bytes| u16::from_le_bytes(*bytes).into());
     let words: Vec<u64> = words.collect();

@@ -83,7 +83,7 @@ impl RowWriter {
         true
     }
 
-    /// Whether there is no room for another row.
+    /// True if there is no room for another row.
     #[inline]
     pub fn is_full(&mut self) -> bool {
         let rows = self.shared.rows;
@@ -93,7 +93,7 @@ impl RowWriter {
         self.pushed.wrapping_sub(self.taken) == rows
     }
 
-    /// Whether more than half of the ring is in use.
+    /// True if more than half of the ring is in use.
     #[inline]
     pub fn is_half_full(&mut self) -> bool {
         let half = self.shared.rows / 2;

@@ -5,10 +5,10 @@ use super::sync::{Arc, AtomicI64, Ordering};
 use super::{Consumer, EdgeCounter, PulseShaper, Reader, Told, Writer};
 use tickbus_base::time::Nanos;
 
-/// Bytes of a frame that are fewer than what a comparison of memory begins to pay for.
+/// The number of bytes below which a memory comparison does not pay off.
 const SMALL: usize = 8;
 
-/// The tick's end of a driver's image: of all its stations, so that a tick hands over, and takes over, what belongs
+/// The tick's end of a driver's image, for all its stations, so that a tick hands over and takes over data that belong
 /// together.
 #[derive(Debug)]
 pub struct TickEnd {
@@ -34,7 +34,7 @@ struct Sent {
     signals: Box<[usize]>,
     /// The bytes published last, up to eight, as a number whose least significant byte comes first.
     word: u64,
-    /// The same of this tick.
+    /// The bytes of this tick, likewise.
     kept: u64,
 }
 
@@ -44,16 +44,16 @@ struct Shown {
     place: Place,
     /// Of the frame taken over last.
     head: Head,
-    /// The sequence number of the bytes that the simulation was shown last.
+    /// The sequence number of the bytes that the simulation last saw.
     sequence: u64,
     shaper: PulseShaper,
     shaped: Box<[u8]>,
-    /// Whether the simulation sees anything else than the frame: shaped levels, or fail-safe values. While the shaper has
-    /// an edge to show, it does.
+    /// True if the simulation sees anything other than the frame: shaped levels, or fail-safe values. Always true while
+    /// the shaper has an edge to show.
     forced: bool,
 }
 
-/// Receives what [`TickEnd::read`] shows.
+/// Receives the data of [`TickEnd::read`].
 pub trait Receiver {
     /// The station's bytes, with every edge made visible; called when they may have changed.
     fn levels(&mut self, bytes: &[u8]);
@@ -68,9 +68,9 @@ pub trait Receiver {
 pub struct Arrival {
     /// A whole new bus cycle has arrived since data were last shown.
     pub fresh: bool,
-    /// The data do not count, and nothing was shown.
+    /// The data are stale, and nothing was shown.
     pub stale: bool,
-    /// Time since the peer was last heard from; [`Nanos::MAX`] if it never was.
+    /// Time since the peer was last heard; [`Nanos::MAX`] if it never was.
     pub age: Nanos,
     /// Frames received for this station so far.
     pub sequence: u64,
@@ -85,7 +85,7 @@ fn as_word(bytes: &[u8]) -> u64 {
     u64::from_le_bytes(word)
 }
 
-/// Whether two frames differ. Small frames were just written byte by byte; a word-wide load would stall on store
+/// True if two frames differ. Small frames were just written byte by byte; a word-wide load would stall on store
 /// forwarding.
 #[inline]
 fn differ(one: &[u8], other: &[u8]) -> bool {
@@ -155,8 +155,8 @@ impl TickEnd {
         self.ticks(now);
     }
 
-    /// Keeps the bytes of a station, which are up to eight, as a number whose least significant byte comes first, for
-    /// [`write_kept`](Self::write_kept). Returns whether they are those published last.
+    /// Keeps the bytes of a station, at most eight, as a number whose least significant byte comes first, for
+    /// [`write_kept`](Self::write_kept). Returns whether they equal those published last.
     #[inline]
     pub fn keep_word(&mut self, station: usize, word: u64) -> bool {
         let sent = &mut self.sent[station];
@@ -164,8 +164,8 @@ impl TickEnd {
         sent.word == word
     }
 
-    /// As [`write`](Self::write), of what was [kept](Self::keep_word) of all stations in this tick; `is_same`: that was published
-    /// already.
+    /// Like [`write`](Self::write), for the bytes of all stations [kept](Self::keep_word) in this tick; `is_same`: all
+    /// of them are published already.
     #[inline]
     pub fn write_kept(&mut self, now: Nanos, is_same: bool) {
         if !is_same {
@@ -191,8 +191,8 @@ impl TickEnd {
         self.tx.publish();
     }
 
-    /// As [`write`](Self::write), for an image of one station of up to eight bytes that are at hand as a number, the least
-    /// significant byte first: a tick that changes nothing then touches no frame.
+    /// Like [`write`](Self::write), for an image of one station whose bytes, at most eight, are available as a number,
+    /// the least significant byte first: a tick that changes nothing then touches no frame.
     ///
     /// # Panics
     ///
@@ -220,10 +220,10 @@ impl TickEnd {
         self.tx.publish();
     }
 
-    /// The simulation has ticked. What it wrote in this tick was handed over before.
+    /// The simulation has ticked. Its values of this tick must be handed over before.
     #[inline]
     pub fn ticks(&self, now: Nanos) {
-        // After the frame: a bus that sees this time and then looks for a frame finds one that is as young.
+        // After the frame: a bus that sees this time and then looks for a frame finds one of at least this time.
         self.alive.store(now.0, Ordering::Release);
     }
 
@@ -333,23 +333,23 @@ impl TickEnd {
         no_edges(&self.shown[station].shaper, receiver);
     }
 
-    /// As [`shown_instead`](Self::shown_instead), with edges that are not the frame's either.
+    /// Like [`shown_instead`](Self::shown_instead), with edges that are not the frame's either.
     pub fn overridden(&mut self, station: usize) {
         self.shown[station].forced = true;
     }
 
-    /// The bytes of a station as they came last, whether they count or not.
+    /// The last bytes of a station, stale or not.
     pub fn latest(&self, station: usize) -> &[u8] {
         &self.rx.value().bytes[self.shown[station].place.bytes.clone()]
     }
 
-    /// Time since the peer of a station was last heard from; [`Nanos::MAX`] if it never was. For statistics: the age of
-    /// the data that a tick shows is in its [`Arrival`].
+    /// Time since the peer of a station was last heard; [`Nanos::MAX`] if it never was. For statistics: the age of the
+    /// data that a tick shows is in its [`Arrival`].
     pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
         age(now, self.told[station].heard.load(Ordering::Relaxed))
     }
 
-    /// Whether the data of a station's peer are valid, for statistics.
+    /// True if the data of a station's peer are valid, for statistics.
     pub fn is_valid(&self, station: usize) -> bool {
         self.told[station].is_valid.load(Ordering::Relaxed)
     }
@@ -359,14 +359,15 @@ impl TickEnd {
         self.told[station].sequence.load(Ordering::Relaxed)
     }
 
-    /// Bus cycles whose data arrived up to the frame taken over last: one for all stations that a cycle carries.
+    /// Bus cycles whose data arrived up to the frame taken over last: a cycle counts once for all stations that it
+    /// carries.
     #[inline]
     pub fn cycles(&self) -> u64 {
         self.cycles
     }
 
-    /// Tells of every latched signal of a station, by its index in the signal table, how many edges there were so far, in
-    /// both directions; the counts wrap.
+    /// Calls `tell` for every latched signal of a station, with its index in the signal table and the number of its
+    /// edges so far, in both directions; the counts wrap.
     pub fn edges(&self, station: usize, mut tell: impl FnMut(usize, u32)) {
         let (sent, shown) = (&self.sent[station], &self.shown[station]);
         for (signal, count) in sent.signals.iter().zip(sent.edges.counts()) {

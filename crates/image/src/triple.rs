@@ -95,8 +95,8 @@ impl<T> Writer<T> {
 }
 
 impl<T: Sync> Writer<T> {
-    /// As [`with_buffer`](Self::with_buffer), beside the value published last, or the initial one: what did not change
-    /// need not be published, and need not be kept once more to see that.
+    /// Like [`with_buffer`](Self::with_buffer), beside the value published last, or the initial one: the writer can
+    /// skip publishing an unchanged value, and needs no extra copy to detect that.
     #[inline]
     pub fn with_last<R>(&mut self, write: impl FnOnce(&mut T, &T) -> R) -> R {
         self.shared.buffer(self.last).with(|last| {
@@ -113,14 +113,15 @@ impl<T: Sync> Writer<T> {
 }
 
 impl<T> Reader<T> {
-    /// Whether there is a value that was not seen yet.
+    /// True if there is a value that the reader has not seen yet.
     #[inline]
     pub fn has_news(&self) -> bool {
-        // Relaxed suffices for a look: whoever acts on it takes the value over by `update`, which orders the accesses.
+        // Relaxed suffices for a look: a reader that acts on it takes the value over by `update`, which orders the
+        // accesses.
         self.shared.state.load(Ordering::Relaxed) & FRESH != 0
     }
 
-    /// Takes over the newest value, if it was not seen yet; tells whether there was one.
+    /// Takes over the newest value, if it was not seen yet; returns whether there was one.
     #[inline]
     pub fn update(&mut self) -> bool {
         if !self.has_news() {
@@ -177,7 +178,7 @@ mod tests {
                 assert_eq!(*seen, last, "step {step}");
                 *buffer = value;
             });
-            // Some are not published, and some not read.
+            // Some values are not published, and some not read.
             if step % 3 != 0 {
                 writer.publish();
                 last = value;

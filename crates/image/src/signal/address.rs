@@ -78,7 +78,7 @@ impl Width {
     }
 }
 
-/// What the number in an address counts.
+/// The unit of the number in an address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Addressing {
     /// Bytes, as Siemens does: `%IW2` is bytes 2 and 3.
@@ -91,12 +91,12 @@ pub enum Addressing {
 
 /// An address in the process image of one station.
 ///
-/// Its text form counts bytes: `%QX1.0` is bit 0 of byte 1, `%IW4` bytes 4 and 5.
+/// The text form counts bytes: `%QX1.0` is bit 0 of byte 1, `%IW4` bytes 4 and 5.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Address {
     /// `%I` or `%Q`.
     pub area: Area,
-    /// How many bits.
+    /// The number of bits.
     pub width: Width,
     /// Offset of the first byte.
     pub byte: usize,
@@ -176,7 +176,7 @@ impl Address {
         })
     }
 
-    /// The range of its bits, counted from the start of the area.
+    /// The range of the address's bits, counted from the start of the area.
     pub fn bits(self) -> std::ops::Range<usize> {
         let start = self.byte * 8 + usize::from(self.bit);
         start..start + self.width.bits()

@@ -1,5 +1,5 @@
-//! Byte orders of multi-byte values: where a byte or a bit lies. The tick swaps the bytes of whole values, by the `Order`
-//! in `plan/word.rs`.
+//! Byte orders of multi-byte values: the position of a byte or a bit. The tick swaps the bytes of whole values with the
+//! `Order` in `plan/word.rs`.
 
 use std::fmt;
 

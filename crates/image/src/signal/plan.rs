@@ -16,7 +16,7 @@ use self::number::{Codec, Integer64, Number, Real, Unscaled};
 use self::run::{Gaps, Member, Run};
 use super::{Area, ByteOrder, DataType, Scale, Signal, SignalTable, Slot};
 
-/// How many values could not be encoded as they were.
+/// The number of values that could not be encoded unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Conversions {
     /// Values beyond the range of their type, replaced by its nearest limit.
@@ -55,7 +55,7 @@ pub struct Plan {
     bytes: usize,
     octets: Octets,
     runs: Vec<Box<dyn Run>>,
-    /// Whether there is nothing but octets in a frame of up to eight bytes.
+    /// True if a frame of up to eight bytes consists only of octets.
     is_word: bool,
     fail_safes: Vec<(usize, Slot)>,
 }
@@ -112,9 +112,9 @@ impl Plan {
         conversions
     }
 
-    /// The frame that [`encode`](Self::encode) would make, as a number whose least significant byte comes first, of up to
-    /// eight bytes that are all BOOLs, eight to a byte in the order of the slots. `None` for other frames, and if a value
-    /// is NaN.
+    /// The frame that [`encode`](Self::encode) would make, as a number whose least significant byte comes first, if the
+    /// frame has up to eight bytes that are all BOOLs, eight to a byte in the order of the slots. `None` for other
+    /// frames, and if a value is NaN.
     ///
     /// # Panics
     ///
@@ -154,7 +154,7 @@ impl Plan {
         }
     }
 
-    /// The only check of lengths: all indices below are within what it has checked.
+    /// The only check of lengths: all indices below are within the checked lengths.
     #[inline]
     fn check(&self, slots: usize, bytes: usize) {
         assert!(
@@ -166,7 +166,7 @@ impl Plan {
     }
 }
 
-/// What decides which loop converts a signal.
+/// The properties that select a loop for a signal.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Kind {
     data_type: DataType,

@@ -55,7 +55,7 @@ impl RawValues {
     ///
     /// # Panics
     ///
-    /// As [`take`](Self::take).
+    /// The same as for [`take`](Self::take).
     pub fn give(&self, station: usize, frame: &mut [u8]) {
         self.plans[station].encode(&self.slots, frame);
     }
@@ -75,7 +75,7 @@ impl RawValues {
         }
     }
 
-    /// Sets the bits of a signal, which are no more than its type has.
+    /// Sets the bits of a signal, which must fit its type.
     #[expect(clippy::cast_precision_loss, reason = "at most 32 bits")]
     pub fn set(&mut self, signal: usize, bits: u64) {
         self.slots[signal] = if self.is_long[signal] {

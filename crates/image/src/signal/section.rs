@@ -24,7 +24,7 @@ pub struct Section<'a> {
     pub address: Value<'a>,
     /// The value of `station`.
     pub station: Option<Value<'a>>,
-    /// The structure that it is a part of, if any.
+    /// The structure that contains the signal, if any.
     pub structure: Option<Structure>,
 }
 
@@ -38,20 +38,20 @@ pub struct Structure {
 }
 
 impl Section<'_> {
-    /// Offset just beyond it, or beyond the structure that it is a part of.
+    /// Offset just beyond the signal, or beyond the structure that contains it.
     pub fn end(&self) -> usize {
         let signal = &self.signal;
         let own = signal.byte + signal.data_type.size_bytes();
         self.structure.map_or(own, |structure| structure.end)
     }
 
-    /// Whether its name is in the file, and is not derived from the name of its table.
+    /// True if the name is in the file, and is not derived from the name of its table.
     pub fn has_own_name(&self) -> bool {
         let name = self.name.as_ref().and_then(Value::as_text);
         name == Some(&self.signal.name)
     }
 
-    /// What messages call the whole table.
+    /// The name of the whole table in messages.
     pub fn title(&self) -> String {
         let name = self.name.as_ref().and_then(Value::as_text);
         match (name, self.structure) {
@@ -62,7 +62,7 @@ impl Section<'_> {
         }
     }
 
-    /// What messages call the signal.
+    /// The name of the signal in messages.
     pub fn label(&self) -> String {
         let Signal { name, .. } = &self.signal;
         if name.is_empty() {
@@ -172,7 +172,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     })
 }
 
-/// Checks what can be checked of the values of a signal whose type is unknown.
+/// Checks the values of a signal with an unknown type, as far as possible.
 fn check_shapes(
     scale: Option<&Value<'_>>,
     fail_safe: Option<&Value<'_>>,
@@ -189,7 +189,7 @@ fn check_shapes(
     }
 }
 
-/// A name: printable characters, and not one that is reserved for tickbus.
+/// A name: printable characters, not reserved for tickbus.
 pub fn name_of<'a>(value: &Value<'a>) -> Option<&'a str> {
     let name = value.label(NAME_LIMIT, "give the signal a name of its own")?;
     if name.starts_with("bus.") {
@@ -226,7 +226,7 @@ fn type_of(value: &Value<'_>) -> Option<DataType> {
         .ok()
 }
 
-/// The type that programming languages call by this name.
+/// The type that has this name in programming languages.
 fn other_name(text: &str) -> Option<DataType> {
     Some(match text.to_ascii_uppercase().as_str() {
         "BIT" | "BOOLEAN" => DataType::Bool,
@@ -433,7 +433,7 @@ pub fn pair_of<'a>(value: &Value<'a>, right: &str) -> Option<[(f64, Value<'a>); 
     Some([(numbers.0?, first), (numbers.1?, second)])
 }
 
-/// Whether a raw number is within the range of the type; it may have a fraction.
+/// True if a raw number is within the range of the type; it may have a fraction.
 fn fits_raw(number: f64, data_type: DataType) -> bool {
     let (least, greatest) = raw_limits(data_type);
     (least..=greatest).contains(&number)
@@ -462,14 +462,14 @@ fn raw_range(data_type: DataType) -> String {
     }
 }
 
-/// The value of a signal whose bits are all zero, as a bus delivers for a device that is gone.
+/// The value of a signal whose bits are all zero, as a bus delivers for a missing device.
 fn at_rest(signal: &Signal) -> Slot {
     signal
         .scale
         .map_or_else(Slot::default, |scale| Slot::from_real(scale.offset))
 }
 
-/// A value of `signal`, in its unit, as its slot holds it; messages call the key `key`.
+/// A value of `signal`, in its unit, as its slot; messages call the key `key`.
 pub fn slot_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
     if signal.data_type == DataType::Bool {
         return bit_of(value, key);

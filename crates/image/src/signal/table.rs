@@ -17,19 +17,19 @@ pub enum Latch {
 /// One signal of the process image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Signal {
-    /// Its name, unique in the table; names that start with `bus.` are reserved.
+    /// The name, unique in the table; names that start with `bus.` are reserved.
     pub name: String,
-    /// Index of its station in [`SignalTable::stations`].
+    /// Index of the station in [`SignalTable::stations`].
     pub station: usize,
     /// `%I` or `%Q`.
     pub area: Area,
-    /// Offset of its first byte in the station's area.
+    /// Offset of the first byte in the station's area.
     pub byte: usize,
     /// Bit within that byte, 0 to 7; 0 unless the type is BOOL.
     pub bit: u8,
-    /// The type of its bits.
+    /// The data type.
     pub data_type: DataType,
-    /// The order of its bytes; irrelevant for types of up to one byte.
+    /// The byte order; irrelevant for types of up to one byte.
     pub order: ByteOrder,
     /// Conversion to engineering units; `None` for raw values.
     pub scale: Option<Scale>,
@@ -40,21 +40,21 @@ pub struct Signal {
     /// On a `%I`: how long a latched pulse is held at least, in addition to the one completed exchange that
     /// always carries it.
     pub hold: Nanos,
-    /// The value in its place when the data are stale (`%Q`) or the simulation has stopped (`%I`), in
-    /// engineering units, as the signal's own slot would hold it.
+    /// The substitute value when the data are stale (`%Q`) or the simulation has stopped (`%I`), in engineering units,
+    /// in the format of the signal's slot.
     pub fail_safe: Slot,
-    /// Whether that value was stated, and is not merely the usual 0.
+    /// True if the file states that value, and it is not merely the default 0.
     pub states_fail_safe: bool,
     /// How far the value may move, in engineering units, before a bus that sends on change sends it; zero
     /// sends every change. Never negative, and zero on a BOOL.
     pub dead_band: f64,
-    /// The lowest and the highest value of normal operation, in engineering units: the two values that its
-    /// scale names. A hint for displays; values are not limited to it.
+    /// The lowest and the highest value of normal operation, in engineering units: the two values that the scale names.
+    /// A hint for displays; values are not limited to it.
     pub range: Option<[f64; 2]>,
 }
 
 impl Signal {
-    /// A signal of the first station as its name, place and type alone make it: unscaled, without a latch.
+    /// A signal of the first station with only a name, place and type: unscaled, without a latch.
     pub fn new(name: impl Into<String>, area: Area, byte: usize, data_type: DataType) -> Self {
         Self {
             name: name.into(),
@@ -75,7 +75,7 @@ impl Signal {
         }
     }
 
-    /// Whether its slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.
+    /// True if the slot holds a 64-bit integer and not a double: an unscaled LWORD, LINT or ULINT.
     pub const fn is_integer_slot(&self) -> bool {
         self.scale.is_none()
             && matches!(
@@ -84,7 +84,7 @@ impl Signal {
             )
     }
 
-    /// Its address in the image of its station.
+    /// The address in the image of the station.
     pub const fn address(&self) -> Address {
         Address {
             area: self.area,
@@ -98,7 +98,7 @@ impl Signal {
 /// One station (slave, unit, node) of a driver, with a frame for each area.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Station {
-    /// Its name, unique in the table; empty where a driver.cfg declares no station.
+    /// The name, unique in the table; empty where a driver.cfg declares no station.
     pub name: String,
     /// Size of `%I` in bytes.
     pub input_bytes: usize,
@@ -116,7 +116,7 @@ pub struct SignalTable {
 }
 
 impl Station {
-    /// Size of one of its areas in bytes.
+    /// Size of an area in bytes.
     pub const fn bytes(&self, area: Area) -> usize {
         match area {
             Area::Input => self.input_bytes,
@@ -126,7 +126,7 @@ impl Station {
 }
 
 impl SignalTable {
-    /// The signals of one station without a name, whose areas have these numbers of bytes.
+    /// The signals of a single station without a name, whose areas have these numbers of bytes.
     pub fn of_one_station(input_bytes: usize, output_bytes: usize, signals: Vec<Signal>) -> Self {
         Self {
             stations: vec![Station {

@@ -61,7 +61,7 @@ impl DataType {
         Self::Lreal,
     ];
 
-    /// Its name in the standard: `BOOL` to `LREAL`.
+    /// The name in the standard: `BOOL` to `LREAL`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Bool => "BOOL",
@@ -93,17 +93,17 @@ impl DataType {
         }
     }
 
-    /// Its size in bytes: 1, 2, 4 or 8; a BOOL occupies a bit of one byte.
+    /// The size in bytes: 1, 2, 4 or 8; a BOOL occupies a bit of one byte.
     pub const fn size_bytes(self) -> usize {
         self.width().bytes()
     }
 
-    /// Whether it is an integer or a bit string of more than one bit: every type except BOOL, REAL and LREAL.
+    /// True for an integer or a bit string of more than one bit: every type except BOOL, REAL and LREAL.
     pub const fn is_integer(self) -> bool {
         !matches!(self, Self::Bool | Self::Real | Self::Lreal)
     }
 
-    /// Whether it is a signed integer.
+    /// True for a signed integer.
     pub const fn is_signed(self) -> bool {
         matches!(self, Self::Sint | Self::Int | Self::Dint | Self::Lint)
     }

@@ -1,4 +1,4 @@
-//! Runs of BOOL signals: bytes that are all signals, and bytes of which only some bits are.
+//! Runs of BOOL signals: bytes fully covered by signals, and bytes with signals in only some bits.
 
 use wide::{CmpEq, i16x8, i32x8, i64x2};
 
@@ -22,15 +22,15 @@ pub(super) fn lay_out(members: &[Member]) -> (Octets, Option<Box<dyn Run>>) {
     (Octets::new(octets), partials)
 }
 
-/// Bytes whose bits 0 to 7 are eight consecutive slots. Not among the runs, since groups of BOOLs are what many machines
-/// consist of: they are converted without a call.
+/// Bytes whose bits 0 to 7 are eight consecutive slots. They are not among the runs, since many machines consist of
+/// groups of BOOLs: they are converted without a call.
 #[derive(Debug)]
 pub(super) struct Octets {
     all: Vec<Octet>,
     /// The first of their slots.
     first: usize,
-    /// Per octet, how many eights of slots are before it from the first on, and its bit in a word; if all of them stand
-    /// so, in up to eight bytes.
+    /// Per octet, its distance from the first one in groups of eight slots, and its bit in a word; if all octets are at
+    /// such distances, in up to eight bytes.
     in_word: Option<Vec<(usize, u32)>>,
 }
 
@@ -73,7 +73,7 @@ impl Octets {
         }
     }
 
-    /// Whether [`word`](Self::word) can be asked for.
+    /// True if [`word`](Self::word) may be called.
     pub(super) fn fit_into_a_word(&self) -> bool {
         self.in_word.is_some()
     }
@@ -93,7 +93,7 @@ impl Octets {
         }
     }
 
-    /// The same of any values.
+    /// The same for any values.
     #[cold]
     #[inline(never)]
     fn word_of_any(&self, slots: &[Slot]) -> Option<u64> {
@@ -190,12 +190,12 @@ impl Run for Partials {
     }
 }
 
-/// Whether a fail-safe value is 1; not when it is NaN.
+/// True if a fail-safe value is 1; false for NaN.
 fn is_high(slot: Slot) -> bool {
     high(slot, false, &mut Conversions::default())
 }
 
-/// Whether a BOOL is 1: for every value except zero; NaN takes `fail_safe`, and is counted.
+/// True if a BOOL is 1: for every value except zero; NaN takes `fail_safe`, and is counted.
 fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
     let value = slot.real();
     if value.is_nan() {
@@ -209,29 +209,29 @@ fn high(slot: Slot, fail_safe: bool, conversions: &mut Conversions) -> bool {
 /// The bits of 1.0.
 const ONE: u64 = 1.0_f64.to_bits();
 
-/// Eight slots as one byte, the first slot as bit 0: right if they [are plain](are_plain), for which their bits are added to
-/// `seen`. One operation has several slots then, and none of their values is looked at.
+/// Eight slots as one byte, the first slot as bit 0: correct if the slots [are plain](are_plain); for that check, their
+/// bits are added to `seen`. One operation thus handles several slots, without looking at their values.
 #[inline]
 fn pack(slots: &[Slot; 8], seen: &mut i64x2) -> u8 {
     let pair = |first: usize| i64x2::new([slots[first].signed(), slots[first + 1].signed()]);
     let pairs = [pair(0), pair(2), pair(4), pair(6)];
     *seen |= (pairs[0] | pairs[1]) | (pairs[2] | pairs[3]);
-    // Zero or not is to be seen in the upper halves.
+    // The upper halves show whether a value is zero.
     let upper = slots.map(|slot| (slot.signed() >> 32) as i32);
     let words = i16x8::from_i32x8_saturate(i32x8::new(upper));
     let [byte, ..] = (!words.cmp_eq(i16x8::ZERO).move_mask()).to_le_bytes();
     byte
 }
 
-/// Whether all of the slots whose bits are in `seen` are 0.0 or 1.0, as BOOLs mostly are; or other powers of two below, which
-/// are packed as well: they have no bits but those of 1.0 either.
+/// True if all slots whose bits are in `seen` are 0.0 or 1.0, as BOOLs mostly are. Other powers of two below are packed
+/// correctly as well, since they also have no bits but those of 1.0.
 #[inline]
 fn are_plain(seen: i64x2) -> bool {
     let [one, other] = seen.to_array();
     (one | other).cast_unsigned() & !ONE == 0
 }
 
-/// As [`pack`], of any values; NaN slots take their bit from `fail_safe` and are counted.
+/// Like [`pack`], for any values; NaN slots take their bit from `fail_safe` and are counted.
 fn pack_any(slots: &[Slot; 8], fail_safe: u8, conversions: &mut Conversions) -> u8 {
     (0..8).zip(slots).fold(0, |byte, (bit, slot)| {
         let fail_safe = fail_safe >> bit & 1 == 1;

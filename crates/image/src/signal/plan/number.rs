@@ -16,16 +16,16 @@ pub(super) trait Codec: Debug + Send + Sync + 'static {
     type Word: Word;
     /// The number between slot and word: unscaled, not yet rounded.
     type Raw: Copy;
-    /// What the codec stores of each signal's scale.
+    /// The codec's form of a signal's scale.
     type Scale: Copy + Debug + Send + Sync + 'static;
 
-    /// Converts a signal's scale to what the codec stores.
+    /// Converts a signal's scale to that form.
     fn scale(scale: Option<Scale>) -> Self::Scale;
 
     /// The raw number of `slot`.
     fn raw(slot: Slot, scale: Self::Scale) -> Self::Raw;
 
-    /// Whether `raw` can be encoded as it is.
+    /// True if `raw` can be encoded unchanged.
     fn fits(raw: Self::Raw) -> bool;
 
     /// The word of a raw number that fits.
@@ -39,7 +39,7 @@ pub(super) trait Codec: Debug + Send + Sync + 'static {
         conversions: &mut Conversions,
     ) -> Self::Word;
 
-    /// The slot that `word` stands for.
+    /// The slot for `word`.
     fn decode(word: Self::Word, scale: Self::Scale) -> Slot;
 
     /// The word of `slot`, whether its value fits or not.
@@ -199,10 +199,10 @@ pub(super) trait Number: Debug + Send + Sync + 'static {
     const LOWEST: f64;
     /// The greatest finite number, as near as a double comes.
     const HIGHEST: f64;
-    /// Whether infinities are numbers of this type.
+    /// True if infinities are numbers of this type.
     const HAS_INFINITY: bool;
 
-    /// Whether `raw`, once rounded, is a finite number of this type; never for NaN.
+    /// True if `raw`, once rounded, is a finite number of this type; false for NaN.
     fn fits(raw: f64) -> bool;
 
     /// The number nearest to `raw`: integers round half away from zero.
@@ -214,8 +214,8 @@ pub(super) trait Number: Debug + Send + Sync + 'static {
 
 /// Moves `raw` away from zero, so that truncating it rounds half away from zero.
 ///
-/// It adds the greatest double below one half. A plain half would round 0.49999999999999994 up to 1, and odd
-/// integers beyond 2^52 to their even neighbour.
+/// Adds the greatest double below one half. A plain half would round 0.49999999999999994 up to 1, and odd integers
+/// beyond 2^52 to their even neighbour.
 fn nudge(raw: f64) -> f64 {
     raw + 0.499_999_999_999_999_94_f64.copysign(raw)
 }

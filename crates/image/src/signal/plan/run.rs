@@ -13,10 +13,10 @@ use crate::signal::{Signal, Slot};
 /// A signal and its slot number.
 pub(super) type Member<'a> = (usize, &'a Signal);
 
-/// Fewer adjacent signals than this are not worth a loop of their own.
+/// Fewer adjacent signals than this are not worth a separate loop.
 const SHORTEST_DENSE: usize = 4;
 
-/// How many values a dense run encodes before it checks whether all of them fitted.
+/// The number of values that a dense run encodes before it checks that all of them fitted.
 const BLOCK: usize = 32;
 
 /// Signals that are converted by the same instructions.
@@ -62,7 +62,7 @@ pub(super) fn lay_out<C: Codec, O: Order>(members: &[Member]) -> Vec<Box<dyn Run
     runs
 }
 
-/// What a run stores of its signals, in its own order.
+/// A run's data of its signals, in the order of the run.
 #[derive(Debug)]
 struct Values<C: Codec> {
     scales: Box<[C::Scale]>,

@@ -48,7 +48,7 @@ fn values([low, high]: [f64; 2]) -> Vec<f64> {
     values
 }
 
-/// As many signals of one type as there are values, and this many unused bytes after every third one.
+/// One signal of this type per value, and this many unused bytes after every third one.
 fn table(data_type: DataType, scale: Option<Scale>, count: usize, gap: usize) -> SignalTable {
     let size = data_type.size_bytes();
     let signals = (0..count).map(|at| Signal {
@@ -63,7 +63,7 @@ fn table(data_type: DataType, scale: Option<Scale>, count: usize, gap: usize) ->
     SignalTable::of_one_station(count * (size + gap), 0, signals.collect())
 }
 
-/// Encodes `values`, and gives the bytes of each signal, with the conversions.
+/// Encodes `values`; returns the bytes of each signal, and the conversions.
 fn encoded(table: &SignalTable, values: &[f64]) -> (Vec<Vec<u8>>, Conversions) {
     let slots: Vec<_> = values.iter().map(|value| Slot::from_real(*value)).collect();
     let mut frame = vec![0xAA; table.stations[0].input_bytes];
@@ -127,7 +127,7 @@ fn a_real_is_infinite_only_if_its_value_is() {
         (None, f64::NEG_INFINITY, -infinity, 0),
         (None, 1e300, most, 1),
         (Some(tiny), f64::INFINITY, infinity, 0),
-        // Beyond the doubles only once it is scaled.
+        // Exceeds the doubles only once it is scaled.
         (Some(tiny), 1e300, most, 1),
         (Some(tiny), -1e300, -most, 1),
     ] {

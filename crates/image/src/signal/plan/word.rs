@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 /// An unsigned integer as wide as a value on the wire.
 pub(super) trait Word: Copy + Debug + Send + Sync + 'static {
-    /// Its size in bytes.
+    /// The size in bytes.
     const BYTES: usize;
 
     /// The same word, least significant byte first.

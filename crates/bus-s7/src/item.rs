@@ -143,7 +143,7 @@ impl ReturnCode {
     /// The object does not exist.
     pub const MISSING: Self = Self(0x0A);
 
-    /// What it means, in words.
+    /// The meaning of the code.
     pub const fn words(self) -> &'static str {
         match self.0 {
             0xFF => "done",
@@ -173,13 +173,13 @@ impl fmt::Display for ReturnCode {
 /// One variable, or several consecutive ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Item {
-    /// Where it lies.
+    /// The object that contains it.
     pub object: Object,
-    /// Its first byte in the object.
+    /// The first byte in the object.
     pub byte: usize,
-    /// Its bit within that byte; 0 for whole bytes.
+    /// The bit within that byte; 0 for whole bytes.
     pub bit: u8,
-    /// The type of its elements.
+    /// The type of the elements.
     pub element: Element,
     /// The number of elements. Positive, and 1 for bits.
     pub count: u16,
@@ -208,12 +208,12 @@ impl Item {
         }
     }
 
-    /// Its bit number; `None` if it consists of bytes.
+    /// The bit number; `None` for bytes.
     pub fn bit(&self) -> Option<u8> {
         (self.element == Element::Bit).then_some(self.bit)
     }
 
-    /// Its bytes in the object.
+    /// The bytes in the object.
     pub fn range(&self) -> Range<usize> {
         self.byte..self.byte + usize::from(self.count) * self.element.width()
     }
@@ -249,7 +249,7 @@ impl Item {
         })
     }
 
-    /// Appends its address.
+    /// Appends the item's address.
     pub fn write(&self, out: &mut Vec<u8>) {
         let element = match self.element {
             Element::Bit => 0x01,

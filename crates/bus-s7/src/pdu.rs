@@ -71,7 +71,7 @@ impl Kind {
 /// One PDU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pdu<'a> {
-    /// Its kind.
+    /// The kind.
     pub kind: Kind,
     /// Matches an answer to its job.
     pub reference: u16,
@@ -88,7 +88,7 @@ impl<'a> Pdu<'a> {
     ///
     /// # Errors
     ///
-    /// It is not a PDU, or its lengths are inconsistent.
+    /// The message is not a PDU, or its lengths are inconsistent.
     pub fn read(message: &'a [u8]) -> Result<Self, ProtocolError> {
         match message.first() {
             Some(&PROTOCOL) => {}
@@ -139,7 +139,7 @@ pub struct Draft {
 }
 
 impl Draft {
-    /// Begins a PDU at the end of `out`; its parameters are to be appended.
+    /// Begins a PDU at the end of `out`; append its parameters next.
     pub fn begin(kind: Kind, reference: u16, error: u16, out: &mut Vec<u8>) -> Self {
         let begin = out.len();
         let [r0, r1] = reference.to_be_bytes();

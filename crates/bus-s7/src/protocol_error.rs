@@ -1,4 +1,4 @@
-//! How a peer can violate the protocol, in words.
+//! The ways in which a peer can violate the protocol, in words.
 
 use super::length::LONGEST;
 use tickbus_fieldbus::BusError;
@@ -59,7 +59,7 @@ pub enum ProtocolError {
     /// The transport connection was ended or refused.
     #[error("it ended the transport connection (reason {0})")]
     Disconnected(u8),
-    /// The peer rejected what it was sent.
+    /// The peer rejected a transport unit.
     #[error("it rejected a transport unit (cause {0})")]
     Rejected(u8),
     /// The negotiated length leaves no room, or is more than was requested.

@@ -22,8 +22,8 @@ const REFERENCE: u16 = 1;
 
 /// The variables of a server.
 ///
-/// A job reads and writes pieces one after another, but is a unit: what it reads is consistent, and what it
-/// writes takes effect when [`done`](Self::done) is called.
+/// A job reads and writes pieces one after another, but is a unit: its reads are consistent, and its writes take effect
+/// when [`done`](Self::done) is called.
 pub trait Memory {
     /// Bytes of an object that a job reads. They are sent in its answer.
     ///
@@ -82,9 +82,9 @@ pub struct ServerSession {
 enum Phase {
     /// The client must request a connection.
     Opening,
-    /// It is connected, and must negotiate the PDU length.
+    /// The client is connected, and must negotiate the PDU length.
     Connected,
-    /// It may send jobs.
+    /// The client may send jobs.
     Agreed,
 }
 
@@ -112,7 +112,7 @@ impl ServerSession {
     ///
     /// # Errors
     ///
-    /// The client violates the protocol, or ends the connection. Nothing more is to be sent.
+    /// The client violates the protocol, or ends the connection. Send nothing more.
     pub fn packet(
         &mut self,
         now: Nanos,
@@ -253,7 +253,7 @@ impl ServerSession {
         memory: &mut impl Memory,
         reply: &mut Vec<u8>,
     ) -> Result<(), u16> {
-        // Some clients omit even the number of items, just to see whether the server is alive.
+        // Some clients omit even the number of items, just to check that the server is alive.
         let (count, addresses) = match pdu.parameters {
             [_] => (0, &[][..]),
             [_, count, addresses @ ..] => (*count, addresses),

@@ -1,4 +1,4 @@
-//! System status lists (SZL): what clients read from a CPU before anything else, among it the CPU's identity.
+//! System status lists (SZL), which clients read from a CPU before anything else; among them the CPU's identity.
 
 use super::pdu::error;
 use tickbus_base::time::Nanos;
@@ -47,13 +47,13 @@ impl Identity {
 /// The contents of a server's lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Facts {
-    /// How it identifies itself.
+    /// The server's identity.
     pub identity: Identity,
-    /// The longest unit that it agrees to.
+    /// The longest unit that the server agrees to.
     pub pdu: u16,
     /// The number of clients served at the same time.
     pub clients: u16,
-    /// What its clock read when the driver's clock read zero, as the time since 1 January 1970.
+    /// The reading of the server's clock when the driver's clock read zero, as the time since 1 January 1970.
     pub epoch: Nanos,
 }
 
@@ -175,7 +175,7 @@ fn communication(facts: &Facts) -> Vec<u8> {
     record
 }
 
-/// What panels may request: reading once and writing once, but no cyclic services.
+/// The services that panels may request: reading once and writing once, but nothing cyclic.
 fn monitoring(facts: &Facts) -> Vec<u8> {
     let mut record = vec![0, 3, 0b11, 0, 0, 0];
     // Bytes that are read consistently: the data of one PDU, without headers.

@@ -60,7 +60,7 @@ pub enum Tpdu<'a> {
     Data {
         /// The message ends here.
         last: bool,
-        /// Its bytes.
+        /// The bytes of the message.
         bytes: &'a [u8],
     },
     /// The peer ends the connection, or refuses it; with its reason.

@@ -34,7 +34,7 @@ impl Tsap {
         Self::new(&[PROGRAMMING_DEVICE, rack * 32 + slot])
     }
 
-    /// Its bytes.
+    /// The bytes.
     pub fn as_bytes(&self) -> &[u8] {
         &self.bytes[..usize::from(self.length)]
     }

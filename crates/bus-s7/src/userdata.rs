@@ -24,7 +24,7 @@ const DATA_BLOCK: u8 = 0x41;
 /// The language code of data blocks.
 const LANGUAGE: u8 = 5;
 
-/// What answers are made from.
+/// The sources of an answer.
 #[derive(Debug)]
 pub(super) struct Ask<'a> {
     /// When the request arrived.

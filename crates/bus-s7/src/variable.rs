@@ -17,13 +17,13 @@ const LOGO_V: Object = Object::Block(1);
 pub struct Variable {
     /// The object that contains it.
     pub object: Object,
-    /// Its first byte in the object.
+    /// The first byte in the object.
     pub byte: usize,
-    /// Its bit within that byte; 0 for whole bytes.
+    /// The bit within that byte; 0 for whole bytes.
     pub bit: u8,
-    /// Its width.
+    /// The width.
     pub width: Width,
-    /// Its type, if stated.
+    /// The type, if stated.
     pub data_type: Option<DataType>,
 }
 
@@ -32,7 +32,7 @@ impl Variable {
     ///
     /// # Errors
     ///
-    /// What does not match, and what to write instead.
+    /// The signal does not match; the message says what to write instead.
     pub(super) fn check(&self, signal: &Signal) -> Result<(), Mistake> {
         let own = signal.data_type;
         let bits = |count: usize| match count {
@@ -68,13 +68,13 @@ impl Variable {
         }
     }
 
-    /// Its bits within its object: the first, and their number.
+    /// The bits within the object: the first, and their number.
     pub(super) fn bits(&self) -> (usize, usize) {
         (self.byte * 8 + usize::from(self.bit), self.width.bits())
     }
 }
 
-/// Writes it as in TIA Portal; variables of 64 bits, for which that has no letter, as in PLC4X.
+/// Writes the variable as in TIA Portal; variables of 64 bits, for which TIA Portal has no letter, as in PLC4X.
 impl fmt::Display for Variable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
@@ -173,7 +173,7 @@ impl FromStr for Variable {
     }
 }
 
-/// What a letter or a type says about a variable.
+/// The information about a variable in a letter or a type.
 #[derive(Clone, Copy)]
 struct Kind {
     width: Width,

@@ -1,4 +1,4 @@
-//! One connection without its socket: the session, and what it transfers to and from the port.
+//! One connection without its socket: the session, and its transfers to and from the port.
 
 use std::io;
 use std::net::SocketAddr;
@@ -17,11 +17,11 @@ const STATE: Nanos = Nanos::from_millis(200);
 /// it.
 const UNTOLD: u8 = 5;
 
-/// When a station is tried again after the CPU refused something of it.
+/// When to retry a station after the CPU refused some of its data.
 const RETRY: Nanos = Nanos::from_secs(1);
 
-/// When a CPU that was not asked for its identity is asked after all, if nothing is written to it for that reason: the
-/// connections that broke at the question may have broken with the cable.
+/// When to ask a CPU for its identity after all, if the question was omitted and nothing is written for that reason:
+/// the connections that broke at the question may have broken with the cable.
 const ASK_AGAIN: Nanos = Nanos::from_secs(5);
 
 /// One connection.
@@ -33,7 +33,7 @@ pub(super) struct Connection<'a> {
     has_identity: bool,
     /// When to ask the CPU for its operating state next; `None` if it does not report it.
     state: Option<Nanos>,
-    /// When to connect again, to ask for the identity that was not asked for.
+    /// When to connect again, to ask for the identity that was omitted before.
     ask_again: Option<Nanos>,
     /// A cycle became due while the question was pending.
     is_due: bool,
@@ -45,7 +45,7 @@ pub(super) struct Connection<'a> {
 /// The state of a station after the last cycles.
 #[derive(Clone, Debug, Default)]
 struct StationCycle {
-    /// Whether any of its data are written, and whether any are read.
+    /// True if any of the station's data are written, and if any are read.
     has: [bool; 2],
     /// The CPU refused some of its data; they are tried again at this time.
     resume: Option<Nanos>,
@@ -120,7 +120,7 @@ impl<'a> Connection<'a> {
     fn ask_state(&mut self, now: Nanos, port: &mut Port) {
         if self.session.is_idle() && self.state.is_some_and(|due| due <= now) {
             self.state = Some(now + STATE);
-            // A server takes any question for a sign of life, and none passes a line that is down.
+            // A server takes any question for a sign of life, and none may pass a line that is down.
             if port.is_up(now) {
                 self.session.ask_state(now);
             }
@@ -154,8 +154,8 @@ impl<'a> Connection<'a> {
         Ok(())
     }
 
-    /// The CPU does not report its operating state, so its data are taken as valid. If an earlier CPU
-    /// reported STOP and this one reports nothing, it is assumed to be another one.
+    /// The CPU does not report its operating state, so its data count as valid. If an earlier CPU reported STOP and
+    /// this one reports nothing, it is assumed to be another one.
     fn presume_run(&mut self, now: Nanos, port: &mut Port) {
         if self.bus.said.take() == Some(PlcState::Stop) {
             for station in 0..self.stations.len() {
@@ -239,7 +239,7 @@ impl<'a> Connection<'a> {
                     port.sent(&receipt.of(index));
                 }
                 station.refusal = None;
-                // It may have been reported during an earlier connection.
+                // The refusal may have been reported during an earlier connection.
                 let told = &mut self.bus.told_refusals[index];
                 if !told.is_empty() {
                     told.clear();
@@ -250,11 +250,11 @@ impl<'a> Connection<'a> {
         self.put_off(port)
     }
 
-    /// Skips the stations for a while of which the CPU refused something.
+    /// Skips the stations with refused data for a while.
     ///
     /// # Errors
     ///
-    /// It refused something of every station.
+    /// The CPU refused data of every station.
     fn put_off(&mut self, port: &Port) -> Result<(), BusError> {
         let is_used = |station: &&StationCycle| station.has != [false, false];
         let is_served = |station: &StationCycle| station.resume.is_none();
@@ -301,7 +301,7 @@ impl Caller for Connection<'_> {
         if !self.has_identity {
             return Ok(());
         }
-        // Before the cycle, or an overloaded line would never get to it.
+        // Before the cycle, or an overloaded line would never get a turn for it.
         self.ask_state(now, port);
         if self.pace.take(now) {
             self.cycle(now, port)?;

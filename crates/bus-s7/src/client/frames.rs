@@ -1,4 +1,4 @@
-//! What is written to a CPU and read from it, signal by signal.
+//! The data written to and read from a CPU, signal by signal.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::length::LEAST;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::SignalTable;
 
-/// What is written to a CPU and read from it, and where.
+/// The data written to and read from a CPU, and their places.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FrameFields {
     pub(super) written: Vec<Field>,
@@ -47,14 +47,14 @@ impl FrameFields {
         }
     }
 
-    /// Whether any data of a station are written, and whether any are read.
+    /// True if any data of a station are written, and if any are read.
     pub(super) fn has(&self, station: usize) -> [bool; 2] {
         let any = |fields: &[Field]| fields.iter().any(|field| field.station == station);
         [any(&self.written), any(&self.read)]
     }
 
-    /// What is written and read in one cycle, for people: the items, and the number of jobs with PDUs of at
-    /// most `longest` bytes and with the shortest possible ones.
+    /// The transfers of one cycle, for people: the items, and the number of jobs with PDUs of at most `longest` bytes
+    /// and with the shortest possible ones.
     pub fn summary(&self, longest: u16) -> [String; 2] {
         let one = |way, fields: &[Field]| {
             let jobs = |limit: u16| plan::jobs(way, fields, usize::from(limit));
@@ -83,7 +83,7 @@ impl FrameFields {
 }
 
 impl ClientOptions {
-    /// What is written and read in one cycle, for people.
+    /// The transfers of one cycle, for people.
     pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
         let frames = FrameFields::new(self, table, self.role);
         let writes = match self.write_to {

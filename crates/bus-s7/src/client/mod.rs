@@ -40,7 +40,7 @@ pub struct S7Client {
     /// The last operating state that the CPU reported, and how often in a row it has not answered since.
     said: Option<PlcState>,
     untold: u8,
-    /// Whether it was logged that the CPU does not report it.
+    /// True if the missing operating state was logged.
     told_unknown: bool,
     /// The refusals that were logged, by station.
     told_refusals: Vec<String>,
@@ -58,7 +58,8 @@ impl ListRequest {
     /// After this many times it is omitted for one connection.
     const LIMIT: u8 = 2;
 
-    /// Whether to send it on the connection that starts. If omitted, the next connection tries it once more.
+    /// True if the request is to be sent on the connection that starts. If omitted, the next connection tries it once
+    /// more.
     fn is_asked(&mut self) -> bool {
         let is_asked = self.unanswered < Self::LIMIT;
         self.unanswered = self.unanswered.min(Self::LIMIT - 1);

@@ -48,7 +48,7 @@ impl ClientOptions {
     ///
     /// # Errors
     ///
-    /// The text is not an address, or one that cannot be connected to.
+    /// The text is not an address, or the address is not one to connect to.
     pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
         self.address = parse_address(address)?;
         Ok(())
@@ -115,7 +115,7 @@ impl ClientOptions {
         })
     }
 
-    /// Reports signals that would be written over one another. What is read may be read twice.
+    /// Reports signals that would overwrite one another. Reads may overlap.
     fn report_overlaps(&self, lines: &[At<'_>], table: &SignalTable) {
         let (sends, _) = self.role.areas();
         let written = table.signals.iter().enumerate();

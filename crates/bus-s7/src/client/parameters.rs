@@ -19,7 +19,7 @@ pub struct ConnectionParameters {
     pub pdu: u16,
     /// The time-out of an answer.
     pub patience: Nanos,
-    /// Whether the CPU is asked for its identity.
+    /// True if the CPU is asked for its identity.
     pub asks_who: bool,
 }
 
@@ -56,7 +56,7 @@ impl From<ProtocolError> for End {
     }
 }
 
-/// What the owner of a session must handle.
+/// An event that the owner of a session must handle.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SessionEvent {
     /// The connection is up, with PDUs of at most this length, and with the CPU's identity if it was asked

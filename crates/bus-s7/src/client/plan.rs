@@ -1,7 +1,7 @@
 //! Plans the jobs of a cycle: as few as the negotiated PDU length permits.
 //!
-//! A read may include bytes between signals. A write covers exactly the bits of signals: a byte that signals
-//! cover only in part is written bit by bit, each bit an item of its own.
+//! A read may include bytes between signals. A write covers exactly the bits of signals: a byte that signals cover only
+//! in part is written bit by bit, each bit a separate item.
 
 use std::ops::Range;
 
@@ -15,8 +15,8 @@ const ITEMS: usize = 20;
 const JOB: usize = pdu::JOB_HEADER + 2;
 const ANSWER: usize = pdu::ANSWER_HEADER + 2;
 
-/// Gaps, in bytes, that may be read over. The first costs less than an item of its own; the longer ones are
-/// used if that saves a job.
+/// Gaps, in bytes, that may be read over. The first costs less than a separate item; the longer ones are used if that
+/// saves a job.
 const GAPS: [usize; 4] = [item::DATA_HEADER, 16, 64, 128];
 
 /// The direction of a job.
@@ -87,7 +87,7 @@ fn carry(from: &[u8], at: usize, to: &mut [u8], into: usize, bits: usize) {
     }
 }
 
-/// What cannot be split: the bytes of a value, or of adjacent BOOLs, or one bit.
+/// An indivisible unit: the bytes of a value, or of adjacent BOOLs, or one bit.
 struct Cell {
     station: usize,
     object: Object,
@@ -194,7 +194,7 @@ fn pieces(way: JobDirection, cells: &[Cell], gap: usize, limit: usize) -> Vec<Pi
 }
 
 impl Run {
-    /// Whether both form one run of whole bytes.
+    /// True if both form one run of whole bytes.
     const fn is_followed_by(self, next: Self) -> bool {
         self.bits > 1
             && next.bits > 1

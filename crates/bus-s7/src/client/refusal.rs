@@ -1,4 +1,4 @@
-//! What a CPU refused, and what to do about it.
+//! The refusals of a CPU, and their remedies.
 
 use std::fmt;
 
@@ -7,12 +7,12 @@ use crate::item::{Item, Object, ReturnCode};
 use crate::pdu::error;
 use tickbus_fieldbus::BusError;
 
-/// What a CPU refused.
+/// The subject of a CPU's refusal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// One item of a job.
     Item {
-        /// Whether it was to be written.
+        /// True if the item was to be written.
         written: bool,
         /// The item.
         item: Item,

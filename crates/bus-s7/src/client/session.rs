@@ -29,10 +29,10 @@ const STATE: usize = 2;
 
 /// One connection to a CPU.
 ///
-/// The owner of the socket passes what it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write),
-/// reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to see
-/// whether the connection may go on. After [`SessionEvent::Met`] it starts a cycle by [`begin`](Self::begin), or asks
-/// for the operating state by [`ask_state`](Self::ask_state), whenever the session [is idle](Self::is_idle);
+/// The owner of the socket passes the bytes that it reads to [`hear`](Self::hear), writes [`to_write`](Self::to_write),
+/// reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to see whether the
+/// connection may continue. After [`SessionEvent::Met`] it starts a cycle by [`begin`](Self::begin), or asks for the
+/// operating state by [`ask_state`](Self::ask_state), whenever the session [is idle](Self::is_idle);
 /// [`SessionEvent::Done`] ends the cycle, [`SessionEvent::State`] the question.
 #[derive(Debug)]
 pub struct ClientSession {
@@ -47,7 +47,7 @@ pub struct ClientSession {
     /// Power of two of the longest TPDU.
     size: u8,
     reference: u16,
-    /// Since when an answer has been pending.
+    /// The time since which an answer has been pending.
     asked: Option<Nanos>,
     identity: Identity,
     /// The received part of the list being read.
@@ -117,17 +117,17 @@ impl ClientSession {
         }
     }
 
-    /// Whether the CPU is being asked for its identity.
+    /// True while the CPU is being asked for its identity.
     pub fn asks_who(&self) -> bool {
         matches!(self.phase, Phase::Asking(list) if list < STATE)
     }
 
-    /// Whether the CPU is being asked for its operating state.
+    /// True while the CPU is being asked for its operating state.
     pub fn asks_state(&self) -> bool {
         self.phase == Phase::Asking(STATE)
     }
 
-    /// Whether a cycle can start.
+    /// True if a cycle can start.
     pub fn is_idle(&self) -> bool {
         self.phase == Phase::Idle
     }
@@ -142,7 +142,7 @@ impl ClientSession {
         &self.traffic.into[station]
     }
 
-    /// What the CPU refused of a station in the last cycle; everything else was transferred.
+    /// The CPU's refusal for a station in the last cycle; everything else was transferred.
     pub fn refusal(&self, station: usize) -> Option<&Refusal> {
         self.traffic.refused[station].as_ref()
     }
@@ -184,7 +184,7 @@ impl ClientSession {
             .map_or(Nanos::MAX, |asked| asked + self.terms.patience + Nanos(1))
     }
 
-    /// Checks whether the connection may go on at `now`.
+    /// Checks that the connection may continue at `now`.
     ///
     /// # Errors
     ///
@@ -427,7 +427,7 @@ impl ClientSession {
         let Job { way, pieces } = &self.traffic.jobs[index];
         let asked = function_of(*way, pieces);
         if answer.parameters == [asked[0], 1] && asked[1] > 1 {
-            // Some servers answer the first item alone. The cycle begins again; writing the same value twice does no harm.
+            // Some servers answer only the first item. The cycle restarts; writing the same value twice does no harm.
             self.traffic.one_by_one = true;
             self.traffic.plan(usize::from(self.pdu));
             self.traffic.refused.fill(None);

@@ -13,12 +13,12 @@ pub(super) struct Traffic {
     /// The frames of this cycle by station: those to be written, and those read.
     pub(super) out: Vec<Box<[u8]>>,
     pub(super) into: Vec<Box<[u8]>>,
-    /// What the CPU refused in this cycle, by station.
+    /// The CPU's refusals in this cycle, by station.
     pub(super) refused: Vec<Option<Refusal>>,
     /// Stations that are excluded from the cycles.
     pub(super) suspended: Vec<bool>,
     pub(super) may_write: bool,
-    /// Each job has one item: the CPU answers the first of several alone.
+    /// Each job has one item: the CPU answers only the first of several.
     pub(super) one_by_one: bool,
 }
 

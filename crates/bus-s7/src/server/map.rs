@@ -29,7 +29,7 @@ pub(super) struct Map {
 struct Cpu {
     inputs: usize,
     outputs: usize,
-    /// Its rack and slot.
+    /// The rack and slot.
     slot: Option<(u8, u8)>,
 }
 

@@ -95,7 +95,7 @@ struct Shared {
     role: Role,
     stations: Box<[StationMemory]>,
     flags: Box<[u8]>,
-    /// Whether a write is an event even if it changes nothing.
+    /// True if a write is an event even without a change.
     every_write: bool,
     /// The client and the time for which the outgoing frames were taken: jobs that arrive together see the
     /// same values.
@@ -109,13 +109,13 @@ struct StationMemory {
     /// The values of the other area that clients read in this batch, once they are taken.
     outgoing: Box<[u8]>,
     is_taken: bool,
-    /// For them; `None` if nothing goes out.
+    /// The receipt for the outgoing values; `None` if nothing goes out.
     receipt: Option<Receipt>,
     /// The bits written by the current job.
     changed: Vec<Range<usize>>,
-    /// Whether the current job reads or writes anything of this station.
+    /// True if the current job reads or writes anything of this station.
     addressed: bool,
-    /// Whether any client has ever written.
+    /// True if any client has ever written.
     has_writer: bool,
     writers: Writers,
 }

@@ -29,7 +29,7 @@ pub struct ServerOptions {
     pub pdu: u16,
     /// The most clients at the same time.
     pub clients: usize,
-    /// Whether a client is refused that writes what another one has written lately.
+    /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
     /// Rack and slot of each station; empty if there are no `[[station]]` tables.
     pub slots: Vec<Option<(u8, u8)>>,
@@ -38,22 +38,22 @@ pub struct ServerOptions {
 /// A data block: a range of an area of a station.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// Its number.
+    /// The number.
     pub number: u16,
-    /// The area that it is a part of.
+    /// The area that contains the block.
     pub area: Area,
     /// The station's name; `None` if there is a single station.
     pub station: Option<String>,
-    /// Its first byte in the area.
+    /// The first byte in the area.
     pub offset: usize,
-    /// Its number of bytes; `None` to the end of the area.
+    /// The number of bytes; `None` to the end of the area.
     pub length: Option<usize>,
-    /// Its offset in the text, for mistakes.
+    /// The offset in the text, for mistakes.
     at: usize,
 }
 
 impl Block {
-    /// The index of its station.
+    /// The index of the block's station.
     pub(super) fn station_in(&self, table: &SignalTable) -> Option<usize> {
         match &self.station {
             None if table.stations.len() > 1 => None,

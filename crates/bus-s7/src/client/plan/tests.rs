@@ -45,7 +45,7 @@ fn a_gap_is_read_over_and_never_written_over() {
         items(&jobs(JobDirection::Read, &near, 240)),
         [(block, 0..8, None)]
     );
-    // A long gap costs more than an item of its own.
+    // A long gap costs more than a separate item.
     let far = [run(0, 0, 2), run(0, 60, 2)].concat();
     assert_eq!(
         items(&jobs(JobDirection::Read, &far, 240)),
@@ -202,7 +202,7 @@ proptest! {
                 let range = begin + range.start..begin + range.end;
                 match (way, piece.item.bit()) {
                     (JobDirection::Write, None) => {
-                        // A byte that is not filled would be found to be zero.
+                        // A byte that is not filled would remain zero.
                         let mut data = vec![0; range.len()];
                         piece.gather(&frames[piece.station], &mut data);
                         cpu[range].copy_from_slice(&data);

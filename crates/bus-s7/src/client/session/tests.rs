@@ -165,7 +165,7 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
         &mut session,
         "03 00 00 21 02 f0 80 32 07 0000 0002 0008 0008 0001120411440100 ff 09 0004 0011 0000",
     );
-    // It arrives in two PDUs; the first has the order number.
+    // The list arrives in two PDUs; the first has the order number.
     let order = "0011 0000 001c 0001 0001 36455337203531352d32414d30312d3041423020";
     hears(
         &mut session,
@@ -183,7 +183,7 @@ fn a_cpu_is_asked_who_it_is_and_may_have_nothing_to_say() {
         "03 00 00 27 02 f0 80 32 07 0000 0003 000c 000a 0001120812840101 07 00 0000 ff 09 0006 000000000000",
     )
     .expect("right");
-    // The CPU does not have the other one.
+    // The CPU does not have the other list.
     let news = {
         said(&mut session);
         hears(
@@ -256,7 +256,7 @@ fn an_item_that_is_refused_is_told_and_the_rest_of_the_cycle_is_done() {
             ..
         })
     ));
-    // While excluded there is nothing to transfer; included again, it is as before.
+    // An excluded station transfers nothing; included again, it does as before.
     session.suspend(0, true);
     assert_eq!(session.begin(Nanos::ZERO), Some(SessionEvent::Done));
     assert_eq!(session.refusal(0), None);

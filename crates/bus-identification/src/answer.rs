@@ -1,19 +1,19 @@
-//! Answers: how long one is follows from its command and its status, since its data may contain ETX.
+//! Answers. Command and status determine the length of an answer, since its data may contain ETX.
 
 use crate::command::{ETX, checksum, seal};
 use crate::hex;
 use crate::{Access, Command, Heads, Status};
 
-/// What a reader answered.
+/// An answer of a reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Answer {
     /// The first character, that of the command.
     pub command: u8,
-    /// What became of it; [`DONE`](Status::DONE) of an answer that has none.
+    /// The outcome; [`DONE`](Status::DONE) for an answer without a status.
     pub status: Status,
     /// The head, of an answer to a command for all heads.
     pub head: Option<u8>,
-    /// How many octets of data it has.
+    /// The number of octets of data.
     pub length: usize,
 }
 
@@ -22,7 +22,7 @@ pub struct Answer {
 enum Data {
     /// This many.
     Exactly(usize),
-    /// The manual does not say how many: silence ends them.
+    /// The manual does not state the number: silence ends the data.
     UntilSilence,
 }
 
@@ -31,20 +31,20 @@ enum Data {
 pub(crate) struct Shape {
     character: u8,
     data: Data,
-    /// An answer has its head's number.
+    /// Answers contain the number of their head.
     is_of_all: bool,
-    /// An answer may have no status: that to `d` has none, and those to other system commands are not in the manual.
+    /// Answers may lack a status: those to `d` have none, and those to other system commands are not in the manual.
     may_be_bare: bool,
 }
 
-/// What the beginning of some bytes is.
+/// How well some bytes match.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fit {
     /// No answer of this shape.
     No,
-    /// It may become one.
+    /// The bytes may become an answer.
     Begins,
-    /// One of this length, whose data begin here.
+    /// An answer of this length, whose data begin at this place.
     Whole {
         answer: Answer,
         length: usize,
@@ -74,17 +74,17 @@ impl Shape {
         }
     }
 
-    /// Whether each head gives an answer of its own, once, so that silence ends them.
+    /// True if each head sends a separate answer, once, so that silence ends them.
     pub(crate) const fn has_many(&self) -> bool {
         self.is_of_all && self.character.is_ascii_lowercase()
     }
 
-    /// Whether answers begin with this.
+    /// True if answers begin with this character.
     pub(crate) const fn is_of(&self, character: u8) -> bool {
         self.character == character
     }
 
-    /// Octets of the longest answer that is known.
+    /// Octets of the longest known answer.
     pub(crate) const fn longest(&self) -> usize {
         match self.data {
             Data::Exactly(count) => count + 6,
@@ -92,12 +92,12 @@ impl Shape {
         }
     }
 
-    /// Whether only silence ends an answer.
+    /// True if only silence ends an answer.
     pub(crate) const fn ends_by_silence(&self) -> bool {
         matches!(self.data, Data::UntilSilence)
     }
 
-    /// Whether an answer is at the beginning of `bytes`; the line `is_silent` behind them or not.
+    /// Matches the beginning of `bytes` with an answer; `is_silent` if the line is silent after them.
     pub(crate) fn fit(&self, bytes: &[u8], is_silent: bool) -> Fit {
         match self.fit_so_far(bytes, is_silent) {
             Fit::Begins if is_silent && self.ends_by_silence() => Fit::No,
@@ -141,7 +141,7 @@ impl Shape {
         let mut data = 3;
         let mut head = None;
         if self.is_of_all {
-            // An error of no head in particular need not have a number.
+            // An error that concerns no particular head may lack a number.
             let bare = whole(5, status, None, 3);
             if !status.is_done() && !matches!(bare, Fit::No) {
                 return bare;
@@ -183,7 +183,7 @@ pub(crate) fn append(
     seal(out, start);
 }
 
-/// Appends an answer without one.
+/// Appends an answer without a status.
 pub(crate) fn append_bare(character: u8, out: &mut Vec<u8>) {
     let start = out.len();
     out.push(character);
@@ -212,7 +212,7 @@ mod tests {
             let part = fit(command, &bytes[..end], false);
             assert!(matches!(part, Fit::Begins | Fit::No if end == 0 || part == Fit::Begins));
         }
-        // Silence ends answers of unknown length; others end by themselves.
+        // Silence ends answers of unknown length; others have a known end.
         let is_silent = Shape::of(command).data == Data::UntilSilence;
         if !is_silent {
             bytes.extend(b"w00");

@@ -5,7 +5,7 @@
 pub enum CarrierType {
     /// IDC: 32 octets.
     Idc,
-    /// IDC-1K: 128 octets, what a reader expects after it was switched on.
+    /// IDC-1K: 128 octets, the type that a reader expects after power-on.
     #[default]
     Idc1K,
     /// IMC-40-64K: 8192 octets.
@@ -15,7 +15,7 @@ pub enum CarrierType {
 }
 
 impl CarrierType {
-    /// All of them, by the names that a driver.cfg has for them.
+    /// All types, by their names in a driver.cfg.
     pub const ALL: [(&'static str, Self); 4] = [
         ("IDC", Self::Idc),
         ("IDC-1K", Self::Idc1K),
@@ -23,13 +23,13 @@ impl CarrierType {
         ("IMC-40-256K", Self::Imc256K),
     ];
 
-    /// Its name.
+    /// The name.
     pub fn name(self) -> &'static str {
         let found = Self::ALL.iter().find(|(_, carrier)| *carrier == self);
         found.map_or("", |(name, _)| name)
     }
 
-    /// Its size in octets.
+    /// The size in octets.
     pub const fn size(self) -> usize {
         match self {
             Self::Idc => 0x20,
@@ -47,7 +47,7 @@ impl CarrierType {
         }
     }
 
-    /// The command `d` and the digits of an address depend on this alone.
+    /// The family, which alone determines the command `d` and the digits of an address.
     pub const fn family(self) -> Family {
         match self {
             Self::Idc => Family::Idc,
@@ -56,13 +56,13 @@ impl CarrierType {
         }
     }
 
-    /// Whether it has all of these octets, and one command may name them.
+    /// True if the carrier has all of these octets, and one command can address them.
     pub const fn has(self, address: u16, length: usize) -> bool {
         length > 0 && length <= self.most() && address as usize + length <= self.size()
     }
 }
 
-/// What a reader can be set to.
+/// The setting of a reader.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Family {
     /// `1`: IDC.
@@ -75,7 +75,7 @@ pub enum Family {
 }
 
 impl Family {
-    /// Its character in the command `d`.
+    /// The family's character in the command `d`.
     pub const fn digit(self) -> u8 {
         match self {
             Self::Idc => b'1',
@@ -90,7 +90,7 @@ impl Family {
         all.into_iter().find(|family| family.digit() == digit)
     }
 
-    /// How many digits its addresses have.
+    /// The number of digits of an address.
     pub const fn address_digits(self) -> usize {
         match self {
             Self::Imc40 => 4,

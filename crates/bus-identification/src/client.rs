@@ -5,15 +5,16 @@ use tickbus_base::time::Nanos;
 use crate::answer::{Fit, Shape};
 use crate::{Answer, CarrierType, Command};
 
-/// Bytes that are kept of what nobody asked for.
+/// The most bytes kept of unrequested input.
 const INBOX: usize = 1024;
 
-/// What became of a command.
+/// The outcome of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// An answer; [`Client::data`] has its data. It ends the command, unless that was for all heads, or is repeated.
+    /// An answer; [`Client::data`] has its data. The command has then ended, unless it is for all heads, or is
+    /// repeated.
     Answered(Answer),
-    /// The command for all heads is over: no more answers have come.
+    /// The command for all heads has ended: no more answers have come.
     Over,
     /// No answer has come in time.
     Silent,
@@ -24,7 +25,7 @@ pub enum Outcome {
 pub struct Timing {
     /// Bits per second; a character has ten.
     pub baud: u32,
-    /// How long a reader may take for an answer, beside the time of its characters.
+    /// The reader's time for an answer, in addition to the time of its characters.
     pub timeout: Nanos,
 }
 
@@ -52,7 +53,7 @@ impl Timing {
 #[derive(Clone, Copy, Debug)]
 struct Asked {
     shape: Shape,
-    /// Until when its answer may come.
+    /// The deadline for the answer.
     limit: Nanos,
     /// A head has answered a command for all heads.
     is_answered: bool,
@@ -61,7 +62,8 @@ struct Asked {
 
 /// The client's end of a line: commands and received bytes go in, bytes to send and [`Outcome`]s come out.
 ///
-/// What is no answer to what was asked is skipped, byte by byte, so that after noise the next right answer is found.
+/// The client skips bytes that are no answer to its command one by one, so that it finds the next valid answer after
+/// noise.
 #[derive(Debug)]
 pub struct Client {
     carriers: CarrierType,
@@ -79,7 +81,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// For a reader of these carriers. (To let it know of them is a command of its own.)
+    /// A client for a reader of these carriers. (A separate command sets the reader.)
     pub fn new(carriers: CarrierType, timing: Timing) -> Self {
         Self {
             carriers,
@@ -95,17 +97,17 @@ impl Client {
         }
     }
 
-    /// Whether a command waits for its answer.
+    /// True while a command waits for its answer.
     pub const fn is_busy(&self) -> bool {
         self.asked.is_some()
     }
 
-    /// Begins a command at `now`. A repeated one takes the place of the one before, and is over with
+    /// Begins a command at `now`. A repeated command replaces the previous one, and ends with
     /// [`EndAuto`](Command::EndAuto).
     ///
     /// # Panics
     ///
-    /// When another one [waits](Self::is_busy), or the command cannot be [appended](Command::append).
+    /// When a command [is pending](Self::is_busy), or this one cannot be [appended](Command::append).
     pub fn ask(&mut self, now: Nanos, command: &Command<'_>) {
         assert!(self.asked.is_none(), "one command at a time");
         let shape = Shape::of(command);
@@ -126,12 +128,12 @@ impl Client {
         }
     }
 
-    /// The bytes to be sent.
+    /// The bytes to send.
     pub fn to_write(&self) -> &[u8] {
         &self.request[self.written..]
     }
 
-    /// The first `count` of [these](Self::to_write) are on their way.
+    /// The first `count` bytes of [these](Self::to_write) were sent.
     pub fn wrote(&mut self, count: usize) {
         self.written += count;
     }
@@ -144,7 +146,7 @@ impl Client {
         self.skip(old);
     }
 
-    /// The next outcome at `now`, if any; to be called until it is `None`.
+    /// The next outcome at `now`, if any; call it until it returns `None`.
     pub fn poll(&mut self, now: Nanos) -> Option<Outcome> {
         let is_silent = now - self.heard >= self.timing.silence();
         if let Some(answer) = self.find(is_silent) {
@@ -165,7 +167,7 @@ impl Client {
         if now < asked.limit {
             return None;
         }
-        // What seemed to be the beginning of an answer is none; an answer may stand behind it.
+        // False start: these bytes are no answer, but one may follow.
         while !self.inbox.is_empty() {
             self.skip(1);
             if let Some(answer) = self.find(true) {
@@ -176,11 +178,11 @@ impl Client {
         Some(Outcome::Silent)
     }
 
-    /// Until when to wait for bytes, if there is nothing to be sent; [`Nanos::MAX`] for ever.
+    /// How long to wait for bytes, if there is nothing to send; [`Nanos::MAX`] for ever.
     pub fn deadline(&self) -> Nanos {
         let silent = self.heard + self.timing.silence();
         match &self.asked {
-            // Silence ends these, and nothing else.
+            // Only silence ends these.
             Some(asked)
                 if asked.is_answered || asked.shape.ends_by_silence() && !self.inbox.is_empty() =>
             {
@@ -197,7 +199,7 @@ impl Client {
         &self.data
     }
 
-    /// How many bytes were no part of an answer.
+    /// The number of bytes that belonged to no answer.
     pub const fn skipped(&self) -> u64 {
         self.skipped
     }
@@ -207,7 +209,7 @@ impl Client {
         self.skipped += count as u64;
     }
 
-    /// Takes the first answer out of the inbox, and skips what is before it.
+    /// Takes the first answer out of the inbox, and skips the bytes before it.
     fn find(&mut self, is_silent: bool) -> Option<Answer> {
         let asked = self.asked.map(|asked| asked.shape);
         let shapes = [asked, self.auto].into_iter().flatten();

@@ -1,4 +1,4 @@
-//! The bus `ivi-client`: the heads of a reader as stations, each with a command that is given by a toggle bit.
+//! The bus `ivi-client`: the heads of a reader as stations, each with a command that a toggle bit triggers.
 #![cfg_attr(
     not(unix),
     allow(dead_code, unused_imports, reason = "no serial ports are used there")
@@ -17,19 +17,19 @@ use crate::LineOptions;
 use crate::heads::HeadNumbers;
 use session::Station;
 
-/// What the controller reads of a head, before the data of the answer.
+/// The controller's inputs from a head, before the data of the answer.
 pub(crate) const INPUTS: [&str; 4] = ["echo", "status", "flags", "length"];
 
-/// What the controller writes of a head, before the data of the command.
+/// The controller's outputs to a head, before the data of the command.
 pub(crate) const OUTPUTS: [&str; 4] = ["command", "length", "address", "address"];
 
-/// Their lengths.
+/// The lengths of these.
 pub(crate) const BEFORE_DATA: [usize; 2] = [INPUTS.len(), OUTPUTS.len()];
 
-/// The status, beyond those of a reader, of a command without an answer: the reader may have executed it.
+/// The status of a command without an answer, which no reader sends: the reader may have executed it.
 pub const NO_ANSWER: u8 = 0xFF;
 
-/// The default time-out for an answer, beside the time of its characters.
+/// The default time-out for an answer, in addition to the time of its characters.
 const TIMEOUT: Nanos = Nanos::from_secs(1);
 
 /// The options of the bus `ivi-client`.
@@ -37,7 +37,7 @@ const TIMEOUT: Nanos = Nanos::from_secs(1);
 pub struct ClientOptions {
     /// The line.
     pub line: LineOptions,
-    /// How long the reader may take for an answer, beside the time of its characters.
+    /// The reader's time for an answer, in addition to the time of its characters.
     pub timeout: Nanos,
     pub(crate) heads: HeadNumbers,
 }
@@ -62,7 +62,7 @@ impl ClientOptions {
 pub(crate) struct IviClient {
     options: ClientOptions,
     cycle: Nanos,
-    /// Kept when the line breaks: no command is given twice.
+    /// Kept when the line breaks: no command is sent twice.
     stations: Vec<Station>,
 }
 
@@ -81,7 +81,7 @@ impl IviClient {
 
 impl Free for IviClient {
     fn last_cycles(&self) -> u32 {
-        // A reader is given commands, and keeps no outputs.
+        // A reader gets commands, and keeps no outputs.
         0
     }
 

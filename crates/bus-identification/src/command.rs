@@ -1,4 +1,4 @@
-//! Commands, as they are on the line: a character, parameters in ASCII, data, checksum, ETX.
+//! Commands in the format of the line: a character, parameters in ASCII, data, checksum, ETX.
 
 use crate::hex;
 use crate::{Family, Status};
@@ -19,8 +19,8 @@ pub enum Heads {
     Off,
     /// `1` to `4`.
     One(u8),
-    /// `x`: all heads that are connected. Reading gives an answer from each that has a carrier; writing writes the first
-    /// carrier that is found.
+    /// `x`: all connected heads. A reading command gets an answer from each head that has a carrier; a writing command
+    /// writes to the first carrier found.
     All,
 }
 
@@ -43,7 +43,7 @@ impl Heads {
     }
 }
 
-/// What heads are to do.
+/// The task of a head.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access<'a> {
     /// `a`: reads 32 octets from address 0.
@@ -52,14 +52,14 @@ pub enum Access<'a> {
     Read {
         /// The first octet.
         address: u16,
-        /// How many.
+        /// The number of octets.
         length: u8,
     },
     /// `k`: writes.
     Write {
         /// The first octet.
         address: u16,
-        /// At most 255.
+        /// The octets, at most 255.
         data: &'a [u8],
     },
     /// `i`: reads the number of a code carrier.
@@ -70,15 +70,15 @@ pub enum Access<'a> {
     ReadPage(u16),
     /// `m`: writes a page.
     WritePage {
-        /// Which.
+        /// The page's number.
         page: u16,
-        /// All of it.
+        /// The whole page.
         data: &'a [u8; PAGE],
     },
 }
 
 impl Access<'_> {
-    /// Its character, that of the single mode.
+    /// The character, in single mode.
     pub const fn character(&self) -> u8 {
         match self {
             Self::ReadStart => b'a',
@@ -91,7 +91,7 @@ impl Access<'_> {
         }
     }
 
-    /// Whether it changes the carrier.
+    /// True if the command changes the carrier.
     pub const fn writes(&self) -> bool {
         matches!(
             self,
@@ -103,31 +103,31 @@ impl Access<'_> {
 /// A command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command<'a> {
-    /// For heads.
+    /// A command for heads.
     Access {
-        /// Which.
+        /// The heads.
         heads: Heads,
-        /// Whether it is repeated until [`EndAuto`](Self::EndAuto): the command is a capital then.
+        /// True if the command is repeated until [`EndAuto`](Self::EndAuto): its character is then a capital.
         is_auto: bool,
-        /// What they are to do.
+        /// The task.
         access: Access<'a>,
     },
-    /// `d`: which carriers there are.
+    /// `d`: sets the type of carriers.
     SetCarriers(Family),
     /// `c`: the reader checks its memory.
     CheckMemory,
-    /// `b`: carriers are read and written on both sides.
+    /// `b`: reads and writes carriers on both sides.
     DoubleSided,
-    /// `o`: the reader begins anew.
+    /// `o`: restarts the reader.
     ResetReader,
     /// `q`: ends a repeated command.
     EndAuto,
-    /// `v`: which version the reader has.
+    /// `v`: requests the reader's version.
     Version,
 }
 
 impl<'a> Command<'a> {
-    /// One for one head, executed once.
+    /// A command for one head, executed once.
     pub const fn once(head: u8, access: Access<'a>) -> Self {
         Self::Access {
             heads: Heads::One(head),
@@ -136,7 +136,7 @@ impl<'a> Command<'a> {
         }
     }
 
-    /// Its first character.
+    /// The first character.
     pub const fn character(&self) -> u8 {
         match self {
             Self::Access {
@@ -158,7 +158,7 @@ impl<'a> Command<'a> {
         }
     }
 
-    /// Appends it, for a reader that is set to `family`.
+    /// Appends the command, for a reader that is set to `family`.
     ///
     /// # Panics
     ///
@@ -199,11 +199,11 @@ impl<'a> Command<'a> {
     }
 
     /// Reads the command at the beginning of `bytes`, sent to a reader that is set to `family`, and its length; `None`
-    /// while it is incomplete.
+    /// while the command is incomplete.
     ///
     /// # Errors
     ///
-    /// The status that answers it. Where it ends is then known only if the length is.
+    /// The status to answer with. The end of the command is known only if the length is.
     pub fn parse(bytes: &'a [u8], family: Family) -> Result<Option<(Self, usize)>, Refused> {
         let Some(&first) = bytes.first() else {
             return Ok(None);
@@ -286,13 +286,13 @@ impl<'a> Command<'a> {
     }
 }
 
-/// A command that is answered with an error.
+/// A command that gets an error as its answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{status}")]
 pub struct Refused {
     /// The error.
     pub status: Status,
-    /// How long the command is; `None` if nobody can say, and silence ends it.
+    /// The length of the command; `None` if it is unknown, and silence ends the command.
     pub length: Option<usize>,
 }
 
@@ -310,7 +310,7 @@ pub fn checksum(octets: &[u8]) -> u8 {
     octets.iter().fold(0, |sum, octet| sum.wrapping_add(*octet))
 }
 
-/// Ends what begins at `start` with its checksum and ETX.
+/// Seals the bytes from `start` on with their checksum and ETX.
 pub(crate) fn seal(out: &mut Vec<u8>, start: usize) {
     let sum = checksum(&out[start..]);
     out.extend([sum, ETX]);

@@ -6,12 +6,12 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use crate::HEADS;
 
-/// Which head each station is.
+/// The head of each station.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct HeadNumbers {
-    /// That of a driver without `[[station]]` tables.
+    /// The head of a driver without `[[station]]` tables.
     single: u8,
-    /// Those of the tables, as far as they could be read, with their lines.
+    /// The heads in the tables, as far as they could be read, with their lines.
     own: Vec<(Option<u8>, usize)>,
     /// The offset of `[fieldbus]`.
     at: usize,
@@ -53,7 +53,7 @@ impl HeadNumbers {
         self.own.push((number, value.line()));
     }
 
-    /// How many there are.
+    /// The number of heads.
     pub(crate) fn count(&self) -> usize {
         self.own.len().max(1)
     }
@@ -64,7 +64,7 @@ impl HeadNumbers {
         own.unwrap_or(self.single)
     }
 
-    /// Reports stations that are smaller than what a head has before its data: `least` bytes of `%I`, and of `%Q`.
+    /// Reports stations that are smaller than a head's bytes before its data: `least` bytes of `%I`, and of `%Q`.
     pub(crate) fn fit(&self, table: &SignalTable, least: [usize; 2], collector: &Collector<'_>) {
         for station in &table.stations {
             for (area, least, key) in [
@@ -104,7 +104,7 @@ fn read_head(value: &Value<'_>) -> Option<u8> {
     u8::try_from(number).ok()
 }
 
-/// What the bytes of a signal are: the names of those before the data, and the place among the data.
+/// The meaning of a signal's bytes: the name of a byte before the data, or its place in the data.
 pub(crate) fn meaning(byte: usize, names: &[&'static str]) -> String {
     names.get(byte).map_or_else(
         || format!("data {}", byte - names.len()),

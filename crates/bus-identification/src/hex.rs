@@ -13,7 +13,7 @@ pub(crate) fn append(value: u16, count: usize, out: &mut Vec<u8>) {
     out.extend_from_slice(&all[4 - count..]);
 }
 
-/// The number that at most four digits are; `None` if one is no digit.
+/// The number that up to four digits represent; `None` if one is no digit.
 pub(crate) fn parse(digits: &[u8]) -> Option<u16> {
     digits.iter().try_fold(0, |value: u16, digit| {
         let digit = match digit {

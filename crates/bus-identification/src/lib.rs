@@ -1,8 +1,8 @@
 //! The IVI protocol of Pepperl+Fuchs over a serial line: a reader with up to four heads reads and writes the code
-//! carriers before them, on pallets and the like.
+//! carriers in front of them, on pallets and the like.
 //!
-//! The core knows no port and no image. A [`Command`] is what a reader is asked; [`Client`] asks it, one command at a
-//! time; [`Reader`] is a simulated one, with [`Head`]s and [`Carrier`]s.
+//! The core knows no port and no image. A [`Command`] is a request to a reader; a [`Client`] sends commands, one at a
+//! time; a [`Reader`] is a simulated reader, with [`Head`]s and [`Carrier`]s.
 //!
 //! ```
 //! use tickbus_base::time::Nanos;

@@ -18,13 +18,13 @@ const RATES: [u32; 6] = [300, 600, 1200, 2400, 4800, 9600];
 /// The characters of a question and its answer, for the carriers with the longest addresses.
 const QUESTION: usize = 16;
 
-/// What a device begins with that is made, and not found.
+/// The prefix of a device that this end creates.
 const PSEUDO: &str = "pty:";
 
-/// The line, and what is at its reader's heads.
+/// The line, and the carriers at its reader's heads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LineOptions {
-    /// The system's name of the serial port; or `pty:` and the name that the port gets.
+    /// The system's name of the serial port; or `pty:` and the name of the port to create.
     pub device: String,
     /// Bits per second.
     pub baud: u32,
@@ -33,7 +33,7 @@ pub struct LineOptions {
 }
 
 impl LineOptions {
-    /// Reads `device`, `baud` and `carrier`. Only one who `may_make` it can name a port of its own.
+    /// Reads `device`, `baud` and `carrier`. Only with `may_make` may the device be a port to create.
     pub(crate) fn read(table: &mut Table<'_>, may_make: bool) -> Option<Self> {
         let device = table.require(
             "device",
@@ -63,7 +63,7 @@ impl LineOptions {
         }
     }
 
-    /// With this time-out.
+    /// The timing with this time-out.
     pub(crate) const fn timing(&self, timeout: Nanos) -> Timing {
         Timing {
             baud: self.baud,
@@ -71,18 +71,18 @@ impl LineOptions {
         }
     }
 
-    /// The default bus cycle, for this many heads. Ten of them have to outlast two rounds of questions.
+    /// The default bus cycle, for this many heads. Ten cycles must be longer than two rounds of questions.
     pub(crate) fn cycle(&self, heads: usize) -> Nanos {
         let round = self.timing(Nanos::ZERO).characters(QUESTION * heads);
         CYCLE.max(Nanos(round.0 / 4))
     }
 
-    /// The name of a port that this end makes.
+    /// The name of the port that this end creates.
     pub(crate) fn made(&self) -> Option<&Path> {
         self.device.strip_prefix(PSEUDO).map(Path::new)
     }
 
-    /// The name by which the port is opened.
+    /// The name for opening the port.
     pub(crate) fn port(&self) -> &str {
         self.device.strip_prefix(PSEUDO).unwrap_or(&self.device)
     }

@@ -9,34 +9,34 @@ use crate::{Access, CarrierType, Command, Family, Heads, Status, Timing};
 /// Heads of a reader.
 pub const HEADS: usize = 4;
 
-/// A repeated command is executed this often. The manual does not tell a reader's own pace.
+/// The period of a repeated command. The manual does not state a reader's own pace.
 const REPEAT: Nanos = Nanos::from_millis(50);
 
-/// Answers that may wait to be sent; a reader whose client does not listen drops what comes then.
+/// The most bytes of answers that wait; a reader whose client does not read drops further ones.
 const OUTBOX: usize = 4096;
 
-/// What its version is, by `v`.
+/// The answer to `v`.
 pub const VERSION: &[u8] = b"tickbus";
 
-/// A carrier before a head.
+/// A carrier in front of a head.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Carrier {
-    /// Its type.
+    /// The type.
     pub kind: CarrierType,
-    /// Its octets, as many as its type has.
+    /// The octets, as many as the type has.
     pub octets: Vec<u8>,
-    /// Its number, for `i`; none if empty.
+    /// The number, for `i`; empty for none.
     pub number: Vec<u8>,
-    /// It does not take what is written.
+    /// True if the carrier rejects writes.
     pub is_protected: bool,
 }
 
 impl Carrier {
-    /// One of zeros, except for what it begins with.
+    /// A carrier of zeros, except for its beginning.
     ///
     /// # Panics
     ///
-    /// When it begins with more than it has.
+    /// When the beginning is longer than the carrier.
     pub fn new(kind: CarrierType, beginning: &[u8]) -> Self {
         let mut octets = vec![0; kind.size()];
         octets[..beginning.len()].copy_from_slice(beginning);
@@ -52,14 +52,14 @@ impl Carrier {
 /// A head of a reader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Head {
-    /// Whether the reader has it.
+    /// True if the head is connected to the reader.
     pub is_connected: bool,
-    /// What is before it.
+    /// The carrier in front of the head.
     pub carrier: Option<Carrier>,
-    /// The answer to each command instead of its execution, except for [`BATTERY_LOW`](Status::BATTERY_LOW), which
-    /// is that of a command that was executed.
+    /// The answer to each command in place of its execution, except for [`BATTERY_LOW`](Status::BATTERY_LOW), the
+    /// status of a command that was executed.
     pub fault: Option<Status>,
-    /// How often its carriers were written.
+    /// The number of writes to its carriers.
     pub writes: u8,
 }
 
@@ -70,26 +70,26 @@ pub struct Reader {
     carriers: Family,
     timing: Timing,
     inbox: Vec<u8>,
-    /// What is to be answered once the line is silent: the command's character, and why.
+    /// The pending answer for when the line is silent: the command's character, and the error.
     broken: Option<(u8, Status)>,
     heard: Nanos,
-    /// The repeated command, and when it is executed next.
+    /// The repeated command, and the time of its next execution.
     auto: Option<(Vec<u8>, Nanos)>,
     outbox: Vec<u8>,
     written: usize,
 }
 
-/// What a reader has heard.
+/// The input that a reader has processed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
-    /// How many commands it has executed, or refused with a status.
+    /// The number of commands executed, or refused with a status.
     pub commands: usize,
-    /// How many times it could make nothing of bytes.
+    /// The number of times that bytes made no sense.
     pub damaged: usize,
 }
 
 impl Reader {
-    /// One that was just switched on, with these heads. Of the timing it needs the rate alone.
+    /// A reader after power-on, with these heads. Only the rate of the timing is used.
     pub fn new(heads: [Head; HEADS], timing: Timing) -> Self {
         Self {
             heads,
@@ -108,26 +108,26 @@ impl Reader {
     ///
     /// # Panics
     ///
-    /// When it has another number.
+    /// When the number is a different one.
     pub fn head(&self, number: u8) -> &Head {
         &self.heads[usize::from(number) - 1]
     }
 
-    /// The same, to be changed.
+    /// The head with this number, mutable.
     ///
     /// # Panics
     ///
-    /// When it has another number.
+    /// When the number is a different one.
     pub fn head_mut(&mut self, number: u8) -> &mut Head {
         &mut self.heads[usize::from(number) - 1]
     }
 
-    /// The bytes to be sent.
+    /// The bytes to send.
     pub fn to_write(&self) -> &[u8] {
         &self.outbox[self.written..]
     }
 
-    /// The first `count` of [these](Self::to_write) are on their way.
+    /// The first `count` bytes of [these](Self::to_write) were sent.
     pub fn wrote(&mut self, count: usize) {
         self.written += count;
         if self.written == self.outbox.len() {
@@ -136,7 +136,7 @@ impl Reader {
         }
     }
 
-    /// Its line was unplugged: what was on its way is lost. Heads, the type of carriers and a repeated command stay.
+    /// The line was unplugged: bytes under way are lost. Heads, the type of carriers and a repeated command stay.
     pub fn unplug(&mut self) {
         self.inbox.clear();
         self.broken = None;
@@ -182,7 +182,7 @@ impl Reader {
         heard
     }
 
-    /// Does what is due at `now`: answers what was broken once the line is silent, and repeats the repeated command.
+    /// Does the work due at `now`: answers invalid input once the line is silent, and repeats the repeated command.
     pub fn turn(&mut self, now: Nanos) -> Heard {
         let mut heard = Heard::default();
         if now - self.heard >= self.timing.silence() {
@@ -196,14 +196,14 @@ impl Reader {
                 self.answer(first, status, None, &[]);
             }
         }
-        // A client that does not take its answers gets no more of them.
+        // A client that does not read its answers gets no more of them.
         if self.outbox.is_empty()
             && let Some((frame, due)) = self.auto.take()
         {
             if due > now {
                 self.auto = Some((frame, due));
             } else {
-                // It was parsed before, and means the same unless the type of carriers was set anew.
+                // Parsed earlier; still valid unless the carrier type has changed.
                 if let Ok(Some((Command::Access { heads, access, .. }, _))) =
                     Command::parse(&frame, self.carriers)
                 {
@@ -264,7 +264,7 @@ impl Reader {
 
     fn access(&mut self, first: u8, heads: Heads, access: &Access<'_>) {
         match heads {
-            // No head executes it, and the reader itself answers. The next command switches the heads on.
+            // No head executes it, so the reader itself answers. The next command switches the heads on.
             Heads::Off => self.answer(first, Status::DONE, None, &[]),
             Heads::One(number) => {
                 self.access_one(first, number, false, access);
@@ -318,7 +318,7 @@ impl Reader {
     }
 }
 
-/// Where the data of an answer are.
+/// The source of an answer's data.
 enum Source {
     Nothing,
     Octets(usize, usize),
@@ -382,7 +382,7 @@ impl Head {
     }
 }
 
-/// What the reset of an IDC leaves: words AAAB, and AAAA as the last one. That of an IDC-1K changes no data.
+/// The content of an IDC after a reset: words AAAB, and AAAA as the last one. The reset of an IDC-1K changes no data.
 const RESET_IDC: [u8; 32] = {
     let mut octets = [0xAA; 32];
     let mut word = 0;

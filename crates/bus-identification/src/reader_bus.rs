@@ -18,20 +18,20 @@ use tickbus_image::signal::SignalTable;
 use crate::heads::HeadNumbers;
 use crate::{Carrier, CarrierType, HEADS, Head, LineOptions, Reader, Status};
 
-/// What the machine writes of a head, before the data that a carrier comes with.
+/// The machine's inputs to a head, before the initial data of a carrier.
 pub(crate) const INPUTS: [&str; 8] = [
     "flags", "fault", "unused", "unused", "number", "number", "number", "number",
 ];
 
-/// What the machine reads of a head, before its carrier's data.
+/// The machine's outputs from a head, before its carrier's data.
 pub(crate) const OUTPUTS: [&str; 8] = [
     "flags", "writes", "unused", "unused", "unused", "unused", "unused", "unused",
 ];
 
-/// Their lengths.
+/// The lengths of these.
 pub(crate) const BEFORE_DATA: [usize; 2] = [INPUTS.len(), OUTPUTS.len()];
 
-/// A carrier is before the head; in what the machine reads: the head has taken it over.
+/// A carrier is in front of the head; in the machine's outputs: the head has taken it over.
 const PRESENT: u8 = 1;
 /// The head's cable is unplugged.
 const UNPLUGGED: u8 = 2;
@@ -64,7 +64,7 @@ pub(crate) struct IviReader {
     options: ReaderOptions,
     cycle: Nanos,
     stations: Vec<Station>,
-    /// Kept when the line breaks: its carriers hold what was written.
+    /// Kept when the line breaks: its carriers hold the written data.
     reader: Reader,
 }
 
@@ -72,7 +72,7 @@ pub(crate) struct IviReader {
 #[derive(Debug)]
 struct Station {
     head: u8,
-    /// What the machine reads.
+    /// The frame that the machine reads.
     frame: Vec<u8>,
 }
 
@@ -102,7 +102,7 @@ impl Free for IviReader {
     #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = self.options.line.clone();
-        // A carrier may have left while there was no port.
+        // The carrier may have changed while there was no port.
         let now = port.clock().now();
         take(&mut self.reader, &self.stations, line.carriers, now, port);
         if let Some(link) = line.made() {
@@ -155,7 +155,7 @@ struct Serving<'a> {
     stations: &'a mut [Station],
     reader: &'a mut Reader,
     pace: Pace,
-    /// A command has come since the machine was told the last time.
+    /// A command has come since the last report to the machine.
     is_heard: bool,
     /// The line is not down by an injected fault.
     is_up: bool,
@@ -166,7 +166,7 @@ impl Serving<'_> {
         take(self.reader, self.stations, self.line.carriers, now, port);
     }
 
-    /// Tells the machine what its carriers hold now.
+    /// Reports the current content of the carriers to the machine.
     fn tell(&mut self, now: Nanos, port: &mut Port) {
         if !std::mem::take(&mut self.is_heard) {
             return;
@@ -188,7 +188,7 @@ impl Serving<'_> {
     }
 }
 
-/// Takes over what the machine says of its heads and carriers.
+/// Takes over the machine's settings of its heads and carriers.
 fn take(reader: &mut Reader, stations: &[Station], kind: CarrierType, now: Nanos, port: &mut Port) {
     let Some(mut frames) = port.look(0..stations.len(), now) else {
         return;
@@ -200,7 +200,7 @@ fn take(reader: &mut Reader, stations: &[Station], kind: CarrierType, now: Nanos
     port.sent(&receipt);
 }
 
-/// Lets a head be as the machine writes it. A carrier that was there keeps its octets.
+/// Sets a head up as the machine writes it. A carrier that stays keeps its octets.
 fn place(head: &mut Head, frame: &[u8], kind: CarrierType) {
     let [flags, fault, ..] = *frame else {
         return;
@@ -223,7 +223,8 @@ fn place(head: &mut Head, frame: &[u8], kind: CarrierType) {
     carrier.is_protected = flags & PROTECTED != 0;
 }
 
-/// Writes what the machine reads of a head. The data of a carrier that has left stay until the next one comes.
+/// Writes the frame that the machine reads of a head. The data of a carrier that has left stay until the next one
+/// comes.
 fn show(head: &Head, frame: &mut [u8]) {
     let (before, data) = frame.split_at_mut(OUTPUTS.len());
     before[0] = if head.carrier.is_some() { PRESENT } else { 0 };
@@ -236,7 +237,7 @@ fn show(head: &Head, frame: &mut [u8]) {
 
 impl Caller for Serving<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
-        // A line that is down by an injected fault carries nothing.
+        // An injected fault has taken the line down; nothing passes.
         if !port.is_up(now) {
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! The status that every answer about a carrier has.
+//! The status in every answer about a carrier.
 
 use std::fmt;
 
@@ -15,13 +15,13 @@ impl Status {
     pub const NO_HEAD: Self = Self(0x02);
     /// There is no carrier before the head.
     pub const NO_CARRIER: Self = Self(0x03);
-    /// The carrier did not take what was written.
+    /// The carrier rejected a write.
     pub const WRITE_ERROR: Self = Self(0x04);
     /// The command was damaged on the line.
     pub const LINE_CHECKSUM: Self = Self(0x06);
     /// The address, or the length, is beyond the carrier.
     pub const OUT_OF_RANGE: Self = Self(0x09);
-    /// The reader does not reach its head.
+    /// The reader does not reach the head.
     pub const HEAD_SILENT: Self = Self(0x0A);
     /// The carrier does not have this function.
     pub const UNSUPPORTED: Self = Self(0x0D);
@@ -30,12 +30,12 @@ impl Status {
     /// The command was executed, and the carrier's battery is low.
     pub const BATTERY_LOW: Self = Self(0x10);
 
-    /// Whether the command was executed, so that a reading answer has data.
+    /// True if the command was executed, so that a reading answer has data.
     pub const fn is_done(self) -> bool {
         matches!(self, Self::DONE | Self::BATTERY_LOW)
     }
 
-    /// Whether it says that the head itself is not there, or is the wrong one.
+    /// True if the head itself is missing, or is the wrong one.
     pub const fn is_of_the_head(self) -> bool {
         matches!(
             self,
@@ -43,12 +43,12 @@ impl Status {
         )
     }
 
-    /// Whether it tells of a carrier that is before the head.
+    /// True if the status implies a carrier in front of the head.
     pub const fn is_of_a_carrier(self) -> bool {
         matches!(self.0, 0x00 | 0x04 | 0x08 | 0x0C | 0x0D | 0x10 | 0x11)
     }
 
-    /// What it means, and what to do; of a code that is not in the manual, that.
+    /// The meaning and the remedy; for a code that is not in the manual, just that.
     pub const fn sentence(self) -> &'static str {
         match self.0 {
             0x00 => "done",
@@ -77,7 +77,7 @@ impl Status {
         }
     }
 
-    /// As an answer has it.
+    /// The digits in an answer.
     pub(crate) fn digits(self) -> [u8; 2] {
         super::hex::digits(self.0)
     }

@@ -35,7 +35,7 @@ fn a_carrier_is_read_changed_and_written_and_leaves_with_what_was_written() {
     changed[4..7].copy_from_slice(&[3, 3, 7]);
     assert_eq!(pair.ask(b'w', 0, 21, &[]), (0, changed.clone()));
     assert_eq!(pair.machine.get("writes"), 1.0);
-    // The same command once more is a new one by its toggle bit.
+    // The same command again is a new one by its toggle bit.
     assert_eq!(pair.ask(b'w', 0, 21, &[]).0, 0);
     pair.machine.set("present", 0.0);
     pair.until("the carrier is gone", |pair| {
@@ -46,7 +46,7 @@ fn a_carrier_is_read_changed_and_written_and_leaves_with_what_was_written() {
     }
     assert_eq!(pair.ask(b'w', 0, 1, &[]), (3, vec![]), "no carrier");
     assert_eq!(pair.controller.get("connected"), 1.0);
-    // The next one begins with what it brings.
+    // The next carrier has its own initial data.
     pair.put(&[9]);
     assert_eq!(pair.ask(b'w', 0, 2, &[]), (0, vec![9, 1]));
 }
@@ -143,7 +143,7 @@ fn a_line_that_is_unplugged_comes_back_by_itself() {
     assert!(pair.line.name().is_symlink());
 }
 
-/// A reader at the far end of a terminal, which takes each command that writes without a word.
+/// A reader at the far end of a terminal that never answers writing commands.
 struct Taciturn {
     terminal: LinkedTerminal,
     reader: Reader,
@@ -169,7 +169,7 @@ impl Taciturn {
         }
     }
 
-    /// Answers what has come. A client that waits for an answer sends one command at a time.
+    /// Answers the received commands. A client that waits for an answer sends one command at a time.
     fn turn(&mut self) {
         let mut bytes = [0; 256];
         let Ok(count) = self.terminal.read(&mut bytes) else {
@@ -210,7 +210,7 @@ fn a_silent_reader_is_told_and_a_command_without_an_answer_is_not_given_twice() 
         controller.get("echo") == f64::from(b'k' | 0x80)
     });
     assert_eq!(controller.get("status"), f64::from(NO_ANSWER));
-    // The next one is given after it.
+    // The next command is sent after it.
     controller.set("command", f64::from(b'w'));
     await_that("the next command is over", || {
         far.turn();

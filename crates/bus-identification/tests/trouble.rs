@@ -1,4 +1,5 @@
-//! What goes wrong between a controller and a machine at the two ends of a pseudo-terminal, and what must not come of it.
+//! Faults between a controller and a machine at the two ends of a pseudo-terminal, and the damage that they must not
+//! do.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -200,7 +201,7 @@ fn a_command_that_was_not_sent_yet_is_taken_back() {
     let mut pair = Pair::new();
     pair.put(&[1]);
     assert_eq!(pair.ask(b'w', 0, 1, &[]), (0, vec![1]));
-    // What was done already stays so.
+    // Finished commands stay finished.
     let done = pair.controller.get("echo");
     pair.controller.set("command", f64::from(b'q' | 0x80));
     let seen = pair.cycles();

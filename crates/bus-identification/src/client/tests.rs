@@ -82,10 +82,10 @@ fn what_looked_like_a_longer_answer_gives_way_when_time_is_over() {
             length: 60,
         },
     ));
-    // Its head came from noise; the error behind it is the answer.
+    // The first bytes came from noise; the error after them is the answer.
     client.hear(at(1), &[b"w00", &sealed(b"w03")[..]].concat());
     assert_eq!(client.poll(at(1)), None);
-    // Silence alone does not end it, and nobody waits for that: an adapter may hold bytes back.
+    // Silence alone does not end the command, and nobody waits for that: an adapter may hold bytes back.
     let limit = client.deadline();
     assert!(limit > TIMING.timeout, "{limit}");
     assert_eq!(status(client.poll(limit)), Some(3));
@@ -114,7 +114,7 @@ fn silence_ends_an_answer_of_unknown_length() {
     assert_eq!(client.deadline(), at(190));
     assert_eq!(status(client.poll(at(190))), Some(0));
     assert_eq!(client.data(), b"1.0");
-    // What is too short by then was none.
+    // Bytes that are still incomplete by then are no answer.
     client.ask(at(300), &Command::Version);
     client.hear(at(301), b"v0");
     assert_eq!(client.deadline(), at(401));
@@ -138,7 +138,7 @@ fn repeated_answers_come_until_the_command_is_ended() {
         assert_eq!(client.data(), [datum]);
         assert!(!client.is_busy());
     }
-    // Half of one, then nothing, and another one.
+    // Half an answer, then nothing, and another one.
     client.hear(at(10), b"W0");
     assert_eq!(client.poll(client.deadline()), None);
     client.ask(at(300), &Command::EndAuto);
@@ -172,7 +172,7 @@ fn all_heads_answer_until_the_line_is_silent() {
 }
 
 proptest! {
-    /// Whatever a line carries, an outcome comes, and data of another length than that asked for never do.
+    /// Any input leads to an outcome, and data of a wrong length never do.
     #[test]
     fn any_bytes_lead_to_an_outcome(pieces in proptest::collection::vec(
         proptest::collection::vec(prop_oneof![Just(b'w'), Just(b'0'), Just(3), any::<u8>()], 0..20), 0..20)

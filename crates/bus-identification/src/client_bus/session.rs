@@ -10,10 +10,10 @@ use tickbus_fieldbus::{BusError, Cause, PlcState, Port, Receipt};
 use super::{ClientOptions, INPUTS, NO_ANSWER};
 use crate::{Access, Answer, CarrierType, Client, Command, Outcome, PAGE, Status};
 
-/// The bit of a command that changes with each new one.
+/// The bit of a command that toggles with each new one.
 const TOGGLE: u8 = 0x80;
 
-/// A carrier is before the head.
+/// A carrier is in front of the head.
 const PRESENT: u8 = 1;
 /// The head is there.
 const CONNECTED: u8 = 2;
@@ -22,9 +22,9 @@ const CONNECTED: u8 = 2;
 #[derive(Debug)]
 pub(crate) struct Station {
     head: u8,
-    /// What the controller reads: the last command's echo, its status, flags, length, data.
+    /// The controller's inputs: the last command's echo, its status, flags, length, data.
     frame: Vec<u8>,
-    /// A command was sent, and is not answered yet.
+    /// A command was sent, but not answered yet.
     sent: Option<u8>,
     receipt: Option<Receipt>,
     /// The station was reported as left.
@@ -42,7 +42,7 @@ impl Station {
         }
     }
 
-    /// Shows what became of a command.
+    /// Shows the outcome of a command.
     fn show(&mut self, echo: u8, status: u8, data: &[u8]) {
         let room = &mut self.frame[INPUTS.len()..];
         room.fill(0);
@@ -57,12 +57,12 @@ impl Station {
             _ if status.is_of_the_head() => 0,
             Status::NO_CARRIER => CONNECTED,
             _ if status.is_of_a_carrier() => CONNECTED | PRESENT,
-            // It says nothing of a carrier.
+            // This status does not concern a carrier.
             _ => CONNECTED | self.frame[2] & PRESENT,
         };
     }
 
-    /// The command in what the controller writes, if it is a new one.
+    /// The command in the controller's outputs, if it is a new one.
     fn new_command<'a>(
         &self,
         frame: &'a [u8],
@@ -111,7 +111,7 @@ impl Station {
         let fits = match access {
             Access::Read { address, length } => carriers.has(address, usize::from(length)),
             Access::Write { address, data } => carriers.has(address, data.len()),
-            // More do not fit into three digits.
+            // Higher numbers do not fit into three digits.
             Access::ReadPage(page) | Access::WritePage { page, .. } => page <= 0xFFF,
             _ => true,
         };
@@ -123,16 +123,16 @@ impl Station {
     }
 }
 
-/// What was asked last.
+/// The last request to the reader.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asked {
-    /// To end what another program had repeated.
+    /// End a command that another program had repeated.
     EndAuto,
-    /// To work with this type of carriers.
+    /// Set this type of carriers.
     SetCarriers,
-    /// The controller's command, of this station.
+    /// The controller's command for this station.
     Command(usize),
-    /// Whether a carrier is there.
+    /// Check for a carrier.
     Presence(usize),
 }
 
@@ -146,10 +146,10 @@ pub(super) struct Session<'a> {
     is_set_up: bool,
     cycle: Nanos,
     pace: Pace,
-    /// When it last looked at what is due.
+    /// When it last checked for due work.
     looked: Nanos,
     skipped: u64,
-    /// What the line says while the reader answers.
+    /// The line's message while the reader answers.
     running: String,
 }
 
@@ -161,7 +161,7 @@ impl<'a> Session<'a> {
         now: Nanos,
     ) -> Self {
         for station in &mut *stations {
-            // What was on its way when the line broke is not sent again: another carrier may be there by now.
+            // A command under way when the line broke is not sent again: there may be another carrier by now.
             if let Some(sent) = station.sent.take() {
                 station.show(sent, NO_ANSWER, &[]);
             }
@@ -185,7 +185,7 @@ impl<'a> Session<'a> {
         &self.options.line.device
     }
 
-    /// Begins a cycle: with the set-up, if the reader needs it.
+    /// Begins a cycle; with the set-up, if the reader needs it.
     fn begin(&mut self, now: Nanos, port: &mut Port) {
         if self.is_set_up {
             self.go_on(0, now, port);
@@ -199,7 +199,7 @@ impl<'a> Session<'a> {
         self.asked = Some(asked);
     }
 
-    /// Asks the first head from this one on, or ends the cycle.
+    /// Asks the next head from this one on, or ends the cycle.
     fn go_on(&mut self, from: usize, now: Nanos, port: &mut Port) {
         for index in from..self.stations.len() {
             if !port.is_station_up(index, now) {
@@ -214,8 +214,8 @@ impl<'a> Session<'a> {
             let frame = frames.frame(index);
             let station = &mut self.stations[index];
             let given = frame.first().copied().unwrap_or(0);
-            // The fail-safe 0 of a controller that pauses is no command: if the echo followed it, the last command would
-            // be a new one when the controller goes on.
+            // The fail-safe 0 of a paused controller is no command: if the echo followed it, the last command would be
+            // a new one when the controller continues.
             let command = if is_paused && given & !TOGGLE == 0 {
                 None
             } else {
@@ -268,7 +268,7 @@ impl<'a> Session<'a> {
                 if let Some(sent) = station.sent.take() {
                     let data = self.client.data();
                     let room = station.frame.len() - INPUTS.len();
-                    // The length of a code carrier's number is not known before.
+                    // The length of a code carrier's number is not known in advance.
                     if data.len() <= room {
                         station.show(sent, answer.status.0, data);
                     } else {
@@ -282,7 +282,7 @@ impl<'a> Session<'a> {
         Ok(())
     }
 
-    /// Hands in what the controller reads of a head, and asks the next one.
+    /// Passes the controller's inputs of a head on, and asks the next head.
     fn deliver(&mut self, index: usize, status: Status, now: Nanos, port: &mut Port) {
         let device = &self.options.line.device;
         let station = &mut self.stations[index];
@@ -312,7 +312,7 @@ impl<'a> Session<'a> {
         {
             self.stations[index].show(sent, NO_ANSWER, &[]);
         }
-        // It may have been off, and forgotten its set-up.
+        // The reader may have been off, and lost its settings.
         self.is_set_up = false;
         let error = BusError::Link(format!(
             "the reader on {} did not answer within {}; check that it is on, in read/write mode and at {} baud, and the \
@@ -362,7 +362,7 @@ impl Caller for Session<'_> {
 
     fn deadline(&self, _port: &Port) -> Nanos {
         if self.client.is_busy() {
-            // While an answer is slow, wake up in every cycle to see how old the data are.
+            // While an answer is slow, wake up in every cycle to check the age of the data.
             self.client.deadline().min(self.looked + self.cycle)
         } else {
             self.pace.due()

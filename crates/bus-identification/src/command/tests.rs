@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 
-/// The examples of the manual: what is before the checksum, and the checksum.
+/// The examples of the manual: the bytes before the checksum, and the checksum.
 const EXAMPLES: [(&str, u8); 8] = [
     ("a2", 0x93),
     ("A1", 0x72),
@@ -67,7 +67,8 @@ fn the_examples_of_the_manual_have_its_checksums_and_meanings() {
             assert_eq!(Command::parse(&bytes[..end], Family::Idc1K), Ok(None));
         }
     }
-    // The manual's example of "M2007" with zeros has 15h, which is the sum of "L2007": by its own rule this is 16h.
+    // The manual's example of "M2007" with zeros has 15h, which is the sum of "L2007": by the manual's own rule it
+    // should be 16h.
     let zeros = auto(
         TWO,
         Access::WritePage {

@@ -32,7 +32,7 @@ impl Line {
         line
     }
 
-    /// Carries bytes both ways until the client has an outcome that is no answer of several.
+    /// Carries bytes both ways until the client has an outcome that is not one of several answers.
     fn ask(&mut self, command: &Command<'_>) -> Vec<(Option<u8>, u8, Vec<u8>)> {
         self.client.ask(self.now, command);
         let mut answers = Vec::new();
@@ -127,7 +127,7 @@ fn each_type_has_its_limits_and_functions() {
     let (_, data) = line.access(1, Access::ReadStart);
     assert_eq!(data[..4], [0xAA, 0xAB, 0xAA, 0xAB]);
     assert_eq!(data[30..], [0xAA, 0xAA]);
-    // The reset of an IDC-1K leaves its data.
+    // The reset of an IDC-1K keeps its data.
     let mut line = Line::new(CarrierType::Idc1K);
     assert_eq!(line.access(1, Access::Reset).0, 0);
     assert_eq!(line.access(1, read(0, 4)).1, b"\x03one");
@@ -216,7 +216,7 @@ fn system_commands_are_answered() {
         assert_eq!(line.ask(&command), [(None, 0, vec![])], "{command:?}");
     }
     assert_eq!(line.ask(&Command::Version), [(None, 0, VERSION.to_vec())]);
-    // A reader that begins anew expects an IDC-1K, whose addresses are shorter.
+    // A restarted reader expects an IDC-1K, whose addresses are shorter.
     assert_eq!(line.ask(&Command::ResetReader), [(None, 0, vec![])]);
     line.client = Client::new(CarrierType::Idc1K, TIMING);
     assert_eq!(line.access(1, read(0, 1)).0, 0x0D);

@@ -13,7 +13,7 @@ use tickbus_conformance::rig::{End, await_that};
 /// Octets of data at both ends.
 pub const DATA: usize = 24;
 
-/// Both ends of a line, which has a folder of its own.
+/// Both ends of a line with a separate folder.
 pub struct Line {
     pub folder: TempDir,
 }
@@ -73,12 +73,12 @@ impl Line {
         text
     }
 
-    /// The machine's end, which makes the port.
+    /// The machine's end, which creates the port.
     pub fn reader(&self, heads: &[u8]) -> End {
         self.reader_by("pty:", heads, &Monotonic::shared())
     }
 
-    /// The same, with this before the port's name, and by this clock.
+    /// The machine's end, with this before the port's name, and this clock.
     pub fn reader_by<C: Clock + 'static>(&self, device: &str, heads: &[u8], clock: &Arc<C>) -> End {
         let signals = [
             ("present", "%IX0.0"),
@@ -110,7 +110,7 @@ impl Line {
         )
     }
 
-    /// Opens the port as another program, once the machine has made it.
+    /// Opens the port as another program, once the machine has created it.
     #[track_caller]
     pub fn open_port(&self, machine: &mut End) -> SerialPort {
         let settings = SerialSettings {
@@ -129,7 +129,7 @@ impl Line {
     }
 }
 
-/// A command for head 1, as it is on the line.
+/// A command for head 1, in the format of the line.
 pub fn command(is_auto: bool, access: Access<'_>) -> Vec<u8> {
     let command = Command::Access {
         heads: Heads::One(1),
@@ -182,7 +182,7 @@ impl Pair {
         cycles.parse().expect("a number")
     }
 
-    /// The machine puts a carrier before the head.
+    /// The machine puts a carrier in front of the head.
     #[track_caller]
     pub fn put(&mut self, octets: &[u8]) {
         for (index, octet) in octets.iter().enumerate() {
@@ -206,7 +206,7 @@ impl Pair {
             .set("command", f64::from(command | self.toggle));
     }
 
-    /// Gives a command and waits for its answer: the status, and the data.
+    /// Sends a command and waits for its answer: the status, and the data.
     #[track_caller]
     pub fn ask(&mut self, command: u8, address: u16, count: u8, data: &[u8]) -> (u8, Vec<u8>) {
         self.command(command, address, count, data);

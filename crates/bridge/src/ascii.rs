@@ -1,4 +1,4 @@
-//! A client at a serial line, as a client of the dispatcher: lines in, lines out, and time handed in.
+//! A client on a serial line, as a client of the dispatcher: lines in, lines out; the caller passes the time.
 
 use std::collections::VecDeque;
 
@@ -10,13 +10,13 @@ use crate::lines::{Cut, Lines};
 use crate::outbox::{Outbox, put};
 use crate::speaker::Speaker;
 
-/// After this time in which nothing was sent, the dispatcher gets a sign of life; and within it, answers.
+/// If nothing was sent for this time, the dispatcher gets a sign of life; it must answer within the same time.
 const ALIVE: Nanos = Nanos::from_secs(20);
 
-/// How many requests wait until the dispatcher has carried them out.
+/// The most requests that may wait for the dispatcher.
 const REQUESTS: usize = 64;
 
-/// What the client hears when the dispatcher has gone.
+/// The client's message when the dispatcher has gone.
 const AWAY: &[u8] = b"ERR 503 the dispatcher does not answer; the bridge goes on calling it, and sends your values and \
                       connections then";
 
@@ -41,23 +41,23 @@ impl LineEnd {
     }
 }
 
-/// What went through a bridge.
+/// Counts of everything that went through a bridge.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Lines from the serial side.
     pub said: u64,
     /// Lines from the dispatcher for the serial side.
     pub heard: u64,
-    /// Values that a newer one has replaced, because a side was slow.
+    /// Values that were replaced by newer ones, because a side was slow.
     pub overtaken: u64,
-    /// Lines from the serial side that reached nobody: too long, too many, or for a dispatcher that was not there.
+    /// Lines from the serial side that were dropped: too long, too many, or without a dispatcher.
     pub dropped: u64,
 }
 
 /// A bridge between a serial line and a connection with the dispatcher.
 ///
-/// It passes lines on as they are. On top of that it introduces the client again when a connection was lost, with its
-/// newest values and the requests that may not have arrived; gives signs of life; and keeps the newest values where a side
+/// The bridge forwards lines unchanged. In addition it reintroduces the client after a lost connection, with its newest
+/// values and the requests that may not have arrived; it sends signs of life, and keeps the newest values where a side
 /// is slow.
 #[derive(Debug)]
 pub struct AsciiBridge {
@@ -65,60 +65,60 @@ pub struct AsciiBridge {
     from_dispatcher: Lines,
     to_serial: Outbox,
     to_dispatcher: Outbox,
-    /// What came from the serial line, and waits for room in `requests`.
+    /// Input from the serial line that waits for room in `requests`.
     unread: Vec<u8>,
     state: State,
     client: Option<Client>,
     /// CONNECT, DISCONNECT and LIST lines that may not have been carried out yet.
     requests: VecDeque<Vec<u8>>,
-    /// Who waits for the next `OK PING`, and since when.
+    /// The senders of pending PINGs, with their times.
     pings: VecDeque<(Asker, Nanos)>,
-    /// When the dispatcher last got something.
+    /// When the dispatcher was last sent something.
     sent: Nanos,
-    /// When something last came from it, or the connection.
+    /// When the dispatcher last sent something, or the connection was made.
     heard: Nanos,
     traffic: Traffic,
 }
 
-/// The client, by what it has said.
+/// The client, as it has introduced itself.
 #[derive(Debug)]
 struct Client {
-    /// The line with which it has identified itself.
+    /// The client's identification line.
     line: Vec<u8>,
     counts: Counts,
-    /// It has not heard the answer to that yet.
+    /// The client has not received the answer to that line yet.
     is_waiting: bool,
-    /// The newest values of its outputs.
+    /// The newest values of the outputs.
     outputs: Vec<(Channel, Number)>,
-    /// It hears `P I1=?` of an input whose source is lost: version 3.
+    /// The client receives `P I1=?` when an input loses its source: version 3.
     hears_losses: bool,
-    /// The newest values that it has heard of its inputs.
+    /// The newest values that the client received for its inputs.
     inputs: Vec<(Channel, Number)>,
-    /// Inputs that have a value from before the connection, and none from this one.
+    /// Inputs that have a value from an earlier connection, but none from this one.
     stale: Vec<Channel>,
 }
 
-/// How far the connection with the dispatcher is.
+/// The progress of the connection with the dispatcher.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
     /// There is no connection.
     Away,
-    /// There is none: the dispatcher does not take the client now, and is asked again after a pause.
+    /// There is no connection: the dispatcher has refused the client for now, and is called again after a pause.
     Refused,
-    /// The dispatcher does not know who this is.
+    /// The dispatcher does not know the client.
     Stranger,
-    /// The identification was sent, and is not answered.
+    /// The identification was sent, but not answered yet.
     Introduced,
     /// The dispatcher knows the client.
     Here,
-    /// BYE was sent: by the client, or because it begins anew.
+    /// BYE was sent: by the client, or because it starts over.
     Leaving {
-        /// The client has said it.
+        /// The client has sent it.
         by_client: bool,
     },
 }
 
-/// Who has sent a PING.
+/// The sender of a PING.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Asker {
     Client,
@@ -131,7 +131,7 @@ enum Asker {
 }
 
 impl AsciiBridge {
-    /// A bridge to a serial line whose lines end with `end`; those from there may end in any way.
+    /// A bridge to a serial line whose lines end with `end`; received lines may have any end.
     pub fn new(end: LineEnd) -> Self {
         Self {
             from_serial: Lines::default(),
@@ -149,14 +149,14 @@ impl AsciiBridge {
         }
     }
 
-    /// Since when it waits for the dispatcher without a word from it; `None` if it does not.
+    /// The time since which it waits for an answer of the dispatcher; `None` if it does not.
     fn waits_since(&self) -> Option<Nanos> {
         let asked = self.pings.front().map(|(_, asked)| *asked);
         let left = matches!(self.state, State::Leaving { .. }).then_some(self.sent);
         asked.or(left).map(|since| since.max(self.heard))
     }
 
-    /// What went through so far.
+    /// The traffic so far.
     pub fn traffic(&self) -> Traffic {
         Traffic {
             overtaken: self.to_serial.overtaken + self.to_dispatcher.overtaken,
@@ -164,7 +164,7 @@ impl AsciiBridge {
         }
     }
 
-    /// The serial port is gone. Close the connection: to the others its client has left.
+    /// The serial port is gone. Close the connection: for all others the client has left.
     pub fn unplugged(&mut self) {
         self.state = State::Away;
         self.from_serial = Lines::default();
@@ -172,13 +172,13 @@ impl AsciiBridge {
         self.to_serial.clear();
         self.requests.clear();
         if let Some(client) = &mut self.client {
-            // They may have changed when the port is back.
+            // The values may have changed by the time the port is back.
             client.outputs.clear();
             client.is_waiting = false;
         }
     }
 
-    /// What is to be written to the serial port now.
+    /// The bytes to write to the serial port now.
     pub fn to_serial(&mut self) -> &[u8] {
         self.to_serial.next_bytes()
     }
@@ -188,7 +188,7 @@ impl AsciiBridge {
         self.to_serial.wrote(count);
     }
 
-    /// Whether bytes from the serial port are wanted now; if not, the dispatcher has to answer first.
+    /// True if bytes from the serial port are wanted now; otherwise the dispatcher has to answer first.
     pub fn wants_serial(&self) -> bool {
         self.unread.is_empty() && !self.must_wait()
     }
@@ -202,7 +202,7 @@ impl AsciiBridge {
         self.resume(now);
     }
 
-    /// Reads what has waited.
+    /// Reads the input that has waited.
     fn resume(&mut self, now: Nanos) {
         if self.unread.is_empty() || self.must_wait() {
             return;
@@ -227,8 +227,8 @@ impl AsciiBridge {
         }
     }
 
-    /// Whether a line of the client could overtake a request, or be one too many. Without a dispatcher all are read, since
-    /// their answers say so.
+    /// True if a line of the client could overtake a request, or be one too many. Without a dispatcher all lines are
+    /// read, since the answers report that.
     fn must_wait(&self) -> bool {
         let is_full = self.requests.len() >= REQUESTS;
         !self.is_apart() && (is_full || self.state == State::Here && self.has_unsent())
@@ -239,7 +239,7 @@ impl AsciiBridge {
         matches!(self.state, State::Away | State::Refused)
     }
 
-    /// The client has said a line.
+    /// The client has sent a line.
     fn said(&mut self, now: Nanos, line: Vec<u8>) {
         let parsed = parse(&line);
         match (&parsed, self.state) {
@@ -271,7 +271,7 @@ impl AsciiBridge {
             {
                 self.request(now, line);
             }
-            // The dispatcher says best what is wrong.
+            // The dispatcher knows best what is wrong.
             (_, State::Here) if self.to_dispatcher.is_full() => self.traffic.dropped += 1,
             (_, State::Here) => self.to_dispatcher.line(&line),
             (Err(refusal), _) => {
@@ -303,9 +303,9 @@ impl AsciiBridge {
                 self.to_dispatcher.line(line);
                 self.state = State::Introduced;
             }
-            // A program that connects itself would come with a new connection.
+            // A program that connects on its own would use a new connection.
             State::Introduced | State::Here => self.leave(false),
-            // It is introduced with the next connection.
+            // The next connection introduces the client.
             State::Refused | State::Leaving { .. } => {}
         }
     }
@@ -315,7 +315,7 @@ impl AsciiBridge {
         self.state = State::Leaving { by_client };
     }
 
-    /// Keeps values as the newest ones, if all of them are right.
+    /// Keeps values as the newest ones, if all of them are valid.
     fn keep(&mut self, values: Values<'_>) -> bool {
         let Some(client) = &mut self.client else {
             return false;
@@ -343,7 +343,7 @@ impl AsciiBridge {
         self.send_requests(now);
     }
 
-    /// How many requests were sent in this connection and are not carried out yet: the first ones.
+    /// The number of requests sent in this connection that are not carried out yet: the first ones.
     fn under_way(&self) -> usize {
         let asked = self.pings.iter();
         asked.filter(|(asker, _)| *asker == Asker::Request).count()
@@ -353,7 +353,7 @@ impl AsciiBridge {
         self.under_way() < self.requests.len()
     }
 
-    /// Sends the requests that the dispatcher has room for.
+    /// Sends as many requests as the dispatcher has room for.
     fn send_requests(&mut self, now: Nanos) {
         if self.state != State::Here {
             return;
@@ -381,13 +381,13 @@ impl AsciiBridge {
         self.pings.push_back((asker, now));
     }
 
-    /// The dispatcher has said a line.
+    /// The dispatcher has sent a line.
     fn obey(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
         if line == b"OK PING" {
             let asker = self.pings.pop_front().map(|(asker, _)| asker);
             match (asker, self.state) {
                 (Some(Asker::Client), _) => self.pass(line),
-                // While it leaves, the requests are those for the next connection.
+                // While the client leaves, the requests are those for the next connection.
                 (Some(Asker::Request), State::Here) => {
                     self.requests.pop_front();
                     self.send_requests(now);
@@ -405,7 +405,7 @@ impl AsciiBridge {
         Ok(())
     }
 
-    /// The dispatcher has answered to the identification.
+    /// The dispatcher has answered the identification.
     fn introduced(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
         let Some(client) = &mut self.client else {
             return Ok(());
@@ -434,7 +434,7 @@ impl AsciiBridge {
         Ok(())
     }
 
-    /// Lets the client know of the inputs that have had no value since its dispatcher was away: their sources are gone.
+    /// Reports to the client the inputs that have had no value since the dispatcher was away: their sources are gone.
     fn pass_losses(&mut self) {
         if let Some(client) = &mut self.client {
             let none = if client.hears_losses {
@@ -474,9 +474,9 @@ impl AsciiBridge {
         self.say(format!("ERR {why}").as_bytes());
     }
 
-    /// Says a line of the bridge's own.
+    /// Sends a line from the bridge itself.
     fn say(&mut self, line: &[u8]) {
-        // A flood of mistakes is not answered for longer than the line can carry the answers.
+        // A flood of mistakes gets no more answers than the line can carry.
         if !self.to_serial.is_full() {
             self.to_serial.line(line);
         }

@@ -1,8 +1,7 @@
 //! Bridges to the dispatcher of a virtual laboratory, for clients that cannot connect over TCP themselves.
 //!
-//! [`AsciiBridge`] carries the lines of a client at a serial line, and does no I/O; [`serial`] puts it on a port. [`mqtt`]
-//! makes topics of a broker the channels of a client.
-//! docs/dispatcher.md has a section for users.
+//! [`AsciiBridge`] carries the lines of a client on a serial line, without I/O; [`serial`] connects it with a port.
+//! [`mqtt`] turns topics of a broker into the channels of a client. docs/dispatcher.md has a section for users.
 
 mod ascii;
 mod lines;

@@ -1,22 +1,22 @@
-//! Cutting what arrives into lines.
+//! Splits input into lines.
 
 use tickbus_dispatcher::grammar::LONGEST_LINE;
 
-/// Cuts a stream of bytes into lines. Each of CR, LF and CR LF ends a line, since serial clients use all of them; empty lines
-/// are left out.
+/// Splits a stream of bytes into lines. Each of CR, LF and CR LF ends a line, since serial clients use all of them;
+/// empty lines are dropped.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
     begun: Vec<u8>,
-    /// The rest of the current line is too long, and is ignored.
+    /// The rest of the current line is too long, and is skipped.
     is_skipping: bool,
 }
 
-/// What has been cut off.
+/// A piece of the input.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Cut {
     /// A line, without its end.
     Line(Vec<u8>),
-    /// The beginning of a line that is too long. It is reported once, and its rest is ignored.
+    /// The beginning of a line that is too long. Reported once; the rest is skipped.
     TooLong,
 }
 
@@ -29,7 +29,7 @@ impl Lines {
             *bytes = rest.get(1..).unwrap_or_default();
             if !self.is_skipping {
                 self.begun.extend_from_slice(part);
-                // The dispatcher counts CR LF with the line.
+                // The dispatcher's limit includes the CR LF.
                 if self.begun.len() > LONGEST_LINE - 2 {
                     self.begun = Vec::new();
                     self.is_skipping = end.is_none();

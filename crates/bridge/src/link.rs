@@ -1,4 +1,4 @@
-//! The connection of a bridge with the dispatcher: called again when it is lost.
+//! The connection of a bridge with the dispatcher, with reconnects.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
@@ -9,13 +9,13 @@ use tickbus_fieldbus::tcp::{Address, Dialler, Stream, is_for_later};
 
 use crate::speaker::Speaker;
 
-/// Its key in the poll set.
+/// The dispatcher's key in the poll set.
 pub(crate) const DISPATCHER: usize = 1;
 
 /// At most this many bytes are read at once.
 pub(crate) const BUFFER: usize = 16 * 1024;
 
-/// A stream in the poll set, and what is waited for.
+/// A stream in the poll set, with its interest.
 pub(crate) struct Watched<S> {
     key: usize,
     pub(crate) stream: S,
@@ -34,7 +34,7 @@ impl<S: Stream> Watched<S> {
         })
     }
 
-    /// Waits for these from now on.
+    /// Waits for these events from now on.
     pub(crate) fn watch(&mut self, set: &mut PollSet, reads: bool, writes: bool) -> io::Result<()> {
         let interest = match (reads, writes) {
             (true, true) => Some(Interest::ReadWrite),
@@ -68,9 +68,9 @@ pub(crate) struct Link {
     address: Address,
     dialler: Dialler,
     connection: Option<Watched<TcpStream>>,
-    /// Why the dispatcher is not there, as it was reported last.
+    /// The last reported reason for the missing dispatcher.
     told: String,
-    /// The dispatcher was there, but did not let the client in.
+    /// The dispatcher answered, but refused the client.
     is_refused: bool,
     buffer: Box<[u8]>,
 }
@@ -96,7 +96,7 @@ impl Link {
         }
     }
 
-    /// Reads what has arrived, and calls the dispatcher if it is not there.
+    /// Reads the bytes that have arrived, and calls the dispatcher if it is not connected.
     pub(crate) fn turn(
         &mut self,
         now: Nanos,
@@ -159,7 +159,7 @@ impl Link {
         }
     }
 
-    /// Writes what the dispatcher takes, and waits for what is wanted next.
+    /// Writes as much as the dispatcher accepts, and sets the next interest.
     pub(crate) fn write(
         &mut self,
         now: Nanos,
@@ -190,7 +190,7 @@ impl Link {
         connection.watch(set, speaker.wants_to_hear(), is_blocked)
     }
 
-    /// Closes the connection, without a word.
+    /// Closes the connection, without a good-bye.
     pub(crate) fn close(&mut self, set: &mut PollSet) {
         if let Some(connection) = self.connection.take() {
             connection.close(set);
@@ -218,7 +218,7 @@ impl Link {
         news(&format!("connected with {}", self.address));
     }
 
-    /// Each reason once.
+    /// Reports each reason once.
     fn tell_away(&mut self, why: String, news: &mut dyn FnMut(&str)) {
         if why != self.told {
             news(&format!("{why}; it is called again each second"));

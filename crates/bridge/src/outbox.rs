@@ -1,32 +1,32 @@
-//! What waits to be sent to one side.
+//! The bytes and values that wait to be sent to one side.
 
 use std::io::Write as _;
 
 use tickbus_dispatcher::{Channel, Number};
 
-/// While fewer bytes than this wait, each line of values is passed on as it is; otherwise only the newest value of each
-/// channel is kept. A line of 9600 baud sends so many in a second.
+/// While fewer bytes than this wait, each line of values is forwarded as it is; otherwise only the newest value of each
+/// channel is kept. A line at 9600 baud sends about this many bytes in a second.
 const ROOM: usize = 1024;
 
 /// From here on nothing more is accepted.
 const FULL: usize = 64 * 1024;
 
-/// A line of values that have waited has at most this many bytes and one value, so that newer ones are not late.
+/// The longest line of values that have waited, plus one value, in bytes; short, so that newer ones are not late.
 const LONGEST: usize = 256;
 
-/// Bytes that wait to be sent, and behind them the newest value of each channel.
+/// Bytes that wait to be sent, followed by the newest value of each channel.
 #[derive(Debug)]
 pub(crate) struct Outbox {
     end: &'static [u8],
     bytes: Vec<u8>,
     written: usize,
     waiting: Vec<(Channel, Number)>,
-    /// Values that a newer one has replaced.
+    /// Values that were replaced by newer ones.
     pub(crate) overtaken: u64,
 }
 
 impl Outbox {
-    /// An empty one, whose lines end with `end`.
+    /// An empty outbox, whose lines end with `end`.
     pub(crate) const fn new(end: &'static [u8]) -> Self {
         Self {
             end,
@@ -37,7 +37,7 @@ impl Outbox {
         }
     }
 
-    /// Whether so much waits that nothing more should be asked for.
+    /// True if so many bytes wait that no more should be requested.
     pub(crate) fn is_full(&self) -> bool {
         self.bytes.len() - self.written >= FULL
     }
@@ -57,14 +57,14 @@ impl Outbox {
         }
     }
 
-    /// Adds values that replace what waits of their channels.
+    /// Adds values that replace the waiting ones of their channels.
     pub(crate) fn newest(&mut self, items: &[(Channel, Number)]) {
         for item in items {
             self.overtaken += u64::from(put(&mut self.waiting, *item));
         }
     }
 
-    /// What is to be sent now.
+    /// The bytes to send now.
     pub(crate) fn next_bytes(&mut self) -> &[u8] {
         if self.written == self.bytes.len() {
             self.bytes.clear();
@@ -76,7 +76,7 @@ impl Outbox {
                 } else if self.bytes.len() >= LONGEST {
                     break;
                 }
-                // A vector takes everything.
+                // Writing to a vector cannot fail.
                 let _ = write!(self.bytes, " {channel}={number}");
                 taken += 1;
             }
@@ -97,7 +97,7 @@ impl Outbox {
         }
     }
 
-    /// Forgets all that waits.
+    /// Drops everything that waits.
     pub(crate) fn clear(&mut self) {
         self.bytes = Vec::new();
         self.written = 0;
@@ -105,7 +105,7 @@ impl Outbox {
     }
 }
 
-/// Puts a value in the place of the one of its channel, or at the end; returns whether there was one.
+/// Replaces the value of its channel, or appends it; returns whether there was one.
 pub(crate) fn put(list: &mut Vec<(Channel, Number)>, item: (Channel, Number)) -> bool {
     let found = list.iter_mut().find(|(channel, _)| *channel == item.0);
     if let Some(old) = found {

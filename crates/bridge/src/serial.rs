@@ -12,18 +12,18 @@ use tickbus_fieldbus::tcp::{Address, Stream, is_for_later};
 use crate::ascii::AsciiBridge;
 use crate::link::{BUFFER, Link, Watched};
 
-/// Its key in the poll set.
+/// The port's key in the poll set.
 const PORT: usize = 0;
 
-/// How often a port that is gone is looked for.
+/// How often to look for a missing port.
 const LOOK: Nanos = Nanos::from_secs(1);
 
-/// Where the client is.
+/// The location of the client.
 #[derive(Debug)]
 pub enum Device {
-    /// At a serial port, by the name that the system has for it.
+    /// On a serial port, by the system's name.
     Port(String, SerialSettings),
-    /// On this machine: at a virtual port, which is made.
+    /// On this machine: on a virtual port that the bridge creates.
     Virtual(VirtualPort),
 }
 
@@ -35,11 +35,11 @@ pub struct VirtualPort {
 }
 
 impl VirtualPort {
-    /// Makes one, and lets the symbolic link `link` lead to it.
+    /// Creates a virtual port, and the symbolic link `link` to it.
     ///
     /// # Errors
     ///
-    /// There is a file of this name that is not a link to a virtual port, or the system has no more ports.
+    /// There is a file of this name that is not a link to a virtual port, or the system has no free ports.
     pub fn new(link: &Path) -> io::Result<Self> {
         Ok(Self {
             link: link.to_owned(),
@@ -48,21 +48,21 @@ impl VirtualPort {
     }
 }
 
-/// What a bridge works with.
+/// The environment of a bridge.
 pub struct Hosting<'h> {
     /// The clock.
     pub clock: &'h dyn Clock,
-    /// Ends it.
+    /// Ends the bridge.
     pub stop: &'h Stop,
-    /// Takes what an operator should know, a line each.
+    /// Takes news for an operator, one line each.
     pub news: &'h mut dyn FnMut(&str),
 }
 
-/// Carries lines between `device` and the dispatcher at `address` until stopped. What goes away is opened again.
+/// Carries lines between `device` and the dispatcher at `address` until stopped. Lost ends are opened again.
 ///
 /// # Errors
 ///
-/// The port cannot be opened at first, or the system cannot wait for it.
+/// The port cannot be opened at the start, or the system cannot wait for it.
 pub fn run(
     bridge: &mut AsciiBridge,
     mut device: Device,
@@ -113,7 +113,7 @@ impl Device {
     }
 }
 
-/// The words of an error alone: that it is one of a line needs no saying here.
+/// The text of an error alone; its kind need not be mentioned here.
 fn reason(error: BusError) -> String {
     match error {
         BusError::Link(why) => why,
@@ -128,7 +128,7 @@ struct Host<'b, 'h> {
     link: Link,
     device: Device,
     port: Option<Watched<Box<dyn Stream>>>,
-    /// When a port that is gone is looked for.
+    /// When to look for a missing port.
     next_look: Nanos,
     buffer: Box<[u8]>,
 }
@@ -160,7 +160,7 @@ impl Host<'_, '_> {
         Ok(())
     }
 
-    /// Looks whether the port is there again.
+    /// Checks if the port is back.
     fn look(&mut self, now: Nanos) -> io::Result<()> {
         if now >= self.next_look {
             self.next_look = now + LOOK;
@@ -196,7 +196,7 @@ impl Host<'_, '_> {
         }
     }
 
-    /// Writes what the port takes, and waits for what is wanted next.
+    /// Writes as much as the port accepts, and sets the next interest.
     fn write(&mut self, now: Nanos) -> io::Result<()> {
         let Some(port) = &mut self.port else {
             return Ok(());

@@ -1,4 +1,4 @@
-//! The bridge for ASCII clients, with the real dispatcher at its other end: both without I/O, on one time.
+//! The bridge for ASCII clients, with the real dispatcher at its other end: both without I/O, in the same time.
 #![allow(missing_docs, reason = "tests")]
 
 use std::net::SocketAddr;
@@ -53,21 +53,22 @@ impl Lab {
         self.dispatcher = Dispatcher::new(Settings::default(), patch);
     }
 
-    /// A client that is connected directly says a line.
+    /// A directly connected client sends a line.
     fn say(&mut self, seat: usize, line: &str) {
         let line = format!("{line}\n");
         self.dispatcher.arrived(self.now, seat, line.as_bytes());
         self.settle();
     }
 
-    /// What it hears.
+    /// The lines for a client.
     fn hear(&mut self, seat: usize) -> Vec<String> {
         let bytes = self.dispatcher.to_write(seat).to_vec();
         self.dispatcher.wrote(seat, bytes.len());
         lines(&bytes, "\r\n")
     }
 
-    /// Carries bytes between bridge and dispatcher until nothing moves. Returns why the bridge ends the connection, if it does.
+    /// Carries bytes between bridge and dispatcher until nothing moves. Returns why the bridge ends the connection, if
+    /// it does.
     fn settle(&mut self) -> Option<String> {
         loop {
             if self.dispatcher.unsaved().is_some() {
@@ -93,7 +94,7 @@ impl Lab {
                 continue;
             }
             if self.dispatcher.is_closing(seat) {
-                // One that is wanted at once.
+                // The bridge may want a new connection at once.
                 if self.cut() {
                     self.connect();
                     continue;
@@ -103,14 +104,14 @@ impl Lab {
         }
     }
 
-    /// The client at the serial line says this; what it hears.
+    /// The client on the serial line sends this; returns the lines for it.
     fn serial(&mut self, text: &str) -> Vec<String> {
         self.bridge.from_serial(self.now, text.as_bytes());
         self.settle();
         self.told()
     }
 
-    /// What it hears now.
+    /// The current lines for the client on the serial line.
     fn told(&mut self) -> Vec<String> {
         let mut all = Vec::new();
         loop {
@@ -124,7 +125,7 @@ impl Lab {
         }
     }
 
-    /// Time passes, and everyone looks at it.
+    /// Lets time pass for everyone.
     fn pass(&mut self, seconds: i64) -> Result<(), String> {
         for _ in 0..seconds {
             self.now += Nanos::from_secs(1);
@@ -148,8 +149,8 @@ const SCADA: &str = "VR:SCADA:Q02:I02:AQ00:AI00:127.0.0.1:3333";
 const AWAY: &str = "ERR 503 the dispatcher does not answer; the bridge goes on calling it, and sends your values and \
                     connections then";
 
-/// A laboratory with a pump that is connected directly, and a client at the serial line whose I1 is the pump's Q1, and
-/// whose Q1 is the pump's I1.
+/// A laboratory with a directly connected pump, and a client on the serial line whose I1 is the pump's Q1, and whose Q1
+/// is the pump's I1.
 fn patched() -> (Lab, usize) {
     let mut lab = Lab::new();
     let pump = lab.client();
@@ -203,7 +204,7 @@ fn a_silent_client_is_kept_alive_and_hears_no_answers_to_what_it_did_not_ask() {
     let (mut lab, pump) = patched();
     for _ in 0..10 {
         lab.pass(59).expect("the dispatcher answers");
-        // The pump is no bridge's.
+        // No bridge keeps the pump alive.
         lab.say(pump, "");
     }
     assert!(lab.told().is_empty());
@@ -216,7 +217,7 @@ fn a_dispatcher_that_does_not_answer_is_given_up() {
     lab.seat = None;
     let why = lab.pass(60).expect_err("it does not answer");
     assert!(why.contains("20s"), "{why}");
-    // Nor is one that is only said values to.
+    // The same if it is only sent values.
     let (mut lab, _) = patched();
     lab.seat = None;
     let given_up = (0..60).any(|value| {
@@ -226,7 +227,7 @@ fn a_dispatcher_that_does_not_answer_is_given_up() {
         lab.pass(1).is_err()
     });
     assert!(given_up);
-    // One that need not answer, since the serial line is slow, is not blamed.
+    // A dispatcher that need not answer, since the serial line is slow, is not given up.
     let (mut lab, _) = patched();
     while lab.bridge.wants_to_hear() {
         lab.bridge.from_serial(lab.now, b"LIST\r");
@@ -242,7 +243,7 @@ fn after_a_restart_the_client_is_introduced_again_with_its_newest_values() {
     lab.serial("P Q1=24 Q2=3\rP Q1=20\r");
     lab.restart();
     assert_eq!(lab.told(), [AWAY]);
-    // On change alone: it does not say this again.
+    // The client sends values only on change: it does not send this again.
     assert!(lab.serial("P Q2=7\r").is_empty());
     assert_eq!(lab.serial("PING\r"), [AWAY]);
     let pump = pump_again(&mut lab);
@@ -272,7 +273,8 @@ fn what_somebody_has_cut_or_moved_stays_so_after_a_restart() {
 #[test]
 fn requests_that_may_not_have_arrived_are_sent_again() {
     let (mut lab, _) = patched();
-    // It was written, but the connection broke before it arrived; a second one waits until there is a dispatcher.
+    // The request was written, but the connection broke before it arrived; a second one waits until there is a
+    // dispatcher.
     lab.bridge.from_serial(lab.now, b"CONNECT I2:PUMP:Q2\r");
     let count = lab.bridge.to_write().len();
     lab.bridge.wrote(lab.now, count);
@@ -285,7 +287,7 @@ fn requests_that_may_not_have_arrived_are_sent_again() {
     assert_eq!(lab.dispatcher.patch().len(), 4);
     lab.say(pump, "P Q2=2");
     assert_eq!(lab.told(), ["P I2=2"]);
-    // What was carried out is not.
+    // A request that was carried out is not repeated.
     lab.say(pump, "DISCONNECT I2");
     lab.restart();
     pump_again(&mut lab);
@@ -325,7 +327,7 @@ fn a_client_that_begins_anew_gets_a_new_connection() {
     let heard = lab.serial("VR SCADA Q2 I2 V=2\r");
     assert_eq!(heard, ["OK VR", PUMP, SCADA, "END 2"]);
     assert_eq!(lab.hear(pump), ["P I1=0"], "its values went with it");
-    // Under a name that another client has.
+    // With a name that another client has.
     let heard = lab.serial("VR PUMP Q2 I2 V=2\r");
     assert_eq!(heard.len(), 1, "{heard:?}");
     assert!(heard[0].starts_with("ERR 409 "), "{heard:?}");
@@ -368,7 +370,7 @@ fn whoever_speaks_before_there_is_a_dispatcher_is_heard_when_there_is_one() {
     lab.settle();
     assert_eq!(lab.told(), [PUMP, SCADA]);
     assert_eq!(lab.hear(pump), ["P I1=24"]);
-    // Not without end.
+    // Not endlessly.
     lab.cut();
     lab.told();
     let heard = lab.serial(&"LIST\r".repeat(70));
@@ -418,7 +420,7 @@ fn what_a_driver_says_right_after_it_begins_anew_is_kept() {
     assert_eq!(lab.hear(pump), ["P I1=24"]);
     lab.say(pump, "P Q2=2");
     assert_eq!(lab.told(), ["P I2=2"]);
-    // Answers to what was asked before belong to the old requests.
+    // Pending answers belong to the old requests.
     let heard = lab.serial("LIST\rVR SCADA Q2 I2\rCONNECT I1:PUMP:Q1\rPING\r");
     assert_eq!(heard, [AWAY, PUMP, SCADA, "P I2=2"]);
     assert_eq!(lab.dispatcher.patch().len(), 3);
@@ -452,7 +454,7 @@ fn an_input_whose_source_does_not_come_back_is_off_after_a_restart() {
         assert_eq!(lab.told()[..], ["P I1=24", "P I2=24"]);
         lab.restart();
         assert_eq!(lab.told(), [AWAY]);
-        // The tank comes back, and the pump does not.
+        // The tank comes back, but not the pump.
         let tank = lab.client();
         lab.say(tank, "VP TANK Q1");
         lab.say(tank, "P Q1=24");
@@ -463,7 +465,7 @@ fn an_input_whose_source_does_not_come_back_is_off_after_a_restart() {
             heard.ends_with(&["P I2=24".to_owned(), lost.to_owned()]),
             "{heard:?}"
         );
-        // That is not said twice.
+        // The loss is not reported twice.
         lab.cut();
         lab.connect();
         lab.settle();
@@ -481,7 +483,7 @@ fn many_requests_at_once_wait_for_their_turn() {
     let heard = lab.serial(&(all.collect::<String>() + "PING\r"));
     assert_eq!(heard, ["OK PING"]);
     assert_eq!(lab.dispatcher.patch().len(), 200);
-    // While the dispatcher is there, and does not answer.
+    // While the dispatcher is connected, but does not answer.
     let seat = lab.seat.take();
     lab.serial(&"LIST\r".repeat(70));
     assert!(lab.told().is_empty());

@@ -48,7 +48,7 @@ struct Lab {
     dispatcher: Dispatcher,
     mapping: Mapping,
     seat: usize,
-    /// A tank that is connected directly.
+    /// A directly connected tank.
     tank: usize,
 }
 
@@ -112,21 +112,21 @@ impl Lab {
         }
     }
 
-    /// The tank says this.
+    /// The tank sends this.
     fn say(&mut self, line: &str) {
         let line = format!("{line}\n");
         self.dispatcher
             .arrived(self.now, self.tank, line.as_bytes());
     }
 
-    /// What the tank hears.
+    /// The lines for the tank.
     fn hear(&mut self) -> String {
         let bytes = self.dispatcher.to_write(self.tank).to_vec();
         self.dispatcher.wrote(self.tank, bytes.len());
         String::from_utf8(bytes).expect("text").replace("\r\n", ";")
     }
 
-    /// What is published for this that the tank says.
+    /// The messages published for this line of the tank.
     fn published(&mut self, line: &str) -> Vec<String> {
         self.say(line);
         self.settle();
@@ -139,7 +139,7 @@ impl Lab {
         all
     }
 
-    /// What the tank hears of this message.
+    /// The lines for the tank after this message.
     fn message(&mut self, topic: &str, payload: &str) -> String {
         self.mapping.message(topic, payload.as_bytes());
         self.settle();
@@ -192,12 +192,12 @@ fn messages_become_outputs_and_what_is_none_is_named_and_counted() {
         ("hall/setpoint/percent", "3", "P AI2=0.3;"),
         ("hall/switch", "ON", "P I1=24;"),
         ("hall/switch", "OFF", "P I1=0;"),
-        // No value, as the bridge publishes it itself.
+        // No value, as published by the bridge itself.
         ("hall/switch", "ON", "P I1=24;"),
         ("hall/switch", "", "P I1=0;"),
         ("hall/setpoint", "", "P AI1=0;"),
         ("hall/setpoint/percent", "", "P AI2=0;"),
-        // What is published, and what nobody asked for.
+        // The bridge's own topics, and unknown ones.
         ("hall/level", "1", ""),
         ("hall/other", "1", ""),
     ] {
@@ -224,7 +224,7 @@ fn messages_become_outputs_and_what_is_none_is_named_and_counted() {
     assert_eq!(lab.message("hall/switch", "24"), "");
     lab.mapping.message("hall/setpoint", &[0xFF, 0x00]);
     let news = lab.mapping.news();
-    // The 1st, 2nd, 4th and 8th of one topic, and the first of the other.
+    // The 1st, 2nd, 4th and 8th message of one topic, and the first of the other.
     assert_eq!(news.len(), 5, "{news:?}");
     assert_eq!(
         news[1],

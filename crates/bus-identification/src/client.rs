@@ -36,14 +36,14 @@ impl Timing {
         Nanos(bits.saturating_mul(1_000_000_000) / i64::from(self.baud.max(1)))
     }
 
-    /// The silence that ends what has no known length, and after which the next byte begins a command: that of five
+    /// The silence that ends data of unknown length, and after which the next byte begins a command: that of five
     /// characters, and at least 100 ms, for which a busy computer may hold bytes back.
     pub fn silence(&self) -> Nanos {
         self.characters(5).max(Nanos::from_millis(100))
     }
 
-    /// The time-out, or the silence if that is longer: a reader that has heard noise does not understand a client that
-    /// asks anew before it.
+    /// The time-out, or the silence if that is longer: after noise, a reader does not understand a client that retries
+    /// sooner.
     pub fn patience(&self) -> Nanos {
         self.timeout.max(self.silence())
     }

@@ -1,4 +1,4 @@
-//! The newest state, for everyone who looks.
+//! The newest state, for all viewers.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,24 +14,24 @@ use crate::site::{Answer, Differences, Site, State};
 /// The shortest time between two looks.
 const PERIOD: Duration = Duration::from_micros(16_667);
 
-/// Formatting that takes long is followed by a pause of this many times its length, so that large pages leave time for
-/// other work.
+/// Slow formatting is followed by a pause of this many times its duration, so that large pages leave time for other
+/// work.
 const REST: u32 = 5;
 
 /// The longest pause.
 const LONGEST_REST: Duration = Duration::from_secs(1);
 
-/// How many events are kept for viewers who lack the same.
+/// The number of events kept for other viewers with the same last state.
 const KEPT: usize = 4;
 
-/// The newest state. Viewers who are slow miss those between, and keep nobody waiting.
+/// The newest state. Slow viewers miss the states in between, and delay nobody.
 pub(crate) struct Feed {
     state: watch::Sender<Newest>,
-    /// Somebody has begun to look.
+    /// A viewer has come.
     wanted: Notify,
     /// Changes so far.
     changes: AtomicU64,
-    /// There was a change: the pause is cut short.
+    /// There was a change: cut the pause short.
     hurry: Notify,
     /// Looks that were answered so far.
     looks: AtomicU64,
@@ -39,21 +39,21 @@ pub(crate) struct Feed {
     clock: Arc<dyn Clock>,
 }
 
-/// The events that were formatted of the present state, and what that took.
+/// The events formatted for the current state, and the time that took.
 #[derive(Default)]
 struct Formatted {
     number: u64,
-    /// By the state that the viewer had.
+    /// By the viewer's last state.
     events: Vec<(Option<u64>, Bytes)>,
     spent: Nanos,
 }
 
-/// Somebody who looks.
+/// A viewer.
 pub(crate) struct Viewer {
     newest: watch::Receiver<Newest>,
-    /// The changes before it came: it gets no state that was looked at before them.
+    /// The changes before the viewer came: it gets no state from before them.
     changes: u64,
-    /// What it got last.
+    /// The last state that the viewer got.
     seen: Seen,
 }
 
@@ -62,30 +62,30 @@ enum Seen {
     #[default]
     Nothing,
     Whole(Bytes),
-    /// By its number.
+    /// The state with this number.
     State(u64),
 }
 
-/// What was seen last.
+/// The last state that was looked at.
 enum Newest {
-    /// Nobody looks.
+    /// There are no viewers.
     Unknown,
     State(Published),
-    /// There is nothing to be seen any more.
+    /// The site has ended.
     Ended,
 }
 
-/// A state, for everybody.
+/// A state for all viewers.
 #[derive(Clone)]
 struct Published {
     content: Content,
-    /// The changes before it was looked at.
+    /// The changes before the look at it.
     changes: u64,
 }
 
 #[derive(Clone)]
 enum Content {
-    /// Formatted, as an event.
+    /// Formatted as an event.
     Whole(Bytes),
     Differences {
         state: Arc<dyn Differences>,
@@ -133,7 +133,7 @@ impl Feed {
         }
     }
 
-    /// A viewer more.
+    /// Adds a viewer.
     pub(crate) fn subscribe(&self) -> Viewer {
         let mut newest = self.state.subscribe();
         newest.mark_changed();
@@ -146,8 +146,8 @@ impl Feed {
         }
     }
 
-    /// The next event for a viewer: the newest state, or what it lacks of it. `None`: there is nothing to be seen any
-    /// more.
+    /// The next event for a viewer: the newest state, or its differences from the viewer's last one. `None`: the site
+    /// has ended.
     pub(crate) async fn next(&self, viewer: &mut Viewer) -> Option<Bytes> {
         loop {
             viewer.newest.changed().await.ok()?;
@@ -178,7 +178,7 @@ impl Feed {
         }
     }
 
-    /// The event for somebody who has seen this. Most viewers have seen the same, and share it.
+    /// The event for a viewer who has seen this state. Most viewers have seen the same one, and share the event.
     fn differences(&self, state: &dyn Differences, seen: Option<u64>) -> (u64, Bytes) {
         let mut formatted = self.formatted();
         if formatted.number == state.number() {
@@ -202,28 +202,28 @@ impl Feed {
     }
 
     fn formatted(&self) -> MutexGuard<'_, Formatted> {
-        // An event is kept as a whole or not at all.
+        // An event is stored completely or not at all.
         self.formatted
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Something was changed: viewers who come from now on see it.
+    /// There was a change: viewers who come from now on see it.
     pub(crate) fn changed(&self) {
         self.changes.fetch_add(1, Ordering::Relaxed);
         self.hurry.notify_one();
     }
 
-    /// The number of looks that were answered. While it stands still, what is shown may be old.
+    /// The number of answered looks. While it does not grow, the page may be outdated.
     pub(crate) fn looks(&self) -> u64 {
         self.looks.load(Ordering::Relaxed)
     }
 
-    /// Looks while somebody else does, until the site has ended.
+    /// Looks at the site while there are viewers, until the site has ended.
     pub(crate) async fn run(&self, site: Arc<dyn Site>) {
         loop {
             while self.state.receiver_count() == 0 {
-                // What was true then need not be when the next one comes.
+                // The state may be outdated when the next viewer comes.
                 self.state.send_replace(Newest::Unknown);
                 self.wanted.notified().await;
             }
@@ -235,7 +235,7 @@ impl Feed {
                 self.state.send_replace(Newest::Ended);
                 return;
             };
-            // How long the site took to answer was not this thread's work, and asks for no rest.
+            // The time for the site's answer was not this thread's work, and needs no rest.
             let begin = self.clock.now();
             let content = match state {
                 State::Whole(make) => Content::Whole(event(&make())),
@@ -244,7 +244,7 @@ impl Feed {
                     state,
                 },
             };
-            // With what was formatted for single viewers since the last look.
+            // Includes the formatting for single viewers since the last look.
             let spent = std::mem::take(&mut self.formatted().spent);
             let taken = self.clock.now() - begin + spent;
             let taken = u64::try_from(taken.0).unwrap_or_default();
@@ -260,11 +260,11 @@ impl Feed {
             });
             let rest = Duration::from_nanos(taken).saturating_mul(REST);
             let rest = rest.min(LONGEST_REST).saturating_sub(PERIOD);
-            // What the site took to answer is part of the period.
+            // The time for the site's answer is part of the period.
             let passed = (self.clock.now() - asked).to_duration();
             tokio::time::sleep(PERIOD.saturating_sub(passed)).await;
             if !rest.is_zero() {
-                // A change during the look is remembered, and is looked at as soon.
+                // A change during the look is remembered, and is looked at just as soon.
                 let _ = timeout(rest, self.hurry.notified()).await;
             }
         }

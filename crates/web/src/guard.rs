@@ -1,8 +1,8 @@
-//! Who may look, and who may change something.
+//! Access control: who may look, and who may change something.
 //!
-//! A page of another site, open in the same browser, can send requests to this machine. It can neither forge `Origin`
-//! nor send `Authorization` without having been allowed to; by a name of its own that suddenly means this machine (DNS
-//! rebinding) it would be of one origin with the room, but then `Host` has that name.
+//! A page of another site, open in the same browser, can send requests to this machine. Without permission it can
+//! neither forge `Origin` nor send `Authorization`. A page whose own host name suddenly resolves to this machine (DNS
+//! rebinding) would have the same origin as the room, but its requests have that name in `Host`.
 
 use std::io;
 use std::net::IpAddr;
@@ -11,14 +11,14 @@ use hyper::header::{AUTHORIZATION, HOST, HeaderMap, HeaderName, ORIGIN};
 
 use crate::token;
 
-/// Lets requests in.
+/// Checks requests.
 pub(crate) struct Guard {
     token: String,
-    /// The name under which the room is served.
+    /// The host name of the room.
     host: String,
 }
 
-/// Whether a request has the token.
+/// The state of a request's token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Token {
     Right,
@@ -42,7 +42,7 @@ impl Guard {
         &self.token
     }
 
-    /// Whether the request is meant for this room, and comes from nowhere else; if not, why.
+    /// Checks that the request is meant for this room, and comes from nowhere else; if not, says why.
     pub(crate) fn check_source(&self, headers: &HeaderMap) -> Result<(), String> {
         const HOSTS: &str =
             "the request does not say once for which host it is; send one Host header";
@@ -67,8 +67,8 @@ impl Guard {
                 return Err(OTHER.to_owned());
             }
         }
-        // A browser sends no Origin with what a page of another site loads as a picture or a script. To follow a link from
-        // there is another thing.
+        // A browser sends no Origin when a page of another site loads a picture or a script from here. A link from
+        // there may be followed.
         let is_elsewhere = headers
             .get_all("sec-fetch-site")
             .iter()
@@ -80,8 +80,8 @@ impl Guard {
         Ok(())
     }
 
-    /// Whether a `Host` means this room: by an address, which cannot be rebound, or by its name. The port is not compared:
-    /// a tunnel may have another one.
+    /// True if a `Host` means this room: by an address, which cannot be rebound, or by its name. The port is not
+    /// compared, since a tunnel may use a different one.
     fn is_own(&self, host: &str) -> bool {
         let name = match host.rsplit_once(':') {
             Some((name, port)) if port.bytes().all(|byte| byte.is_ascii_digit()) => name,
@@ -98,7 +98,7 @@ impl Guard {
             return Token::Missing;
         }
         let given = only(headers, &AUTHORIZATION).and_then(|it| it.strip_prefix("Bearer "));
-        // The time that this takes does not tell how much of it is right.
+        // The duration of the comparison must not reveal how much of the token is right.
         let is_right = given.is_some_and(|given| {
             let pairs = given.bytes().zip(self.token.bytes());
             let differences = pairs.fold(0, |all, (one, other)| all | (one ^ other));
@@ -108,7 +108,7 @@ impl Guard {
     }
 }
 
-/// The value of a header that stands there once.
+/// The value of a header that occurs once.
 fn only<'h>(headers: &'h HeaderMap, name: &HeaderName) -> Option<&'h str> {
     let mut all = headers.get_all(name).iter();
     let first = all.next()?.to_str().ok()?;

@@ -1,11 +1,11 @@
-//! The web room: where live pages are served.
+//! The web room, which serves live pages.
 //!
-//! A [`Site`] brings the files of a page, makes its state when somebody looks, and carries out changes. The [`Room`] has
-//! the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites, limits,
-//! and server-sent events of which every viewer gets the newest: the whole state, or what it lacks of it.
+//! A [`Site`] provides the files of a page, its state while there are viewers, and carries out changes. The [`Room`]
+//! does the rest: one thread, a token without which nothing can be changed, the refusal of requests from other sites,
+//! limits, and server-sent events that give every viewer the newest state: all of it, or just the differences.
 //!
-//! It stands on hyper, not on the framework axum around it: axum's own server has no limit of time for headers nor of
-//! connections, and a page has so few paths that a `match` is their router.
+//! The room uses hyper, not the framework axum on top of it: axum's own server limits neither the time for headers nor
+//! the number of connections, and a page has so few paths that a `match` suffices as their router.
 
 mod feed;
 mod guard;
@@ -19,7 +19,7 @@ mod token;
 pub use room::{Limits, Room, Serving};
 pub use site::{Answer, Asset, Change, Differences, Document, Outcome, Refused, Site, State, Verb};
 
-/// What the scripts of every page share: the token, asking, listening.
+/// The shared parts of every page's scripts: the token, requests, events.
 pub const CLIENT: &str = include_str!("client.js");
 
 /// The script that reads the events, as a worker for all tabs of a browser; `client.js` expects it at `/stream.js`.

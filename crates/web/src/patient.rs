@@ -1,4 +1,4 @@
-//! A connection that is given up when its reader takes nothing for too long.
+//! A connection that is given up when its reader reads nothing for too long.
 
 use std::io;
 use std::pin::Pin;
@@ -9,7 +9,7 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 use tokio::time::{Sleep, sleep};
 
-/// A stream whose writes fail when nothing was taken for as long as `patience`.
+/// A stream whose writes fail when no byte was accepted for `patience`.
 pub(crate) struct Patient {
     stream: TcpStream,
     patience: Duration,

@@ -28,17 +28,17 @@ use crate::token;
 /// The longest head of a request, in bytes: four times what a browser sends.
 const HEAD: usize = 16 * 1024;
 
-/// How long nobody is accepted after the system had no socket.
+/// The pause in accepting after the system had no free socket.
 const PAUSE: Duration = Duration::from_millis(100);
 
-/// What is refused so that the rest is served.
+/// The limits that keep the room available.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// Connections at a time; further ones are closed at once.
     pub connections: usize,
-    /// Of these, those of one computer.
+    /// Connections at a time of one computer.
     pub per_computer: usize,
-    /// How long a request may take to arrive, and how long a viewer may read nothing.
+    /// The time for a request to arrive, and the time that a viewer may read nothing.
     pub patience: Duration,
 }
 
@@ -53,7 +53,7 @@ impl Default for Limits {
     }
 }
 
-/// An address that is listened on, and its token.
+/// A listening address, and its token.
 pub struct Room {
     listener: TcpListener,
     address: SocketAddr,
@@ -79,7 +79,7 @@ impl Room {
     pub fn bind(address: &Address, limits: Limits) -> io::Result<Self> {
         let (listener, bound) = bind(address, None)?;
         let host = if bound.ip().is_unspecified() {
-            // Not an address to be opened.
+            // Not an address to open.
             "localhost".to_owned()
         } else {
             address.host.to_string()
@@ -93,12 +93,12 @@ impl Room {
         })
     }
 
-    /// Takes the token from this file, so that an address that was opened stays right after a restart. A file that does not exist is
-    /// made, for its owner alone.
+    /// Takes the token from this file, so that an opened address stays valid after a restart. A missing file is
+    /// created, readable only by its owner.
     ///
     /// # Errors
     ///
-    /// The file cannot be read or made, holds no token, or other users may read it.
+    /// The file cannot be read or created, contains no token, or is readable by other users.
     pub fn keep_token(&mut self, file: &Path) -> io::Result<()> {
         let kept = token::kept(file, self.guard.token()).map_err(|error| {
             let file = file.display();
@@ -108,22 +108,22 @@ impl Room {
         Ok(())
     }
 
-    /// The address that it listens on.
+    /// The address on which it listens.
     pub const fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What is to be opened in a browser, with the token. A browser sends what stands behind `#` to nobody.
+    /// The URL for a browser, with the token. A browser sends the part after `#` to nobody.
     pub fn url(&self) -> String {
         let port = self.address.port();
         format!("http://{}:{port}/#token={}", self.host, self.guard.token())
     }
 
-    /// Serves a page, in a thread of its own, until what is returned is dropped.
+    /// Serves a page, in a separate thread, until the returned value is dropped.
     ///
     /// # Errors
     ///
-    /// The system has no thread, or cannot wait for sockets.
+    /// The system could not start a thread, or cannot wait for sockets.
     pub fn serve(self, site: Arc<dyn Site>, clock: Arc<dyn Clock>) -> io::Result<Serving> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_io()
@@ -156,7 +156,7 @@ impl Room {
     }
 }
 
-/// A page that is served; dropping it ends that.
+/// A page being served; dropping it ends that.
 #[derive(Debug)]
 pub struct Serving {
     stop: Option<oneshot::Sender<()>>,
@@ -167,13 +167,13 @@ impl Drop for Serving {
     fn drop(&mut self) {
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
-            // A panic has been reported by itself.
+            // A panic has been reported already.
             let _ = thread.join();
         }
     }
 }
 
-/// Has the system send at once, and give up on a peer that confirms nothing.
+/// Makes the system send at once, and give up a peer that confirms nothing.
 fn prepared(stream: TcpStream, patience: Duration) -> io::Result<TcpStream> {
     let stream = stream.into_std()?;
     let patience = i64::try_from(patience.as_nanos()).map_or(Nanos::MAX, Nanos);
@@ -194,7 +194,7 @@ async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
         let Some(seat) = seats.take(peer.ip()) else {
             continue;
         };
-        // A viewer whose computer has gone without a word is not to be taken for one that is there.
+        // A viewer whose computer has silently gone must not count as present.
         let Ok(stream) = prepared(stream, limits.patience) else {
             continue;
         };
@@ -202,7 +202,7 @@ async fn accept(listener: TcpListener, hall: &Arc<Hall>, limits: Limits) {
         tokio::spawn(async move {
             let service = service_fn(|request| answer(&hall, request));
             let stream = TokioIo::new(Patient::new(stream, limits.patience));
-            // It does not matter how a browser hangs up.
+            // The way in which a browser hangs up does not matter.
             let _ = http1::Builder::new()
                 .timer(TokioTimer::new())
                 .header_read_timeout(limits.patience)

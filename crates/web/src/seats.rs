@@ -1,4 +1,4 @@
-//! How many connections there may be, in all and from one computer.
+//! The limits on connections, in total and per computer.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
@@ -10,11 +10,11 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 pub(crate) struct Seats {
     all: Arc<Semaphore>,
     per_computer: usize,
-    /// Those of computers that have some, and of others that had.
+    /// The seats of computers that have some, or had some before.
     each: HashMap<IpAddr, Arc<Semaphore>>,
 }
 
-/// A seat that is taken; dropping it gives it back.
+/// A taken seat; dropping it frees it.
 pub(crate) struct Seat {
     _of_all: OwnedSemaphorePermit,
     _of_its: OwnedSemaphorePermit,
@@ -44,7 +44,7 @@ impl Seats {
     }
 }
 
-/// What tells computers apart: an IPv6 address by its network, in which a computer may give itself any number of addresses.
+/// The identity of a computer: for an IPv6 address its network, in which a computer may use any number of addresses.
 fn computer(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) if !address.is_loopback() => {

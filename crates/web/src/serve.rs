@@ -23,34 +23,34 @@ use crate::site::{Answer, Change, Site, Verb};
 /// The largest body of a request, in bytes.
 const BODY: usize = 4096;
 
-/// A viewer hears something at least this often while the site answers; a page that does not knows that what it shows
-/// is old.
+/// A viewer gets a message at least this often while the site answers; a page without messages knows that its contents
+/// are outdated.
 const BEAT: Duration = Duration::from_secs(1);
 
-/// The page and its own files; nothing from elsewhere, nothing inline, in nobody's frame.
+/// Only the page and its own files; nothing from other hosts, nothing inline, not within a frame.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; img-src 'self' data:; \
      base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 const JSON: &str = "application/json";
 
-/// What all connections share.
+/// The data shared by all connections.
 pub(crate) struct Hall {
     pub(crate) site: Arc<dyn Site>,
     pub(crate) guard: Guard,
     pub(crate) feed: Feed,
     pub(crate) patience: Duration,
-    /// How many viewers have the token.
+    /// The number of viewers with the token.
     pub(crate) holders: AtomicUsize,
 }
 
 impl Hall {
-    /// Tells the site of somebody who has the token.
+    /// Reports activity of a viewer with the token to the site.
     fn heard(&self) {
         self.site.heard(self.holders.load(Ordering::Relaxed));
     }
 }
 
-/// A viewer who has the token.
+/// A viewer with the token.
 struct Holder(Arc<Hall>);
 
 impl Holder {
@@ -134,7 +134,7 @@ async fn respond(hall: &Arc<Hall>, request: Request<Incoming>) -> Result<Respons
     hall.site.change(Change { verb, path, body }, answer);
     let outcome = timeout(hall.patience, outcome).await;
     let outcome = outcome.map_err(|_| undecided())?.map_err(|_| nobody())?;
-    // One that was refused changed nothing, unless the site itself failed.
+    // A refused change changed nothing, unless the site itself failed.
     if outcome
         .as_ref()
         .err()
@@ -182,7 +182,7 @@ async fn get(hall: &Arc<Hall>, path: &str, token: Token) -> Result<Response<Body
     }
 }
 
-/// The newest state, each time that it is another one and the viewer has taken the last.
+/// The newest state, whenever it has changed and the viewer has taken the last one.
 fn events(hall: &Arc<Hall>, token: Token) -> Response<Body> {
     let mut events = Events {
         hall: Arc::clone(hall),
@@ -199,14 +199,14 @@ fn events(hall: &Arc<Hall>, token: Token) -> Response<Body> {
     respond_with("text/event-stream", StreamBody::new(stream).boxed_unsync())
 }
 
-/// What one viewer hears.
+/// The events for one viewer.
 struct Events {
     hall: Arc<Hall>,
     _holder: Option<Holder>,
     viewer: Viewer,
-    /// The looks that were answered when something was sent last.
+    /// The number of answered looks at the last event.
     looks: u64,
-    /// When the viewer is to hear something even if the state is the same.
+    /// When the viewer gets an event even for the same state.
     beat: Interval,
 }
 
@@ -216,7 +216,7 @@ impl Events {
             tokio::select! {
                 biased;
                 event = self.hall.feed.next(&mut self.viewer) => break event?,
-                // This thread lives, but does the site? If it has answered nothing since, the viewer has to know.
+                // This thread lives, but does the site? If it has answered no look since, the viewer has to know.
                 _ = self.beat.tick() => {
                     if self.hall.feed.looks() != self.looks {
                         break Bytes::from_static(b"event: beat\ndata:\n\n");

@@ -1,69 +1,67 @@
-//! What a page consists of.
+//! The parts of a page.
 
 use std::fmt;
 use std::sync::Arc;
 
 use tokio::sync::oneshot::{Receiver, Sender, channel};
 
-/// A page: its files, its state and what can be changed.
+/// A page: its files, its state and its changes.
 ///
-/// Calls come from the room's thread, in which all viewers wait: they must not block.
+/// The room's thread makes all calls, and all viewers wait for it: they must not block.
 pub trait Site: Send + Sync + 'static {
-    /// Its files; the page itself has the path `/`.
+    /// The files; the page itself has the path `/`.
     fn assets(&self) -> &[Asset];
 
-    /// Somebody looks: has the present state made, and handed to `answer`. Asked at most 60 times a second, and only while
-    /// somebody looks.
+    /// Makes the current state and passes it to `answer`. Called at most 60 times a second, and only while there are
+    /// viewers.
     fn look(&self, answer: Answer<State>);
 
-    /// Has a document of the site's own made, of what is there at this moment; `None` if there is none at this path. Asked
-    /// for every path that is not in [`assets`](Self::assets).
+    /// Makes a document of the site from the current state; `None` if there is none at this path. Called for every path
+    /// that is not in [`assets`](Self::assets).
     fn get(&self, path: &str, answer: Answer<Option<Document>>) {
         let _ = path;
         answer.give(None);
     }
 
-    /// Somebody who has the token was heard of: by a request, or as a viewer who came or went. There are `viewers` of
-    /// them now.
+    /// A viewer with the token was active: by a request, or by coming or going. There are now `viewers` of them.
     fn heard(&self, viewers: usize) {
         let _ = viewers;
     }
 
-    /// Carries out a change asked for by somebody who has the token.
+    /// Carries out a change requested by a viewer with the token.
     fn change(&self, change: Change, answer: Answer<Outcome>);
 }
 
 /// A file of a page.
 #[derive(Clone, Copy, Debug)]
 pub struct Asset {
-    /// Its path, from `/`.
+    /// The path, from `/`.
     pub path: &'static str,
-    /// Its media type.
+    /// The media type.
     pub kind: &'static str,
-    /// What is in it.
+    /// The content.
     pub text: &'static str,
 }
 
-/// A document that was made for one request.
+/// A document made for one request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Document {
-    /// Its media type.
+    /// The media type.
     pub kind: &'static str,
-    /// What is in it.
+    /// The content.
     pub text: String,
 }
 
-/// The present state. What makes JSON of it is called in the room's thread, so that the thread that was asked need not do
-/// the formatting.
+/// The current state. The room's thread turns it into JSON, so that the site's thread need not do the formatting.
 pub enum State {
-    /// The whole of it, in one line, for everybody.
+    /// The whole state, in one line, for all viewers.
     Whole(Box<dyn FnOnce() -> String + Send>),
-    /// What each viewer lacks.
+    /// The differences for each viewer.
     Differences(Arc<dyn Differences>),
 }
 
 impl State {
-    /// A state that is sent as a whole.
+    /// A state that is always sent as a whole.
     pub fn whole(make: impl FnOnce() -> String + Send + 'static) -> Self {
         Self::Whole(Box::new(make))
     }
@@ -78,17 +76,17 @@ impl fmt::Debug for State {
     }
 }
 
-/// A state of which viewers get what has changed since they looked last.
+/// A state of which viewers get the changes since their last look.
 pub trait Differences: Send + Sync {
-    /// The number of the present state. Another state has a larger one.
+    /// The number of the current state. A newer state has a larger one.
     fn number(&self) -> u64;
 
-    /// The number of the present state, and in one line of JSON how it differs from the one with the number `seen`; with
-    /// `None` all of it.
+    /// The number of the current state, and in one line of JSON its differences from the state with the number `seen`;
+    /// with `None` the whole state.
     fn since(&self, seen: Option<u64>) -> (u64, String);
 }
 
-/// What became of a change.
+/// The outcome of a change.
 pub type Outcome = Result<(), Refused>;
 
 /// Why a change was refused.
@@ -96,31 +94,31 @@ pub type Outcome = Result<(), Refused>;
 pub struct Refused {
     /// The status of HTTP, from 400 to 599.
     pub status: u16,
-    /// What happened, and what would be right.
+    /// The cause and the remedy.
     pub text: String,
 }
 
-/// A change that is asked for.
+/// A requested change.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
-    /// What is to be done.
+    /// The kind of change.
     pub verb: Verb,
-    /// With what, from `/`.
+    /// The subject, from `/`.
     pub path: String,
-    /// The new value, without blanks at its ends.
+    /// The new value, trimmed.
     pub body: String,
 }
 
-/// What is to be done.
+/// The kind of change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verb {
-    /// `PUT`: it shall be so.
+    /// `PUT`: make it so.
     Put,
-    /// `DELETE`: it shall not be.
+    /// `DELETE`: end it.
     Delete,
 }
 
-/// Takes an answer, from any thread. If it is dropped without one, the asker hears that nobody is there any more.
+/// Takes an answer, from any thread. If it is dropped without one, the requester learns that the site is gone.
 pub struct Answer<T>(Sender<T>);
 
 impl<T> Answer<T> {
@@ -131,7 +129,7 @@ impl<T> Answer<T> {
 
     /// Answers.
     pub fn give(self, answer: T) {
-        // If the asker has gone, nobody minds.
+        // A requester that has gone does not mind.
         let _ = self.0.send(answer);
     }
 }

@@ -20,7 +20,7 @@ pub(crate) fn fresh() -> io::Result<String> {
     Ok(token)
 }
 
-/// The token in the file at `path`, which is made with this one if there is none. Only its owner may read it.
+/// The token in the file at `path`. A missing file is created with `token`. Only its owner may read it.
 pub(crate) fn kept(path: &Path, token: &str) -> io::Result<String> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);

@@ -1,4 +1,4 @@
-//! The room over real sockets: who gets in, what is refused, and that nobody waits for anybody else.
+//! The room over real sockets: access, refusals, and that no viewer delays another.
 #![allow(missing_docs, reason = "tests")]
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -14,18 +14,18 @@ use tickbus_web::{
     Answer, Asset, Change, Limits, Outcome, Refused, Room, Serving, Site, State, Verb,
 };
 
-/// A page with one text that can be put.
+/// A page with one text that can be changed.
 #[derive(Default)]
 struct Toy {
     text: Mutex<String>,
     looks: AtomicU64,
-    /// Looks are not answered, but kept.
+    /// Looks are kept without an answer.
     is_hung: AtomicBool,
     kept: Mutex<Vec<Answer<State>>>,
-    /// The changes of what hangs.
+    /// The changes that hang.
     changes: Mutex<Vec<Answer<Outcome>>>,
     clock: Arc<Manual>,
-    /// How far the clock goes on while a look waits for its answer, and while it is formatted.
+    /// How far the clock advances while a look waits for its answer, and while it is formatted.
     waiting: AtomicI64,
     formatting: AtomicI64,
 }
@@ -50,7 +50,7 @@ impl Site for Toy {
         let formatting = Nanos(self.formatting.load(Ordering::SeqCst));
         let clock = Arc::clone(&self.clock);
         let text = self.text.lock().expect("no panic").clone();
-        // More than sockets keep, without so much being put.
+        // More than sockets buffer, without sending that much.
         let padding = " ".repeat(if text.starts_with("large") {
             1 << 20
         } else {
@@ -112,11 +112,11 @@ impl Fixture {
         TcpStream::connect(self.address).expect("it listens")
     }
 
-    /// Sends a request with these further headers, and returns the answer, head and body.
+    /// Sends a request with these additional headers, and returns the answer, head and body.
     fn ask(&self, line: &str, headers: &str, body: &str) -> String {
         let mut stream = self.connect();
         let length = body.len();
-        // What is refused early is closed before all of it was written.
+        // An early refusal closes the connection before everything was written.
         let _ = write!(
             stream,
             "{line} HTTP/1.1\r\nHost: {}\r\nConnection: close\r\nContent-Length: {length}\r\n{headers}\r\n{body}",
@@ -130,7 +130,7 @@ impl Fixture {
         self.ask("PUT /text", &headers, text)
     }
 
-    /// The next look that is kept.
+    /// The next kept look.
     fn kept(&self) -> Answer<State> {
         loop {
             if let Some(answer) = self.toy.kept.lock().expect("no panic").pop() {
@@ -156,7 +156,7 @@ impl Fixture {
 
 fn read(mut stream: TcpStream) -> String {
     let mut text = String::new();
-    // A server that refuses a body may close before it has read it.
+    // A server that refuses a body may close before it has read the body.
     let _ = stream.read_to_string(&mut text);
     text
 }
@@ -294,7 +294,7 @@ fn large_bodies_and_heads_are_refused() {
         fixture.address
     )
     .expect("it reads");
-    // Until the server has had enough; it never says how much will come.
+    // Until the server gives up; the announced length never ends.
     let mut writer = stream.try_clone().expect("a descriptor");
     while writer.write_all(b"400\r\n").is_ok()
         && writer.write_all(&[b'z'; 0x400]).is_ok()
@@ -338,7 +338,7 @@ fn a_site_that_was_slow_is_looked_at_again_at_once() {
         span.store(HOUR, Ordering::SeqCst);
         let mut viewer = fixture.view();
         assert_eq!(viewer.state(), "\"\"");
-        // Not by a change that was asked for here, which would cut the pause short.
+        // Not by a change through the room, which would cut the pause short.
         "slow".clone_into(&mut fixture.toy.text.lock().expect("no panic"));
         assert_eq!(viewer.state(), "\"slow\"");
         fixture.put("changed");
@@ -355,7 +355,7 @@ fn a_change_during_a_look_keeps_nobody_from_seeing_it() {
     fixture.put("one");
     answer.give(State::whole(|| "\"before\"".to_owned()));
     assert_eq!(viewer.state(), "\"before\"");
-    // Who comes after the change gets none of the looks before it.
+    // A viewer who comes after the change gets none of the earlier looks.
     let answer = fixture.kept();
     fixture.put("two");
     let mut late = fixture.view();
@@ -373,7 +373,7 @@ fn a_site_that_answers_nothing_has_no_beat() {
     assert_eq!(viewer.state(), "\"\"");
     fixture.toy.is_hung.store(true, Ordering::SeqCst);
     let answer = fixture.kept();
-    // One may be for the looks that were answered before.
+    // One event may be due to the looks answered before.
     let stream = viewer.0.get_ref().try_clone().expect("a descriptor");
     let patience = Some(Duration::from_secs(5));
     stream.set_read_timeout(patience).expect("not zero");
@@ -405,7 +405,7 @@ fn who_asks_a_site_that_hangs_is_told_so() {
     let answer = fixture.ask("PUT /hang", &headers, "late");
     assert_status(&answer, 504);
     assert!(answer.contains("may still make the change"), "{answer}");
-    // Who can, does it all the same.
+    // The site can still make the change.
     let late = fixture.toy.changes.lock().expect("no panic").pop();
     late.expect("it was asked").give(Ok(()));
 }
@@ -427,7 +427,7 @@ fn who_does_not_read_keeps_nobody_waiting_and_gets_the_newest() {
     assert_eq!(lazy.state(), "\"\"");
     let mut diligent = fixture.view();
     diligent.state();
-    // Far more than a socket keeps.
+    // Far more than a socket buffers.
     for number in 0..40 {
         fixture.put(&format!("large {number}"));
         while diligent.state() != format!("\"large {number}\"") {}
@@ -449,7 +449,7 @@ fn a_viewer_who_never_reads_is_given_up() {
     let lazy = fixture.view();
     let mut number = 0_u64;
     let mut writer = lazy.0.get_ref();
-    // Its socket is full at some time, and closed some time later: a connection that is closed with bytes unread is reset.
+    // The socket fills up, and is closed some time later: a connection that is closed with unread bytes is reset.
     while writer.write_all(b" ").is_ok() {
         number += 1;
         fixture.put(&format!("large {number}"));
@@ -486,8 +486,8 @@ fn ten_thousand_connections_come_and_go() {
     let fixture = serve(Limits::default());
     for number in 0..10_000 {
         drop(fixture.connect());
-        // An answer tells that all before it were accepted. More at once than the system keeps for a listener have to call
-        // again after a second.
+        // An answer proves that all earlier connections were accepted. If more come at once than the system queues for
+        // a listener, they have to retry after a second.
         if number % 64 == 0 {
             fixture.ask("GET /", "", "");
         }

@@ -1,4 +1,4 @@
-//! The file that says which topic goes with which channel.
+//! The file that maps topics to channels.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,53 +7,53 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read
 use tickbus_dispatcher::{Channel, Counts, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role, is_name};
 use tickbus_fieldbus::tcp::Address;
 
-/// What a bridge between MQTT and the dispatcher does.
+/// The description of a bridge between MQTT and the dispatcher.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// Where the MQTT broker listens.
+    /// The address of the MQTT broker.
     pub broker: Address,
-    /// The topic that says whether the bridge is there.
+    /// The topic for the state of the bridge.
     pub status: Option<String>,
-    /// Where the dispatcher listens.
+    /// The address of the dispatcher.
     pub dispatcher: Address,
-    /// What the bridge is in the laboratory.
+    /// The bridge's role in the laboratory.
     pub role: Role,
-    /// Its name there, and with the broker.
+    /// The bridge's name there, and with the broker.
     pub name: String,
-    /// Its channels.
+    /// The channels.
     pub channels: Vec<Entry>,
 }
 
-/// A channel and its topic. Values of an input are published; those of an output come from subscribers' messages.
+/// A channel and its topic. Values of an input are published; those of an output come from messages of the topic.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// The channel.
     pub channel: Channel,
     /// The topic.
     pub topic: String,
-    /// The broker keeps what is published for later subscribers.
+    /// The broker keeps the message for later subscribers.
     pub retain: bool,
-    /// How a value is written in a message.
+    /// The format of a value in a message.
     pub format: Format,
 }
 
-/// How a value is written in a message.
+/// The format of a value in a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Format {
     /// As a number in plain text.
     Plain,
-    /// As a number: what goes on is the value times `factor`, plus `offset`.
+    /// As a number: the forwarded value is the original times `factor`, plus `offset`.
     Scaled {
         /// The factor.
         factor: f64,
-        /// What is added then.
+        /// The offset.
         offset: f64,
     },
     /// As a word for on and one for off.
     Words {
-        /// Above 8 V; 24 V the other way.
+        /// On above 8 V; 24 V in the other direction.
         on: String,
-        /// Below 5 V; 0 V the other way.
+        /// Off below 5 V; 0 V in the other direction.
         off: String,
     },
 }
@@ -87,7 +87,7 @@ impl Map {
         }
     }
 
-    /// How many channels of each kind it has: up to the highest number that is used.
+    /// The number of channels of each kind: up to the highest number in use.
     pub fn counts(&self) -> Counts {
         let count = |kind: Kind| {
             let own = self.channels.iter().map(|entry| entry.channel);
@@ -132,7 +132,7 @@ fn read(mut root: Table<'_>) -> Option<Map> {
     })
 }
 
-/// The broker's address, and the topic of the status with its place.
+/// The broker's address, and the topic of the status with its position.
 fn read_mqtt(mut table: Table<'_>) -> Option<(Address, Option<(Value<'_>, String)>)> {
     let broker = table.require(
         "broker",
@@ -173,7 +173,7 @@ fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
     Some((address?, role?, name?))
 }
 
-/// A topic of one's own, and no filter for several.
+/// A single topic, not a filter for several.
 fn topic(value: &Value<'_>) -> Option<String> {
     let right = "write a topic such as \"hall/pump/speed\"";
     let text = value.label(1000, right)?;
@@ -198,7 +198,7 @@ fn read_channels(list: &Value<'_>) -> Vec<Entry> {
             let what = format!("{channel} stands in line {line} already");
             collector.report(at, what, "a channel has one topic");
         }
-        // Several outputs may listen to one topic.
+        // Several outputs may subscribe to one topic.
         let collides = |other: &&Entry| {
             let hears_both = other.channel.kind.is_output() && channel.kind.is_output();
             other.topic == entry.topic && !hears_both && other.channel != channel

@@ -14,20 +14,20 @@ use crate::speaker::Speaker;
 /// Publishes a message of an entry; false if the broker takes no more now.
 pub type Publish<'p> = dyn FnMut(&Entry, &str) -> bool + 'p;
 
-/// What went through.
+/// Counts of everything that went through.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Traffic {
     /// Messages published.
     pub published: u64,
-    /// Messages that were passed on as values.
+    /// Messages that were forwarded as values.
     pub received: u64,
-    /// Messages that were no value of their channel, and left out; and values that no message can say.
+    /// Messages that were no value of their channel, and dropped; and values that no message can express.
     pub refused: u64,
-    /// Values that a newer one has replaced, because a side was slow.
+    /// Values that were replaced by newer ones, because a side was slow.
     pub overtaken: u64,
 }
 
-/// So many messages may wait to be published; from then on only the newest of each topic.
+/// The most messages that wait to be published; beyond that, only the newest of each topic is kept.
 const QUEUE: usize = 256;
 
 /// A client of the dispatcher whose values are messages.
@@ -36,23 +36,23 @@ pub struct Mapping {
     map: Map,
     client: Client,
     is_connected: bool,
-    /// Messages to be published, with their entries.
+    /// Messages to publish, with their entries.
     waiting: VecDeque<(usize, String)>,
-    /// By entries: whether the input has had a value in this connection with the dispatcher.
+    /// By entries: true if the input has had a value in this connection with the dispatcher.
     has_value: Vec<bool>,
-    /// By entries: how many messages were no value, or values no message.
+    /// By entries: the number of messages that were no value, or values that were no message.
     refused: Vec<u64>,
-    /// What an operator should know.
+    /// News for an operator.
     news: Vec<String>,
     traffic: Traffic,
 }
 
 impl Mapping {
-    /// What `map` says.
+    /// The mapping that `map` describes.
     ///
     /// # Errors
     ///
-    /// No dispatcher can take such a client.
+    /// No dispatcher can accept such a client.
     pub fn new(map: Map) -> Result<Self, Mistake> {
         Ok(Self {
             client: client(&map)?,
@@ -66,23 +66,23 @@ impl Mapping {
         })
     }
 
-    /// What it does.
+    /// The map.
     pub fn map(&self) -> &Map {
         &self.map
     }
 
-    /// What went through so far.
+    /// The traffic so far.
     pub fn traffic(&self) -> Traffic {
         self.traffic
     }
 
-    /// What an operator should know, and does not yet.
+    /// Takes the news for an operator.
     pub fn news(&mut self) -> Vec<String> {
         std::mem::take(&mut self.news)
     }
 
-    /// The broker is gone. Close the connection with the dispatcher: to the others this client has left. Its values are
-    /// forgotten, since they may have changed when the broker is back.
+    /// The broker is gone. Close the connection with the dispatcher: for all others this client has left. Its values
+    /// are dropped, since they may have changed by the time the broker is back.
     pub fn broker_lost(&mut self) {
         // Cannot fail: the same map made the first client.
         if let Ok(client) = client(&self.map) {
@@ -106,7 +106,7 @@ impl Mapping {
             }
             self.traffic.refused += 1;
             *refused += 1;
-            // Who sends one such message sends more.
+            // A sender of one such message sends more.
             if refused.is_power_of_two() {
                 let text = shown(&String::from_utf8_lossy(payload));
                 let right = entry.format.right();
@@ -118,7 +118,7 @@ impl Mapping {
         }
     }
 
-    /// Publishes what the dispatcher has sent, as long as the broker takes it.
+    /// Publishes the dispatcher's values, as long as the broker accepts them.
     pub fn publish(&mut self, publish: &mut Publish<'_>) {
         while let Some((at, payload)) = self.waiting.front()
             && publish(&self.map.channels[*at], payload)
@@ -205,7 +205,7 @@ impl Speaker for Mapping {
                     put(at, String::new());
                 }
             }
-            // The source of an old value may have left while nobody here could hear it.
+            // The source of an old value may have left while the bridge was not connected.
             Event::Settled => {
                 for (at, entry) in entries() {
                     if !has_value[at] && !entry.channel.kind.is_output() {
@@ -244,12 +244,12 @@ impl Speaker for Mapping {
     }
 }
 
-/// What is published of a value.
+/// The message for a value.
 enum Payload {
     Text(String),
-    /// Nothing: it is between off and on.
+    /// Unchanged: within the hysteresis band.
     Between,
-    /// It has more digits than a number of the dispatcher.
+    /// The value has more digits than a number of the dispatcher.
     TooLarge,
 }
 
@@ -271,7 +271,7 @@ impl Format {
         }
     }
 
-    /// A message as a value. An empty one, as it is published for an input without a source, is 0.
+    /// A message as a value. An empty one, as published for an input without a source, is 0.
     fn value(&self, payload: &[u8]) -> Option<Number> {
         if payload.is_empty() {
             return Some(Number::ZERO);
@@ -287,7 +287,7 @@ impl Format {
         }
     }
 
-    /// What messages should be.
+    /// The expected form of messages.
     fn right(&self) -> String {
         match self {
             Self::Plain | Self::Scaled { .. } => "a number such as 21.5 as plain text".to_owned(),
@@ -296,7 +296,7 @@ impl Format {
     }
 }
 
-/// A number with 15 digits that count: those that a double carries through a calculation.
+/// A number with 15 significant digits: those that a double keeps through a calculation.
 fn decimal(value: f64) -> Option<Number> {
     if !value.is_finite() {
         return None;

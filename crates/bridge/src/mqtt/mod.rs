@@ -1,7 +1,7 @@
 //! MQTT topics as the channels of a client of the dispatcher.
 //!
-//! [`Map`] says which topic goes with which channel, [`Mapping`] does what it says without I/O, and `run` connects it with
-//! the broker and the dispatcher.
+//! [`Map`] assigns topics to channels, [`Mapping`] implements a map without I/O, and `run` connects it with the broker
+//! and the dispatcher.
 
 mod map_file;
 mod mapping;

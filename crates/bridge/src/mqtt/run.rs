@@ -17,43 +17,43 @@ use super::mapping::Mapping;
 use crate::link::Link;
 use crate::speaker::Speaker as _;
 
-/// What the topic of the state says.
+/// The messages of the state's topic.
 const ONLINE: &str = "online";
 const OFFLINE: &str = "offline";
 
-/// After this time without a sign of life the broker takes the bridge for gone, and the bridge the broker.
+/// After this time without a sign of life, broker and bridge regard each other as gone.
 const ALIVE: Nanos = Nanos::from_secs(10);
 
-/// How long after the broker was lost it is called again.
+/// The pause before calling a lost broker again.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// How many messages may wait between the threads, in each direction.
+/// The most messages that may wait between the threads, in each direction.
 const QUEUE: usize = 256;
 
-/// The longest message, in bytes, that is received: what is no number is reported, and does not end the connection.
+/// The longest accepted message, in bytes: a message that is no number is reported, and does not end the connection.
 const LONGEST: usize = 16 * 1024 * 1024;
 
-/// What a bridge works with.
+/// The environment of a bridge.
 pub struct Hosting<'h> {
     /// The clock.
     pub clock: Arc<dyn Clock>,
-    /// Ends it.
+    /// Ends the bridge.
     pub stop: &'h Stop,
-    /// Takes what an operator should know, a line each.
+    /// Takes news for an operator, one line each.
     pub news: &'h mut dyn FnMut(&str),
 }
 
-/// What comes from the broker's side.
+/// An event from the broker's side.
 enum Heard {
     Connected,
     Lost(String),
     Message(String, Vec<u8>),
-    /// It has room again.
+    /// The broker has room again.
     Room,
     Refused(usize),
 }
 
-/// Carries values between the broker and the dispatcher until stopped. What goes away is called again.
+/// Carries values between the broker and the dispatcher until stopped. Lost connections are restored.
 ///
 /// # Errors
 ///
@@ -89,9 +89,9 @@ struct Between<'b, 'h> {
     link: Link,
     broker: Broker,
     is_connected: bool,
-    /// What was published as the state in this connection with the broker, which may have an old one.
+    /// The state published in this connection with the broker, which may still have an old one.
     is_online: Option<bool>,
-    /// Why the broker is not there, as it was reported last.
+    /// The last reported reason for the missing broker.
     told: String,
 }
 
@@ -171,7 +171,7 @@ impl Between<'_, '_> {
         }
     }
 
-    /// Publishes whether values go through.
+    /// Publishes the state of the bridge: true if values go through.
     fn set_online(&mut self, is_online: bool) {
         if self.is_online == Some(is_online) || !self.is_connected {
             return;
@@ -190,7 +190,7 @@ impl Between<'_, '_> {
     }
 }
 
-/// The topics that are subscribed to.
+/// The subscribed topics.
 fn topics(mapping: &Mapping) -> impl Iterator<Item = &str> {
     let outputs = mapping.map().channels.iter();
     let outputs = outputs.filter(|entry| entry.channel.kind.is_output());
@@ -247,7 +247,7 @@ impl Broker {
             .map(|topic| SubscribeFilter::new(topic.to_owned(), QoS::AtLeastOnce))
             .collect();
         if !filters.is_empty() {
-            // If the broker was lost meanwhile, it is done again when it is there.
+            // If the broker was lost meanwhile, this is repeated with the next connection.
             let _ = self.client.try_subscribe_many(filters);
         }
     }
@@ -310,7 +310,7 @@ impl Driver {
         }
     }
 
-    /// Tells the other thread; false if that has ended.
+    /// Sends the other thread an event; false if that thread has ended.
     fn tell(&self, heard: Heard) -> bool {
         let is_told = self.sender.send(heard).is_ok();
         self.waker.wake();

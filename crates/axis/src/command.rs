@@ -1,6 +1,6 @@
-//! Commands that a PLC gives by number: their table is on the simulator's side.
+//! Commands that a PLC gives by number: the simulator's side has their table.
 
-/// What a command makes an axis do, encoded in the bits of its command structure.
+/// The motion of a command, encoded in the bits of its command structure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
     /// Moves to the target position. No bit.
@@ -26,7 +26,7 @@ impl Mode {
         ("tracking", Self::Tracking),
     ];
 
-    /// Its name in a driver.cfg.
+    /// The name in a driver.cfg.
     pub fn name(self) -> &'static str {
         let found = Self::ALL.into_iter().find(|(_, mode)| *mode == self);
         found.map_or("", |(name, _)| name)
@@ -59,7 +59,7 @@ pub struct Motion<T> {
 }
 
 impl Motion<f64> {
-    /// Whether none of them is NaN or infinite.
+    /// True if no number is NaN or infinite.
     pub fn is_finite(&self) -> bool {
         let all = [
             self.position,
@@ -75,10 +75,10 @@ impl Motion<f64> {
 /// One command of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Command {
-    /// Its number in the PLC; never 0, which means no command.
+    /// The number in the PLC; never 0, which means no command.
     pub number: u16,
-    /// What the axis does.
+    /// The motion.
     pub mode: Mode,
-    /// Its numbers. Those that are `None` come from the PLC.
+    /// The numbers. Those that are `None` come from the PLC.
     pub motion: Motion<Option<f64>>,
 }

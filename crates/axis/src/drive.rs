@@ -1,18 +1,18 @@
-//! What a command means to an axis: one simulated drive, stepped through time.
+//! The effect of commands on an axis: one simulated drive, stepped through time.
 
 use super::{AxisKind, Limits, Motion, Profile};
 
 /// The tolerance within which a target counts as reached, in the unit of the axis.
 const THERE: f64 = 1e-9;
 
-/// What the PLC commands an axis to do.
+/// The PLC's command to an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[expect(
     clippy::struct_excessive_bools,
     reason = "the bits of the structure, one by one"
 )]
 pub struct Demand {
-    /// Its rising edge gives a command.
+    /// A rising edge gives a command.
     pub execute: bool,
     /// Follow; on an axis of kind `torque`: close.
     pub tracking: bool,
@@ -20,15 +20,15 @@ pub struct Demand {
     pub torque_control: bool,
     /// Run.
     pub speed_control: bool,
-    /// Without it nothing moves.
+    /// Without this the axis does not move.
     pub enable: bool,
     /// The numbers.
     pub motion: Motion<f64>,
-    /// How fast the acceleration may change; 0 lets it jump.
+    /// The rate of change of the acceleration; 0 lets it jump.
     pub jerk: f64,
 }
 
-/// What an axis tells the PLC.
+/// The feedback of an axis to the PLC.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Feedback {
     /// The axis has no fault.
@@ -103,7 +103,7 @@ enum Doing {
     Follow,
 }
 
-/// The speed at which an axis that is moved by pressure alone opens and closes.
+/// The speed at which an axis that moves by pressure alone opens and closes.
 const SQUEEZE: f64 = 400.0;
 
 impl Drive {
@@ -123,8 +123,8 @@ impl Drive {
         }
     }
 
-    /// Advances by `seconds` as `demand` says; `follows` is the position that a tracking axis has to follow,
-    /// and `stop` the position that a closing axis cannot pass.
+    /// Advances by `seconds` as `demand` says; `follows` is the position for a tracking axis to follow, and `stop` the
+    /// position that a closing axis cannot pass.
     pub fn step(&mut self, seconds: f64, demand: &Demand, follows: f64, stop: f64) -> Feedback {
         let rises = demand.execute && !self.executed;
         self.executed = demand.execute;
@@ -174,7 +174,7 @@ impl Drive {
         // A REAL from the wire may be NaN or infinite: the position would never be valid again.
         if impossible || !motion.is_finite() || (moves && !limits.make_sense()) {
             self.error = Feedback::NONSENSE;
-            // It brakes with the deceleration of the previous command.
+            // The axis brakes with the deceleration of the previous command.
             self.doing = Doing::Run { speed: 0.0 };
             return;
         }
@@ -236,7 +236,7 @@ impl Drive {
                 let target = *target;
                 let way = target - self.position;
                 let brake = self.motion.deceleration.abs();
-                // The highest speed from which it can still stop at the target.
+                // The highest speed from which the axis can still stop at the target.
                 let safe = (2.0 * brake * way.abs())
                     .sqrt()
                     .min(self.motion.speed.abs());
@@ -287,7 +287,7 @@ impl Drive {
         } else {
             self.motion.deceleration
         };
-        // A command without a rate, as tracking may have, changes the speed at once.
+        // A command without a rate, as possible with tracking, changes the speed at once.
         let most = if rate.abs() > 0.0 {
             rate.abs() * seconds
         } else {
@@ -345,7 +345,7 @@ mod tests {
         }
     }
 
-    /// Steps until the axis is in position; gives the seconds that this took.
+    /// Steps until the axis is in position; returns the seconds that this took.
     fn arrives(drive: &mut Drive, demand: &Demand) -> f64 {
         for step in 1..10_000 {
             if drive.step(SCAN, demand, 0.0, 0.0).in_position {

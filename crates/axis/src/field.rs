@@ -58,7 +58,7 @@ pub enum Field {
     CommandDone,
 }
 
-/// What a field carries, which decides how its value scales.
+/// The quantity in a field, which determines its scale.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Quantity {
     /// A bit, by its number within its byte.
@@ -105,12 +105,12 @@ impl Field {
         Self::CommandDone,
     ];
 
-    /// Its position in [`ALL`](Self::ALL).
+    /// The position in [`ALL`](Self::ALL).
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// The part of its signal's name after the axis' name and a dot.
+    /// The part of the signal's name after the axis' name and a dot.
     pub const fn name(self, kind: AxisKind) -> &'static str {
         match (self, kind) {
             (Self::Tracking, AxisKind::Torque) => "Close",
@@ -147,7 +147,7 @@ impl Field {
         }
     }
 
-    /// The offset of its first byte in its structure.
+    /// The offset of the first byte in the structure.
     pub const fn offset(self) -> usize {
         match self {
             Self::Execute
@@ -169,7 +169,7 @@ impl Field {
         }
     }
 
-    /// Its bit within that byte; 0 unless it is a BOOL.
+    /// The bit within that byte; 0 unless the field is a BOOL.
     pub const fn bit(self) -> u8 {
         match self.quantity() {
             Quantity::Bit(bit) => bit,
@@ -177,7 +177,7 @@ impl Field {
         }
     }
 
-    /// The type of its signal.
+    /// The type of the signal.
     pub const fn data_type(self) -> DataType {
         match self.quantity() {
             Quantity::Bit(_) => DataType::Bool,

@@ -1,9 +1,9 @@
 //! Axes of a simulated machine: each has a command structure from the PLC and a feedback structure to it.
 //!
-//! An `[[axis]]` table of a driver.cfg expands into about fifteen signals, whose addresses [`Field`] knows.
-//! [`Reflexes`] does the routine work of a machine on every tick: acknowledging commands, looking them up by
-//! number, end switches. [`Profile`] and [`Drive`] are the motion itself: how a move proceeds over time, and
-//! what a command means to an axis.
+//! An `[[axis]]` table of a driver.cfg expands into about fifteen signals, whose addresses [`Field`] has. [`Reflexes`]
+//! does the routine work of a machine on every tick: acknowledging commands, looking them up by number, end switches.
+//! [`Profile`] and [`Drive`] are the motion itself: the course of a move over time, and the effect of commands on an
+//! axis.
 
 mod command;
 mod drive;
@@ -22,7 +22,7 @@ pub use field::{COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field};
 pub use profile::{Limits, Profile};
 pub use reflexes::{Reflexes, UNKNOWN_COMMAND};
 
-/// What an axis is for: decides which commands make sense, and the names of two of its bits.
+/// The purpose of an axis: determines which commands make sense, and the names of two of its bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum AxisKind {
     /// Moves to positions.
@@ -45,7 +45,7 @@ impl AxisKind {
         ("tracking", Self::Tracking),
     ];
 
-    /// Its name in a driver.cfg.
+    /// The name in a driver.cfg.
     pub fn name(self) -> &'static str {
         let found = Self::ALL.into_iter().find(|(_, kind)| *kind == self);
         found.map_or("", |(name, _)| name)
@@ -55,25 +55,25 @@ impl AxisKind {
 /// One `[[axis]]` of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Its name, the first part of the names of its signals.
+    /// The name, the first part of the names of its signals.
     pub name: String,
-    /// Its kind.
+    /// The kind.
     pub kind: AxisKind,
-    /// Unit of its position, for people.
+    /// Unit of the position, for people.
     pub unit: Option<String>,
-    /// Lowest and highest position, in its unit.
+    /// Lowest and highest position, in the unit.
     pub limits: Option<[f64; 2]>,
-    /// Whether positions on the wire are counted from the opposite end.
+    /// True if positions on the wire are counted from the opposite end.
     pub inverted: bool,
-    /// Offset of its command structure in `%Q`.
+    /// Offset of the command structure in `%Q`.
     pub command: usize,
-    /// Offset of its feedback structure in `%I`.
+    /// Offset of the feedback structure in `%I`.
     pub feedback: usize,
-    /// Size of its feedback structure.
+    /// Size of the feedback structure.
     pub feedback_bytes: usize,
     /// The commands that the PLC gives by number.
     pub commands: Vec<Command>,
-    /// Its end switches.
+    /// The end switches.
     pub switches: Vec<Switch>,
     /// The index of each field's signal in the signal table, by [`Field::index`].
     slots: [Option<usize>; Field::COUNT],
@@ -82,15 +82,15 @@ pub struct Axis {
 /// An end switch: a bit that the driver derives from the position.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
-    /// Name of its signal.
+    /// Name of the signal.
     pub name: String,
     /// The position at which it trips, in the unit of the axis.
     pub at: f64,
-    /// Whether it is on above that position, rather than below.
+    /// True if the switch is on above that position, rather than below.
     pub above: bool,
-    /// How far the axis has to move back before it switches off, in the unit of the axis.
+    /// How far the axis has to move back before the switch goes off, in the unit of the axis.
     pub hysteresis: f64,
-    /// The index of its signal in the signal table.
+    /// The index of the signal in the signal table.
     slot: usize,
 }
 
@@ -100,14 +100,14 @@ impl Axis {
         self.slots[field.index()]
     }
 
-    /// The name of the signal of one of its fields.
+    /// The name of a field's signal.
     pub fn signal(&self, field: Field) -> String {
         format!("{}.{}", self.name, field.name(self.kind))
     }
 }
 
 impl Axis {
-    /// What the PLC commands, read from a machine's slots.
+    /// The PLC's command, read from a machine's slots.
     pub fn demand(&self, slots: &[Slot]) -> Demand {
         let value = |field| self.slot(field).map_or(0.0, |slot| slots[slot].real());
         let on = |field| value(field) != 0.0;
@@ -148,7 +148,7 @@ impl Axis {
 
 /// Finds the signals of `axes` in the signal table that was made from them.
 ///
-/// A signal that is missing stays `None`: the driver.cfg then has mistakes and will not be used.
+/// A missing signal stays `None`: the driver.cfg then has mistakes and will not be used.
 pub fn resolve(axes: &mut [Axis], table: &SignalTable) {
     let places: HashMap<&str, usize> = (table.signals.iter().enumerate())
         .map(|(place, signal)| (signal.name.as_str(), place))

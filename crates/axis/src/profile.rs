@@ -20,7 +20,7 @@ pub struct State {
     pub distance: f64,
     /// The speed; never negative.
     pub speed: f64,
-    /// The acceleration; negative while it slows down.
+    /// The acceleration; negative while the speed decreases.
     pub acceleration: f64,
 }
 
@@ -96,7 +96,7 @@ impl Ramp {
 }
 
 impl Limits {
-    /// Whether all of them are finite and positive.
+    /// True if all limits are finite and positive.
     pub fn make_sense(&self) -> bool {
         let all = [
             self.speed,
@@ -117,7 +117,7 @@ impl Limits {
     /// The distance needed to reach `speed` and stop again.
     fn least_distance(&self, speed: f64) -> f64 {
         let (up, down) = self.ramps(speed);
-        // Each ramp is symmetric, so that its mean speed is half of the highest.
+        // Each ramp is symmetric, so its mean speed is half of the highest.
         speed / 2.0 * (up.lasts() + down.lasts())
     }
 

@@ -1,4 +1,4 @@
-//! What the machine's side does on every tick for its axes, apart from the machine's own model.
+//! The work of the machine's side on every tick for its axes, apart from the machine's own model.
 
 use super::{Axis, Command, Field, Mode};
 use tickbus_image::signal::Slot;
@@ -8,8 +8,8 @@ pub const UNKNOWN_COMMAND: u16 = 3;
 
 /// The reflexes of all axes of a driver in the role Device: acknowledging, commands by number, end switches.
 ///
-/// They work on slots, between the simulation and the codec, so that a simulation need not know about them: a
-/// command given by number appears in the slots as if the PLC had sent all of its values. They allocate
+/// The reflexes work on slots, between the simulation and the codec, and the simulation need not know about them: a
+/// command given by number appears in the slots as if the PLC had sent all of its values. The reflexes allocate
 /// nothing.
 #[derive(Debug)]
 pub struct Reflexes {
@@ -19,7 +19,7 @@ pub struct Reflexes {
 #[derive(Debug)]
 struct Reflex {
     execute: usize,
-    /// Whether the simulation has seen `Execute`.
+    /// True if the simulation has seen `Execute`.
     delivered: bool,
     acknowledge: Option<usize>,
     numbers: Option<Numbers>,
@@ -59,7 +59,7 @@ const fn level(on: bool) -> Slot {
 }
 
 impl Reflexes {
-    /// The reflexes that `axes` need; `None` if they need none.
+    /// The reflexes for `axes`; `None` if no axis needs any.
     pub fn new(axes: &[Axis]) -> Option<Self> {
         let axes: Box<[Reflex]> = axes.iter().filter_map(Reflex::new).collect();
         (!axes.is_empty()).then_some(Self { axes })
@@ -146,7 +146,7 @@ impl Reflex {
         }
         for switch in &mut self.switches {
             let position = slots[switch.position].real();
-            // The distance beyond the trip point: it switches on at 0, and off below minus the hysteresis.
+            // The distance beyond the trip point: the switch goes on at 0, and off below minus the hysteresis.
             let beyond = if switch.above {
                 position - switch.at
             } else {
@@ -174,7 +174,7 @@ impl Reflex {
 }
 
 impl Numbers {
-    /// Replaces what the PLC sent by the command whose number it names.
+    /// Replaces the PLC's values by the command with the requested number.
     fn received(&mut self, slots: &mut [Slot], execute: usize) {
         self.unknown = false;
         let number = slots[self.number].real();

@@ -36,8 +36,7 @@ pub struct OffsetAllocator<'a> {
 }
 
 impl<'a> OffsetAllocator<'a> {
-    /// Allocates the two structures of an axis: at the offsets of its table, or right behind the preceding
-    /// axis.
+    /// Allocates the two structures of an axis: at the offsets of its table, or right after the preceding axis.
     fn take(
         &mut self,
         station: Option<&Value<'a>>,
@@ -61,7 +60,7 @@ impl<'a> OffsetAllocator<'a> {
 pub struct Read<'a> {
     /// The axis. Its signals are not [resolved](super::resolve) yet.
     pub axis: Axis,
-    /// Its signals, in the order of their addresses, followed by those of its end switches.
+    /// The signals, in the order of their addresses, followed by those of the end switches.
     pub sections: Vec<Section<'a>>,
 }
 
@@ -214,7 +213,7 @@ pub fn read<'a>(
     Some(Read { axis, sections })
 }
 
-/// What the sections of all fields of one axis share.
+/// The data shared by the sections of all fields of one axis.
 struct Structures<'t, 'a> {
     name: &'t Value<'a>,
     /// The values of `command_offset` and `feedback_offset`.
@@ -257,7 +256,7 @@ fn is_short(name: &str, value: &Value<'_>) -> bool {
     short
 }
 
-/// Whether a structure that ends at `end` fits into its area.
+/// True if a structure that ends at `end` fits into its area.
 fn fits(end: usize, name: &str, value: &Value<'_>) -> bool {
     if end > AREA_LIMIT {
         value.wrong(
@@ -295,7 +294,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
             Quantity::Torque if axis.kind == AxisKind::Torque => Some("%".to_owned()),
             _ => None,
         },
-        // Their pulses may be shorter than a tick or a bus cycle.
+        // The pulses may be shorter than a tick or a bus cycle.
         latch: matches!(field, Field::Execute | Field::Acknowledge).then_some(Latch::Rising),
         states_fail_safe: false,
         hold: Nanos::ZERO,

@@ -124,9 +124,9 @@ enum Asker {
     Client,
     /// The bridge, as a sign of life.
     Bridge,
-    /// The bridge, to learn that a request was carried out.
+    /// The bridge, to learn if a request was carried out.
     Request,
-    /// The bridge, to learn that the inputs have the values that they get at first.
+    /// The bridge, to learn if the inputs have their first values.
     Settled,
 }
 

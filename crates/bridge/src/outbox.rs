@@ -37,7 +37,7 @@ impl Outbox {
         }
     }
 
-    /// True if so many bytes wait that no more should be requested.
+    /// True if the backlog is so large that nothing more should be requested.
     pub(crate) fn is_full(&self) -> bool {
         self.bytes.len() - self.written >= FULL
     }

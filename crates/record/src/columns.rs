@@ -1,4 +1,4 @@
-//! What a recording contains for every tick.
+//! The contents of a recording for every tick.
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, DataType, Signal, SignalTable, Slot};
@@ -46,9 +46,9 @@ impl ValueKind {
 pub struct Column {
     /// The signal's name.
     pub name: String,
-    /// Whether it counts the signal's edges since the previous tick.
+    /// True if the column counts the signal's edges since the previous tick.
     pub is_edges: bool,
-    /// The type of its values.
+    /// The type of the values.
     pub kind: ValueKind,
     /// The signal's address; unknown in a CSV file.
     pub address: Option<Address>,
@@ -61,20 +61,20 @@ pub struct Column {
 }
 
 impl Column {
-    /// Whether it represents a 64-bit integer as a double, because of a scale.
+    /// True for a 64-bit integer that is a double because of a scale.
     pub(super) fn is_scaled_integer(&self) -> bool {
         let plain = |data_type| ValueKind::of(data_type, false) != self.kind;
         self.kind == ValueKind::Real && self.data_type.is_some_and(plain)
     }
 
-    /// Its name for people: `Start button`, or `Start button.edges`.
+    /// The name for people: `Start button`, or `Start button.edges`.
     pub fn title(&self) -> String {
         let edges = if self.is_edges { ".edges" } else { "" };
         format!("{}{edges}", self.name)
     }
 }
 
-/// What a recording contains for every tick, and which driver made it.
+/// The contents of a recording for every tick, and the driver that made it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Columns {
     /// The driver's name; empty in a CSV file.
@@ -133,11 +133,11 @@ impl Columns {
 /// One tick of a recording.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tick {
-    /// Its number, from 1; the numbers of dropped ticks are missing.
+    /// The number, from 1; the numbers of dropped ticks are missing.
     pub number: u64,
     /// Simulation time.
     pub time: Nanos,
-    /// The number of its status: 0 fresh, 1 unchanged, 2 stale, negative for errors.
+    /// The number of the status: 0 fresh, 1 unchanged, 2 stale, negative for errors.
     pub status: i32,
     /// Ticks dropped between the start of the recording and this one.
     pub dropped: u64,

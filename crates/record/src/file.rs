@@ -1,4 +1,4 @@
-//! The file of a recording: whatever happens to it, it ends with a whole tick.
+//! The file of a recording, which always ends with a whole tick.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
@@ -78,12 +78,12 @@ impl Out {
         self.pending.len()
     }
 
-    /// Marks the end of a tick in the buffer; with it the file has `ticks` ticks.
+    /// Marks the end of a tick in the buffer; the file then has `ticks` ticks.
     pub(super) fn whole(&mut self, ticks: u64) {
         self.ends.push((self.pending.len(), ticks));
     }
 
-    /// Whether the file has at least one whole part.
+    /// True if the file has at least one whole part.
     pub(super) fn has_begun(&self) -> bool {
         self.length > 0
     }
@@ -93,7 +93,7 @@ impl Out {
         self.ticks
     }
 
-    /// Writes what is pending.
+    /// Writes the pending bytes.
     ///
     /// # Errors
     ///

@@ -1,8 +1,8 @@
-//! Recordings: what every tick saw, to be read by people, shown in reports, and replayed.
+//! Recordings of every tick's values, for people to read, for reports, and for replays.
 //!
-//! A [`Recorder`] takes whole ticks from the ticking thread through a ring that never makes it wait, and its
-//! own thread writes them to a file: VCD, which every waveform viewer opens, or CSV. A [`Recording`] reads
-//! such a file back, tick by tick.
+//! A [`Recorder`] takes whole ticks from the ticking thread through a ring that never blocks that thread, and its own
+//! thread writes them to a file: VCD, which every waveform viewer opens, or CSV. A [`Recording`] reads such a file
+//! back, tick by tick.
 
 mod columns;
 mod csv;

@@ -31,7 +31,7 @@ impl Format {
     ///
     /// # Errors
     ///
-    /// It is neither.
+    /// The extension is neither.
     pub fn of(file: &Path) -> Result<Self, Mistake> {
         let ending = file.extension().map(std::ffi::OsStr::to_ascii_lowercase);
         match ending.as_ref().and_then(|ending| ending.to_str()) {
@@ -63,7 +63,7 @@ pub enum When {
 pub struct Options {
     /// The file as written there: relative to the folder of the driver.cfg.
     pub file: PathBuf,
-    /// Its format.
+    /// The format.
     pub format: Format,
     /// Capacity of the ring in ticks; `None` chooses it by the size of a tick. Positive.
     pub ring: Option<usize>,

@@ -1,5 +1,5 @@
-//! The files that are recorded to or replayed: none is used for both at once, and none is recorded to twice, by this
-//! process or another.
+//! The files that are recorded to or replayed: no file is used for both at once, or recorded to twice, by this process
+//! or another.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, Metadata, OpenOptions};
@@ -10,7 +10,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use super::RecordingError;
 use tickbus_base::os::{Lock, lock_file, lock_holder, unlock_file};
 
-/// How each file in use is used.
+/// The use of each file.
 static IN_USE: Mutex<BTreeMap<Identity, Use>> = Mutex::new(BTreeMap::new());
 
 /// Identifies a file under any name or link: device and inode.
@@ -37,8 +37,8 @@ pub struct FileClaim {
 }
 
 impl FileClaim {
-    /// Opens the file at `path` to write at its end, and claims it; if it is in use already, gives how. What it has stays
-    /// until [`truncate`](Self::truncate). A device is used as it is, without a claim.
+    /// Opens the file at `path` to write at its end, and claims it; if it is in use already, returns how. The contents
+    /// stay until [`truncate`](Self::truncate). A device is used without a claim.
     ///
     /// # Errors
     ///
@@ -46,7 +46,8 @@ impl FileClaim {
     pub fn to_write(path: &Path) -> io::Result<Result<(File, Option<Self>), String>> {
         let mut options = OpenOptions::new();
         options.write(true).create(true).truncate(false);
-        // A writer at the end leaves no hole where another program cuts the file. Elsewhere it could not truncate.
+        // A writer at the end leaves no hole if another program truncates the file. On other systems it could not
+        // truncate.
         let file = options.append(cfg!(unix)).open(path)?;
         let metadata = file.metadata()?;
         if !metadata.is_file() {
@@ -81,7 +82,7 @@ impl FileClaim {
     pub fn to_replay(path: &Path) -> Result<Self, RecordingError> {
         let opened = fs::metadata(path).and_then(|metadata| {
             if !metadata.is_file() {
-                // To open a pipe would wait for a writer.
+                // Opening a pipe would wait for a writer.
                 return Err(io::Error::other("it is no file"));
             }
             Ok((identity(path, &metadata)?, File::open(path)?))
@@ -113,18 +114,18 @@ impl FileClaim {
         Ok(Self { id, file })
     }
 
-    /// Whether the file has nothing.
+    /// True if the file is empty.
     pub(super) fn is_empty(&self) -> bool {
         self.file
             .metadata()
             .is_ok_and(|metadata| metadata.len() == 0)
     }
 
-    /// Discards what the file has.
+    /// Discards the contents of the file.
     ///
     /// # Errors
     ///
-    /// The system refuses it.
+    /// The system refuses to truncate.
     pub fn truncate(&self) -> io::Result<()> {
         self.file.set_len(0)
     }
@@ -142,7 +143,7 @@ impl Drop for FileClaim {
     }
 }
 
-/// Locks a file against other processes. Some file systems have no locks, and are used without.
+/// Locks a file against other processes; true if nobody else has locked it, or if the file system has no locks.
 fn is_locked(file: &File, lock: Lock) -> bool {
     lock_file(file, lock).unwrap_or(true)
 }

@@ -1,4 +1,4 @@
-//! The recorder: takes ticks from the tick, and writes them on its own thread.
+//! The recorder: takes ticks from the ticking thread, and writes them on its own thread.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -19,7 +19,7 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_image::signal::Slot;
 use tickbus_image::{RowReader, RowWriter, row_ring};
 
-/// How often the thread polls the ring. The tick makes no system calls, so that it cannot wake the thread.
+/// How often the thread polls the ring. The tick makes no system calls, so it cannot wake the thread.
 const LOOK: Nanos = Nanos::from_millis(5);
 
 /// Every this many polls, everything is written to the file: a killed process loses at most a tenth of a
@@ -62,7 +62,7 @@ pub struct RecorderCounters {
 }
 
 impl RecorderCounters {
-    /// Why the recording ended before it was closed, if it did.
+    /// Why the recording ended before it was closed, if so.
     pub fn error(&self) -> Option<String> {
         self.lock_error().clone()
     }
@@ -125,8 +125,8 @@ impl Bell {
         self.token.stop();
     }
 
-    /// Lets the recording thread wait until there is something to do, or for [`LOOK`]. Outside a simulation that is real
-    /// time, also where the driver's clock stands still.
+    /// Lets the recording thread wait for work, or for [`LOOK`]. Outside a simulation that is real time, even if the
+    /// driver's clock stands still.
     fn wait(&self, clock: &dyn Clock) {
         if clock.simulation().is_some() {
             clock.wait_until(clock.now() + LOOK, &self.token);
@@ -144,8 +144,8 @@ impl Bell {
 
 /// Records the ticks of one driver; dropping it ends the recording.
 ///
-/// What the tick calls, [`record`](Self::record), allocates nothing, and on a free bus it takes no lock and
-/// makes no system call either.
+/// The tick's call, [`record`](Self::record), allocates nothing, and on a free bus it takes no lock and makes no system
+/// call.
 #[derive(Debug)]
 pub struct Recorder {
     ring: RowWriter,
@@ -164,7 +164,7 @@ pub struct Recorder {
 /// Why a recording cannot start.
 #[derive(Debug, thiserror::Error)]
 pub enum RecorderError {
-    /// Another file, or another time, would do.
+    /// A problem with the file; another file, or a later attempt, may work.
     #[error("{0}")]
     File(String),
     /// The system refused a thread.
@@ -207,8 +207,8 @@ fn open(path: &Path) -> Result<(File, Option<FileClaim>), RecorderError> {
 }
 
 impl Recorder {
-    /// Opens the file that `options` name, relative to `folder`, and starts the thread that writes to it. What the file
-    /// has is overwritten by the first tick.
+    /// Opens the file that `options` name, relative to `folder`, and starts the thread that writes to it. The first
+    /// tick overwrites the file.
     ///
     /// If the ring is full, a `lossless` recorder makes the tick wait until there is room; any other drops
     /// the tick and counts it.
@@ -241,7 +241,7 @@ impl Recorder {
             .map_err(RecorderError::Thread)
     }
 
-    /// As [`start`](Self::start), for any target.
+    /// Like [`start`](Self::start), for any target.
     pub(super) fn over(
         target: Box<dyn Target>,
         format: Format,
@@ -340,7 +340,7 @@ impl Recorder {
         }
     }
 
-    /// Its counters.
+    /// The counters.
     pub fn counters(&self) -> &Arc<RecorderCounters> {
         &self.scans
     }
@@ -381,7 +381,7 @@ struct Writing {
     kinds: Box<[super::ValueKind]>,
     sink: Box<dyn Sink>,
     rows: Rows,
-    /// The file has the beginning of this recording, or will with the next flush.
+    /// The file has the beginning of this recording, or will have it with the next flush.
     has_begun: bool,
     out: Out,
     /// Number and time of the previous tick.
@@ -394,7 +394,7 @@ struct Writing {
 
 impl Writing {
     fn run(&mut self) {
-        // After this thread has ended, for whatever reason, no tick may wait for it.
+        // After this thread has ended, for any reason, no tick may wait for it.
         let (scans, bell) = (Arc::clone(&self.scans), Arc::clone(&self.bell));
         let _end = Ended { scans, bell };
         if let Err(error) = self.write() {
@@ -430,7 +430,7 @@ impl Writing {
             self.bell.wait(&*self.clock);
         }
         if !self.has_begun {
-            // A run without a tick leaves the recording of an earlier one.
+            // A run without a tick keeps the recording of an earlier one.
             if self.place.as_ref().is_some_and(|place| !place.is_empty()) {
                 return Ok(());
             }

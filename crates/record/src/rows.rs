@@ -1,19 +1,19 @@
-//! The rows that a recorder is handed.
+//! The rows passed to a recorder.
 
 use tickbus_image::signal::{Area, Plan, SignalTable, Slot};
 
 use super::Columns;
 
-/// The rows that a recorder is handed, tick by tick.
+/// The rows passed to a recorder, tick by tick.
 #[derive(Debug)]
 pub struct Rows {
     pub(super) columns: Columns,
-    /// Of each station, the codec of what this end sends, and a frame for it.
+    /// Per station, the codec of the values that this end sends, and a frame for it.
     sent: Vec<(Plan, Box<[u8]>)>,
 }
 
 impl From<Columns> for Rows {
-    /// Rows that are recorded as they are.
+    /// Rows that are recorded unchanged.
     fn from(columns: Columns) -> Self {
         Self {
             columns,
@@ -23,8 +23,8 @@ impl From<Columns> for Rows {
 }
 
 impl Rows {
-    /// Rows whose values of `area` have yet to pass the codec: the recording has what it makes of them, since that is on
-    /// the line. The first columns are the signals of `table`.
+    /// Rows whose values of `area` have yet to pass the codec: the recording gets the result, which is on the line. The
+    /// first columns are the signals of `table`.
     pub fn sending(columns: Columns, table: &SignalTable, area: Area) -> Self {
         let stations = table.stations.iter().enumerate();
         let sent = stations.map(|(index, station)| {

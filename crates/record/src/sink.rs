@@ -1,4 +1,4 @@
-//! What the formats of recordings have in common: what a file is made of, and how numbers are written.
+//! The common parts of the formats: the pieces of a file, and the form of numbers.
 
 use std::io::Write as _;
 
@@ -9,7 +9,7 @@ pub(super) trait Sink: Send {
     /// Writes the beginning of the file.
     fn header(&mut self, out: &mut Vec<u8>);
 
-    /// One tick; values are as [`ValueKind::kept`](super::ValueKind::kept) gives them.
+    /// One tick; the values come from [`ValueKind::kept`](super::ValueKind::kept).
     fn tick(&mut self, tick: &Tick, out: &mut Vec<u8>);
 
     /// Writes the end of a recording that was closed properly.

@@ -1,4 +1,4 @@
-//! What is written reads back: completely, truncated, and from a full disk.
+//! Written recordings can be read back: complete, truncated, and from a full disk.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -72,7 +72,7 @@ fn open(format: Format, bytes: &[u8], table: &SignalTable) -> Result<Recording, 
     Recording::read("run", format, bytes, Some(table))
 }
 
-/// All ticks, and how reading ended.
+/// All ticks, and the result of the last read.
 fn read(mut recording: Recording) -> (Vec<Tick>, Result<bool, RecordingError>) {
     let mut tick = Tick::new(recording.columns());
     let mut ticks = Vec::new();
@@ -386,7 +386,7 @@ fn dropped_ticks_are_counted_and_marked() {
         .lines()
         .find_map(|line| line.strip_prefix("record.dropped="));
     let dropped: u64 = dropped.expect("a count").parse().expect("a number");
-    // Ticks dropped after the last recorded one appear in the count only.
+    // Ticks dropped after the last recorded one appear only in the count.
     assert_eq!(dropped, last.dropped + 50_000 - last.number);
     assert!(dropped > 0, "no machine writes as fast as that");
 }

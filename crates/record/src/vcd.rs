@@ -1,8 +1,8 @@
 //! Writing VCD, the value change dump of IEEE 1364, for waveform viewers.
 //!
-//! Each value that changed gets a line; the last line of every tick is that of the variable `tick`. So a tick
-//! is complete when this line is, and ticks without other changes are in the file as well. Comments in the
-//! header describe the variables, because VCD has no types, no units, and no arbitrary names.
+//! Each changed value gets a line; the last line of every tick is that of the variable `tick`. So a tick is complete
+//! when this line is, and ticks without other changes are in the file as well. Comments in the header describe the
+//! variables, because VCD has no types, no units, and no arbitrary names.
 
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -15,7 +15,7 @@ use super::columns::{Column, Columns, Tick, ValueKind};
 use super::sink::{Sink, count, real};
 use tickbus_image::signal::Area;
 
-/// The width of the status in bits: VCD has no signed values, so that negative ones are in two's complement.
+/// The width of the status in bits: VCD has no signed values, so negative ones are in two's complement.
 const STATUS_BITS: u32 = 32;
 
 /// A station's name, and one of its areas.

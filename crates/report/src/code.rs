@@ -44,7 +44,7 @@ impl Coding {
         }
         let is_single = changes.iter().all(|c| narrow(c.value).is_some());
         let plain = if is_single { 4 } else { 8 };
-        // An index takes a byte or two, so the table pays as long as there are few distinct values.
+        // An index takes a byte or two, so the table pays off as long as there are few distinct values.
         let most = changes.len() * (plain - 2) / 8 + 4;
         let mut different = HashSet::new();
         for change in changes {
@@ -101,7 +101,7 @@ const fn divisor(mut a: i64, mut b: i64) -> i64 {
     a
 }
 
-/// The block of the changes, and how its values are written.
+/// The block of the changes, and the coding of its values.
 pub(super) fn block(changes: &[Change], begin: Nanos, unit: i64) -> (Coding, String) {
     let mut bytes = Vec::with_capacity(changes.len() * 2);
     let mut last = begin;

@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use super::{Contents, DEFAULT_BUDGET, RunStatistics, read, write};
 use tickbus_record::Recording;
 
-/// Writes a page to a temporary file first: an old page stays until the new one is complete. Returns its
-/// size.
+/// Writes a page; first to a temporary file, so that an old page stays until the new one is complete. Returns its size.
 ///
 /// # Errors
 ///
@@ -36,7 +35,7 @@ pub fn write_file(contents: &Contents<'_>, path: &Path) -> io::Result<u64> {
 ///
 /// # Errors
 ///
-/// Nothing can be read of the recording, or the page cannot be written; the error says what would be right.
+/// The recording cannot be read at all, or the page cannot be written; the error states the remedy.
 pub fn page_beside(
     recording: &Path,
     title: &str,
@@ -44,7 +43,7 @@ pub fn page_beside(
     texts: &[(String, String)],
 ) -> Result<PathBuf, String> {
     let mut read_from = Recording::open(recording, None).map_err(|error| error.to_string())?;
-    // What precedes a damaged place in the recording is worth a page.
+    // The part before a damaged place in the recording is worth a page.
     let (run, _) = read(&mut read_from, DEFAULT_BUDGET);
     let statistics = statistics.map(RunStatistics::read);
     let file = recording.file_name().unwrap_or(recording.as_os_str());

@@ -5,7 +5,7 @@ use tickbus_base::time::Nanos;
 use tickbus_record as record;
 use tickbus_record::{Columns, Recording, RecordingError, Tick};
 
-/// The status of an exchange from which on data are stale.
+/// From this status of an exchange on, data are stale.
 const STALE: i32 = 2;
 
 /// The destination of a column's values.
@@ -18,8 +18,7 @@ enum Target {
     Nowhere,
 }
 
-/// Reads a recording to its end; the error says why it cannot be read further, and the run is what came
-/// before.
+/// Reads a recording to its end. The error says why it cannot be read further; the run has everything before.
 pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingError>) {
     let columns = recording.columns().clone();
     let mut run = Run::new(budget);
@@ -81,7 +80,7 @@ pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingE
         );
     }
     for (column, target) in columns.columns.iter().zip(&targets) {
-        // A CSV file has no types: a signal that was only ever 0 or 1 is taken for a bool.
+        // A CSV file has no types: a signal that was only ever 0 or 1 counts as a bool.
         if let (None, Target::Signal(signal, _)) = (column.data_type, target) {
             run.call_bool_if_it_looks_like_one(*signal);
         }

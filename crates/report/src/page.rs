@@ -13,9 +13,9 @@ use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
 const CHART: &str = include_str!("chart.html");
-/// The style of the page, for other pages that are to look like it.
+/// The style of the page, for other pages with the same look.
 pub const STYLE: &str = include_str!("style.css");
-/// The script that finds values by their time. What it needs of the page stands at its beginning.
+/// The script that finds values by their time. Its beginning states its needs.
 pub const LOOKUP: &str = include_str!("lookup.js");
 /// The script that draws signals over time, for scripts that come after [`LOOKUP`].
 pub const DRAW: &str = include_str!("draw.js");
@@ -33,7 +33,7 @@ const ACTIVITY: usize = 400;
 /// The most spans drawn per band of the chart.
 const MOST_SPANS: usize = 20_000;
 
-/// What a page is made from.
+/// The parts of a page.
 #[derive(Clone, Copy, Debug)]
 pub struct Contents<'a> {
     /// The heading.
@@ -48,7 +48,7 @@ pub struct Contents<'a> {
     pub faults: &'a [usize],
     /// Statistics of a driver or a PLC program.
     pub statistics: Option<&'a RunStatistics>,
-    /// Texts to be shown verbatim, each under its heading.
+    /// Texts shown verbatim, each under its heading.
     pub texts: &'a [(String, String)],
 }
 

@@ -1,4 +1,4 @@
-//! What a report knows about a run.
+//! The data of a run for a report.
 
 use tickbus_base::time::{Nanos, TimeHistogram};
 
@@ -30,11 +30,11 @@ pub struct Change {
 /// One signal and its changes.
 #[derive(Clone, Debug)]
 pub struct Signal {
-    /// Its name; may contain any characters.
+    /// The name; may contain any characters.
     pub name: String,
-    /// The type of its values.
+    /// The type of the values.
     pub kind: SignalKind,
-    /// The unit of its values; empty if it has none.
+    /// The unit of the values; empty without one.
     pub unit: String,
     changes: Vec<Change>,
     seen: u64,
@@ -44,13 +44,13 @@ pub struct Signal {
 }
 
 impl Signal {
-    /// Its changes, in time order. The first is its first known value.
+    /// The changes, in time order. The first is the first known value.
     pub fn changes(&self) -> &[Change] {
         &self.changes
     }
 
-    /// The number of its changes in the recording; greater than the number of changes held here once it was
-    /// thinned.
+    /// The number of the signal's changes in the recording; greater than the number of changes held here once the
+    /// signal was thinned.
     pub fn seen(&self) -> u64 {
         self.seen
     }
@@ -66,7 +66,7 @@ impl Signal {
         self.resolution
     }
 
-    /// Its least and its greatest value, if known.
+    /// The least and the greatest value, if known.
     pub fn range(&self) -> Option<(f64, f64)> {
         self.span
     }
@@ -133,13 +133,13 @@ impl Signal {
     }
 }
 
-/// Whether two values look the same to a reader: NaN equals NaN.
+/// True if two values look the same to a reader: NaN equals NaN.
 #[expect(clippy::float_cmp, reason = "a change is any change")]
 fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
 
-/// What a mark is about.
+/// The kind of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum MarkKind {
     /// The line entered a state, which lasts until the next mark of this kind. The text is the state,
@@ -147,7 +147,7 @@ pub enum MarkKind {
     Link,
     /// A step began, which lasts until the next mark of this kind; with an empty text no step is active.
     Step,
-    /// A fault: a jam, or one that was injected.
+    /// A fault: a jam, or an injected one.
     Fault,
     /// Ticks are missing from the recording.
     Gap,
@@ -155,25 +155,25 @@ pub enum MarkKind {
     Note,
 }
 
-/// Something that happened at a time, or that began then.
+/// An event at a time, or the beginning of something longer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mark {
     /// When it began.
     pub at: Nanos,
     /// When it ended, where that is known.
     pub until: Option<Nanos>,
-    /// Its kind.
+    /// The kind.
     pub kind: MarkKind,
-    /// Its subject, where there are several: for a line state, the station.
+    /// The subject, if there are several: for a line state, the station.
     pub of: String,
-    /// Its text.
+    /// The text.
     pub text: String,
 }
 
-/// A run: its signals with their changes, its ticks and its marks, fed in time order.
+/// A run: its signals with their changes, its ticks and its marks, added in time order.
 ///
-/// Its memory is limited by its budget of changes, however long the run: when the budget is used up, the
-/// signal with the most changes is thinned.
+/// The run's memory is limited by its budget of changes, however long the run: when the budget is used up, the signal
+/// with the most changes is thinned.
 #[derive(Debug)]
 pub struct Run {
     signals: Vec<Signal>,
@@ -190,7 +190,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// A run without signals, for at most `budget` changes in all.
+    /// A run without signals, for at most `budget` changes in total.
     pub fn new(budget: usize) -> Self {
         Self {
             signals: Vec::new(),
@@ -330,7 +330,7 @@ impl Run {
         self.ticks
     }
 
-    /// Its first and last time; zero for both if nothing happened.
+    /// The first and last time; zero for both if nothing happened.
     pub fn extent(&self) -> (Nanos, Nanos) {
         self.extent.unwrap_or_default()
     }

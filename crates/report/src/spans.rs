@@ -8,11 +8,11 @@ use tickbus_base::toml_text::short_number;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Span {
     pub(super) from: Nanos,
-    /// Its end; the end of the run if nothing ended it.
+    /// The end; the end of the run if there was no other.
     pub(super) until: Nanos,
-    /// Whether it was still going on when the run ended, as far as is known.
+    /// True if the span continued to the end of the run, as far as known.
     pub(super) is_open: bool,
-    /// Its subject; usually empty.
+    /// The subject; usually empty.
     pub(super) of: String,
     pub(super) text: String,
 }

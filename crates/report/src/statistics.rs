@@ -24,8 +24,7 @@ const VALUES: [&str; 5] = ["p50", "p90", "p99", "max", "mean"];
 const UNITS: [(&str, &str); 2] = [("_us", "µs"), ("", "")];
 
 impl RunStatistics {
-    /// Reads the statistics in a text; other lines are skipped, so that the complete output of a command may
-    /// be given.
+    /// Reads the statistics in a text; other lines are skipped, so the complete output of a command may be passed.
     pub fn read(text: &str) -> Self {
         let mut found: Vec<(String, String)> = Vec::new();
         let mut places = std::collections::HashMap::new();
@@ -39,12 +38,12 @@ impl RunStatistics {
         Self(found)
     }
 
-    /// Whether there are any.
+    /// True if there are no statistics.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// All keys with their values, in the order in which they came.
+    /// All keys with their values, in the order of the text.
     pub(super) fn all(&self) -> &[(String, String)] {
         &self.0
     }

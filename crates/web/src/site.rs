@@ -16,8 +16,8 @@ pub trait Site: Send + Sync + 'static {
     /// viewers.
     fn look(&self, answer: Answer<State>);
 
-    /// Makes a document of the site from the current state; `None` if there is none at this path. Called for every path
-    /// that is not in [`assets`](Self::assets).
+    /// Makes a document of the site from the current state; `None` if this path has none. Called for every path that
+    /// is not in [`assets`](Self::assets).
     fn get(&self, path: &str, answer: Answer<Option<Document>>) {
         let _ = path;
         answer.give(None);

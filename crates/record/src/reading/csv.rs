@@ -217,7 +217,7 @@ fn cells(line: &str) -> Option<Vec<String>> {
     }
 }
 
-/// The cell that begins after a quotation mark, and what follows the closing one.
+/// The cell that begins after a quotation mark, and the text after the closing one.
 fn unquoted(text: &str) -> Option<(String, &str)> {
     let (mut cell, mut rest) = (String::new(), text);
     loop {

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, ErrorKind, Read};
 /// The longest line of a recording: a CSV header with a great many signals.
 const LONGEST: u64 = 64 << 20;
 
-/// Passes on complete lines only: what follows the last line end was truncated while it was written.
+/// Passes on complete lines only: text after the last line end was truncated during writing.
 pub(super) struct WholeLines<R> {
     inner: R,
     line: Vec<u8>,
@@ -25,7 +25,7 @@ impl<R: BufRead> WholeLines<R> {
         }
     }
 
-    /// Reads the next line, to be had from [`line`](Self::line); false at the end.
+    /// Reads the next line, available from [`line`](Self::line); false at the end.
     pub(super) fn advance(&mut self) -> io::Result<bool> {
         self.line.clear();
         self.at = 0;
@@ -55,7 +55,7 @@ impl<R: BufRead> WholeLines<R> {
         self.number
     }
 
-    /// Whether the file ended within a line.
+    /// True if the file ended within a line.
     pub(super) fn is_cut(&self) -> bool {
         self.cut
     }

@@ -22,7 +22,7 @@ pub struct RecordingError {
     pub file: String,
     /// The line, from 1, if a single line is at fault.
     pub line: Option<u64>,
-    /// What is wrong, and what would be right.
+    /// The mistake and its remedy.
     pub mistake: Mistake,
 }
 
@@ -37,7 +37,7 @@ impl RecordingError {
     }
 }
 
-/// What a reader finds wrong at its current line.
+/// A mistake at the reader's current line.
 #[derive(Debug)]
 struct ReadError {
     mistake: Mistake,
@@ -126,11 +126,11 @@ impl Recording {
         )
     }
 
-    /// As [`open`](Self::open), for a recording from another source; errors call it `file`.
+    /// Like [`open`](Self::open), for a recording from another source; errors call it `file`.
     ///
     /// # Errors
     ///
-    /// It is not a recording.
+    /// The source is not a recording.
     pub fn read(
         file: &str,
         format: Format,
@@ -155,7 +155,7 @@ impl Recording {
         })
     }
 
-    /// What it contains for every tick.
+    /// The contents of every tick.
     pub fn columns(&self) -> &Columns {
         &self.columns
     }
@@ -174,8 +174,8 @@ impl Recording {
         read.map_err(|fault| error(&self.file, fault, line))
     }
 
-    /// Why the recording ends where it does, as far as is known, once it has ended: the recorder's last
-    /// comment, or that it was truncated.
+    /// Why the recording ends at its last tick, as far as known, once it has ended: the recorder's last comment, or
+    /// that it was truncated.
     pub fn ending(&self) -> String {
         match &self.reader {
             Reader::Vcd(reader) => reader.ending(),
@@ -183,8 +183,8 @@ impl Recording {
         }
     }
 
-    /// Whether the recording ends without an end mark, as after a power failure: known once it has ended, and
-    /// in a CSV file only if the cut is within a line.
+    /// True if the recording ends without an end mark, as after a power failure: known once it has ended, and in a CSV
+    /// file only if the cut is within a line.
     pub fn is_cut(&self) -> bool {
         match &self.reader {
             Reader::Vcd(reader) => reader.is_cut(),

@@ -14,7 +14,7 @@ use tickbus_image::signal::{Address, DataType, Slot};
 /// The largest number of columns.
 const MOST_COLUMNS: usize = 250_000;
 
-/// What a variable of the file represents.
+/// The meaning of a variable in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Variable {
     Tick,
@@ -85,7 +85,7 @@ impl<R: BufRead> VcdReader<R> {
                 Some(Err(error)) if error.kind() != ErrorKind::UnexpectedEof => {
                     return Err(fault(&error));
                 }
-                // What follows the last whole tick is incomplete.
+                // The rest after the last whole tick is incomplete.
                 _ => {
                     self.cut = self.ending.is_none();
                     return Ok(false);
@@ -213,7 +213,7 @@ impl Change<'_> {
     }
 }
 
-/// What the header states, comment by comment.
+/// The information in the header, comment by comment.
 #[derive(Default)]
 struct Header {
     version: Option<u32>,

@@ -122,7 +122,7 @@ impl Program for Axes {
         let seconds = |span: Nanos| span.to_duration().as_secs_f64();
         let passed = seconds((scan.now - self.last.max(began)).max(Nanos::ZERO));
         self.last = scan.now;
-        // Without a PLC nothing is enabled.
+        // Without a PLC no axis is enabled.
         if scan.alive {
             decode.decode(inputs, slots);
         } else {

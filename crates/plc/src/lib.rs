@@ -40,15 +40,15 @@ pub const INTERVAL: Nanos = Nanos::from_millis(10);
 
 /// A PLC program.
 pub trait Program: Send {
-    /// The name by which it is asked for, or the path of its file.
+    /// The name for requesting the program, or the path of its file.
     fn name(&self) -> &str;
 
-    /// Its default scan interval. Positive.
+    /// The default scan interval. Positive.
     fn interval(&self) -> Nanos {
         INTERVAL
     }
 
-    /// Is told, before the first scan, the layout of its image.
+    /// Gets the layout of its image, before the first scan.
     ///
     /// # Errors
     ///
@@ -69,14 +69,14 @@ pub trait Program: Send {
         None
     }
 
-    /// Runs the program once: inputs to outputs. It allocates nothing and never blocks.
+    /// Runs the program once: inputs to outputs. Allocates nothing and never blocks.
     ///
     /// Images may be longer than the program needs; the rest is not touched. If they are shorter, missing
     /// inputs read as 0 and missing outputs are dropped.
     fn scan(&mut self, scan: &mut Scan<'_>);
 
-    /// Whether a scan that takes seconds is a fault of the program. A scan that always ends at once was merely not let run by a
-    /// busy computer, and goes on when that lets it.
+    /// True if a scan that takes seconds is a fault of the program. If every scan ends at once, a slow one was merely
+    /// delayed by a busy computer, and continues when it gets its turn.
     fn can_hang(&self) -> bool {
         true
     }
@@ -95,14 +95,14 @@ pub trait Report: Send + Sync + std::fmt::Debug {
     /// The report for people, shown when the program ends.
     fn summary(&self) -> String;
 
-    /// Whether the program has finished its task.
+    /// True if the program has finished its task.
     fn is_done(&self) -> bool;
 
-    /// What went wrong, if anything, once it [is done](Self::is_done).
+    /// The failure, if any, once the program [is done](Self::is_done).
     fn failure(&self) -> Option<String>;
 }
 
-/// Why there is no such program.
+/// Why a program is not available.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ProgramError {
     /// No built-in program has that name.
@@ -129,14 +129,14 @@ pub enum ProgramError {
         option: &'static str,
         /// The given value.
         value: String,
-        /// What would be right.
+        /// The accepted values.
         right: String,
     },
     /// A user's own program cannot be used, or the program does not fit the image of this driver.
     Unfit {
         /// The program.
         program: String,
-        /// What is wrong with it; its name comes before.
+        /// The mistake, to be printed after the program's name.
         mistake: Mistake,
     },
 }
@@ -157,7 +157,7 @@ impl ProgramError {
         }
     }
 
-    /// What is wrong, and what would be right.
+    /// The mistake and its remedy.
     pub fn mistake(&self) -> Mistake {
         match self {
             Self::UnknownName { name, known } => Mistake::new(

@@ -11,9 +11,8 @@ const TENTH: i64 = 100_000_000;
 /// by the program as well; unless both are from 1 to `STEPS`, the block has no power flow and changes
 /// nothing.
 ///
-/// With power flow: `reset` makes the preset step the active one, and has priority; else a rising
-/// `step` turns the drum one step on, from the last to the first. Then `q` is the active step's
-/// pattern.
+/// With power flow: `reset` makes the preset step the active one, and has priority; otherwise a rising `step` turns the
+/// drum one step further, from the last to the first. Then `q` is the active step's pattern.
 ///
 /// Where the manuals are silent: a `step` that is already true when the block is enabled is not an edge,
 /// `reset` keeps the step's time at 0, and a fault time-out of 0 disables it.
@@ -25,7 +24,7 @@ pub struct Drum<const STEPS: usize> {
     pub preset: u16,
     /// The active step's pattern, `Q`.
     pub q: u16,
-    /// The first followers, `FF`: one bit per step, on for the active one alone; `ff[0]` is step 1.
+    /// The first followers, `FF`: one bit per step, on only for the active one; `ff[0]` is step 1.
     pub ff: [bool; STEPS],
     /// The drum coil, `DRC`: the block is enabled and the active step is not the preset one.
     pub drum_coil: bool,

@@ -1,7 +1,7 @@
 //! The built-in PLC programs: those of the demos, and two for commissioning and measuring.
 //!
-//! None of them is part of the driver: they are what stands at the other end of it, hosted by a loopback or run by
-//! `tickbus plc`. [`program`] finds one by its name, or one of the user's own by its path.
+//! None of them is part of the driver: they are at the other end of the line, hosted by a loopback or run by `tickbus
+//! plc`. [`program`] finds a built-in program by its name, or a user's own program by its path.
 
 use std::path::Path;
 
@@ -20,7 +20,7 @@ pub use mirror::Mirror;
 pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};
 
-/// The names that [`program`] knows.
+/// The built-in names for [`program`].
 pub const PROGRAMS: [&str; 5] = [
     Rig::NAME,
     Mirror::NAME,
@@ -29,21 +29,21 @@ pub const PROGRAMS: [&str; 5] = [
     Lathe::NAME,
 ];
 
-/// Makes the program called `name`, with its options as (key, value) pairs. Where an option is given
-/// twice, the last one counts.
+/// Makes the program called `name`, with its options as (key, value) pairs. If an option is given twice, the last one
+/// counts.
 ///
-/// The name is one of [`PROGRAMS`], or the path of a [`HostedProgram`] program: then it has a `/` in it or ends
-/// in `.so`, `.dll` or `.dylib`.
+/// The name is one of [`PROGRAMS`], or the path of a [`HostedProgram`]: a path contains `/` or ends in `.so`, `.dll` or
+/// `.dylib`.
 ///
 /// # Errors
 ///
-/// The name is unknown, the program has no such option, or the option cannot have that value; the
-/// text says which would be right.
+/// The name is unknown, the program has no such option, or the option does not accept the value; the text says what
+/// would be right.
 pub fn program(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
     program_beside(Path::new(""), name, options)
 }
 
-/// The same, with paths that count from `folder`.
+/// The same, with paths relative to `folder`.
 ///
 /// # Errors
 ///
@@ -69,7 +69,7 @@ pub fn program_beside(
     }
 }
 
-/// Whether there can be a program called `name` that takes `options`, without loading anything.
+/// Checks without loading anything that there can be a program called `name` that takes `options`.
 ///
 /// # Errors
 ///

@@ -5,13 +5,14 @@ use tickbus_plc::{Program, ProgramError, Scan};
 
 /// Copies every `%I` byte to the `%Q` byte at the same offset, as far as both images reach.
 ///
-/// Stale inputs are copied as well, as a plug would do. Where a mirror stands in for a machine, `%Q` signals that state a `fail_safe`
+/// Stale inputs are copied as well, as a plug would do. If a mirror stands in for a machine, `%Q` signals with a stated
+/// `fail_safe` have that value meanwhile.
 /// have that value meanwhile.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Mirror;
 
 impl Mirror {
-    /// Its name in [`program`](super::program).
+    /// The name in [`program`](super::program).
     pub const NAME: &'static str = "mirror";
 
     /// A mirror; it has no options.

@@ -66,7 +66,7 @@ struct Measured {
 const GIVE_UP: u64 = 5;
 
 impl Reaction {
-    /// Its name in [`program`](super::program).
+    /// The name in [`program`](super::program).
     pub const NAME: &'static str = "reaction";
 
     /// The program's options.

@@ -32,11 +32,11 @@ pub struct Qualifiers {
     pub ds: bool,
     /// `SL`: from now on for `t`, even if the step ends, or until `R`.
     pub sl: bool,
-    /// The time of whichever timed qualifier (`L`, `D`, `SD`, `DS`, `SL`) is on.
+    /// The time of the active timed qualifier (`L`, `D`, `SD`, `DS`, `SL`).
     pub t: Nanos,
 }
 
-/// Decides from the qualifiers whether an action runs.
+/// Determines from the qualifiers if an action runs.
 ///
 /// `Q = ¬R ∧ (N ∨ S' ∨ (L ∧ ¬TON(L)) ∨ TON(D) ∨ rise(P) ∨ TON(SD') ∨ DS' ∨ (SL' ∧ ¬TON(SL')))`,
 /// where a dash marks the latch that `R` clears. The action runs (`A`) in every call with `Q`, and
@@ -69,7 +69,7 @@ impl ActionControl {
         }
     }
 
-    /// Evaluates the block and returns `A`: whether the action runs in this scan.
+    /// Evaluates the block and returns `A`: true if the action runs in this scan.
     pub fn call(&mut self, now: Nanos, on: &Qualifiers) -> bool {
         let timed = [on.l, on.d, on.sd, on.ds, on.sl];
         self.conflict = timed.into_iter().filter(|&on| on).count() > 1;
@@ -80,7 +80,7 @@ impl ActionControl {
         let delayed = self.delayed.call(now, on.d, on.t);
         let pulse = self.pulse.call(on.p);
 
-        // These go on after their step has ended, when `t` may be another's.
+        // These continue after their step has ended, when `t` may belong to another.
         let (latch, timer, time) = &mut self.stored_delayed;
         if on.sd {
             *time = on.t;

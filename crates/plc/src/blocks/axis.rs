@@ -9,10 +9,9 @@ const ACKNOWLEDGE_LIMIT: Nanos = Nanos::from_secs(1);
 /// How `Execute` makes sure that the machine sees its edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Execute {
-    /// It stays on for this long; 500 ms in 2018, so at most two commands per second.
+    /// `Execute` stays on for this long; 500 ms in 2018, so at most two commands per second.
     Hold(Nanos),
-    /// It stays on until the machine acknowledges, and the next edge waits until the acknowledge is off
-    /// again.
+    /// `Execute` stays on until the machine acknowledges, and the next edge waits until the acknowledge is off again.
     Acknowledge,
 }
 
@@ -21,7 +20,7 @@ pub enum Execute {
 pub struct AxisCommand {
     /// The mode.
     pub mode: Mode,
-    /// Its numbers.
+    /// The numbers.
     pub motion: Motion<f64>,
     /// If not 0, the machine's own table provides the numbers that are missing here.
     pub number: u16,
@@ -98,17 +97,17 @@ impl AxisControl {
         self.demand.speed_control = false;
     }
 
-    /// Whether a command given now would be sent at once.
+    /// True if a command given now would be sent at once.
     pub fn is_ready(&self) -> bool {
         self.waiting.is_none() && self.phase == Phase::Ready
     }
 
-    /// Whether the machine has accepted every command.
+    /// True if the machine has accepted every command.
     pub fn is_taken(&self) -> bool {
         self.waiting.is_none() && self.taken
     }
 
-    /// Whether the last command was accepted and its target is reached.
+    /// True if the last command was accepted and its target is reached.
     pub fn is_done(&self, inputs: &AxisInputs) -> bool {
         self.is_taken() && inputs.in_position
     }
@@ -118,8 +117,7 @@ impl AxisControl {
         self.commands
     }
 
-    /// Evaluates the block: one scan at `now`. Without `enable` the axis stops, and all commands are
-    /// discarded.
+    /// Evaluates the block: one scan at `now`. Without `enable` the axis stops, and all commands are discarded.
     pub fn call(&mut self, now: Nanos, inputs: &AxisInputs, enable: bool) {
         self.demand.enable = enable;
         if !enable {
@@ -159,7 +157,7 @@ impl AxisControl {
     fn await_machine(&mut self, now: Nanos, since: Nanos, inputs: &AxisInputs) {
         let lasts = now - since;
         let (taken, over) = match self.execute {
-            // It was this command that cleared InPosition; otherwise only time can tell.
+            // This command cleared InPosition; otherwise only time can tell.
             Execute::Hold(hold) => (!inputs.in_position || lasts >= hold, lasts >= hold),
             Execute::Acknowledge => (inputs.acknowledge, inputs.acknowledge),
         };

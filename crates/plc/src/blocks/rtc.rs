@@ -4,8 +4,8 @@ use tickbus_base::time::Nanos;
 
 /// A settable clock, `RTC`.
 ///
-/// While `IN` is false, `CDT` is the clock that the call hands in. A rising `IN` loads `PDT`; while
-/// `IN` stays true, `CDT` is that date plus the time since then. `Q` is `IN`.
+/// While `IN` is false, `CDT` is the clock passed to the call. A rising `IN` loads `PDT`; while `IN` stays true, `CDT`
+/// is that date plus the time since then. `Q` is `IN`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Rtc {
     /// The current date and time, `CDT`, as of the last call.

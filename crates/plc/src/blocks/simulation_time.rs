@@ -5,12 +5,12 @@ use tickbus_base::time::Nanos;
 /// The state of a simulation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Simulation {
-    /// Nothing has been received from it yet.
+    /// Nothing has been received from the simulation yet.
     #[default]
     Unknown,
-    /// Its time advances.
+    /// The simulation's time advances.
     Running,
-    /// Its time stands still: it is paused, or has ended while the line stays up.
+    /// The simulation's time stands still: the simulation is paused, or has ended while the line stays up.
     Stopped,
 }
 

@@ -62,12 +62,12 @@ impl Tof {
 
 /// Pulse, `TP`: a rising input makes a pulse of length `PT`, whatever the input does meanwhile.
 ///
-/// It rearms when a call after the pulse finds the input false.
+/// The block rearms when a call after the pulse finds the input false.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Tp {
     /// `Q`, as of the last call.
     pub q: bool,
-    /// The elapsed time, `ET`, as of the last call; it stands at `PT` until the block rearms.
+    /// The elapsed time, `ET`, as of the last call; stays at `PT` until the block rearms.
     pub et: Nanos,
     start: Option<Nanos>,
 }

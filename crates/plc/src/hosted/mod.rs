@@ -28,10 +28,9 @@ const FILE_LIMIT: u64 = 256 << 20;
 
 /// A compiled PLC program in a shared object.
 ///
-/// Its options, as text: `addressing` says what the numbers of its addresses count, `bytes` or `iec`
-/// (default: as the driver.cfg, else bytes). `order` is the byte order of values for which the driver.cfg has
-/// no signal, `ABCD` (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the
-/// machine's data are not stale.
+/// The options, as text: `addressing` is the unit of the numbers in the program's addresses, `bytes` or `iec` (default:
+/// as the driver.cfg, else bytes). `order` is the byte order of values for which the driver.cfg has no signal, `ABCD`
+/// (big-endian, the default) to `DCBA`. `alive` names a `%I` bit that is TRUE while the machine's data are not stale.
 #[derive(Debug)]
 pub struct HostedProgram {
     name: String,
@@ -48,7 +47,7 @@ impl HostedProgram {
     /// The program's options.
     const OPTIONS: [&'static str; 3] = ["addressing", "alive", "order"];
 
-    /// Whether `name` is the path of a file, rather than the name of a built-in program.
+    /// True if `name` is the path of a file, rather than the name of a built-in program.
     pub fn is_path(name: &str) -> bool {
         let extension = Path::new(name).extension();
         let known = ["so", "dll", "dylib"];
@@ -248,8 +247,8 @@ fn not_loaded(words: &str, copy: &PrivateCopy) -> Mistake {
     Mistake::new(format!("cannot be loaded ({words})"), right)
 }
 
-/// A copy of the program's file that is loaded only once, so that its global variables are its own, and that
-/// does not change when the original file is rebuilt.
+/// A copy of the program's file that is loaded only once, so that its global variables are separate, and that does not
+/// change when the original file is rebuilt.
 #[derive(Debug)]
 struct PrivateCopy(Option<PathBuf>);
 
@@ -283,8 +282,8 @@ impl PrivateCopy {
         self.0.as_deref().unwrap_or(Path::new(""))
     }
 
-    /// The copy after loading. Where a file can be deleted while in use, that is done at once, so that even a
-    /// killed process does not leave it behind.
+    /// The copy after loading. Where a file can be deleted while in use, it is deleted at once, so that even a killed
+    /// process does not leave it behind.
     fn loaded(mut self) -> Self {
         if cfg!(unix) {
             self.remove();

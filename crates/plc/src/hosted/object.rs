@@ -62,7 +62,7 @@ impl Machine {
 ///
 /// # Errors
 ///
-/// What the file is instead, and what would be right.
+/// The file is of another type; the message says which, and what to do.
 pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), Mistake> {
     let build = "build a shared object from it (docs/own-plc-program.md)".to_owned();
     if bytes.is_empty() {
@@ -141,8 +141,8 @@ pub(super) fn check(bytes: &[u8], own: Option<Machine>) -> Result<(), Mistake> {
     }
 }
 
-/// Whether the segments to be loaded are completely in the file: the loader maps them without checking, and
-/// the process would crash on access. 32-bit files are not checked.
+/// True if the segments to be loaded are completely in the file: the loader maps them without checking, and the process
+/// would crash on access. 32-bit files are not checked.
 fn is_whole(bytes: &[u8], machine: Machine) -> bool {
     if machine.bits != 64 {
         return true;

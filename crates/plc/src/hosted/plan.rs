@@ -7,7 +7,7 @@ use tickbus_image::signal::{Address, Addressing, Area, ByteOrder, DataType, Sign
 /// The settings for fitting a program to the image.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Settings {
-    /// What the numbers of its addresses count; `None` leaves it to the driver.cfg.
+    /// The unit of the numbers in addresses; `None` leaves it to the driver.cfg.
     pub(super) addressing: Option<Addressing>,
     /// The `%I` bit that is TRUE while the machine's data are alive.
     pub(super) alive: Option<String>,

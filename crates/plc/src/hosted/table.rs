@@ -52,15 +52,15 @@ struct Table {
 /// A located variable as declared by the program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Declared {
-    /// Its IEC type.
+    /// The IEC type.
     pub(super) data_type: String,
     /// `I`, `Q` or `M`.
     pub(super) area: String,
     /// The size letter.
     pub(super) size: String,
-    /// The numbers of its address.
+    /// The numbers of the address.
     pub(super) numbers: Vec<u32>,
-    /// The size of its value.
+    /// The size of the value.
     pub(super) bytes: usize,
 }
 

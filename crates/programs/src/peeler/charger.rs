@@ -91,7 +91,7 @@ enum Centring {
     Grip,
     Lift,
     Present,
-    /// The block is where the clamps take it.
+    /// The block is at the clamps.
     Held,
 }
 
@@ -102,7 +102,7 @@ enum Transfer {
     Home,
     Waiting,
     Grab,
-    /// The arm moves back with a block, because its position is unknown.
+    /// The arm moves back with a block of unknown position.
     Return,
     AwaitLathe,
     ToLathe,
@@ -145,7 +145,7 @@ struct Signals {
 /// The charger's program, described at the [module](self). Its options are `hold` and `blocks`.
 pub(crate) type Charger = Sequenced<Chains>;
 
-/// Its three chains.
+/// The three chains.
 #[derive(Debug, Default)]
 pub(crate) struct Chains {
     places: Signals,
@@ -154,7 +154,7 @@ pub(crate) struct Chains {
     feeding: Chain<Feeding>,
     centring: Chain<Centring>,
     transfer: Chain<Transfer>,
-    /// Heights of the block's axis at its two ends.
+    /// The heights of the block's axis at its two ends.
     heights: [f64; 2],
 }
 
@@ -268,7 +268,7 @@ impl Chains {
                 (there && axes[LINEAR_FEEDER].is_done()).then_some(Centring::Held)
             }
             Centring::Held => {
-                // The clamps have it when the transfer is in the step that awaits the lathe.
+                // The clamps have the block when the transfer is in the step that awaits the lathe.
                 if self.transfer.step != Transfer::AwaitLathe {
                     return Nanos::ZERO;
                 }
@@ -395,7 +395,7 @@ impl Sequence for Chains {
         self.time.restarted || simulation == Simulation::Unknown
     }
 
-    /// Starts over with the state that the sensors show.
+    /// Starts over from the state that the sensors show.
     fn restart(&mut self, io: &mut Io) {
         io.forget();
         let on = |block: usize| io.is_on(self.places.blocks[block]);

@@ -178,7 +178,7 @@ impl Io {
         self.slots[place.0].real()
     }
 
-    /// Whether a signal is on.
+    /// True if a signal is on.
     pub(super) fn is_on(&self, place: SignalIndex) -> bool {
         self.value(place) != 0.0
     }
@@ -188,7 +188,7 @@ impl Io {
         self.slots[place.0] = Slot::from_real(f64::from(u8::from(on)));
     }
 
-    /// Whether no axis has a fault.
+    /// True if no axis has a fault.
     pub(super) fn all_healthy(&self) -> bool {
         self.axes.iter().all(|axis| axis.inputs.healthy)
     }
@@ -222,12 +222,12 @@ impl Axis {
         self.control.release();
     }
 
-    /// Whether the axis has completed the last request.
+    /// True if the axis has completed the last request.
     pub(super) fn is_done(&self) -> bool {
         self.control.is_done(&self.inputs)
     }
 
-    /// Whether the machine has accepted the last command, and the axis has stopped.
+    /// True if the machine has accepted the last command, and the axis has stopped.
     pub(super) fn stands(&self) -> bool {
         self.control.is_taken() && self.inputs.speed.abs() < 0.5
     }

@@ -115,7 +115,7 @@ struct Signals {
 /// `thickness`.
 pub(crate) type Lathe = Sequenced<Steps>;
 
-/// Its chain of steps.
+/// The chain of steps.
 #[derive(Debug, Default)]
 pub(crate) struct Steps {
     options: Options,
@@ -195,7 +195,7 @@ impl Steps {
 
     /// Knife and rolls approach, and the block starts to turn.
     fn come_near(&mut self, axes: &mut [Axis]) {
-        // It is gripped: with less pressure the block does not crack.
+        // The block is gripped: with less pressure it does not crack.
         for axis in SPINDLES {
             axes[axis].want(squeeze(Mode::Close, HOLD_TORQUE));
         }
@@ -342,9 +342,8 @@ impl Sequence for Steps {
         Ok(())
     }
 
-    /// Starts over. If the charger presents what is between the spindles, it is clamped again; otherwise it
-    /// counts as a core. In that case it is not reported as held, so that a charger that also holds it keeps
-    /// it.
+    /// Starts over. A block between the spindles is clamped again if the charger presents it; otherwise it counts as a
+    /// core. A core is not reported as held, so that a charger that also holds it keeps it.
     fn restart(&mut self, io: &mut Io) {
         io.forget();
         self.turns = 0.0;

@@ -1,10 +1,10 @@
 //! The programs "charger" and "lathe": the two PLCs of a line that peels blocks of wood into veneer.
 //!
-//! They use the axes and signals of `plc/peeler/charger.cfg` and `lathe.cfg`, which they find by name: any
-//! other layout with the same names works as well. The two are connected by four wires, through the machine.
+//! Both programs find the axes and signals of `plc/peeler/charger.cfg` and `lathe.cfg` by name: any other layout with
+//! the same names works as well. The two are connected by four wires, through the machine.
 //!
-//! Both start over, with the state that the sensors show, when the link returns, an axis has recovered from a
-//! fault, a step has timed out, or the simulation was restarted.
+//! Both start over from the state that the sensors show when the link returns, an axis has recovered from a fault, a
+//! step has timed out, or the simulation was restarted.
 
 mod charger;
 mod io;

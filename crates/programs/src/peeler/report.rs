@@ -1,4 +1,4 @@
-//! The report of the two programs: commands per axis, blocks, and how well the veneer's speed was kept.
+//! The report of the two programs: commands per axis, blocks, and the precision of the veneer's speed.
 
 use std::fmt::Write as _;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering::Relaxed};
@@ -9,7 +9,7 @@ use tickbus_plc::Report;
 
 const SECOND: i64 = 1_000_000_000;
 
-/// What a program has done so far. Written by its scans, which never wait; read by its host.
+/// The progress of a program. Written by its scans, which never wait; read by its host.
 #[derive(Debug)]
 pub(crate) struct PeelerCounters {
     axes: Box<[AxisTally]>,
@@ -21,7 +21,7 @@ pub(crate) struct PeelerCounters {
     pub(super) faults: AtomicU64,
     /// How often the simulation was restarted.
     pub(super) restarts: AtomicU64,
-    /// How well the speed was kept, if the program controls one.
+    /// The deviations from the speed, if the program controls one.
     pub(super) kept: Kept,
 }
 

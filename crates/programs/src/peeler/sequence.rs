@@ -1,4 +1,4 @@
-//! What the two programs share: the commands that they give, and how their sequences start over after a fault.
+//! The common parts of the two programs: their commands, and the restart of their sequences after a fault.
 
 use std::fmt::Debug;
 use std::sync::Arc;
@@ -64,16 +64,16 @@ pub(crate) trait Sequence: Debug + Send {
     const NAME: &'static str;
     /// The axes, in the program's own order.
     const AXES: &'static [(&'static str, AxisKind)];
-    /// The options that it takes.
+    /// The options.
     const OPTIONS: &'static [&'static str];
 
-    /// Makes it.
+    /// Makes the sequence.
     fn new(options: Options) -> Self;
 
-    /// Finds its signals by name.
+    /// Finds the signals by name.
     fn fit(&mut self, find: &Find<'_>) -> Result<(), ProgramError>;
 
-    /// Whether it has to start over for another reason than a fault.
+    /// True if the sequence has to start over for another reason than a fault.
     fn begins_anew(
         &mut self,
         _io: &Io,
@@ -84,7 +84,7 @@ pub(crate) trait Sequence: Debug + Send {
         false
     }
 
-    /// Starts over with the state that the sensors show.
+    /// Starts over from the state that the sensors show.
     fn restart(&mut self, io: &mut Io);
 
     /// One scan with healthy axes. An error is a fault: all axes stop.
@@ -101,13 +101,13 @@ pub(crate) struct Sequenced<S> {
     hold: Option<Nanos>,
     io: Option<Io>,
     counters: Arc<PeelerCounters>,
-    /// A fault has occurred, and no axis is enabled. Until the machine has been heard from, its health is unknown.
+    /// A fault has occurred, and no axis is enabled. Until the machine sends data, its health is unknown.
     failed: bool,
     well: Ton,
 }
 
 impl<S: Sequence> Sequenced<S> {
-    /// Its name in [`program`](crate::program).
+    /// The name in [`program`](crate::program).
     pub(crate) const NAME: &'static str = S::NAME;
 
     /// The program with its options.
@@ -129,7 +129,7 @@ impl<S: Sequence> Sequenced<S> {
         })
     }
 
-    /// One scan of the sequence; whether the axes are enabled.
+    /// One scan of the sequence; returns whether the axes are enabled.
     fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
         let anew = self.sequence.begins_anew(io, now, alive, &self.counters);
         let well = self.well.call(now, alive && io.all_healthy(), WELL);

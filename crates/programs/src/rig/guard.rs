@@ -24,7 +24,7 @@ impl JamGuard {
     }
 }
 
-/// Whether `command` would turn a wheel through a lift.
+/// True if `command` would turn a wheel through a lift.
 ///
 /// Every turn requires both lifts to be at their bottom switches, except indexing wheel 2: it passes under
 /// lift 2, and is done while lift 1 is in its sleeve.

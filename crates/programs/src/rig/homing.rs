@@ -66,7 +66,7 @@ pub(super) struct Homing {
     step: Step,
     /// This homing has acknowledged a fault, so that the lift drives have lost their reference.
     unreferenced: bool,
-    /// It ends by bringing down what may be in the sleeve over lift 1.
+    /// Homing ends by bringing down any bottle in the sleeve over lift 1.
     fetches: bool,
     /// A wheel was off its homing sensor.
     jogged: bool,
@@ -177,7 +177,7 @@ impl Homing {
             word |= LA2_RUN;
         }
         match self.step {
-            // The same word as in step 2, so that the machine reports by that step's bit when it is done.
+            // The same word as in step 2, so that the machine reports completion by that step's bit.
             Step::Fetch => word |= LA1_RUN,
             Step::Bring => word |= LA1_RUN | LA1_CODE,
             _ => {}

@@ -141,7 +141,7 @@ impl Inputs {
         self.panel & button::LA2_BOTTOM != 0
     }
 
-    /// Lift 1 is up at the sleeve: the word of step 2 is complete, for whatever purpose it was commanded.
+    /// Lift 1 is up at the sleeve: the word of step 2 is complete, no matter why it was commanded.
     pub(super) fn fetched(self) -> bool {
         self.status & status::STEP_2 != 0
     }
@@ -168,7 +168,7 @@ pub(super) struct Outputs {
 }
 
 impl Outputs {
-    /// Writes all outputs to `%Q`; what is beyond its end is dropped.
+    /// Writes all outputs to `%Q`; bytes beyond its end are dropped.
     pub(super) fn write(self, image: &mut [u8]) {
         let [command_high, command_low] = self.command.to_be_bytes();
         let [step_high, step_low] = self.step.to_be_bytes();

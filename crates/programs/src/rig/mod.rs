@@ -36,12 +36,11 @@
 //! Limits while running: a package sensor on for 1.5 s is a jam; a step may take 5 s. The times of homing
 //! start in the scan after the one that begins the step, because timers are called once per scan.
 //!
-//! The outputs are computed anew in each scan. A suction cup that holds a bottle keeps holding it through
-//! abort and initialise, until the lifts are down. A program that was just started knows nothing about the
-//! machine, so it assumes that both cups hold a bottle. (In the rig's `driver.cfg` the fail-safe value of a
-//! cup is on as well, for the time without a program.) The logic is limited to Booleans, timers, edges and
-//! cases, so that it can be rewritten in Structured Text and compared scan by scan; `docs/ARCHITECTURE.md` tells of all its
-//! versions.
+//! The outputs are computed from scratch in each scan. A suction cup that holds a bottle keeps holding it through abort
+//! and initialise, until the lifts are down. A program that was just started knows nothing about the machine, so it
+//! assumes that both cups hold a bottle. (In the rig's `driver.cfg` the fail-safe value of a cup is on as well, for the
+//! time without a program.) The logic is limited to Booleans, timers, edges and cases, so that it can be rewritten in
+//! Structured Text and compared scan by scan; `docs/ARCHITECTURE.md` lists all its versions.
 
 use self::cycle::Cycle;
 use self::guard::{JamGuard, wheel_locked};
@@ -145,7 +144,7 @@ struct Events {
 }
 
 impl Rig {
-    /// Its name in [`program`](super::program).
+    /// The name in [`program`](super::program).
     pub const NAME: &'static str = "rig";
 
     /// The program's options.
@@ -166,8 +165,7 @@ impl Rig {
         }
     }
 
-    /// As [`new`](Self::new), with its options as text: `la1_code` is `msb-first` (the default) or
-    /// `lsb-first`.
+    /// Like [`new`](Self::new), with its options as text: `la1_code` is `msb-first` (the default) or `lsb-first`.
     ///
     /// # Errors
     ///

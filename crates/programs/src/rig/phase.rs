@@ -23,7 +23,7 @@ pub(super) enum Phase {
 }
 
 impl Phase {
-    /// Whether the homing sequence controls the outputs.
+    /// True if the homing sequence controls the outputs.
     pub(super) fn homes(self) -> bool {
         matches!(self, Self::Home | Self::Recover | Self::Finalise)
     }

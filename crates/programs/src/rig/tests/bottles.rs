@@ -1,6 +1,6 @@
-//! Where the bottles are, and what must not happen to them.
+//! The positions of the bottles, and the accidents that must not happen.
 //!
-//! Of wheel 1 only the pocket under lift 1 is modelled: each index brings a full one from the infeed.
+//! Only the pocket of wheel 1 under lift 1 is modelled: each index brings a full one from the infeed.
 
 use super::plant::{BIG, Lift, Wheel};
 
@@ -17,7 +17,7 @@ const BOTTLE: i32 = 60_000;
 /// The bottles of the cell.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Bottles {
-    /// The first thing that went wrong.
+    /// The first accident.
     pub(super) broken: Option<&'static str>,
     pocket: bool,
     /// The sleeve over lift 1, and that over lift 2.
@@ -80,7 +80,7 @@ impl Bottles {
         }
     }
 
-    /// What lift 1 collides with on its way.
+    /// Checks for collisions of lift 1 on its way.
     fn lift_1(&mut self, position: i32) {
         let before = std::mem::replace(&mut self.position, position);
         let contact = BIG - BOTTLE;

@@ -48,7 +48,7 @@ impl Seen {
         }
     }
 
-    /// Checks what must hold in every scan, for any inputs.
+    /// Checks the rules that must hold in every scan, for any inputs.
     #[track_caller]
     pub(super) fn check(self, inputs: &[u8]) {
         let on = |bits: u16| self.word & bits != 0;
@@ -108,7 +108,7 @@ fn twin(la1_code: La1Code) -> Option<HostedProgram> {
     Some(twin.unwrap_or_else(|error| panic!("{COMPILED}: {error}")))
 }
 
-/// The program, the plant, and everything observed.
+/// The program, the plant, and all observations.
 #[derive(Debug)]
 pub(super) struct Cell {
     pub(super) rig: Rig,

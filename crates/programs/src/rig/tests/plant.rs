@@ -1,7 +1,7 @@
 //! A small machine that obeys the rig's program, detailed enough to test the program.
 //!
-//! It implements the rules that matter to the program: moves start on edges, unreferenced lifts only make
-//! reference runs, faults are latched, bottles are where they were put. It is called once per scan of 10 ms.
+//! The plant implements the rules that matter to the program: moves start on edges, unreferenced lifts only make
+//! reference runs, faults are latched, bottles stay in place. One call per scan of 10 ms.
 
 use super::bottles::Bottles;
 use crate::rig::image::command::{
@@ -25,7 +25,7 @@ const MARGIN: i32 = 10_000;
 pub(super) struct Lift {
     pub(super) position: i32,
     pub(super) referenced: bool,
-    /// It is blocked, and so is its beam.
+    /// The lift is blocked, and its beam interrupted.
     pub(super) jammed: bool,
     top: i32,
     target: Option<i32>,
@@ -48,8 +48,8 @@ impl Lift {
     fn step(&mut self, by: Option<i32>, down: i32) -> bool {
         if self.at_bottom() && self.target.is_none() {
             self.referenced = true;
-            // It sinks onto its stop, as in the reference simulator when the run command drops
-            // (`LiftDrive.stop`). It could not be commanded to go there: referenced, it refuses to go down.
+            // The lift sinks onto its stop, as in the reference simulator when the run command drops
+            // (`LiftDrive.stop`). No command could send it there: a referenced lift refuses to go down.
             if !self.jammed {
                 self.position = 0;
             }
@@ -150,9 +150,9 @@ pub(super) struct Plant {
     pub(super) im1: Wheel,
     pub(super) im2: Wheel,
     pub(super) not_ok: bool,
-    /// It raises Not OK by itself when a lift is jammed.
+    /// The machine raises Not OK on its own when a lift is jammed.
     pub(super) sees_jams: bool,
-    /// It never reports a step as complete.
+    /// The machine never reports a step as complete.
     pub(super) mute: bool,
     /// The code of lift 1 comes LSB first.
     pub(super) lsb_first: bool,

@@ -1,4 +1,4 @@
-//! Whatever happens, the program stays within its bounds, and an operator can bring it home again.
+//! Under any trouble, the program stays within its bounds, and an operator can bring it home again.
 //!
 //! [`Seen::check`](super::cell::Seen::check) holds in every scan of these tests.
 
@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use super::cell::{ABORT, Cell, PARKED, RESET, START, STOP};
 use crate::rig::La1Code;
 
-/// Something that happens to a running cell.
+/// A kind of trouble in a running cell.
 #[derive(Clone, Copy, Debug)]
 enum Trouble {
     Press(u8),

@@ -8,7 +8,7 @@ use tickbus_image::signal::{Address, Addressing, Area, Width};
 pub(super) enum ParsedAddress {
     /// An address of an input or output.
     Image(Address),
-    /// Something in the PLC outside the process image, and what it is.
+    /// An address in the PLC outside the process image, with a description.
     Elsewhere(&'static str),
     /// An input or output in the wrong notation.
     Wrong(Mistake),
@@ -26,7 +26,7 @@ pub(super) fn place(text: &str, addressing: Addressing) -> ParsedAddress {
     if plain.starts_with('%') {
         plain.remove(0);
     }
-    // The peripheral access to an address is at the same place.
+    // The peripheral access to an address has the same place.
     if let Some(rest) = plain.strip_suffix(":P") {
         plain.truncate(rest.len());
     }
@@ -56,7 +56,7 @@ pub(super) fn place(text: &str, addressing: Addressing) -> ParsedAddress {
     if !elsewhere.is_empty() {
         return ParsedAddress::Elsewhere(elsewhere);
     }
-    // German mnemonics; an address without a size letter is a bit's.
+    // German mnemonics; an address without a size letter is that of a bit.
     let international = match letters.chars().next() {
         Some('E') => letters.replacen('E', "I", 1),
         Some('A') => letters.replacen('A', "Q", 1),

@@ -19,7 +19,7 @@ const SEPARATORS: [char; 3] = [';', '\t', ','];
 pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
     let mut at = 0;
     let mut separator = None;
-    // Excel's way of stating the separator.
+    // Excel's statement of the separator.
     if let Some(stated) = text.strip_prefix("sep=") {
         separator = stated.chars().next().filter(|c| SEPARATORS.contains(c));
         at = text.find('\n').map_or(text.len(), |end| end + 1);
@@ -40,8 +40,8 @@ pub(super) fn records(text: &str, wrong: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// The separator that is most frequent outside quotes; comments may contain commas. In a list of properties
-/// (`Level = holding-register:21:UINT`) an equals sign precedes any of them.
+/// The separator that is most frequent outside quotes; comments may contain commas. In a list of properties (`Level =
+/// holding-register:21:UINT`) an equals sign precedes all of them.
 fn usual(text: &str) -> char {
     let mut lines = text
         .lines()
@@ -84,7 +84,7 @@ fn usual(text: &str) -> char {
         .map_or(';', |(separator, _)| separator)
 }
 
-/// The record that begins at `start`, and where the next one begins.
+/// The record that begins at `start`, and the start of the next one.
 fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (Record, usize) {
     let mut record = Vec::new();
     let mut at = start;
@@ -124,8 +124,8 @@ fn record(text: &str, start: usize, separator: char, wrong: &Collector<'_>) -> (
     (record, end)
 }
 
-/// The record of a line whose cells are all in quotes. TIA Portal's SDF has quotation marks within them undoubled, so
-/// that only `","` separates cells.
+/// The record of a line whose cells are all in quotes. TIA Portal's SDF does not double the quotation marks within
+/// them, so only `","` separates cells.
 fn all_quoted(text: &str, start: usize, separator: char) -> Option<(Record, usize)> {
     let end = text[start..]
         .find('\n')
@@ -148,7 +148,7 @@ fn all_quoted(text: &str, start: usize, separator: char) -> Option<(Record, usiz
     (record.len() > 1).then_some((record, text.len().min(end + 1)))
 }
 
-/// A mistake: its offset, what is wrong, and what would be right.
+/// A mistake: its offset, the mistake itself, and the remedy.
 type Found = (usize, &'static str, &'static str);
 
 /// The quoted cell that begins at `start`, and the position of the separator or line end after it.

@@ -116,7 +116,7 @@ pub(super) fn codesys_mapping(records: &[Record], skipped: &Collector<'_>) -> Op
     Some(mapped.collect())
 }
 
-/// How many records are examined if there are no headings.
+/// The number of records examined if there are no headings.
 const LOOK: usize = 50;
 
 /// The columns, if one of them contains addresses.

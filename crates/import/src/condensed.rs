@@ -1,13 +1,13 @@
-//! Messages that differ only in what they quote, printed three times.
+//! Messages that differ only in their quotations, printed three times.
 
 use std::collections::HashMap;
 
 use tickbus_base::toml_text::PlacedMistake;
 
-/// How many of a kind are kept.
+/// The number of messages kept of each kind.
 const KEPT: usize = 3;
 
-/// `list` with the first three messages of each kind, the third with the number of the others.
+/// `list` with the first three messages of each kind, the third with the number of further ones.
 pub fn condensed(list: &[PlacedMistake]) -> Vec<PlacedMistake> {
     let kinds: Vec<String> = list.iter().map(kind).collect();
     let mut counts: HashMap<&str, usize> = HashMap::new();
@@ -19,7 +19,7 @@ pub fn condensed(list: &[PlacedMistake]) -> Vec<PlacedMistake> {
     for (found, kind) in list.iter().zip(&kinds) {
         let number = seen.entry(kind).or_default();
         *number += 1;
-        // A line that says that there is one more would be as long as that one.
+        // A line that announces one more message would be as long as that message.
         let more = counts[kind.as_str()].saturating_sub(KEPT);
         if *number > KEPT && more > 1 {
             continue;
@@ -33,7 +33,7 @@ pub fn condensed(list: &[PlacedMistake]) -> Vec<PlacedMistake> {
     kept
 }
 
-/// The words of a message, without what it quotes and without numbers.
+/// The words of a message, without quotations and numbers.
 fn kind(found: &PlacedMistake) -> String {
     let all = format!("{};{}", found.mistake.what, found.mistake.right);
     let outside = all.split('"').step_by(2);

@@ -5,7 +5,7 @@ use super::cells::{Cell, Record};
 /// The most elements of an array.
 const ELEMENTS: i64 = 10_000;
 
-/// Whether `text` has declarations: a line that ends a block of variables.
+/// True if `text` has declarations: a line that ends a block of variables.
 pub(super) fn has_any(text: &str) -> bool {
     text.lines().any(|line| {
         let line = line.trim().trim_end_matches(';');
@@ -13,7 +13,7 @@ pub(super) fn has_any(text: &str) -> bool {
     })
 }
 
-/// Whether `text` is a whole project in the words of the standard, as OpenPLC and Beremiz compile it.
+/// True if `text` is a whole project in the standard's notation, as OpenPLC and Beremiz compile it.
 pub(super) fn has_configuration(text: &str) -> bool {
     let mut words = text.split_whitespace();
     words.any(|word| word.eq_ignore_ascii_case("END_CONFIGURATION"))
@@ -52,7 +52,7 @@ pub(super) fn read(text: &str, from: usize, to: usize) -> Vec<Record> {
             at: from + at,
         };
         let kind = kind.split_whitespace().collect::<Vec<_>>().join(" ");
-        // The elements of an array at a fixed place are not always as long as the address says.
+        // The elements of an array at a fixed place do not always have the address's size.
         let elements = if address.ends_with('*') {
             elements(&kind)
         } else {

@@ -32,19 +32,19 @@ pub(super) struct Spots {
     pub(super) data_type: Option<DataType>,
     /// The size according to the address, if it states no type.
     pub(super) width: Width,
-    /// It is the lower or the upper half of a register, or that half's first bit.
+    /// The tag is the lower or the upper half of a register, or that half's first bit.
     pub(super) is_half: bool,
     /// The direction that the place implies; most places can be both read and written.
     pub(super) area: Option<Area>,
 }
 
-/// Whether `text` is a device address and cannot be anything else that tables contain.
+/// True if `text` is a device address and cannot be anything else that tables contain.
 pub(super) fn is_address(text: &str) -> bool {
     only(text).is_some()
 }
 
-/// The bus of an address that only one bus has. `%MW20` may belong to either, and `%IW4` may also be one of
-/// the process image.
+/// The bus of an address that only one bus has. `%MW20` may belong to either, and `%IW4` may also be in the process
+/// image.
 pub(super) fn only(text: &str) -> Option<Client> {
     let upper = text.to_ascii_uppercase();
     let bare = upper.strip_prefix('%').unwrap_or(&upper);
@@ -74,7 +74,7 @@ pub(super) fn only(text: &str) -> Option<Client> {
 ///
 /// # Errors
 ///
-/// What is wrong with it, and what would be right.
+/// The address is invalid; the message has the remedy.
 pub(super) fn spots(text: &str, client: Client) -> Result<Spots, Mistake> {
     match client {
         Client::Modbus => {
@@ -123,7 +123,7 @@ pub(super) fn module_side(target: &str) -> Option<Area> {
     is_numbered.then_some(area)
 }
 
-/// The type that KEPServer calls by this name.
+/// KEPServer's type of this name.
 pub(super) fn kepserver_type(text: &str) -> Option<DataType> {
     Some(match text.to_ascii_lowercase().as_str() {
         "boolean" => DataType::Bool,

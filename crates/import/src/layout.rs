@@ -4,8 +4,8 @@ use super::rows::Tag;
 use tickbus_base::Mistake;
 use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 
-/// Takes their addresses from the values that are wider than bits, in each area where these overlap: in the PLC each
-/// size has its own memory. Whether there was any.
+/// Removes the addresses of values wider than bits, in each area where they overlap with bits: in the PLC each size has
+/// its own memory. Returns whether there were any.
 pub(super) fn part(tags: &mut [Tag]) -> bool {
     let mut is_parted = false;
     for area in [Area::Input, Area::Output] {
@@ -34,12 +34,12 @@ pub(super) fn part(tags: &mut [Tag]) -> bool {
     is_parted
 }
 
-/// Assigns an address to each tag without one, behind those that have one: the widest first, bits last, so that no bytes
+/// Assigns an address to each tag without one, after those that have one: the widest first, bits last, so that no bytes
 /// are wasted.
 ///
 /// # Errors
 ///
-/// There is not enough room: what is wrong, and what would be right.
+/// There is not enough room; the message has the remedy.
 pub(super) fn lay(tags: &mut [Tag]) -> Result<(), Mistake> {
     // The next free bit of %I and %Q. Eight bytes are the widest value.
     let mut free = [Area::Input, Area::Output].map(|area| {

@@ -1,10 +1,9 @@
 //! Converts lists of PLC tags to a driver.cfg.
 //!
-//! [`import`] takes the bytes of a file as saved by editors and spreadsheets: a workbook (XLSX), a table as
-//! text (CSV, SDF, a list of properties), PLCopen XML, L5X, files of TwinCAT, or Structured Text. Tags of the process
-//! image keep their addresses.
-//! Clients' lists (PLC4X, KEPServer) have device addresses: these go to `[fieldbus.at]` unchanged, and image
-//! addresses are assigned to the signals. Each line that cannot be used is reported with its position.
+//! [`import`] takes the bytes of a file as saved by editors and spreadsheets: a workbook (XLSX), a table as text (CSV,
+//! SDF, a list of properties), PLCopen XML, L5X, files of TwinCAT, or Structured Text. Tags of the process image keep
+//! their addresses. Clients' lists (PLC4X, KEPServer) have device addresses: these go to `[fieldbus.at]` unchanged, and
+//! image addresses are assigned to the signals. Each unusable line is reported with its position.
 
 mod address;
 mod cells;
@@ -42,8 +41,8 @@ const LONGEST: usize = 64 << 20;
 /// How to read a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// What the numbers of addresses count; `None` for what the program counts that wrote the list, and bytes if it is
-    /// not known.
+    /// The unit of the numbers in addresses; `None` for that of the program that wrote the list, or bytes if it is
+    /// unknown.
     pub addressing: Option<Addressing>,
     /// Skip lines with mistakes instead of refusing the table.
     pub lenient: bool,
@@ -56,11 +55,11 @@ pub struct ImportOptions {
 pub struct Imported {
     /// The text of a driver.cfg in which `tickbus check` finds no mistakes.
     pub text: String,
-    /// The number of its signals.
+    /// The number of signals.
     pub signals: usize,
-    /// The number of those whose addresses import assigned, since the list has none in the process image.
+    /// The number of signals whose addresses import assigned, since the list has none in the process image.
     pub assigned: usize,
-    /// How import read the addresses, where there is a choice.
+    /// The reading of the addresses, where there is a choice.
     pub notes: Vec<String>,
     /// The lines that were left out, in line order: tags outside the process image, and lines with mistakes
     /// if those are skipped.
@@ -69,11 +68,11 @@ pub struct Imported {
 
 /// A table, and the text that its positions refer to.
 struct Sheet {
-    /// Its name in a workbook.
+    /// The name in a workbook.
     name: Option<String>,
     text: String,
     records: Vec<Record>,
-    /// Its columns, if they are known.
+    /// The columns, if known.
     columns: Option<Columns>,
 }
 
@@ -246,7 +245,7 @@ fn tags_of(
         return Err(Mistakes::of(file, mistake));
     }
     let text = write::driver_cfg(Path::new(file), &tags, world);
-    // Mistakes that only the bus can find in the addresses are reported before the file is written.
+    // Only the bus can find some mistakes in the addresses: report them before the file is written.
     if let Err(mistakes) = Config::parse("driver.cfg", &text) {
         let list = mistakes.iter().map(|found| PlacedMistake {
             place: None,
@@ -263,7 +262,7 @@ fn tags_of(
     })
 }
 
-/// What the addresses of `sheets` mean.
+/// The kind of addresses in `sheets`.
 fn world_of(
     sheets: &[Sheet],
     columns: &[Option<Columns>],
@@ -281,7 +280,7 @@ fn world_of(
     let world = if origin == Origin::Logix {
         World::Modules
     } else if origin == Origin::OpenPlc {
-        // Its levels of addresses look like a client's.
+        // These addresses with levels look like a client's.
         World::Image(image)
     } else {
         let lists = sheets.iter().zip(columns);
@@ -296,7 +295,7 @@ fn world_of(
     (image, world)
 }
 
-/// The number of tags without an address, and notes on how the others were read.
+/// The number of tags without an address, and notes on the reading of the others.
 fn unplaced(
     tags: &mut [Tag],
     reading: ImportOptions,

@@ -1,7 +1,7 @@
 //! Inputs and outputs in projects of Studio 5000: L5X, and its table of tags as CSV.
 //!
-//! Modules have structures of data, `Local:1:I` and `Drive:O`, and a project names points in them by aliases, or uses
-//! them as they are, with comments on members and bits.
+//! Modules have structures of data, `Local:1:I` and `Drive:O`. A project names points in them by aliases, or uses them
+//! directly, with comments on members and bits.
 
 use std::collections::{HashMap, HashSet};
 
@@ -23,9 +23,9 @@ struct Point {
     path: String,
     kind: String,
     at: usize,
-    /// An alias names it, as a whole.
+    /// An alias names the whole point.
     is_named: bool,
-    /// Its bits that an alias names.
+    /// The bits of the point that aliases name.
     bits: HashSet<String>,
 }
 
@@ -61,7 +61,7 @@ impl Points {
         });
     }
 
-    /// The values in `node`, which is the data called `path`, or one member or element of it.
+    /// The values in `node`, which has the data called `path`, or one member or element of these.
     fn collect(&mut self, node: Node<'_, '_>, path: &str) {
         // Depth is bounded by the XML parser, and structures of modules have three levels.
         let mut open = vec![(node, path.to_owned())];
@@ -102,7 +102,7 @@ impl Points {
         let mut ports = named(module, "Port");
         let port = ports.find(|port| port.attribute("Upstream") == Some("true"));
         let slot = port.and_then(|port| port.attribute("Address"));
-        // On a network a module has its own name, in a chassis that of the chassis and its slot.
+        // On a network a module has its own name; in a chassis, the name of the chassis and its slot.
         let is_network = port.is_some_and(|port| {
             matches!(
                 port.attribute("Type"),
@@ -146,7 +146,7 @@ impl Points {
         }
     }
 
-    /// `target` as the path of a point, or the beginning of some, or the bit of one.
+    /// `target` as the path of a point, as the start of several, or as the bit of one.
     fn resolved(&self, target: &str) -> String {
         let upper = target.to_ascii_uppercase();
         let end = upper.find('.').unwrap_or(upper.len());
@@ -184,15 +184,15 @@ impl Points {
     }
 }
 
-/// A path that ends in a bit, `….Data.3`: the path in front of it, and the bit.
+/// Splits a path that ends in a bit, `….Data.3`.
 fn bit(path: &str) -> Option<(&str, &str)> {
     let (whole, bit) = path.rsplit_once('.')?;
     let is_bit = !bit.is_empty() && bit.bytes().all(|byte| byte.is_ascii_digit());
     is_bit.then_some((whole, bit))
 }
 
-/// The points of modules in an L5X, by the names of aliases where the project has some; they have the path in the
-/// module (`Local:1:I.Data.0`) instead of an address.
+/// The points of modules in an L5X, named by aliases where the project has any; they have the path in the module
+/// (`Local:1:I.Data.0`) instead of an address.
 pub(super) fn l5x(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     let mut points = Points::default();
     for module in named(root, "Module") {
@@ -207,7 +207,7 @@ pub(super) fn l5x(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
         }
     }
     let mut records = aliases(root, &mut points, skipped);
-    // What an adapter's rack is called is that of the module in it.
+    // A comment on an adapter's rack belongs to the module in it.
     let comments: Vec<(String, String)> = points.comments.drain().collect();
     let comments: HashMap<String, String> = comments
         .into_iter()
@@ -240,7 +240,7 @@ pub(super) fn l5x(root: Node<'_, '_>, skipped: &Collector<'_>) -> Vec<Record> {
     records
 }
 
-/// The aliases of points, and of whole structures; the points they name are marked.
+/// The aliases of points, and of whole structures; marks the points that they name.
 fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> Vec<Record> {
     let (mut records, mut others) = (Vec::new(), Vec::new());
     let mut names = Names::default();
@@ -339,8 +339,8 @@ fn aliases(root: Node<'_, '_>, points: &mut Points, skipped: &Collector<'_>) -> 
     records
 }
 
-/// The type of a point whose module is not in the file, by its radix, or by the names in modules that have a structure
-/// for each point: `Local:1:I.Pt00.Data`, `Local:2:I.Ch03.Data`.
+/// The type of a point whose module is not in the file, by its radix, or by the member names of modules that have a
+/// structure per point: `Local:1:I.Pt00.Data`, `Local:2:I.Ch03.Data`.
 fn kind_by_name(path: &str, is_float: bool) -> Option<&'static str> {
     if bit(path).is_some() {
         return Some("BOOL");
@@ -359,7 +359,7 @@ fn kind_by_name(path: &str, is_float: bool) -> Option<&'static str> {
     }
 }
 
-/// The point at which a comment stands, and its type: `.PT00` and `.PT00.DATA` are one point.
+/// The point of a comment, and its type: `.PT00` and `.PT00.DATA` are one point.
 fn commented_point(operand: &str) -> Option<(String, &'static str)> {
     let kind = |member: &str| kind_by_name(&format!("I{member}"), false);
     if let Some(kind) = kind(operand) {
@@ -369,7 +369,7 @@ fn commented_point(operand: &str) -> Option<(String, &'static str)> {
     kind(&data).map(|kind| (data, kind))
 }
 
-/// Reports an alias of a structure that is not in the `file`, of which the points with a comment may be known.
+/// Reports an alias of a structure that is not in the `file`; points with a comment may be known.
 fn unknown(skipped: &Collector<'_>, at: usize, target: &str, has_points: bool, file: &str) {
     let target = shown(target);
     let what = if has_points {

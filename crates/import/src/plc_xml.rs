@@ -13,7 +13,7 @@ use tickbus_base::toml_text::{Collector, Mistakes};
 /// Files with more nodes than this are refused: no list of variables is this large.
 const NODES: u32 = 3_000_000;
 
-/// What is needed from a project.
+/// The relevant parts of a project.
 pub(super) struct Project {
     pub(super) sheet: Sheet,
     pub(super) origin: Origin,
@@ -22,11 +22,11 @@ pub(super) struct Project {
 /// The program that wrote a list, as far as its addresses depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Origin {
-    /// A table, which anything can have written.
+    /// A table, which any program can have written.
     Table,
     /// A project of CODESYS, TwinCAT or TIA Portal.
     Project,
-    /// What a project of CODESYS counts: elements.
+    /// A project of CODESYS: addresses count elements.
     Codesys,
     /// A project of OpenPLC or Beremiz: addresses count elements, and each size has its own memory.
     OpenPlc,
@@ -96,14 +96,14 @@ fn plcopen_origin(root: Node<'_, '_>) -> Origin {
 fn twincat(root: Node<'_, '_>, text: &str) -> Vec<Record> {
     let declarations = named(root, "Declaration").filter_map(|node| {
         let range = node.range();
-        // The text as it stands in the file, so that its positions are those of the file.
+        // The text as in the file, so that its positions are those of the file.
         let from = range.start + text[range.clone()].find("<![CDATA[")?;
         Some(declarations::read(text, from, range.end))
     });
     declarations.flatten().collect()
 }
 
-/// The tags of a table as TIA Portal exports it.
+/// The tags of a table exported by TIA Portal.
 fn tag_table(root: Node<'_, '_>) -> Vec<Record> {
     let tags = named(root, "Tag").map(|tag| {
         let attribute = |name: &str| tag.attribute(name).unwrap_or_default();
@@ -118,7 +118,7 @@ fn tag_table(root: Node<'_, '_>) -> Vec<Record> {
     tags.collect()
 }
 
-/// The tags of a table as TIA Portal Openness exports it.
+/// The tags of a table exported by TIA Portal Openness.
 fn openness(root: Node<'_, '_>) -> Vec<Record> {
     let tags = named(root, "SW.Tags.PlcTag").filter_map(|tag| {
         let attributes = child(tag, "AttributeList")?;

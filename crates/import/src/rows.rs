@@ -39,10 +39,10 @@ pub(super) enum World {
 pub(super) struct Image {
     /// What the numbers of addresses count.
     pub(super) addressing: Addressing,
-    /// The list is a PLC project. Its author did not write it for tickbus: variables that cannot be signals are left
+    /// The list is a PLC project, whose author did not write it for tickbus: variables that cannot be signals are left
     /// out instead of refused.
     pub(super) is_project: bool,
-    /// Values of each size have a memory of their own, as in OpenPLC: `%IX0.0` is no part of `%IW0`.
+    /// Values of each size have their own memory, as in OpenPLC: `%IX0.0` is no part of `%IW0`.
     pub(super) is_apart: bool,
 }
 
@@ -51,9 +51,9 @@ pub(super) struct Image {
 pub(super) struct Tag {
     pub(super) name: String,
     pub(super) area: Area,
-    /// Its address in the process image, once assigned.
+    /// The address in the process image, once assigned.
     pub(super) address: Option<Address>,
-    /// Its place in the device or in the PLC; empty if that is its address.
+    /// The place in the device or in the PLC; empty if that is the address.
     pub(super) at: String,
     pub(super) data_type: DataType,
     pub(super) order: ByteOrder,
@@ -63,13 +63,13 @@ pub(super) struct Tag {
     pub(super) comment: String,
 }
 
-/// What the preceding tags occupy.
+/// The names and bits of the preceding tags.
 #[derive(Default)]
 pub(super) struct Taken {
     /// Line of each name.
     names: HashMap<String, usize>,
-    /// For each bit of %I and %Q, the line of the tag that occupies it; 0 if free. Where sizes have memories of their
-    /// own, one for each size.
+    /// For each bit of %I and %Q, the line of the tag that occupies it; 0 if free. Where each size has its own memory,
+    /// one such list per size.
     bits: [[Vec<u32>; 2]; SIZES],
 }
 
@@ -136,7 +136,7 @@ struct Row<'r> {
     skipped: &'r Collector<'r>,
 }
 
-/// A tag's place, and what it implies.
+/// A tag's place and its implications.
 struct Found {
     area: Area,
     address: Option<Address>,
@@ -270,7 +270,7 @@ impl Row<'_> {
         None
     }
 
-    /// An input or output whose place another part of the PLC's project decides.
+    /// An input or output whose place another part of the PLC's project determines.
     fn unplaced(&self, cell: &Cell) -> Option<Found> {
         let Some((area, width)) = without_place(&cell.text) else {
             self.skipped.report(
@@ -447,7 +447,7 @@ impl Row<'_> {
 
     /// The type stated by an address, unless its column says otherwise.
     fn agreed(&self, stated: DataType, address: &Cell, client: Client) -> Option<DataType> {
-        // If it is not a type, it is a comment.
+        // Text that is no type is a comment.
         let column = self.cell(self.columns.kind);
         let known = column.and_then(|cell| Some((cell, self.known_type(&cell.text)?)));
         let Some((cell, other)) = known.filter(|(_, other)| *other != stated) else {
@@ -493,7 +493,7 @@ impl Row<'_> {
         })
     }
 
-    /// The type stated in its column.
+    /// The type stated in the column.
     #[expect(clippy::option_option, reason = "wrong, not stated, stated")]
     fn client_type(&self) -> Option<Option<DataType>> {
         let Some(cell) = self

@@ -67,8 +67,8 @@ pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, Mistake> {
     Ok(sheets)
 }
 
-/// A sheet as records. Its text has a line per row and a character per cell, so that positions in it are
-/// those in the sheet.
+/// A sheet as records. Its text has a line per row and a character per cell, so that positions in the text match those
+/// in the sheet.
 fn sheet(name: String, mut cells: Vec<(u32, u32, String)>) -> Sheet {
     cells.sort_by_key(|(row, column, _)| (*row, *column));
     let (mut text, mut records) = (String::new(), Vec::new());

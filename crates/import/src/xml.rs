@@ -20,7 +20,7 @@ pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, '
         .find(|child| child.is_element() && child.tag_name().name() == name)
 }
 
-/// The text within, as one line; if it is long, only the beginning.
+/// The text within a node, as one line; of a long text only the beginning.
 pub(super) fn words(node: Option<Node<'_, '_>>) -> String {
     const PIECES: usize = 1000;
     let pieces = node
@@ -34,7 +34,7 @@ pub(super) fn words(node: Option<Node<'_, '_>>) -> String {
     pieces.join(" ")
 }
 
-/// The offset of an attribute's value, or else of its element.
+/// The offset of an attribute's value, or otherwise of its element.
 pub(super) fn place(node: Node<'_, '_>, attribute: &str) -> usize {
     let attribute = node.attribute_node(attribute);
     attribute.map_or(node.range().start, |attribute| {
@@ -68,7 +68,7 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// The name of a variable; if it is taken, prefixed by the program or list that the variable is local to.
+    /// The name for a variable; if it is taken, prefixed by the program or list that the variable is local to.
     pub(super) fn give(
         &mut self,
         variable: Node<'_, '_>,

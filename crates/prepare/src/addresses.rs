@@ -1,4 +1,4 @@
-//! Whether the variables for the server have memory of their own.
+//! Checks that the server's variables have their own memory.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use super::library::Addresses;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes};
 
-/// Addresses that cannot serve, each under the name of its variable.
+/// Invalid addresses, each under the name of its variable.
 pub(crate) fn mistakes(addresses: &Addresses) -> Vec<Mistakes> {
     let mut wrong = Vec::new();
     let named = named(addresses);
@@ -38,8 +38,8 @@ fn is_same(one: &str, other: &str) -> bool {
     one.eq_ignore_ascii_case(other)
 }
 
-/// Reports an address of the program, at a byte of its file, that one of the server's variables has. Where both may share
-/// memory, a remark is returned.
+/// Reports an address of the program, at a byte of its file, that one of the server's variables also has. If both may
+/// share memory, returns a remark.
 pub(crate) fn check(
     own: &str,
     at: usize,
@@ -63,7 +63,7 @@ pub(crate) fn check(
     ))
 }
 
-/// CODESYS counts in units of the variable's own size, others count bytes.
+/// CODESYS counts in units of the variable's size, others count bytes.
 fn may_overlap(one: &str, other: &str) -> bool {
     [true, false].into_iter().any(|in_units| {
         let areas = (bits(one, in_units), bits(other, in_units));
@@ -74,7 +74,7 @@ fn may_overlap(one: &str, other: &str) -> bool {
     })
 }
 
-/// The area of an address, and its bits; `None` if it has no fixed place or one of several levels.
+/// The area of an address, and its bits; `None` if it has no fixed place, or several levels.
 fn bits(address: &str, in_units: bool) -> Option<(char, Range<u64>)> {
     let capitals = address.to_ascii_uppercase();
     let mut rest = capitals.strip_prefix('%')?.chars();

@@ -8,12 +8,12 @@ use super::code::Code;
 #[derive(Debug, Default)]
 pub(crate) struct Chart {
     pub(crate) steps: Vec<usize>,
-    /// The action and its qualifier, as a step asks for it.
+    /// The action and its qualifier in a step.
     pub(crate) associations: Vec<(usize, Option<usize>)>,
     pub(crate) transitions: Vec<Transition>,
     /// The name of an action, and its statements.
     pub(crate) actions: Vec<(usize, Range<usize>)>,
-    /// The first token that belongs to none of them.
+    /// The first token that belongs to no part of the chart.
     pub(crate) stray: Option<usize>,
 }
 
@@ -26,12 +26,12 @@ pub(crate) struct Transition {
     pub(crate) condition: Option<Range<usize>>,
 }
 
-/// Whether a body is a chart.
+/// True if a body is a chart.
 pub(crate) fn is_chart(code: &Code<'_>, body: &Range<usize>) -> bool {
     is_element(code, body.start, body.end)
 }
 
-/// Whether a step, transition or action begins here, and not a variable of such a name.
+/// True if a step, transition or action begins here, and not a variable of such a name.
 fn is_element(code: &Code<'_>, at: usize, end: usize) -> bool {
     if at >= end {
         return false;
@@ -45,7 +45,7 @@ fn is_element(code: &Code<'_>, at: usize, end: usize) -> bool {
         && code.word(at + 2) == ":"
 }
 
-/// Reads a chart. What cannot be read within its parts is passed over: a compiler refuses it.
+/// Reads a chart, skipping unreadable text within its parts, which a compiler refuses.
 pub(crate) fn chart(code: &Code<'_>, body: &Range<usize>) -> Chart {
     let mut found = Chart::default();
     let mut at = body.start;
@@ -68,7 +68,7 @@ pub(crate) fn chart(code: &Code<'_>, body: &Range<usize>) -> Chart {
             "TRANSITION" => {
                 let end = end("END_TRANSITION").unwrap_or(body.end);
                 let mut inner = at + 1..end;
-                // The := of (PRIORITY := 1) stands in brackets, and before FROM.
+                // The := of (PRIORITY := 1) is in brackets, and before FROM.
                 let from = inner.find(|at| code.is(*at, "FROM")).unwrap_or(end);
                 let assign = (from..end).find(|at| code.word(*at) == ":=");
                 let condition = assign.map(|assign| assign + 1..end);

@@ -1,4 +1,4 @@
-//! What cannot be put on virtual time.
+//! Checks for constructs that cannot be put on virtual time.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -20,19 +20,19 @@ pub(crate) struct World {
     pub(crate) types: HashSet<String>,
     /// Global variables.
     pub(crate) globals: HashSet<String>,
-    /// What the user vouches for: its pragmas read no clock, either.
+    /// The names that the user vouches for; their pragmas read no clock, either.
     pub(crate) vouched: HashSet<String>,
 }
 
 impl World {
-    /// Adds what the user vouches for.
+    /// Adds the names that the user vouches for.
     pub(crate) fn vouch<'n>(&mut self, names: impl IntoIterator<Item = &'n String>) {
         let names = names.into_iter().map(|name| name.to_uppercase());
         self.vouched.extend(names);
         self.types.extend(self.vouched.iter().cloned());
     }
 
-    /// Adds what a source declares.
+    /// Adds the declarations of a source.
     pub(crate) fn add(&mut self, code: &Code<'_>, outline: &Outline) {
         for unit in &outline.units {
             self.types.insert(code.capitals(unit.name));
@@ -49,14 +49,14 @@ impl World {
         }
     }
 
-    /// Whether a type is one of the timers that are replaced, and not one that the sources declare themselves.
+    /// True if a type is one of the timers to replace, and not declared by the sources themselves.
     pub(crate) fn is_timer(&self, name: &str) -> bool {
         let name = name.to_uppercase();
         words::TIMERS.contains(&name.as_str()) && !self.types.contains(&name)
     }
 }
 
-/// What stands between `VAR_GLOBAL` and `END_VAR`, wherever it is.
+/// The declarations between `VAR_GLOBAL` and `END_VAR`, wherever they are.
 pub(crate) fn all_globals(outline: &Outline) -> impl Iterator<Item = Range<usize>> {
     let inner = outline.configurations.iter().flat_map(|one| &one.globals);
     let sections = outline.globals.iter().chain(inner);
@@ -73,7 +73,7 @@ pub(crate) fn all_declarations(outline: &Outline) -> impl Iterator<Item = Range<
     all_globals(outline).chain(units).chain(types)
 }
 
-/// Reports what cannot be prepared in a source.
+/// Reports everything in a source that cannot be prepared.
 pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &Collector<'_>) {
     check_words(code, wrong);
     for pragma in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
@@ -102,7 +102,7 @@ pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &C
     }
 }
 
-/// Reports a pragma, at a byte of the file and in this unit, that is code of which nothing is known.
+/// Reports a pragma, at a byte of the file and in this unit, that is unknown code.
 pub(crate) fn check_pragma(
     text: &str,
     at: usize,
@@ -130,7 +130,7 @@ pub(crate) fn check_pragma(
     }
 }
 
-/// Comments within comments, and names that are taken.
+/// Reports nested comments, and reserved names.
 pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
     for token in &code.all {
         let text = &code.text[token.range()];
@@ -154,7 +154,7 @@ pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
     }
 }
 
-/// Reports addresses that the program and the server's variables both have; the remarks are about those that may be.
+/// Reports addresses that the program and the server's variables share; returns remarks about possibly shared ones.
 pub(crate) fn check_addresses(
     code: &Code<'_>,
     settings: &Addresses,
@@ -165,7 +165,7 @@ pub(crate) fn check_addresses(
         .collect()
 }
 
-/// Reports the name of a type or program, declared at a byte of the file, that variables put in have too.
+/// Reports the name of a type or program, declared at a byte of the file, that an inserted variable has too.
 pub(crate) fn check_name(name: &str, at: usize, wrong: &Collector<'_>) {
     if words::is_variable_put_in(name) {
         let what = format!("tickbus puts in a variable named {}, too", shown(name));
@@ -177,7 +177,7 @@ pub(crate) fn check_name(name: &str, at: usize, wrong: &Collector<'_>) {
     }
 }
 
-/// Reports a type, named at a byte of the file, that runs on a clock, or of which that is not known.
+/// Reports a type, named at a byte of the file, that uses a clock, or may use one.
 pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector<'_>) {
     let is_own = world.types.contains(&name.to_uppercase());
     if is_own || world.is_timer(name) || words::is_standard_type(name) {
@@ -235,7 +235,7 @@ fn check_unit(code: &Code<'_>, unit: &Unit, world: &World, wrong: &Collector<'_>
     }
 }
 
-/// Reports clocks that are read in statements, and calls of which that is not known.
+/// Reports clocks that statements read, and calls that may read one.
 pub(crate) fn check_statements(
     code: &Code<'_>,
     body: &Range<usize>,
@@ -257,7 +257,7 @@ pub(crate) fn check_statements(
         }
         let name = code.capitals(at);
         if at > body.start && code.word(at - 1) == "." {
-            // timer.TON(...) of TIA Portal; other members are blocks whose types were checked.
+            // timer.TON(...) of TIA Portal; other members are blocks, and their types were checked.
             if words::TIMERS.contains(&name.as_str()) {
                 wrong.report(
                     code.start(at),
@@ -300,7 +300,7 @@ fn reads_clock(name: &str) -> String {
     format!("{}() reads the clock of the PLC", shown(name))
 }
 
-/// Reports a call behind a dot, at `at`, whose first name is not declared here: it may be that of a library.
+/// Reports a call behind a dot, at `at`, whose first name is not declared here: it may come from a library.
 fn check_chain(
     code: &Code<'_>,
     at: usize,
@@ -359,7 +359,7 @@ pub(crate) fn check_callers(
     }
 }
 
-/// Whether the token begins an instruction in IL, or a label of one.
+/// True if the token begins an instruction in IL, or a label of one.
 fn is_instructions(code: &Code<'_>, at: usize) -> bool {
     let operand = matches!(
         code.kind(at + 1),
@@ -391,7 +391,7 @@ fn check_chart(code: &Code<'_>, unit: &Unit, chart: &Chart, wrong: &Collector<'_
                 "use the qualifier N, and a TON that the action calls",
             );
         }
-        // Charts of programs are gated; those of blocks stand still as a whole when they are not called.
+        // Charts of programs are gated; those of blocks stop as a whole when they are not called.
         if code.is_any(at, &["P", "P0", "P1"])
             && unit.kind == UnitKind::Program
             && !actions.contains(&code.capitals(*action))

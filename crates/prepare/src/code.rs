@@ -1,14 +1,14 @@
-//! The tokens of a source that mean something, and what they read.
+//! The significant tokens of a source, and their text.
 
 use super::lexer::{Kind, Token, tokens};
 use std::ops::Range;
 
-/// A source, its tokens, and those of them that are neither blanks, comments nor pragmas. Ranges and indices of the other
-/// modules count the latter.
+/// A source, its tokens, and the significant ones: those that are neither blanks, comments nor pragmas. Ranges and
+/// indices in the other modules count significant tokens.
 #[derive(Debug)]
 pub(crate) struct Code<'t> {
     pub(crate) text: &'t str,
-    /// Where the text stands in its file.
+    /// The offset of the text in its file.
     pub(crate) base: usize,
     pub(crate) all: Vec<Token>,
     pub(crate) tokens: Vec<Token>,
@@ -32,13 +32,13 @@ impl<'t> Code<'t> {
         }
     }
 
-    /// What the token reads; nothing behind the last one.
+    /// The text of the token; empty after the last one.
     pub(crate) fn word(&self, at: usize) -> &'t str {
         let token = self.tokens.get(at);
         token.map_or("", |token| &self.text[token.range()])
     }
 
-    /// As [`word`](Self::word), in capitals: names and keywords have no case.
+    /// Like [`word`](Self::word), in capitals: names and keywords ignore case.
     pub(crate) fn capitals(&self, at: usize) -> String {
         self.word(at).to_uppercase()
     }
@@ -59,7 +59,7 @@ impl<'t> Code<'t> {
         self.tokens.get(at).map(|token| token.kind)
     }
 
-    /// The byte offset of a token in the file; behind the last one the end of the part.
+    /// The byte offset of a token in the file; after the last one, the end of the part.
     pub(crate) fn start(&self, at: usize) -> usize {
         let token = self.tokens.get(at);
         self.base + token.map_or(self.text.len(), |token| token.start)
@@ -70,8 +70,8 @@ impl<'t> Code<'t> {
         self.base + token.map_or(self.text.len(), |token| token.end)
     }
 
-    /// The bytes in the file from the first to the last of these tokens, with the pragmas before and behind them; `None` if
-    /// there is neither a token nor a pragma.
+    /// The bytes in the file from the first to the last of these tokens, with the pragmas before and after them; `None`
+    /// if there is neither a token nor a pragma.
     pub(crate) fn bytes(&self, range: &Range<usize>) -> Option<Range<usize>> {
         let before = range.start.checked_sub(1);
         let start = before.map_or(self.base, |last| self.end(last)) - self.base;
@@ -103,7 +103,7 @@ impl<'t> Code<'t> {
         end
     }
 
-    /// The index of the token that opens the bracket closed at `at`; 0 if there is none.
+    /// The index of the token that opens the bracket closed at `at`; 0 if not found.
     pub(crate) fn opening(&self, at: usize) -> usize {
         let mut depth = 0_usize;
         let found = (0..=at).rev().find(|at| {

@@ -1,16 +1,16 @@
-//! Durations as PLC programs write them.
+//! Durations in the notations of PLC programs.
 
 /// The milliseconds of a literal of `TIME`, such as `T#1s500ms`, or of XML, such as `PT0.02S`.
 ///
 /// # Errors
 ///
-/// What is wrong with it.
+/// The text is no such duration; the message says why.
 pub(crate) fn milliseconds(text: &str) -> Result<u32, &'static str> {
     const UNREAD: &str = "is no duration that can be read here";
     let lower = text.trim().to_ascii_lowercase().replace('_', "");
     let known = ["t#", "time#", "lt#", "ltime#", "p"];
     let rest = known.iter().find_map(|start| lower.strip_prefix(start));
-    // Days stand before the T of an XML duration, the rest behind it.
+    // Days precede the T of an XML duration; the rest follows it.
     let mut rest = rest.ok_or(UNREAD)?.to_owned();
     if lower.starts_with('p') {
         rest = rest.replace('t', "");

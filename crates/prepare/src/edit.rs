@@ -1,20 +1,20 @@
-//! Changes of a text that can be found and taken back exactly.
+//! Changes of a text that can be found and undone exactly.
 //!
-//! What is put in stands between two marks, and the first one holds what stood there before:
+//! Inserted text is enclosed in two marks, and the first mark holds the text that was replaced:
 //!
 //! ```text
 //! beam : (*{tickbus TON*)TICKBUS_TON(*tickbus}*);
 //! ```
 //!
-//! In XML the marks are `<!--{tickbus ...-->` and `<!--tickbus}-->`. Nothing else of the text is touched. The text in a mark is
-//! encoded, since a comment in a comment ends at different places in different editors, and XML allows no `--` in one.
+//! In XML the marks are `<!--{tickbus ...-->` and `<!--tickbus}-->`. The rest of the text is unchanged. The text in a
+//! mark is encoded, since editors disagree on the end of nested comments, and XML allows no `--` in a comment.
 
 use std::fmt::Write as _;
 use std::ops::Range;
 
 use tickbus_base::Mistake;
 
-/// How the marks of a part of a text are written.
+/// The notation of the marks in a part of a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Marks {
     StructuredText,
@@ -45,21 +45,21 @@ struct Edit {
 }
 
 impl Edits {
-    /// Puts `new` in the place of what stands in `range`; ranges must not overlap. What is put in at the same place stands in
-    /// the order of the calls.
+    /// Replaces the text in `range` by `new`; ranges must not overlap. Several inserts at one place appear in the order
+    /// of the calls.
     pub(crate) fn replace(&mut self, range: Range<usize>, new: impl Into<String>, marks: Marks) {
         let new = new.into();
         self.0.push(Edit { range, new, marks });
     }
 
-    /// Puts `new` in at `at`.
+    /// Inserts `new` at `at`.
     pub(crate) fn insert(&mut self, at: usize, new: impl Into<String>, marks: Marks) {
         self.replace(at..at, new, marks);
     }
 
     /// The changed text.
     pub(crate) fn apply(mut self, text: &str) -> String {
-        // What is put in at a place stands before what replaces the text there.
+        // Text inserted at a place precedes text that replaces something there.
         self.0
             .sort_by_key(|edit| (edit.range.start, edit.range.end));
         let mut made = String::with_capacity(text.len() * 2);
@@ -84,7 +84,7 @@ impl Edits {
 
 /// The offset of the first mark in `text`, if it has any.
 pub(crate) fn marked(text: &str) -> Option<usize> {
-    // Each mark has this word: one search finds all of them, however many there are.
+    // Each mark contains this word: one search finds all of them.
     const WORD: &str = "tickbus";
     let marks = Marks::ALL.map(Marks::texts);
     let marks = marks.map(|[begin, _, second]| [begin, second]);
@@ -102,7 +102,7 @@ pub(crate) fn marked(text: &str) -> Option<usize> {
 ///
 /// # Errors
 ///
-/// The offset of a mark without its other one, or that is damaged.
+/// The offset of a damaged mark, or of one without its counterpart.
 pub(crate) fn undo(text: &str) -> Result<String, (usize, Mistake)> {
     let mut original = String::with_capacity(text.len());
     let mut at = 0;
@@ -138,7 +138,7 @@ pub(crate) fn undo(text: &str) -> Result<String, (usize, Mistake)> {
     Ok(original)
 }
 
-/// Characters that mean something in a comment of Structured Text or XML, and line ends, as `%` and two digits.
+/// Encodes line ends, and characters with a meaning in comments of Structured Text or XML, as `%` and two digits.
 fn encode(text: &str, into: &mut String) {
     for c in text.chars() {
         if c.is_ascii_control() || "%*(){}<>&-".contains(c) {
@@ -178,7 +178,7 @@ mod tests {
             "t : (*{tickbus*)a (*tickbus}*)(*{tickbus TON*)TICKBUS_TON(*tickbus}*)(*{tickbus*) (* new *)(*tickbus}*);"
         );
         assert_eq!(undo(&made), Ok("t : TON;".to_owned()));
-        // What was changed elsewhere since then stays.
+        // Other changes made since then stay.
         assert_eq!(
             undo(&made.replace("t :", "timer :")),
             Ok("timer : TON;".to_owned())

@@ -1,8 +1,8 @@
-//! Structured Text as tokens that keep every byte: their texts, one after the other, are the source.
+//! Structured Text as tokens that keep every byte: concatenated, their texts are the source.
 
 use std::ops::Range;
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Blanks and line ends.
@@ -26,7 +26,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// Whether the program would be the same without it.
+    /// True if the program would be the same without the token.
     pub(crate) fn is_trivia(self) -> bool {
         matches!(self, Self::Space | Self::Comment)
     }
@@ -102,7 +102,7 @@ fn is_space(byte: u8) -> bool {
     byte.is_ascii_whitespace() || byte == 0x0B
 }
 
-/// Letters beyond ASCII are taken for parts of names: some editors allow them.
+/// Letters beyond ASCII count as parts of names, since some editors allow them.
 fn is_name(byte: u8) -> bool {
     byte.is_ascii_alphanumeric() || byte == b'_' || byte >= 0x80
 }
@@ -120,7 +120,7 @@ fn until(text: &[u8], begin: usize, end: &[u8], kind: Kind) -> (Kind, usize) {
     }
 }
 
-/// A text in quotes, in which `$` makes the next character an ordinary one.
+/// A text in quotes, in which `$` escapes the next character.
 fn quoted(text: &[u8], quote: u8) -> (Kind, usize) {
     let mut at = 1;
     while at < text.len() {
@@ -145,7 +145,7 @@ fn number(text: &[u8]) -> usize {
     at
 }
 
-/// A literal whose type has `length` bytes and stands before a `#`.
+/// A literal whose type has `length` bytes, followed by `#`.
 fn typed(text: &[u8], length: usize) -> (Kind, usize) {
     let is_date = ["D", "DATE", "DT", "TOD", "LD", "LDT", "LTOD"]
         .iter()

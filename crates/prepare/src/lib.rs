@@ -1,17 +1,17 @@
 //! PLC programs put on virtual time, and taken off it again, byte for byte.
 //!
-//! [`prepare`] takes sources in Structured Text, or a project as `PLCopen` XML, and makes the changes by which a real PLC
-//! keeps in step with a server of virtual time: timers are replaced, an execution controller stands around each program's
-//! statements, all tasks become one, and a scheduler runs first in it. [`undo`] takes exactly these changes back.
-//! docs/virtual-time-plc.md has them from the engineer's side.
+//! [`prepare`] takes sources in Structured Text, or a project as `PLCopen` XML, and makes the changes by which a real
+//! PLC keeps in step with a server of virtual time: timers are replaced, each program's statements are wrapped in an
+//! execution controller, all tasks become one, and a scheduler runs first in it. [`undo`] reverts exactly these
+//! changes. docs/virtual-time-plc.md describes them from the engineer's side.
 //!
-//! Sources are never formatted anew: what is put in stands between marks, and what it replaced is held in them.
-//! Bytes that are not UTF-8 are read as Latin-1 and written as they were.
+//! Sources are never reformatted: inserted text is enclosed in marks, which hold the text that was replaced. Bytes that
+//! are not UTF-8 are read as Latin-1 and written back unchanged.
 //!
-//! The parsers for Structured Text on crates.io (`iecst`, `iec61131`, `ironplc-parser`, all MIT) build syntax trees, from which
-//! comments, pragmas and blanks cannot be written again, and none reads every dialect whose programs are to
-//! survive here. Only declarations, charts and the configuration have to be understood, so there is a lexer that keeps every
-//! byte, and an outline read from its tokens. XML is read with `roxmltree`, which knows where each element stands.
+//! The parsers for Structured Text on crates.io (`iecst`, `iec61131`, `ironplc-parser`, all MIT) build syntax trees,
+//! which cannot restore comments, pragmas and blanks, and none of them reads every dialect of the programs to preserve
+//! here. Only declarations, charts and the configuration have to be understood, so there is a lexer that keeps every
+//! byte, and an outline read from its tokens. XML is read with `roxmltree`, which reports the position of each element.
 
 mod addresses;
 mod chart;
@@ -46,16 +46,16 @@ pub use library::{Addresses, SOURCES};
 /// A file with a part of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
-    /// The name that messages have for it.
+    /// The name in messages.
     pub name: String,
-    /// Its contents.
+    /// The contents.
     pub bytes: Vec<u8>,
 }
 
-/// How a program is prepared.
+/// The settings for preparing a program.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
-    /// Where the variables for the server lie.
+    /// The addresses of the server's variables.
     pub addresses: Addresses,
     /// Names of types and functions of libraries that use no clock.
     pub no_clock: Vec<String>,
@@ -74,7 +74,7 @@ pub struct Prepared {
 ///
 /// # Errors
 ///
-/// What cannot be prepared, for each source in which there is something, and its place.
+/// The constructs that cannot be prepared, per source, with their positions.
 pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<Mistakes>> {
     let vouched = settings.no_clock.iter();
     let timers = vouched.filter(|name| words::TIMERS.contains(&name.to_uppercase().as_str()));
@@ -121,7 +121,7 @@ pub fn prepare(sources: &[Source], settings: &Settings) -> Result<Prepared, Vec<
     }
 }
 
-/// The changed sources, or nothing if something was reported or no source has a configuration.
+/// The changed sources; `None` if mistakes were reported, or no source has a configuration.
 fn prepared(
     texts: &[(Cow<'_, str>, Encoding)],
     settings: &Settings,
@@ -230,11 +230,11 @@ fn timer(name: &str) -> Mistake {
     )
 }
 
-/// Takes out what [`prepare`] has put in; what was changed elsewhere since then stays.
+/// Reverts the changes of [`prepare`]; other changes made since then stay.
 ///
 /// # Errors
 ///
-/// The file holds no marks, or some were damaged.
+/// The file has no marks, or damaged ones.
 pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
     let (text, encoding) = decode(&source.bytes);
     let wrong = |at, mistake| {
@@ -250,7 +250,7 @@ pub fn undo(source: &Source) -> Result<Vec<u8>, Mistakes> {
     encode(original, encoding).map_err(|mistake| Mistakes::of(&source.name, mistake))
 }
 
-/// Whether [`prepare`] has put something into a file.
+/// True if [`prepare`] has changed a file.
 pub fn is_prepared(source: &Source) -> bool {
     edit::marked(&decode(&source.bytes).0).is_some()
 }
@@ -260,16 +260,16 @@ fn nothing_to_undo() -> Mistake {
     Mistake::new("there is nothing to take out of this file", right)
 }
 
-/// The blocks of a source of ours, one of [`SOURCES`], as a file in `PLCopen` XML.
+/// The blocks of one of our [`SOURCES`] as a file in `PLCopen` XML.
 pub fn plcopen_xml(name: &str, source: &str) -> String {
     plcopen::document(name, source)
 }
 
-/// How the bytes of a source stand for characters.
+/// The encoding of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Encoding {
     Utf8,
-    /// Each byte is a character: what is no UTF-8 comes back as it was.
+    /// Each byte is a character: bytes that are no UTF-8 are written back unchanged.
     Latin1,
 }
 
@@ -281,7 +281,7 @@ fn decode(bytes: &[u8]) -> (Cow<'_, str>, Encoding) {
     (Cow::Owned(text), Encoding::Latin1)
 }
 
-/// A text whose places are those of `text`, with the line ends by which they are counted: some old editors write bare CR.
+/// A text with the same positions as `text`, with line ends for counting lines: some old editors write bare CR.
 fn with_lines(text: &str) -> Cow<'_, str> {
     if text.contains('\r') && !text.contains('\n') {
         Cow::Owned(text.replace('\r', "\n"))
@@ -294,7 +294,7 @@ fn with_lines(text: &str) -> Cow<'_, str> {
 ///
 /// # Errors
 ///
-/// Something was put into a source in Latin-1 that it cannot hold.
+/// A source in Latin-1 cannot express the inserted text.
 fn encode(text: String, encoding: Encoding) -> Result<Vec<u8>, Mistake> {
     if encoding == Encoding::Utf8 {
         return Ok(text.into_bytes());

@@ -1,4 +1,4 @@
-//! What is put into a program: the blocks of `plc/iec61131`, and the scheduler's program.
+//! The code inserted into a program: the blocks of `plc/iec61131`, and the scheduler's program.
 
 use std::fmt::Write as _;
 
@@ -29,14 +29,14 @@ pub(crate) const TASK: &str = "tickbus_cycle";
 /// A task of the original.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Signal {
-    /// The variable that says when its programs run.
+    /// The variable that signals when the task's programs run.
     pub(crate) name: String,
-    /// In milliseconds; `None`: in every step.
+    /// The interval in milliseconds; `None`: in every step.
     pub(crate) interval: Option<u32>,
 }
 
 impl Signal {
-    /// For the task called `task`, beside the signals of other tasks.
+    /// The signal of the task called `task`, next to those of other tasks.
     pub(crate) fn of_task<'s>(
         task: &str,
         interval: u32,
@@ -55,7 +55,7 @@ impl Signal {
         Self { name, interval }
     }
 
-    /// For programs without a task.
+    /// The signal of programs without a task.
     pub(crate) fn of_every_step() -> Self {
         Self {
             name: "tickbus_execute".to_owned(),
@@ -64,7 +64,8 @@ impl Signal {
     }
 }
 
-/// A name as part of another one: some editors take blanks and letters beyond ASCII, and no compiler two `_` side by side.
+/// A name as part of another one: some editors accept blanks and letters beyond ASCII, and no compiler accepts two
+/// adjacent `_`.
 fn identifier(name: &str) -> String {
     let parts = name.split(|c: char| !c.is_ascii_alphanumeric());
     let parts: Vec<&str> = parts.filter(|part| !part.is_empty()).collect();
@@ -92,7 +93,7 @@ pub(crate) fn globals(signals: &[Signal]) -> Vec<(String, &'static str, &'static
     fixed.into_iter().chain(own).collect()
 }
 
-/// Where the variables for the server lie, such as `%ID0`; `None` leaves that to the user.
+/// The addresses of the server's variables, such as `%ID0`; `None` leaves them to the user.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Addresses {
     /// `go`, a UDINT that the server writes.
@@ -101,9 +102,9 @@ pub struct Addresses {
     pub ms: Option<String>,
     /// `done`, a UDINT that the server reads.
     pub done: Option<String>,
-    /// A second copy of `go`, at the other end of what the server writes: a step begins when both agree.
+    /// A second copy of `go`, at the other end of the server's outputs: a step begins when both agree.
     pub go_end: Option<String>,
-    /// A second copy of `done`, at the other end of what the server reads.
+    /// A second copy of `done`, at the other end of the server's inputs.
     pub done_end: Option<String>,
 }
 
@@ -117,7 +118,7 @@ impl Addresses {
     }
 }
 
-/// The blocks that are needed and the scheduler's program, without comments.
+/// The required blocks and the scheduler's program, without comments.
 pub(crate) fn text(timers: &[&str], signals: &[Signal], addresses: &Addresses) -> String {
     let mut made = String::new();
     for (_, source) in SOURCES {
@@ -161,7 +162,7 @@ fn schedule(signals: &[Signal], addresses: &Addresses) -> String {
     for (name, kind, _) in globals(signals) {
         writeln!(made, "    {name} : {kind};").expect("a String takes all");
     }
-    // A section holds either variables with an address or others.
+    // A section holds either variables with an address or others, not both.
     for (name, address) in addresses.variables() {
         let at = at(address);
         write!(made, "  END_VAR\n  VAR\n    {name} {at}: UDINT;\n").expect("a String takes all");

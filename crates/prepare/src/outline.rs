@@ -1,4 +1,5 @@
-//! What a source in Structured Text declares, and where: program organisation units, types, and the configuration.
+//! The declarations of a source in Structured Text, with their positions: program organisation units, types, and the
+//! configuration.
 
 use std::ops::Range;
 
@@ -48,7 +49,7 @@ pub(crate) struct Unit {
 /// Variables from `VAR` to `END_VAR`.
 #[derive(Debug)]
 pub(crate) struct Section {
-    /// What stands between them.
+    /// The tokens in between.
     pub(crate) inner: Range<usize>,
 }
 
@@ -58,7 +59,7 @@ pub(crate) struct Configuration {
     pub(crate) start: usize,
     pub(crate) name: usize,
     pub(crate) globals: Vec<Section>,
-    /// `RESOURCE`, for each.
+    /// The keyword `RESOURCE` of each resource.
     pub(crate) resources: Vec<usize>,
     pub(crate) tasks: Vec<Task>,
     pub(crate) instances: Vec<Instance>,
@@ -68,7 +69,7 @@ pub(crate) struct Configuration {
 #[derive(Debug)]
 pub(crate) struct Task {
     pub(crate) name: usize,
-    /// All of it.
+    /// The whole statement.
     pub(crate) whole: Range<usize>,
     pub(crate) interval: Option<usize>,
     pub(crate) single: Option<usize>,
@@ -85,7 +86,7 @@ pub(crate) struct Instance {
     pub(crate) program: usize,
 }
 
-/// What a section or a `TYPE` declares.
+/// The declarations of a section or a `TYPE`.
 #[derive(Debug, Default)]
 pub(crate) struct Declared {
     pub(crate) names: Vec<usize>,
@@ -97,7 +98,7 @@ pub(crate) struct Declared {
 ///
 /// # Errors
 ///
-/// The byte offset of the first thing that cannot be read, and what is wrong with it.
+/// The byte offset of the first unreadable place, and the mistake.
 pub(crate) fn outline(code: &Code<'_>) -> Result<Outline, (usize, Mistake)> {
     let mut reader = Reader { code, at: 0 };
     if let Some(token) = endless(code) {
@@ -153,7 +154,7 @@ impl Reader<'_, '_> {
         (self.code.start(self.at), Mistake::new(what, right))
     }
 
-    /// From the keyword at hand to `end`, which is passed; what stands between.
+    /// Moves from the current keyword past `end`; returns the tokens in between.
     fn until(&mut self, end: &str) -> Result<Range<usize>, (usize, Mistake)> {
         let start = self.at;
         let found = (start..self.code.tokens.len()).find(|at| self.code.is(*at, end));
@@ -182,7 +183,7 @@ impl Reader<'_, '_> {
         self.code.is_any(self.at, SECTIONS)
     }
 
-    /// Reports what belongs to a class, or to another unit whose end is missing.
+    /// Reports parts of a class, or of another unit whose end is missing.
     fn check_body(&self, body: &Range<usize>) -> Result<(), (usize, Mistake)> {
         let code = self.code;
         // EXTENDS is no statement, and neither is a name before another one.
@@ -366,7 +367,7 @@ pub(crate) fn declared(code: &Code<'_>, inner: Range<usize>) -> Declared {
                 }
                 pending.clear();
                 at += 1;
-                // The type, up to its initial value or the end of the declaration; a STRUCT begins declarations of its own.
+                // The type, up to its initial value or the end of the declaration; a STRUCT has its own declarations.
                 while at < inner.end && !matches!(code.word(at), ":=" | ";") {
                     if matches!(code.word(at), "(" | "[") {
                         at = code.closing(at, inner.end);
@@ -396,7 +397,7 @@ pub(crate) fn declared(code: &Code<'_>, inner: Range<usize>) -> Declared {
     found
 }
 
-/// Words in the type of a declaration that name no type.
+/// Words in the type of a declaration that are no type names.
 const IN_TYPES: &[&str] = &[
     "ARRAY",
     "OF",

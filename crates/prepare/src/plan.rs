@@ -7,7 +7,7 @@ use super::library::Signal;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, shown};
 
-/// What the configuration says about when programs run.
+/// The schedule of the programs, according to the configuration.
 #[derive(Debug, Default)]
 pub(crate) struct Plan {
     pub(crate) signals: Vec<Signal>,
@@ -25,18 +25,18 @@ pub(crate) struct Named {
 }
 
 impl Named {
-    /// Names have no case.
+    /// Names ignore case.
     fn capitals(&self) -> String {
         self.text.to_uppercase()
     }
 }
 
-/// A task as the configuration states it.
+/// A task of the configuration.
 #[derive(Debug)]
 pub(crate) struct Task {
     pub(crate) name: Named,
     pub(crate) interval: Option<Named>,
-    /// Where the event stands that starts it.
+    /// The position of the event that starts the task.
     pub(crate) single: Option<usize>,
     pub(crate) priority: Option<u32>,
 }
@@ -53,7 +53,8 @@ pub(crate) fn second_resource() -> Mistake {
     Mistake::new("this is a second resource", right)
 }
 
-/// When programs run; what cannot be done is reported, and a remark returned. The configuration is at byte `start`.
+/// The schedule of the programs; reports what is impossible, and returns a remark. The configuration is at byte
+/// `start`.
 pub(crate) fn plan(
     start: usize,
     tasks: &[Task],
@@ -127,7 +128,7 @@ pub(crate) fn plan(
     (plan, note)
 }
 
-/// In one task programs run as listed: a remark where priorities said otherwise.
+/// Within one task, programs run as listed: a remark if priorities required another order.
 fn order_note(tasks: &[Task], instances: &[Instance]) -> Option<String> {
     let priority = |instance: &Instance| {
         let task = instance.task.as_ref()?.capitals();

@@ -1,7 +1,7 @@
 //! Blocks and programs in Structured Text as `PLCopen` XML (TC6, version 2).
 //!
-//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, as in what `tickbus export`
-//! writes: CODESYS, TwinCAT, Beremiz and OpenPLC Editor read it.
+//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, as in the output of
+//! `tickbus export`: CODESYS, TwinCAT, Beremiz and OpenPLC Editor read it.
 
 use std::io;
 
@@ -20,7 +20,7 @@ type Xml = Writer<Vec<u8>>;
 /// A variable: its name, address, type and initial value.
 pub(crate) type Variable<'t> = (&'t str, Option<&'t str>, &'t str, Option<&'t str>);
 
-/// A file with all function blocks and programs of a source, which must be one that [`pous`] takes.
+/// A file with all function blocks and programs of a source, which must be valid for [`pous`].
 pub(crate) fn document(name: &str, source: &str) -> String {
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     write_document(&mut xml, name, source).expect("memory takes all");
@@ -54,7 +54,7 @@ fn write_document(xml: &mut Xml, name: &str, source: &str) -> io::Result<()> {
             .with_attribute(("companyName", ""))
             .with_attribute(("productName", "tickbus"))
             .with_attribute(("productVersion", env!("CARGO_PKG_VERSION")))
-            // The schema requires a time; that of the making would make every file different.
+            // The schema requires a time; the current one would make every file different.
             .with_attribute(("creationDateTime", "2000-01-01T00:00:00"))
             .write_empty()?;
         let header = xml
@@ -92,7 +92,7 @@ fn write_document(xml: &mut Xml, name: &str, source: &str) -> io::Result<()> {
 fn write_units(xml: &mut Xml, source: &str) -> io::Result<()> {
     let code = Code::new(source);
     let read = outline(&code).expect("our own sources can be read");
-    // The comments before the first unit are about all of them.
+    // The comments before the first unit concern all of them.
     read.units
         .iter()
         .try_for_each(|unit| write_unit(xml, &code, unit))

@@ -1,4 +1,4 @@
-//! Pragmas: attributes of an editor, or code that `iec2c` copies into the C that it makes.
+//! Pragmas: attributes of an editor, or code that `iec2c` copies into its C output.
 
 use super::words;
 
@@ -6,13 +6,13 @@ use super::words;
 const ATTRIBUTES: &str = "ATTRIBUTE ANALYSIS DEFINE UNDEFINE DISABLE ENABLE ERROR EXTERNAL FLAG IF ELSIF ELSE END_IF INFO LIBRARY \
     REGION ENDREGION TEXT WARNING";
 
-/// What a pragma's code reads when it reads the PLC's clock.
+/// Names in the code of pragmas that read the PLC's clock.
 const CLOCKS: [&str; 3] = ["__CURRENT_TIME", "__tick", "common_ticktime__"];
 
 /// The functions by which OSCAT reads its clock, and how many of their units make a second.
 const OSCAT: [(&str, u64); 2] = [("T_PLC_MS", 1_000), ("T_PLC_US", 1_000_000)];
 
-/// Whether a pragma is code.
+/// True if a pragma is code.
 pub(crate) fn is_code(pragma: &str) -> bool {
     let inner = inner(pragma);
     let is_part = |c: char| c.is_alphanumeric() || c == '_';
@@ -25,12 +25,12 @@ pub(crate) fn is_code(pragma: &str) -> bool {
     reads_clock(pragma) || rest.contains([';', '=', '(', '+', '-', '*', '&', '|'])
 }
 
-/// Whether the code of a pragma reads the PLC's clock.
+/// True if the code of a pragma reads the PLC's clock.
 pub(crate) fn reads_clock(pragma: &str) -> bool {
     CLOCKS.iter().any(|clock| pragma.contains(clock))
 }
 
-/// The pragma in the place of the one by which a function of OSCAT reads the PLC's clock: it reads `tickbus_now` by the
+/// The replacement of a pragma by which a function of OSCAT reads the PLC's clock: it reads `tickbus_now` by the
 /// function that `iec2c` makes for each global variable. `None` for any other pragma.
 pub(crate) fn on_virtual_time(function: &str, pragma: &str) -> Option<String> {
     let mut clocks = OSCAT.iter();
@@ -38,7 +38,7 @@ pub(crate) fn on_virtual_time(function: &str, pragma: &str) -> Option<String> {
     if !reads_clock(pragma) {
         return None;
     }
-    // Its last statement assigns the time to a variable of the function.
+    // The last statement assigns the time to a variable of the function.
     let mut statements = inner(pragma).rsplit(';').map(str::trim);
     let (variable, _) = statements
         .find(|statement| !statement.is_empty())?
@@ -57,7 +57,7 @@ pub(crate) fn on_virtual_time(function: &str, pragma: &str) -> Option<String> {
     })
 }
 
-/// What stands between the braces.
+/// The text between the braces.
 fn inner(pragma: &str) -> &str {
     pragma.trim_start_matches('{').trim_end_matches('}').trim()
 }

@@ -16,7 +16,7 @@ use tickbus_base::toml_text::Collector;
 
 const MARKS: Marks = Marks::StructuredText;
 
-/// When the programs of a configuration run; what cannot be done is reported, and a remark returned.
+/// The schedule of a configuration's programs; reports what is impossible, and returns a remark.
 pub(crate) fn plan(
     code: &Code<'_>,
     configuration: &Configuration,
@@ -67,7 +67,7 @@ impl Preparation<'_, '_> {
             .collect()
     }
 
-    /// The prepared source; `blocks` is put in at its beginning.
+    /// The prepared source, with `blocks` inserted at its beginning.
     pub(crate) fn text(&self, blocks: Option<&str>) -> String {
         let code = self.code;
         let mut edits = Edits::default();
@@ -101,7 +101,7 @@ impl Preparation<'_, '_> {
         edits.apply(code.text)
     }
 
-    /// Puts an execution controller around the statements of a program.
+    /// Wraps the statements of a program in an execution controller.
     fn control(&self, name: usize, body: &Range<usize>, signal: &str, edits: &mut Edits) {
         let code = self.code;
         let end = code.line_end();
@@ -172,7 +172,7 @@ fn bytes(code: &Code<'_>, range: &Range<usize>) -> Range<usize> {
     code.start(range.start)..code.end(range.end - 1)
 }
 
-/// The blanks before the token in its line, if nothing else stands there.
+/// The blanks before the token in its line, if it is the first one there.
 fn indent<'t>(code: &Code<'t>, at: usize) -> &'t str {
     let before = &code.text[..code.start(at)];
     let blanks = before.trim_end_matches([' ', '\t']).len();
@@ -183,9 +183,9 @@ fn indent<'t>(code: &Code<'t>, at: usize) -> &'t str {
     }
 }
 
-/// Puts the execution controller's header and footer around statements.
+/// Adds the execution controller's header and footer to statements.
 fn wrap(code: &Code<'_>, body: &Range<usize>, signal: &str, edits: &mut Edits) {
-    // Pragmas alone are statements too, for iec2c; it takes no empty one beside them.
+    // For iec2c pragmas alone are statements too; it accepts no empty statement next to them.
     let Some(bytes) = code.bytes(body) else {
         return;
     };
@@ -194,7 +194,7 @@ fn wrap(code: &Code<'_>, body: &Range<usize>, signal: &str, edits: &mut Edits) {
     edits.insert(bytes.end, footer, MARKS);
 }
 
-/// The execution controller around what stands in these bytes of a text.
+/// The execution controller around these bytes of a text.
 pub(crate) fn header_and_footer(
     text: &str,
     bytes: &Range<usize>,

@@ -1,4 +1,4 @@
-//! Whole programs, prepared and taken back.
+//! Whole programs, prepared and undone.
 
 mod refused;
 
@@ -553,7 +553,7 @@ fn every_program_of_this_project_is_prepared_and_taken_back() {
         }
     }
     refused.sort();
-    // The blocks themselves, and programs that use them already.
+    // The blocks themselves, and programs that already use them.
     let right = [
         "action_control.st",
         "bench.st",
@@ -565,7 +565,7 @@ fn every_program_of_this_project_is_prepared_and_taken_back() {
     assert_eq!(refused, right);
 }
 
-/// Pieces of which soups and programs are made.
+/// Pieces of random texts and programs.
 fn pieces() -> impl Strategy<Value = String> {
     let words = [
         "PROGRAM",

@@ -1,4 +1,4 @@
-//! Names that IEC 61131-3 gives a meaning, and names of what reads a clock.
+//! Names that IEC 61131-3 gives a meaning, and names that read a clock.
 
 /// The timers that have a replacement on virtual time.
 pub(crate) const TIMERS: [&str; 4] = ["TON", "TOF", "TP", "RTC"];
@@ -6,7 +6,7 @@ pub(crate) const TIMERS: [&str; 4] = ["TON", "TOF", "TP", "RTC"];
 /// Prefix of the replacements.
 pub(crate) const PREFIX: &str = "TICKBUS_";
 
-/// Whether a name is reserved for what is put in. Others begin with the same prefix: `tickbus export` makes them.
+/// True if a name is reserved for inserted code. Other names begin with the same prefix: `tickbus export` makes them.
 pub(crate) fn is_put_in(name: &str) -> bool {
     let name = name.to_ascii_uppercase();
     let Some(rest) = name.strip_prefix(PREFIX) else {
@@ -16,7 +16,7 @@ pub(crate) fn is_put_in(name: &str) -> bool {
     is_in(own, rest) || rest.starts_with("EXECUTE_") || TIMERS.contains(&rest)
 }
 
-/// Whether a name is one of the variables that are put in: no type or program of that name can stand beside them.
+/// True if a name is one of the inserted variables: no type or program can have that name, too.
 pub(crate) fn is_variable_put_in(name: &str) -> bool {
     is_in(
         "HANDSHAKE GO MS DONE GO_END DONE_END SIMULATED STEPPING NOW",
@@ -27,8 +27,8 @@ pub(crate) fn is_variable_put_in(name: &str) -> bool {
 const TYPES: &str = "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME LTIME DATE LDATE TOD \
     TIME_OF_DAY LTOD DT DATE_AND_TIME LDT STRING WSTRING CHAR WCHAR ANY";
 
-/// Blocks of the standard, of iec2c's library and of CODESYS' that use no clock. Those of closed-loop control take their
-/// cycle as an input.
+/// Blocks of the standard, of iec2c's library and of CODESYS' that use no clock. Those for closed-loop control get
+/// their cycle as an input.
 const BLOCKS: &str = "R_TRIG F_TRIG SR RS SEMA CTU CTD CTUD CTU_DINT CTU_LINT CTU_UDINT CTU_ULINT CTD_DINT CTD_LINT CTD_UDINT \
     CTD_ULINT CTUD_DINT CTUD_LINT CTUD_UDINT CTUD_ULINT DERIVATIVE INTEGRAL HYSTERESIS RAMP";
 
@@ -37,16 +37,16 @@ const FUNCTIONS: &str = "ABS SQRT LN LOG EXP SIN COS TAN ASIN ACOS ATAN ATAN2 EX
     ADD_TIME SUB_TIME MULTIME MUL_TIME DIVTIME DIV_TIME ADD_TOD_TIME ADD_DT_TIME SUB_DATE_DATE SUB_TOD_TIME SUB_TOD_TOD \
     SUB_DT_TIME SUB_DT_DT CONCAT_DATE_TOD DATE_AND_TIME_TO_TIME_OF_DAY DATE_AND_TIME_TO_DATE ADR SIZEOF REF";
 
-/// Words before which no call begins, but an expression in brackets.
+/// Words that precede no call, but an expression in brackets.
 const KEYWORDS: &str = "IF ELSIF ELSE WHILE UNTIL REPEAT CASE OF AND OR XOR NOT MOD TO BY DO THEN RETURN EXIT CONTINUE FOR AND_THEN \
     OR_ELSE";
 
-/// Functions and types of vendors that read a clock of their own.
+/// Functions and types of vendors that read their own clock.
 const CLOCKS: &str = "TIME LTIME TIME_TCK RD_SYS_T WR_SYS_T RD_LOC_T SYSTIMEGETMS SYSTIMEGETUS SYSTIMEGETNS SYSTIMERTCGET GETSYSTEMTIME \
     GETTASKTIME F_GETSYSTEMTIME RUNTIME T_READ TONR TOFR LTON LTOF LTP TON_TIME TOF_TIME TP_TIME TONR_TIME TON_LTIME TOF_LTIME \
     TP_LTIME TONR_LTIME IEC_TIMER IEC_LTIMER S_ODT S_ODTS S_OFFDT S_PULSE S_PEXT BLINK GEN PID PD PID_FIXCYCLE FREQ_MEASURE";
 
-/// Whether a list has a name, in any case.
+/// True if a list has a name, in any case.
 pub(crate) fn is_in(list: &str, name: &str) -> bool {
     list.split_ascii_whitespace()
         .any(|one| one.eq_ignore_ascii_case(name))
@@ -56,12 +56,12 @@ pub(crate) fn is_elementary(name: &str) -> bool {
     is_in(TYPES, name)
 }
 
-/// Whether a type of this name is of the standard and uses no clock.
+/// True if a type of this name is in the standard and uses no clock.
 pub(crate) fn is_standard_type(name: &str) -> bool {
     is_elementary(name) || is_in(BLOCKS, name)
 }
 
-/// Whether a function of this name is of the standard, or converts between elementary types.
+/// True if a function of this name is in the standard, or converts between elementary types.
 pub(crate) fn is_standard_function(name: &str) -> bool {
     let name = name.to_ascii_uppercase();
     let is_value = |name: &str| is_elementary(name) || matches!(name, "BCD" | "STR");
@@ -76,7 +76,7 @@ pub(crate) fn is_keyword(name: &str) -> bool {
     is_in(KEYWORDS, name)
 }
 
-/// Whether something of this name reads a clock, in the library of one vendor or another.
+/// True if this name reads a clock in the library of any vendor.
 pub(crate) fn is_clock(name: &str) -> bool {
     is_in(CLOCKS, name)
 }

@@ -30,14 +30,14 @@ use tickbus_base::toml_text::{Collector, shown};
 /// Files with more nodes than this are refused: no project is this large.
 const NODES: u32 = 10_000_000;
 
-/// Whether a source is XML.
+/// True if a source is XML.
 pub(crate) fn is_xml(text: &str) -> bool {
     text.trim_start_matches('\u{FEFF}')
         .trim_start()
         .starts_with('<')
 }
 
-/// The prepared project and remarks, or nothing if something was reported.
+/// The prepared project and remarks; `None` if mistakes were reported.
 pub(crate) fn prepare(
     text: &str,
     settings: &Settings,
@@ -106,7 +106,7 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         for list in self.named("globalVars") {
             world.globals.extend(variable_names(list));
-            // CODESYS calls its lists by their names.
+            // CODESYS refers to its lists by their names.
             world
                 .globals
                 .extend(list.attribute("name").map(str::to_uppercase));
@@ -219,7 +219,8 @@ impl<'a, 'i> Project<'a, 'i> {
         found
     }
 
-    /// The text of statements with blanks in the place of markup, so that each byte stays where it is; and where it begins.
+    /// The text of statements with blanks in place of markup, so that each byte keeps its position; and the start of
+    /// that text.
     fn masked(&self, statements: Node<'a, 'i>) -> Option<(String, usize)> {
         let texts = || statements.descendants().filter(Node::is_text);
         let holders: BTreeSet<_> = texts()
@@ -351,7 +352,7 @@ impl<'a, 'i> Project<'a, 'i> {
         let unit = bodies.iter().find(|body| signal(body.unit, plan).is_some());
         let holder = unit.and_then(|body| body.unit.parent());
         if let Some(data) = holder.filter(|holder| holder.tag_name().name() == "data") {
-            // CODESYS keeps each unit in an extension of its own, among those of an application.
+            // CODESYS keeps each unit in a separate extension, among those of an application.
             let start = &self.text[data.range().start..];
             let tag = &start[..start.find("<pou")?];
             let blocks = blocks
@@ -365,7 +366,7 @@ impl<'a, 'i> Project<'a, 'i> {
         Some(edits.apply(self.text))
     }
 
-    /// Puts an execution controller around the statements of a program that a task runs.
+    /// Wraps the statements of a program that a task runs in an execution controller.
     fn control(&self, body: &Body<'a, 'i>, plan: &Plan, edits: &mut Edits) -> Option<()> {
         let unit = body.unit;
         let Some(signal) = signal(unit, plan) else {
@@ -393,7 +394,7 @@ impl<'a, 'i> Project<'a, 'i> {
             children.filter(move |node| node.tag_name().name() == name)
         };
         let (tasks, alone): (Vec<_>, Vec<_>) = (is("task").collect(), is("pouInstance").collect());
-        // Durations are written as the project has them.
+        // Durations are written in the project's notation.
         let first = tasks.first().and_then(|task| task.attribute("interval"));
         let interval = if first.is_some_and(|interval| interval.starts_with('P')) {
             format!("PT{}.{:03}S", plan.cycle / 1000, plan.cycle % 1000)
@@ -447,7 +448,7 @@ impl<'a, 'i> Project<'a, 'i> {
         text.replace('\n', line_end(self.text))
     }
 
-    /// Puts XML in as the first content of an element.
+    /// Inserts XML as the first content of an element.
     fn insert_first(&self, node: Node<'a, 'i>, new: &str, edits: &mut Edits) -> Option<()> {
         let end = line_end(self.text);
         let new = format!("{end}{}{end}", self.lines(new));
@@ -463,7 +464,7 @@ impl<'a, 'i> Project<'a, 'i> {
     }
 }
 
-/// Elements called `name` within, in any namespace: versions of `PLCopen` XML differ only in that.
+/// Elements called `name` within a node, in any namespace: versions of `PLCopen` XML differ only in that.
 fn named<'a, 'i>(
     node: Node<'a, 'i>,
     name: &'static str,
@@ -524,7 +525,7 @@ fn inner(text: &str, node: Node<'_, '_>) -> Option<Range<usize>> {
     (start <= end && text.as_bytes()[start - 2] != b'/').then_some(start..end)
 }
 
-/// A file that holds XML beside others.
+/// A file in XML together with other files.
 pub(crate) fn not_alone() -> Mistake {
     let right = "prepare a project in XML by itself";
     Mistake::new("this is XML beside other sources", right)

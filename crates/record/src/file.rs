@@ -50,7 +50,7 @@ impl Target for SimulatedFile {
 pub(super) struct Out {
     target: Box<dyn Target>,
     pending: Vec<u8>,
-    /// Where ticks end in `pending`, each with the number of ticks in the file up to there.
+    /// The ends of ticks in `pending`, each with the number of ticks in the file up to there.
     ends: Vec<(usize, u64)>,
     /// Bytes in the file, and ticks.
     length: u64,

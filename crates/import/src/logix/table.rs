@@ -19,7 +19,7 @@ const HEADINGS: [&str; 6] = [
 ];
 
 /// The points in a table of tags that Studio 5000 exported as CSV: aliases of points, and points with a comment. `None`
-/// for another table.
+/// for any other table.
 pub(crate) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<Record>> {
     let is_heading = |record: &Record| {
         let cells = record.iter().map(|cell| cell.text.as_str());
@@ -28,10 +28,10 @@ pub(crate) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<R
     let first = 1 + records.iter().take(50).position(is_heading)?;
     let mut points = Vec::new();
     let mut seen = HashSet::new();
-    // Aliases of structures, by their names: the target, where it stands, and whether a point of it was found.
+    // Aliases of structures, by their names: the target, its cell, and true if a point of it was found.
     let mut wholes: Vec<(String, &Cell, bool)> = Vec::new();
     let mut by_name = HashMap::new();
-    // An alias gives a better name than the comment of the point.
+    // An alias is a better name than the comment of the point.
     for wanted in ["ALIAS", "COMMENT"] {
         for record in &records[first..] {
             let [of, scope, name, comment, kind, path] = HEADINGS_AT.map(|index| record.get(index));
@@ -48,7 +48,7 @@ pub(crate) fn table(records: &[Record], skipped: &Collector<'_>) -> Option<Vec<R
             let comment = unescaped(comment.map_or("", |comment| comment.text.as_str()));
             let at = [name.at, path.at, path.at, path.at];
             if device::module_side(&path.text).is_none() {
-                // Of a member of an alias the path begins with the name of the alias.
+                // The path of an alias' member begins with the name of the alias.
                 let whole = by_name.get(&called.to_ascii_uppercase());
                 if wanted == "COMMENT"
                     && let Some((target, _, has_points)) =

@@ -148,7 +148,7 @@ fn a_program_of_a_task_has_no_other_caller() {
         "line.st:3:9: two is called here, and a task runs it too; call it or give it a task",
     );
     refused(&saying("Two.act();"), "line.st:3:1: Two is called here");
-    // A variable of that name is something else.
+    // A variable of that name is a different thing.
     let block = "FUNCTION_BLOCK Own VAR n : INT; END_VAR n := 1; END_FUNCTION_BLOCK\n";
     let text = block.to_owned() + &line("VAR two : Own; END_VAR", "two();");
     super::prepared_text(&text, &super::Settings::default());

@@ -1,10 +1,10 @@
 //! Statements in XML as Structured Text.
 
-/// Text of XML with references and markup as characters and blanks, byte for byte in their places.
+/// Text of XML with references and markup replaced by characters and blanks, so that every byte keeps its position.
 ///
 /// # Errors
 ///
-/// The place of a reference to a character that may stand in a word or belong to a symbol: blanks beside it would part them.
+/// The position of a reference to a character that may be part of a word or symbol: blanks next to it would split them.
 pub(super) fn mask(raw: &str) -> Result<String, usize> {
     const MARKUP: [(&str, &str); 7] = [
         ("<![CDATA[", ""),
@@ -40,7 +40,7 @@ pub(super) fn mask(raw: &str) -> Result<String, usize> {
     Ok(masked)
 }
 
-/// What `&#39;` or `&#x27;` stands for, if no other character can change what it means.
+/// The character of `&#39;` or `&#x27;`, if no other character can change its meaning.
 fn referenced(reference: &str) -> Option<char> {
     let number = reference.strip_prefix("&#")?.strip_suffix(';')?;
     let code = match number.strip_prefix('x') {

@@ -1,4 +1,4 @@
-//! Projects as XML, prepared and taken back; and our own blocks as XML.
+//! Projects as XML, prepared and undone; and our own blocks as XML.
 
 use std::path::Path;
 
@@ -360,7 +360,7 @@ fn what_cannot_be_prepared_of_statements_is_told() {
 }
 
 proptest! {
-    /// Pieces are taken out of the project and put in elsewhere.
+    /// Pieces are removed from the project and inserted elsewhere.
     #[test]
     fn no_damage_to_a_project_makes_it_panic(
         damage in proptest::collection::vec((0_usize..3000, 0_usize..80, 0_usize..3000), 1..4),
@@ -383,7 +383,7 @@ proptest! {
     }
 }
 
-/// `TICKBUS_UPDATE=1` writes them anew.
+/// `TICKBUS_UPDATE=1` rewrites the files.
 #[test]
 fn our_blocks_as_xml_are_made_from_their_sources() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../plc/iec61131");

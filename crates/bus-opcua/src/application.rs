@@ -1,4 +1,4 @@
-//! Checks whose certificate it is: the ApplicationUri must be among its alternative names.
+//! Checks the owner of a certificate: the ApplicationUri must be among its alternative names.
 
 use opcua::crypto::X509;
 use x509_cert::Certificate;
@@ -11,7 +11,7 @@ use x509_cert::ext::pkix::name::GeneralName;
 ///
 /// # Errors
 ///
-/// The application that it belongs to instead.
+/// The application that the certificate belongs to instead.
 pub(super) fn check(certificate: &X509, uri: &str) -> Result<(), String> {
     let der = certificate
         .to_der()

@@ -1,15 +1,15 @@
-//! Looks at a line that tasks read, and not the bus itself.
+//! Looks at a line that tasks read instead of the bus itself.
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Port;
 
-/// When a bus looked at what its tasks have read.
+/// The times when a bus looked at its tasks' input.
 ///
-/// If the process was suspended, the tasks run only after the bus has looked, and need several turns for all that waited.
-/// So what they hand in shortly after a late look counts as having waited, too.
+/// If the process was suspended, the tasks run only after the bus has looked, and need several turns for all the
+/// waiting input. So input that they pass on shortly after a late look counts as having waited, too.
 #[derive(Debug)]
 pub(super) struct TaskLooks {
-    /// Until then the tasks may hand in what waited.
+    /// Until this time the tasks may pass on waiting input.
     until: Nanos,
 }
 
@@ -21,7 +21,7 @@ impl TaskLooks {
         }
     }
 
-    /// The bus looks at `now`. Returns whether what it finds may have waited while the process stood still.
+    /// The bus looks at `now`. Returns whether its input may have waited while the process stood still.
     pub(super) fn look(&mut self, port: &mut Port, now: Nanos) -> bool {
         let due = port.next_look();
         port.look_at_line(now);
@@ -35,7 +35,7 @@ impl TaskLooks {
     /// The same for a look that was due, and for the one that follows.
     fn has_waited(&mut self, due: Nanos, now: Nanos, next: Nanos) -> bool {
         let rest = next - now;
-        // As the port has it: threads are woken a little late all the time.
+        // The same rule as the port's: threads often wake a little late.
         if now - due > rest {
             self.until = next;
         }

@@ -26,7 +26,7 @@ const ADDRESS: Address = Address::local(super::url::PORT);
 pub struct ClientOptions {
     /// The server.
     pub url: Url,
-    /// How messages are protected.
+    /// The protection of messages.
     pub security: Policy,
     /// Certificates and login.
     pub credentials: Credentials,
@@ -47,9 +47,9 @@ pub struct ClientOptions {
 /// The node of one signal.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Node {
-    /// Its name.
+    /// The name.
     pub name: NodeName,
-    /// Its offset in the text.
+    /// The offset in the text.
     at: usize,
 }
 
@@ -64,9 +64,9 @@ pub struct ServerOptions {
     pub security: Vec<Policy>,
     /// Certificates, and the user that may log in.
     pub credentials: Credentials,
-    /// Whether anonymous logins are permitted.
+    /// True if anonymous logins are permitted.
     pub anonymous: bool,
-    /// Whether a client is refused that writes what another one has written lately.
+    /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
 }
 
@@ -204,7 +204,7 @@ impl ClientOptions {
         }
     }
 
-    /// Reports nodes of signals that do not exist, and nodes shared by several signals.
+    /// Reports nodes for signals that do not exist, and nodes shared by several signals.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let names: Vec<&str> = table.signals.iter().map(|signal| &*signal.name).collect();
         for (name, node) in &self.nodes {
@@ -314,11 +314,11 @@ impl ServerOptions {
     }
 }
 
-/// A host as clients write it into a URL: brackets around an IPv6 address.
+/// A host in the notation of URLs: brackets around an IPv6 address.
 fn read_host(value: &Value<'_>) -> Option<String> {
     let right = "write this computer's address, such as \"192.168.0.5\", or a name that every client can look up";
     let text = value.text(right)?;
-    // With a port appended it must be an address.
+    // The text with a port appended must be an address.
     match format!("{text}:{}", super::url::PORT).parse::<Address>() {
         Ok(Address {
             host: Host::Ip(ip), ..
@@ -334,7 +334,7 @@ fn read_host(value: &Value<'_>) -> Option<String> {
     }
 }
 
-/// How messages are, or may be, protected, as text.
+/// The required or permitted protection of messages, as text.
 fn protection(policies: &[Policy], mode: Mode) -> String {
     let names: Vec<String> = (policies.iter())
         .map(|policy| match policy {

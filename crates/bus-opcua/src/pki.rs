@@ -46,7 +46,7 @@ pub(super) struct Pki {
     /// The application URI, for programs.
     pub(super) uri: String,
     pub(super) trust: Trust,
-    /// A host that the driver's certificate names as well.
+    /// An additional host that the driver's certificate names.
     pub(super) host: Option<String>,
     /// The clock against which certificates are checked.
     pub(super) wall: WallClock,
@@ -72,11 +72,11 @@ impl Pki {
         }
     }
 
-    /// Creates what is missing: the folders, the driver's certificate and its key.
+    /// Creates missing parts: the folders, the driver's certificate and its key.
     ///
     /// # Errors
     ///
-    /// They cannot be created, or the existing certificate is another application's or has expired.
+    /// They cannot be created, or the existing certificate belongs to another application or has expired.
     pub(super) fn prepare(&self) -> Result<(), BusError> {
         let cannot = |error: io::Error| {
             let folder = self.folder.display();
@@ -141,11 +141,11 @@ impl Pki {
         )))
     }
 
-    /// Checks whether the certificate of the server `uri` is trusted.
+    /// Checks that the certificate of the server `uri` is trusted.
     ///
     /// # Errors
     ///
-    /// It is not: why, and what to do.
+    /// The certificate is not trusted: the reason, and the remedy.
     pub(super) fn judge(
         &self,
         certificate: &ByteString,
@@ -161,7 +161,7 @@ impl Pki {
         };
         let mut store = CertificateStore::new(&self.folder);
         store.set_trust_unknown_certs(self.trust == Trust::Any);
-        // Only the file itself is compared: that it was put there says more than the names in it.
+        // Compare only the file itself: its place in the folder is more significant than the names in it.
         store.set_skip_verify_certs(true);
         let policy = security_policy(policy);
         let name = CertificateStore::cert_file_name(&certificate);

@@ -1,4 +1,4 @@
-//! An async runtime without a thread of its own: a bus thread runs it whenever it waits.
+//! An async runtime without its own thread: a bus thread runs it while waiting.
 
 use std::pin::pin;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,12 +10,12 @@ use tokio::sync::Notify;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::BusError;
 
-/// Runs tasks on the thread of its bus while that waits for its deadline, its [`Stop`] or news.
+/// Runs tasks on the thread of its bus while the bus waits for its deadline, its [`Stop`] or news.
 ///
-/// Deadlines are on the driver's clock. The tasks themselves wait in real time, such as for time-outs of OPC
-/// UA: no clock can be injected into that crate.
+/// Deadlines are on the driver's clock. The tasks themselves wait in real time, such as for time-outs of OPC UA: that
+/// crate accepts no injected clock.
 ///
-/// While it exists it is the waker of its token.
+/// The reactor is the waker of its token as long as it exists.
 #[derive(Debug)]
 pub(super) struct Reactor {
     /// `Some` until it is dropped.
@@ -24,10 +24,10 @@ pub(super) struct Reactor {
     stop: Stop,
 }
 
-/// How driving a future ended.
+/// The outcome of driving a future.
 #[derive(Debug)]
 pub(super) enum Driven<T> {
-    /// It is complete.
+    /// The future is complete.
     Done(T),
     /// The deadline came first.
     Late,
@@ -87,12 +87,12 @@ impl Reactor {
 
     /// Starts a task that runs during waits.
     pub(super) fn spawn(&self, task: impl Future<Output = ()> + Send + 'static) {
-        // Not awaited: it ends with the runtime at the latest.
+        // Not awaited: the task ends with the runtime at the latest.
         drop(self.runtime().spawn(task));
     }
 
-    /// Waits until `deadline` has come on `clock`, news have arrived, or the token is stopped or woken. It
-    /// may return early.
+    /// Waits until `deadline` has come on `clock`, news have arrived, or the token is stopped or woken. May return
+    /// early.
     pub(super) fn wait(&self, clock: &dyn Clock, deadline: Nanos) {
         clock.wait_with(deadline, &self.stop, &mut |patience| {
             let patience = self.patience(patience);
@@ -132,10 +132,10 @@ impl Reactor {
         }
     }
 
-    /// Runs `future` to close something, in real time and with a limit: the driver's clock may stand still.
+    /// Runs `future` to close something, in real time and with a limit, since the driver's clock may stand still.
     pub(super) fn farewell(&self, limit: Duration, future: impl Future) {
         self.runtime().block_on(async {
-            // A peer that does not answer is not waited for any longer.
+            // Do not wait any longer for a peer that does not answer.
             let _ = tokio::time::timeout(limit, future).await;
         });
     }
@@ -163,7 +163,7 @@ impl Drop for Reactor {
     fn drop(&mut self) {
         self.stop.set_waker(None);
         if let Some(runtime) = self.runtime.take() {
-            // Does not wait: tasks are dropped where they are.
+            // Does not wait: drops the tasks.
             runtime.shutdown_background();
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// How many certificates the folder keeps: a peer can present new ones without limit, before any login.
+/// The number of certificates that the folder keeps: a peer can present new ones without limit, before any login.
 const KEPT: usize = 50;
 
 /// The folder as of the last look.
@@ -24,7 +24,7 @@ pub(super) struct Found {
 }
 
 impl Rejects {
-    /// The folder as it is, after removing surplus certificates.
+    /// The current folder, after removing surplus certificates.
     pub(super) fn new(folder: PathBuf) -> Self {
         let mut rejects = Self {
             folder,

@@ -11,10 +11,10 @@ const TEXT_LIMIT: usize = 1000;
 /// The default folder of certificates.
 const PKI: &str = "pki";
 
-/// How messages are encrypted and signed.
+/// The encryption and signing of messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Policy {
-    /// Not at all.
+    /// No encryption or signing.
     None,
     /// `Basic256Sha256`: supported by nearly every server.
     Basic256Sha256,
@@ -40,7 +40,7 @@ impl Policy {
         Self::Aes256Sha256RsaPss,
     ];
 
-    /// Its name in OPC UA.
+    /// The name in OPC UA.
     pub fn name(self) -> &'static str {
         let mut names = Self::NAMES.iter();
         names
@@ -65,7 +65,7 @@ impl Mode {
         ("SignAndEncrypt", Self::SignAndEncrypt),
     ];
 
-    /// Its name in OPC UA.
+    /// The name in OPC UA.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Sign => "Sign",
@@ -74,26 +74,26 @@ impl Mode {
     }
 }
 
-/// Which certificates are trusted.
+/// The certificates to trust.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Trust {
-    /// Those in the folder `trusted`.
+    /// Certificates in the folder `trusted`.
     #[default]
     Listed,
-    /// All; each is stored in the folder `trusted`.
+    /// All certificates; each is stored in the folder `trusted`.
     Any,
 }
 
-/// A user, and where to find the password.
+/// A user, and the source of the password.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Login {
     /// The user's name.
     pub user: String,
-    /// Where to find the password.
+    /// The source of the password.
     pub password: Secret,
 }
 
-/// Where to find a password.
+/// The source of a password.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Secret {
     /// In the first line of a file; relative to the folder of the driver.cfg.
@@ -116,7 +116,7 @@ impl std::fmt::Debug for Secret {
 }
 
 impl Credentials {
-    /// The files that are named: certificates and keys, if messages are protected by one of `policies`, and passwords.
+    /// The named files: certificates and keys, if messages are protected by one of `policies`, and passwords.
     pub(super) fn files(&self, policies: &[Policy]) -> Vec<NamedFile> {
         let protected = policies.iter().any(|policy| *policy != Policy::None);
         let password = self.login.as_ref().and_then(|login| match &login.password {
@@ -129,7 +129,7 @@ impl Credentials {
     }
 }
 
-/// The keys that both ends have, as written in the driver.cfg.
+/// The keys of both ends, as written in the driver.cfg.
 pub(super) struct Keys<'a> {
     pub(super) security: Option<Value<'a>>,
     mode: Option<Value<'a>>,
@@ -146,13 +146,13 @@ struct Reported;
 /// The values of those keys.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Credentials {
-    /// The mode of messages that are protected.
+    /// The mode of protected messages.
     pub mode: Mode,
     /// The user, if there is one.
     pub login: Option<Login>,
     /// The folder of certificates; relative to the folder of the driver.cfg.
     pub pki: PathBuf,
-    /// Which certificates are trusted.
+    /// The certificates to trust.
     pub trust: Trust,
 }
 
@@ -171,7 +171,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// Whether a user is named, with or without mistakes.
+    /// True if a user is named, with or without mistakes.
     pub(super) fn has_user(&self) -> bool {
         self.user.is_some()
     }

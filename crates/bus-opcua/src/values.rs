@@ -1,4 +1,4 @@
-//! Converts between the bits of signals and OPC UA values, which are raw ones, without scale.
+//! Converts between the bits of signals and OPC UA values, which are raw values without scale.
 
 use opcua::types::{DataTypeId, Variant, VariantScalarTypeId};
 

@@ -4,8 +4,8 @@ use super::rows::Tag;
 use tickbus_base::Mistake;
 use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 
-/// Removes the addresses of values wider than bits, in each area where they overlap with bits: in the PLC each size has
-/// its own memory. Returns whether there were any.
+/// Removes the addresses of values wider than bits, in each area where addresses overlap: in the PLC each size has its
+/// own memory. Returns whether there were any.
 pub(super) fn part(tags: &mut [Tag]) -> bool {
     let mut is_parted = false;
     for area in [Area::Input, Area::Output] {

@@ -37,7 +37,7 @@ pub(super) enum World {
 /// How the addresses of a process image are read.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Image {
-    /// What the numbers of addresses count.
+    /// The unit of the numbers in addresses.
     pub(super) addressing: Addressing,
     /// The list is a PLC project, whose author did not write it for tickbus: variables that cannot be signals are left
     /// out instead of refused.

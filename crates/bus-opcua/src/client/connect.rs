@@ -44,10 +44,10 @@ pub(super) fn client(options: &ClientOptions, pki: &Pki, max_age: Nanos) -> Clie
         .pki_dir(folder)
         .certificate_path(&pki.certificate)
         .private_key_path(&pki.key)
-        // Checked before a session is opened, with helpful messages.
+        // The bus checks them before a session is opened, with helpful messages.
         .verify_server_certs(false)
         .trust_server_certs(pki.trust == Trust::Any)
-        // Reconnecting is done by the bus's supervisor, not by the crate.
+        // The bus's supervisor reconnects, not the crate.
         .session_retry_limit(0)
         .request_timeout(patience.to_duration())
         .keep_alive_interval(heartbeat.to_duration())
@@ -92,7 +92,7 @@ pub(super) async fn endpoint(
     };
     let mut endpoint = endpoint.clone();
     check_user(&endpoint, login)?;
-    // The host name that the server uses for itself may be unknown here.
+    // The server's own host name may be unknown here.
     let own = url_with_replaced_hostname(
         endpoint.endpoint_url.as_ref(),
         &url.address.host.to_string(),
@@ -101,7 +101,7 @@ pub(super) async fn endpoint(
     Ok(endpoint)
 }
 
-/// The security that the driver.cfg asks for.
+/// The security that the driver.cfg requests.
 fn asked(options: &ClientOptions) -> String {
     match options.security {
         Policy::None => "security = \"None\"".to_owned(),
@@ -209,7 +209,7 @@ pub(super) async fn open(
     Ok(session)
 }
 
-/// Whether this status of publishing means that the subscription has ended.
+/// True if this status of publishing means that the subscription has ended.
 fn is_fatal(status: StatusCode) -> bool {
     [
         StatusCode::BadNoSubscription,
@@ -222,7 +222,7 @@ fn is_fatal(status: StatusCode) -> bool {
     .contains(&status)
 }
 
-/// Why there is no session, and what to do.
+/// Why there is no session, and the remedy.
 fn refusal(status: StatusCode, secure: bool, user: Option<&str>, pki: &Pki) -> BusError {
     let why = meaning(status);
     match status {

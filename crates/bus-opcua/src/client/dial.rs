@@ -16,7 +16,7 @@ use tokio_util::codec::FramedRead;
 type Reader = ReadHalf<tokio::net::TcpStream>;
 type Writer = WriteHalf<tokio::net::TcpStream>;
 
-/// Gives the crate one connection, once. The connection is made and remade by the bus, as for all buses.
+/// Passes one connection to the crate, once. The bus makes and remakes the connection, as for all buses.
 #[derive(Clone)]
 pub(super) struct Dial {
     stream: Arc<Mutex<Option<TcpStream>>>,

@@ -1,4 +1,4 @@
-//! What the server reports on its own: a subscription.
+//! The server's own reports: a subscription.
 
 use std::sync::Arc;
 
@@ -19,18 +19,18 @@ use super::Field;
 /// The most items in one call; every server accepts this many.
 const CHUNK: usize = 100;
 
-/// How many changes of a latched signal are queued between two publishes.
+/// The number of changes of a latched signal that are queued between two publishes.
 const QUEUE: u32 = 10;
 
 /// How long the server keeps a subscription without requests.
 const LIFE: Nanos = Nanos::from_secs(30);
 
-/// What has arrived from the server.
+/// News from the server.
 #[derive(Debug)]
 pub(super) enum Notification {
     /// The values of one publish, in order, with the indices of their signals.
     Values(Vec<(usize, DataValue)>),
-    /// A publish without values: none has changed.
+    /// A publish without values: nothing has changed.
     Alive,
     /// The operating state of the PLC.
     Plc(PlcState),
@@ -44,7 +44,7 @@ pub(super) enum Notification {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rhythm {
     pub(super) publishing: Nanos,
-    /// `None`: as often as it publishes, and latched signals as often as it can.
+    /// `None`: the publishing interval, and for latched signals the shortest that the server supports.
     pub(super) sampling: Option<Nanos>,
     pub(super) max_age: Nanos,
 }
@@ -85,10 +85,10 @@ impl OnSubscriptionNotificationCore for Feed {
 /// The client handle of the item that is not a signal: the state of the server.
 const STATE: u32 = u32::MAX;
 
-/// The PLC's operating state according to `Server_ServerStatus_State`; `None` for nothing yet. A server that
-/// does not report the state, or does not know it, is assumed to run, even if an earlier server at this
-/// address reported a stop. The outputs of a server in test mode have no effect, like those of a suspended
-/// one (OPC 10000-5, 12.6).
+/// The PLC's operating state according to `Server_ServerStatus_State`; `None` if there is no value yet. A server that
+/// does not report its state, or does not know it, is assumed to run, even if an earlier server at this address
+/// reported a stop. The outputs of a server in test mode have no effect, like those of a suspended one (OPC 10000-5,
+/// 12.6).
 fn state(value: &DataValue) -> Option<PlcState> {
     const RUNNING: i32 = ServerState::Running as i32;
     const UNKNOWN: i32 = ServerState::Unknown as i32;

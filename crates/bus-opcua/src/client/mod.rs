@@ -29,8 +29,8 @@ use readings::Readings;
 use session::ClientSession;
 use writings::Writings;
 
-/// How long a server may take to name its endpoints, and again to open a session and have it checked. Within
-/// that, the crate gives up on single requests after some seconds of real time.
+/// The time for a server to list its endpoints, and again to open a session and have it checked. Within that, the crate
+/// gives up single requests after some seconds of real time.
 const PATIENCE: Nanos = Nanos::from_secs(60);
 
 /// A server that accepts no bytes for this many times `max_age` is given up.
@@ -48,14 +48,14 @@ pub struct Client {
     guard: WriteGuard,
 }
 
-/// What this bus needs to know about a signal.
+/// The bus's data of a signal.
 #[derive(Clone, Debug)]
 struct Field {
     name: String,
     data_type: DataType,
-    /// Whether its edges must not be lost.
+    /// True if the edges must not be lost.
     latched: bool,
-    /// Whether it is read rather than written.
+    /// True if the signal is read rather than written.
     is_read: bool,
     node: NodeName,
 }

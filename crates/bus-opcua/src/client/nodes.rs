@@ -22,7 +22,7 @@ const CHUNK: usize = 50;
 /// The most mistakes in one message.
 const TOLD: usize = 5;
 
-/// The attributes that are read of each node.
+/// The attributes read from each node.
 const ATTRIBUTES: [AttributeId; 3] = [
     AttributeId::Value,
     AttributeId::DataType,
@@ -33,7 +33,7 @@ const ATTRIBUTES: [AttributeId; 3] = [
 const READS: u8 = 1;
 const WRITES: u8 = 2;
 
-/// What the server reports about itself.
+/// The server's information about itself.
 pub(super) struct Server {
     /// The name of the product.
     pub(super) product: String,
@@ -113,8 +113,7 @@ impl Server {
     }
 }
 
-/// The node of each signal, each checked: it exists, has the signal's type, and can be read, or written if
-/// `writes`.
+/// The node of each signal, each checked: it exists, has the signal's type, and can be read, or written if `writes`.
 pub(super) async fn check(
     session: &Arc<Session>,
     server: &Server,
@@ -192,7 +191,7 @@ fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String
             Some(theirs) => return differs(&format!("{theirs:?}")),
             None => {}
         },
-        // Without a value yet, the declared type decides, if it is one of the plain ones.
+        // Without a value so far, the declared type decides, if it is one of the plain ones.
         _ => {
             if let Some(Variant::NodeId(id)) = &kind.value
                 && let Ok(declared) = id.as_data_type_id()
@@ -218,7 +217,7 @@ fn judge(field: &Field, values: &[DataValue], writes: bool) -> Result<(), String
     Ok(())
 }
 
-/// Whether all values of the type are of exactly that type, and not of a subtype.
+/// True if all values of the type are of exactly that type, and not of a subtype.
 fn is_plain(declared: DataTypeId) -> bool {
     // Boolean to String are 1 to 12.
     (1..=12).contains(&(declared as u32))

@@ -1,4 +1,4 @@
-//! What was read: values and their quality, on their way into the image.
+//! Received values and their quality, on their way into the image.
 
 use opcua::types::{DataValue, DateTime, StatusCode};
 
@@ -25,8 +25,8 @@ enum Quality {
 
 /// The signals that are read, and their quality.
 ///
-/// A frame is handed to the image if every value of its station is present and none is bad. While one is bad,
-/// nothing of the station is handed in, so that its data grow old, as they should.
+/// A station's frame is passed to the image if all its values are present and none is bad. While one is bad, no value
+/// of the station is passed on, so that its data grow old, as they should.
 #[derive(Debug)]
 pub(super) struct Readings {
     values: RawValues,
@@ -36,12 +36,12 @@ pub(super) struct Readings {
     frames: Vec<Box<[u8]>>,
     newest: Option<DateTime>,
     told: Nanos,
-    /// The quality as last reported.
+    /// The last reported quality.
     said: Option<String>,
 }
 
 impl Readings {
-    /// Nothing read yet.
+    /// Readings without any values.
     pub(super) fn new(table: &SignalTable, area: Area, port: &Port) -> Self {
         let frames = (0..port.stations()).map(|station| vec![0; port.sizes(station).1].into());
         Self {
@@ -152,13 +152,13 @@ impl Readings {
         Ok(())
     }
 
-    /// Whether all values of a station are present and usable.
+    /// True if all values of a station are present and usable.
     fn is_sound(&self, station: usize) -> bool {
         let mut signals = self.values.signals(station).iter();
         signals.all(|&signal| matches!(self.quality[signal], Quality::Good | Quality::Uncertain))
     }
 
-    /// Hands in the stations whose values are complete.
+    /// Passes on the stations whose values are complete.
     pub(super) fn commit(&mut self, port: &mut Port, now: Nanos, fields: &[Field]) {
         debug_assert_eq!(fields.len(), self.quality.len(), "one per signal");
         port.together(|port| {
@@ -168,7 +168,7 @@ impl Readings {
                 }
                 let frame = &mut self.frames[station];
                 if frame.is_empty() {
-                    // None of its signals is read, but its server is there.
+                    // No signal of the station is read, but its server is present.
                     port.touch(station, now);
                 } else {
                     self.values.give(station, frame);
@@ -189,12 +189,12 @@ impl Readings {
         });
     }
 
-    /// Whether everything that is read is present and usable.
+    /// True if all values are present and usable.
     pub(super) fn is_complete(&self) -> bool {
         (0..self.frames.len()).all(|station| self.is_sound(station))
     }
 
-    /// What is wrong with the first signal that has a bad value; `None` if all are good.
+    /// Describes the first signal that has a bad value; `None` if all are good.
     pub(super) fn trouble(&self, fields: &[Field]) -> Option<String> {
         let mut bad = self.quality.iter().enumerate();
         bad.find_map(|(signal, quality)| match quality {

@@ -26,7 +26,7 @@ pub(super) struct ClientSession<'a> {
     pub(super) table: &'a SignalTable,
     pub(super) nodes: Vec<NodeId>,
     pub(super) readings: Readings,
-    /// `None` while nothing may be written.
+    /// `None` while writing is not permitted.
     pub(super) writings: Option<Writings>,
     /// The most values of one Write; 0 for no limit.
     pub(super) most_writes: usize,
@@ -46,7 +46,7 @@ impl ClientSession<'_> {
         let mut pace = Pace::new(clock.now(), self.cycle);
         let (mut news, mut looks) = (Vec::new(), TaskLooks::new());
         port.begin_to_look(clock.now());
-        // The trouble with values as last reported; `None` for none.
+        // The last reported trouble with values; `None` for none.
         let mut said = None;
         while !stop.is_stopped() {
             let now = clock.now();
@@ -85,8 +85,7 @@ impl ClientSession<'_> {
                 for station in 0..port.stations() {
                     port.plc_state(station, now, state);
                 }
-                // Values that did not change during the stop are not reported again; they are valid from now
-                // on.
+                // Values that did not change during the stop are not reported again; they are valid from now on.
                 if state == PlcState::Run {
                     self.readings.commit(port, now, self.fields);
                 }

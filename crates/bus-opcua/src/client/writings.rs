@@ -1,4 +1,4 @@
-//! What is written: changed signals, in one Write.
+//! The written values: changed signals, in one Write.
 
 use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, WriteValue};
 
@@ -10,20 +10,20 @@ use tickbus_image::signal::{Area, RawValues, SignalTable};
 
 use super::Field;
 
-/// The signals that are written, and the values that the server has.
+/// The signals that are written, and the server's current values.
 #[derive(Debug)]
 pub(super) struct Writings {
     values: RawValues,
     /// The bits that the server has accepted; `None` for none yet.
     known: Vec<Option<u64>>,
-    /// The pending Write: indices of signals, and their bits, with the receipt for the frames that they are from.
+    /// The pending Write: indices of signals, and their bits, with the receipt of their frames.
     flight: Option<(Vec<(usize, u64)>, Receipt)>,
     /// The signals that the server refuses, as last logged.
     refused: Vec<Option<StatusCode>>,
 }
 
 impl Writings {
-    /// Nothing written yet.
+    /// Writings without any accepted values.
     pub(super) fn new(table: &SignalTable, area: Area) -> Self {
         let count = table.signals.len();
         Self {
@@ -34,12 +34,12 @@ impl Writings {
         }
     }
 
-    /// Whether an answer is pending.
+    /// True if an answer is pending.
     pub(super) fn is_under_way(&self) -> bool {
         self.flight.is_some()
     }
 
-    /// The values to write now; empty for none. The outgoing frame then counts as sent.
+    /// The values to write now; may be empty. The outgoing frame then counts as sent.
     pub(super) fn due(
         &mut self,
         port: &mut Port,

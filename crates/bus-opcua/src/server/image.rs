@@ -18,7 +18,7 @@ use super::space;
 use super::watched::{Variable, Watched};
 use super::writers::Writers;
 
-/// How long a notification that is due may take to leave.
+/// The time for a due notification to leave.
 const TO_LEAVE: Nanos = Nanos::from_millis(100);
 
 /// All signals, with their values in the image and in their nodes.
@@ -30,11 +30,11 @@ pub(super) struct Image {
     places: Vec<PublishedSignal>,
     frames: Vec<Box<[u8]>>,
     show: Show,
-    /// Whether a write is an event even if it changes nothing.
+    /// True if a write is an event even without a change.
     every_write: bool,
 }
 
-/// Where values are published: the nodes of the crate's server, and their subscribers.
+/// The place to publish values: the nodes of the crate's server, and their subscribers.
 #[derive(Clone)]
 pub(super) struct Show {
     pub(super) nodes: Arc<Nodes>,
@@ -63,7 +63,7 @@ impl Show {
         }
     }
 
-    /// Reports what the sampling intervals of subscribers have held back.
+    /// Reports values that the sampling intervals of subscribers have held back.
     fn tell_due(&self, places: &[PublishedSignal]) {
         let node = |variable: Variable| {
             let place = &places[variable.signal];
@@ -95,9 +95,9 @@ struct PublishedSignal {
     scaled: Option<(NodeId, Scale)>,
     /// The node's value; `None` at first.
     shown: Option<(u64, StatusCode)>,
-    /// When it was set.
+    /// When the value was set.
     since: Nanos,
-    /// Whether a client has written the signal.
+    /// True if a client has written the signal.
     written: bool,
 }
 
@@ -155,7 +155,7 @@ impl Image {
         }
     }
 
-    /// How many monitored items the server retains although no client is connected.
+    /// The number of monitored items that the server retains although no client is connected.
     pub(super) fn left_behind(&self) -> usize {
         self.show.watched.left_behind()
     }
@@ -225,7 +225,7 @@ impl Image {
         self.show.tell_due(&self.places);
     }
 
-    /// Tells the port which stations' subscribers have had time to see the last values.
+    /// Reports to the port the stations whose subscribers have had time to see the last values.
     fn tell_who_has_the_last(&self, port: &mut Port, now: Nanos) {
         for station in 0..self.frames.len() {
             let mut spans = (self.table.signals.iter().enumerate())
@@ -233,11 +233,11 @@ impl Image {
                     signal.station == station && signal.area == self.role.areas().0
                 })
                 .filter_map(|(index, _)| {
-                    // No subscriber confirms a value: it has twice its time, and a notification some to leave.
+                    // No subscriber confirms a value: allow twice its time, and some for a notification to leave.
                     let span = self.show.watched.span(index)?;
                     Some(now - self.places[index].since >= span + span + TO_LEAVE)
                 });
-            // Nobody watches a station without spans.
+            // A station without spans has no subscribers.
             if spans
                 .next()
                 .is_some_and(|first| first && spans.all(|seen| seen))
@@ -249,7 +249,7 @@ impl Image {
 
     /// Updates the nodes of these signals for a client that is reading them: their pulses count as sent.
     pub(super) fn show_to_reader(&mut self, port: &mut Port, now: Nanos, signals: &[usize]) {
-        // What a client reads is not sent in a cycle, which a fault could lose.
+        // Values that a client reads are not sent in a cycle, which a fault could lose.
         let all = 0..port.stations();
         let Some(receipt) = port.look(all, now).map(|frames| self.take(frames)) else {
             return;
@@ -263,7 +263,7 @@ impl Image {
         }
     }
 
-    /// Takes over what is sent.
+    /// Takes over the outgoing values.
     fn take(&mut self, mut frames: Frames<'_>) -> Receipt {
         for station in frames.stations() {
             self.sends.take(station, frames.frame(station));

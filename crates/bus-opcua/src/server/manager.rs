@@ -1,4 +1,4 @@
-//! What clients do with the nodes: read, subscribe, write.
+//! The clients' access to the nodes: read, subscribe, write.
 
 use std::collections::{HashMap, VecDeque};
 use std::fmt;
@@ -30,10 +30,10 @@ use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
 use super::writers::Writers;
 
-/// A sampling interval that holds no change back, in milliseconds; the crate does not accept zero.
+/// A sampling interval that holds back no change, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
 
-/// What clients have done.
+/// An action of a client.
 pub(super) enum Visit {
     /// Values written in one request. A signal written twice in it starts a new list.
     Written(Visitor, Vec<Vec<(usize, u64)>>),
@@ -41,7 +41,7 @@ pub(super) enum Visit {
     Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
     /// The first client writes what the second one wrote within `max_age`.
     SecondWriter(String, String),
-    /// A client was refused because its certificate is another application's; the text says so.
+    /// A client was refused because its certificate belongs to another application; the text says so.
     Impostor(String),
     /// Certificates were rejected: the new files, and their total number.
     Rejected(Vec<String>, usize),
@@ -61,7 +61,7 @@ pub(super) struct Signals {
     judged: Mutex<VecDeque<(u32, bool)>>,
 }
 
-/// The bus that the nodes belong to.
+/// The data of the bus that owns the nodes.
 pub(super) struct Own {
     /// The area that clients write.
     pub(super) reads: Area,
@@ -69,7 +69,7 @@ pub(super) struct Own {
     pub(super) writers: Arc<Writers>,
     pub(super) inbox: Inbox<Visit>,
     pub(super) wall: WallClock,
-    /// Whether a client's certificate must belong to its application.
+    /// True if a client's certificate must belong to its application.
     pub(super) checks_applications: bool,
     /// The number of the server's tasks without any connection; set when it starts to listen.
     pub(super) tasks_alone: Arc<AtomicUsize>,
@@ -103,7 +103,7 @@ impl Signals {
         }
     }
 
-    /// Checks that the certificate of a client belongs to the application that it claims to be. The crate
+    /// Checks that the certificate of a client belongs to the application that the client claims to be. The crate
     /// checks everything else about it before there is a session.
     fn admits(&self, context: &RequestContext) -> Result<(), StatusCode> {
         if !self.own.checks_applications {
@@ -248,8 +248,8 @@ impl InMemoryNodeManagerImpl for Signals {
             if let Some(&variable) = self.by_node.get(&item.item_to_monitor().node_id) {
                 let publishing = publishing(context, item.handle());
                 let mut rhythm = rhythm(item.sampling_interval(), item.queue_size(), publishing);
-                // Without a queue, a client sees the values at the time of publishing: the newest of all
-                // items, and thus consistent.
+                // Without a queue, a client sees the values at the time of publishing: the newest of all items, and
+                // thus consistent.
                 if item.queue_size() <= 1 && rhythm.sampling <= publishing {
                     item.revise_sampling_interval(UNFILTERED);
                     rhythm.sampling = millis(item.sampling_interval());

@@ -36,7 +36,7 @@ use visitor::Visitor;
 use watched::Watched;
 use writers::Writers;
 
-/// How long clients have to learn of the end, in real time.
+/// The time for clients to learn of the end, in real time.
 const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// How often the folder of rejected certificates is checked, in real time.
@@ -45,9 +45,8 @@ const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
 /// The most sessions at the same time.
 const SESSIONS: usize = 100;
 
-/// async-opcua 0.19 retains the monitored items of a subscription that ends as a whole, up to 200 bytes each.
-/// When at least this many have ended and no client is connected, its server is recreated; the listener
-/// stays.
+/// async-opcua 0.19 retains the monitored items of a subscription that ends as a whole, up to 200 bytes each. If at
+/// least this many have ended and no client is connected, the crate's server is recreated; the listener stays.
 const WORN: usize = 10;
 
 /// The bus of kind `opcua-server`.
@@ -178,16 +177,16 @@ async fn look_after(rejects: Arc<Mutex<Rejects>>, inbox: Inbox<Visit>) {
 struct Started {
     inbox: Inbox<Visit>,
     handle: ServerHandle,
-    /// Notified when it has ended.
+    /// Notified when the server has ended.
     ended: Arc<Notify>,
     show: Show,
-    /// The number of its tasks without any connection.
+    /// The number of the server's tasks without any connection.
     tasks_alone: Arc<AtomicUsize>,
 }
 
 impl Started {
-    /// Whether there is no connection, not even one without a session yet, and no session waits for its
-    /// client to return.
+    /// True if there is no connection, not even one without a session so far, and no session waits for its client to
+    /// return.
     fn is_alone(&self, reactor: &Reactor) -> bool {
         let sessions =
             VariableId::Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount;
@@ -208,7 +207,7 @@ impl Free for Server {
         };
         let refused = |error: std::io::Error| tcp::no_wait(&error);
         let listener = listener.into_os().map_err(refused)?;
-        // All connections inherit this: an answer is sent at once, without waiting for more.
+        // All connections inherit this: answers are sent at once, without waiting for more.
         SockRef::from(&listener)
             .set_tcp_nodelay(true)
             .map_err(refused)?;
@@ -220,7 +219,7 @@ impl Free for Server {
         loop {
             let reactor = Reactor::new(stop)?;
             let listener = listener.try_clone().map_err(refused)?;
-            // A client may come at once, and this thread later.
+            // A client may connect at once, before this thread continues.
             port.begin_to_look(port.clock().now());
             let mut started = self.start(&reactor, port, listener, &rejects)?;
             let show = started.show.clone();
@@ -258,10 +257,10 @@ impl Free for Server {
     }
 }
 
-/// How serving ended.
+/// The outcome of serving.
 enum Served {
     Stopped,
-    /// The crate's server retains too much of clients that are gone.
+    /// The crate's server retains too much data of clients that have gone.
     Worn,
 }
 
@@ -297,7 +296,7 @@ impl Service<'_> {
             for news in news.drain(..) {
                 self.hear(port, now, news)?;
             }
-            // Signs of life that waited are as old as all else that did.
+            // Signs of life that waited are as old as all other waiting input.
             if pace.take(now) || has_waited {
                 self.look(port, now);
                 if self.image.left_behind() >= WORN && started.is_alone(reactor) {
@@ -327,7 +326,7 @@ impl Service<'_> {
             }
             Visit::Reads(visitor, signals, done) => {
                 self.image.show_to_reader(port, now, &signals);
-                // If nothing can be written, clients that read are the peers.
+                // If no station is writable, the reading clients are the peers.
                 let stations = signals.iter().map(|at| self.table.signals[*at].station);
                 let fed: Vec<usize> = stations
                     .filter(|station| port.sizes(*station).1 == 0)
@@ -335,7 +334,7 @@ impl Service<'_> {
                 if !fed.is_empty() {
                     self.meet(port, visitor, fed);
                 }
-                // The reader may be gone.
+                // The reader may have gone.
                 let _ = done.send(());
             }
             Visit::SecondWriter(writer, other) => {

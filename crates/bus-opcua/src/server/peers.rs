@@ -1,4 +1,4 @@
-//! The clients that supply the image, and whether they are still there.
+//! The clients that supply the image, with a check that they are still connected.
 
 use std::time::Duration;
 
@@ -14,25 +14,25 @@ pub(super) struct Peers(Vec<Peer>);
 
 struct Peer {
     visitor: Visitor,
-    /// How far its session was postponed, as of the last look.
+    /// The expiry of the session at the last look, as postponed by requests.
     postponed: Option<Duration>,
-    /// The stations that it supplies.
+    /// The stations that the client supplies.
     stations: Vec<usize>,
 }
 
-/// What has happened to the peers since the last look.
+/// The changes among the peers since the last look.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Seen {
     /// No peer has left.
     Same,
-    /// Some have closed their sessions, or let them expire; others remain.
+    /// Some peers have closed their sessions, or let them expire; others remain.
     Fewer,
-    /// The last one has left.
+    /// The last peer has left.
     Gone,
 }
 
 impl Peers {
-    /// A client has supplied these stations; returns its name if it is new.
+    /// A client has supplied these stations; returns its name if the client is new.
     pub(super) fn add(
         &mut self,
         visitor: Visitor,
@@ -57,8 +57,7 @@ impl Peers {
         known.is_none().then_some(&*peer.visitor.name)
     }
 
-    /// Checks all peers; `alive` is called with each station of a peer that has sent a request since the last
-    /// look.
+    /// Checks all peers; calls `alive` with each station of a peer that has sent a request since the last look.
     pub(super) fn look(&mut self, mut alive: impl FnMut(usize)) -> Seen {
         let before = self.0.len();
         self.0.retain_mut(|peer| {

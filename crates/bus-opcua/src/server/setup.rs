@@ -30,7 +30,7 @@ fn rhythm(cycle: Nanos) -> u64 {
     u64::try_from(millis.clamp(1, 10)).expect("it is positive")
 }
 
-/// After how many publishing intervals without changes a keep-alive is due: three times within `max_age` for
+/// The number of publishing intervals without changes after which a keep-alive is due: three times within `max_age` for
 /// a subscription that publishes every 100 ms, as most do.
 fn keep_alives(max_age: Nanos) -> u32 {
     u32::try_from(max_age.0 / Nanos::from_millis(300).0)
@@ -85,7 +85,7 @@ pub(super) fn build(
     #[expect(clippy::cast_precision_loss, reason = "a few milliseconds")]
     let shortest = rhythm as f64;
     limits.min_publishing_interval_ms = shortest;
-    // A client's request for the next publish shows that it is alive, so it must be answered often enough.
+    // A client's request for the next publish is its sign of life, so requests must be answered often enough.
     limits.max_keep_alive_count = keep_alives(max_age);
     limits.default_keep_alive_count = limits.max_keep_alive_count;
     // Changes are reported as they happen.
@@ -130,7 +130,7 @@ pub(super) fn build(
     };
     let wall = pki.wall;
     let built = builder
-        // The first node manager that owns a node wins, and the signals' own must be the last.
+        // The first node manager that owns a node wins, and the signals' own manager must be the last.
         .without_node_managers()
         .with_node_manager(move |context| Status::new(context, wall))
         .with_node_manager(InMemoryNodeManagerBuilder::new(CoreNodeManagerBuilder))

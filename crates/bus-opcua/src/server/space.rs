@@ -1,4 +1,4 @@
-//! The nodes of a driver: a folder, in it a folder per station, and in these the signals.
+//! The nodes of a driver: a folder, containing a folder per station, which contain the signals.
 
 use opcua::nodes::{ObjectBuilder, VariableBuilder};
 use opcua::server::address_space::AddressSpace;

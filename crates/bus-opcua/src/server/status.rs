@@ -19,8 +19,8 @@ use opcua::types::{
 use crate::pki::date;
 use tickbus_base::time::WallClock;
 
-/// Handles the value of that node in front of the crate's own manager, which handles everything else: with
-/// the latter, `CurrentTime` stands still unless a client subscribes to it.
+/// Handles the value of that node in place of the crate's own manager, which handles everything else. With the latter,
+/// `CurrentTime` stands still unless a client subscribes to it.
 pub(super) struct Status {
     node: NodeId,
     context: ServerContext,

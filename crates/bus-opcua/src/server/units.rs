@@ -1,11 +1,11 @@
-//! Engineering units, as OPC UA names them.
+//! Engineering units, as named in OPC UA.
 
 use opcua::types::EUInformation;
 
 /// The origin of the unit numbers: UN/CEFACT, recommendation 20.
 const CEFACT: &str = "http://www.opcfoundation.org/UA/units/un/cefact";
 
-/// Units as people write them, and their common codes of three characters.
+/// Units in their usual notation, and their common codes of three characters.
 const CODES: [(&str, &str); 36] = [
     ("%", "P1"),
     ("1/min", "RPM"),

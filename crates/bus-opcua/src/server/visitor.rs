@@ -1,22 +1,23 @@
-//! A client's session, as the bus knows it.
+//! A client's session, as the bus sees it.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use opcua::server::node_manager::RequestContext;
 
-/// A client's session. It is reached through closures because the crate does not export its type.
+/// A client's session, accessed through closures because the crate does not export its type.
 pub(super) struct Visitor {
     /// The session's number.
     pub(super) id: u32,
-    /// The client's name, or else the session's.
+    /// The client's name, or otherwise the session's.
     pub(super) name: String,
-    /// By how much the session will expire later than when this was made, as every request postpones that; `None` if it is over.
+    /// How much later the session will expire than it would have when this was made, as every request postpones that;
+    /// `None` if it has ended.
     pub(super) postponed: Box<dyn Fn() -> Option<Duration> + Send>,
 }
 
 impl Visitor {
-    /// Whether its session lasts.
+    /// True as long as the session lasts.
     pub(super) fn is_there(&self) -> bool {
         (self.postponed)().is_some()
     }

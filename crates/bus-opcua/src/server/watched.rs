@@ -1,5 +1,4 @@
-//! The monitored items of clients: which ones are told of a change, and how long a value must be shown to be
-//! seen.
+//! The monitored items of clients: the receivers of a change, and the time that a value must be shown to be seen.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,30 +13,29 @@ use tickbus_base::time::Nanos;
 pub(super) struct Variable {
     /// The index of the signal.
     pub(super) signal: usize,
-    /// Whether its value is in engineering units.
+    /// True if the value is in engineering units.
     pub(super) is_scaled: bool,
 }
 
-/// How often a monitored item samples, and how long a value must be shown to be seen by it.
+/// The sampling interval of a monitored item, and the time that a value must be shown for the item to see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Rhythm {
-    /// How long after a change the crate holds the next one back.
+    /// The time after a change for which the crate holds the next one back.
     pub(super) sampling: Nanos,
     pub(super) span: Nanos,
 }
 
 /// A monitored item.
 ///
-/// async-opcua 0.19 holds back a value whose source time is less than the sampling interval after that of the
-/// last value that passed. At the next publish it checks whether that interval is over; if not, it never
-/// checks again, and the value is not seen until there is another one. So a value that may have been held
-/// back is reported a second time when it is due.
+/// async-opcua 0.19 holds back a value whose source time is less than the sampling interval after that of the last
+/// value that passed. At the next publish it checks if that interval is over; if not, it never checks again, and the
+/// value is not seen until the next one. So a value that may have been held back is reported again when it is due.
 #[derive(Debug)]
 struct Item {
     rhythm: Rhythm,
-    /// The latest source time reported to it.
+    /// The latest source time reported to the item.
     latest: Ticks,
-    /// The value that may be held back, and until when.
+    /// The value that may be held back, and the end of that time.
     held: Option<(Ticks, DataValue)>,
 }
 
@@ -46,7 +44,7 @@ impl Item {
         self.rhythm.sampling.0 / NANOS_PER_TICK
     }
 
-    /// A value is reported to it for the first time.
+    /// A value is reported to the item for the first time.
     fn told(&mut self, value: &DataValue) {
         let source = ticks(value.source_timestamp);
         let now = ticks(value.server_timestamp);
@@ -60,7 +58,7 @@ impl Item {
         self.latest = self.latest.max(source);
     }
 
-    /// The value to report a second time, with a source time that makes it pass in any case.
+    /// The value to report again, with a source time that makes it pass in any case.
     fn due(&mut self, now: Ticks) -> Option<DataValue> {
         let (_, value) = self.held.take_if(|(due, _)| *due <= now)?;
         self.latest = self.latest.saturating_add(self.sampling()).max(now);
@@ -82,15 +80,15 @@ fn ticks(time: Option<DateTime>) -> Ticks {
 
 /// The existing monitored items of each variable.
 ///
-/// The crate has its own list, from which an item is only removed when it is deleted itself; items whose
-/// subscription ended as a whole stay in it and are reported to. So changes are reported by this list.
+/// The crate has its own list, from which an item is only removed when it is deleted itself; items whose subscription
+/// ended as a whole stay in it and still get reports. So changes are reported by this list.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Watched(Arc<Mutex<Items>>);
 
 #[derive(Debug, Default)]
 struct Items {
     of: HashMap<Variable, HashMap<MonitoredItemHandle, Item>>,
-    /// The number of items that have ended in any way.
+    /// The number of items that have ended for any reason.
     ended: usize,
 }
 
@@ -138,7 +136,7 @@ impl Watched {
         }
     }
 
-    /// How long the value of a signal must be shown; `None` without subscribers.
+    /// The time that the value of a signal must be shown; `None` without subscribers.
     pub(super) fn span(&self, signal: usize) -> Option<Nanos> {
         let items = self.lock();
         let both = [false, true].map(|is_scaled| Variable { signal, is_scaled });
@@ -172,7 +170,7 @@ impl Watched {
         }
     }
 
-    /// Reports again what the crate has held back and would drop.
+    /// Reports values again that the crate has held back and would drop.
     pub(super) fn tell_due<'n>(
         &self,
         subscriptions: &SubscriptionCache,
@@ -199,7 +197,7 @@ impl Watched {
         }
     }
 
-    /// How many ended items the crate may retain if none exists any more; 0 otherwise.
+    /// The number of ended items that the crate may retain, if no item exists any more; 0 otherwise.
     pub(super) fn left_behind(&self) -> usize {
         let items = self.lock();
         if items.of.is_empty() { items.ended } else { 0 }

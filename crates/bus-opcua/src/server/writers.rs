@@ -1,4 +1,4 @@
-//! Which session wrote each signal last: two controllers on one machine undo each other's outputs.
+//! The last session that wrote each signal: two controllers on one machine undo each other's outputs.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -8,7 +8,7 @@ use super::visitor::Visitor;
 
 /// The last writers of all signals.
 pub(super) struct Writers {
-    /// Whether a second writer is refused.
+    /// True if a second writer is refused.
     pub(super) is_single: bool,
     clock: Arc<dyn Clock>,
     max_age: Nanos,
@@ -18,12 +18,12 @@ pub(super) struct Writers {
 struct State {
     /// The sessions that have written.
     sessions: Vec<Visitor>,
-    /// The last write of each signal: the session's number, and when.
+    /// The last write of each signal: the session's number, and the time.
     last: Vec<Option<(u32, Nanos)>>,
 }
 
 impl Writers {
-    /// No writes yet to so many `signals`.
+    /// Writers without any writes to `signals` signals.
     pub(super) fn new(
         is_single: bool,
         signals: usize,
@@ -50,14 +50,14 @@ impl Writers {
         }
     }
 
-    /// Forgets sessions that are over, with all that the crate has of them.
+    /// Forgets sessions that have ended, with the crate's data of them.
     pub(super) fn forget_gone(&self) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.sessions.retain(Visitor::is_there);
     }
 
-    /// With a single writer: the client that wrote one of the signals in another session within `max_age`. Then the session `id`
-    /// may write none of them, because the values of one Write are seen together or not at all.
+    /// With a single writer: the client that wrote one of the signals in another session within `max_age`. The session
+    /// `id` may then write none of them, because the values of one Write are seen together or not at all.
     pub(super) fn refuses(
         &self,
         id: u32,
@@ -97,7 +97,8 @@ mod tests {
 
     use super::*;
 
-    /// The values of one Write are seen together or not at all, so one signal of another client's refuses all of them.
+    /// The values of one Write are seen together or not at all, so a single signal of another client refuses all of
+    /// them.
     #[test]
     fn a_write_is_refused_while_another_client_has_written_one_of_its_signals() {
         let clock = Manual::new();

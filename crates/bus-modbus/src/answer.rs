@@ -11,7 +11,7 @@ use super::function::{
 };
 use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
 
-/// What a request did.
+/// The effect of a request.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Done {
     /// The bits written, in the frame that clients write.
@@ -164,7 +164,7 @@ fn word(data: &[u8], at: usize) -> usize {
     usize::from(u16::from_be_bytes([data[at], data[at + 1]]))
 }
 
-/// The data of a request that writes several elements: which elements, and their values.
+/// The data of a request that writes several elements: the elements, and their values.
 fn many(data: &[u8]) -> Result<(Span, &[u8]), Exception> {
     let Some((head, values)) = data.split_first_chunk::<5>() else {
         return Err(Exception::ILLEGAL_DATA_VALUE);
@@ -248,7 +248,7 @@ fn read_write(
     if !fits || counted != writes.count * 2 || values.len() != counted {
         return Err(Exception::ILLEGAL_DATA_VALUE);
     }
-    // Nothing must be written if the read cannot be done.
+    // Write nothing if the read is impossible.
     tables.check_read(Table::HoldingRegisters, reads)?;
     let wrote = write_registers(writes, values, tables)?;
     let read = read_counted(Table::HoldingRegisters, reads, tables, reply)?;

@@ -1,4 +1,4 @@
-//! Addresses of elements as people write them.
+//! Addresses of elements in the notations of users.
 
 use std::fmt;
 use std::str::FromStr;
@@ -10,14 +10,13 @@ use super::table::{ADDRESSES, Table};
 
 /// An element of a table.
 ///
-/// Written as a wire offset, which counts from 0 (`offset:20`, or with its table `holding-register
-/// offset:20`), or as a number, which counts from 1: `holding-register:21`, `4x00021`, `400021` and `40021`
-/// are the same element.
+/// Written as a wire offset, which counts from 0 (`offset:20`, or with its table `holding-register offset:20`), or as a
+/// number, which counts from 1: `holding-register:21`, `4x00021`, `400021` and `40021` are the same element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ElementAddress {
-    /// Its table.
+    /// The table.
     pub table: Table,
-    /// Its offset on the wire, from 0.
+    /// The offset on the wire, from 0.
     pub offset: usize,
 }
 
@@ -34,7 +33,7 @@ impl ElementAddress {
     pub fn parse(text: &str, table: Table) -> Result<Self, Mistake> {
         let wrong = |what: String| Mistake::new(what, SHAPE);
         let none = || wrong(format!("\"{}\" is no place in a table", shown(text)));
-        // The table, the number that counting starts at, and the digits.
+        // The table, the base of counting, and the digits.
         let (table, from, digits) = if let Some((head, digits)) = text.rsplit_once("offset:") {
             let table = match head.strip_suffix(' ') {
                 Some(name) => named(name).ok_or_else(none)?,

@@ -63,7 +63,7 @@ impl Function {
         Self::DeviceIdentification,
     ];
 
-    /// Its code, the first byte of a PDU.
+    /// The code, the first byte of a PDU.
     pub const fn code(self) -> u8 {
         self as u8
     }
@@ -75,7 +75,7 @@ impl Function {
             .find(|function| function.code() == code)
     }
 
-    /// Whether it changes the server's tables: only such functions may be broadcast.
+    /// True if the function changes the server's tables: only such functions may be broadcast.
     pub const fn writes(self) -> bool {
         matches!(
             self,
@@ -100,18 +100,18 @@ impl Exception {
     pub const ILLEGAL_DATA_ADDRESS: Self = Self(2);
     /// A quantity or value that the function does not allow, or a request of the wrong length.
     pub const ILLEGAL_DATA_VALUE: Self = Self(3);
-    /// The server failed to do it.
+    /// The server failed.
     pub const SERVER_DEVICE_FAILURE: Self = Self(4);
     /// Accepted, but it will take time.
     pub const ACKNOWLEDGE: Self = Self(5);
-    /// It is busy; the request may be repeated.
+    /// The server is busy; the request may be repeated.
     pub const SERVER_DEVICE_BUSY: Self = Self(6);
     /// The gateway has no path to the unit.
     pub const GATEWAY_PATH_UNAVAILABLE: Self = Self(0x0A);
     /// The unit behind a gateway does not answer.
     pub const GATEWAY_TARGET_FAILED: Self = Self(0x0B);
 
-    /// Whether the request itself is at fault, so that the server will always refuse it.
+    /// True if the request itself is at fault, so that the server will always refuse it.
     pub const fn is_about_the_request(self) -> bool {
         matches!(
             self,
@@ -119,7 +119,7 @@ impl Exception {
         )
     }
 
-    /// Whether the same request may succeed a little later.
+    /// True if the same request may succeed a little later.
     pub const fn passes(self) -> bool {
         matches!(
             self,
@@ -130,7 +130,7 @@ impl Exception {
         )
     }
 
-    /// Its name in the standard; empty if it has none.
+    /// The name in the standard; empty if unknown.
     pub const fn name(self) -> &'static str {
         match self {
             Self::ILLEGAL_FUNCTION => "illegal function",

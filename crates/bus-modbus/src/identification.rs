@@ -33,8 +33,7 @@ pub struct Identification {
 impl Identification {
     /// The identification of the driver called `name`.
     ///
-    /// It contains no revision: a client that may write to this driver must not lose that by an update of
-    /// tickbus.
+    /// Without a revision: a client that may write to this driver must not lose that right by an update of tickbus.
     pub fn of_driver(name: &str) -> Self {
         let ascii = |c: char| if matches!(c, ' '..='~') { c } else { '?' };
         let name = name.chars().map(ascii).take(TEXT_LIMIT).collect();
@@ -147,7 +146,7 @@ impl Identification {
     }
 }
 
-/// The length of the PDU of an answer that starts like this, as soon as it can be told.
+/// The length of the PDU of an answer that starts like this, as soon as it is determined.
 pub(super) fn length(beginning: &[u8]) -> Option<usize> {
     if beginning.first()? & super::function::EXCEPTION_BIT != 0 {
         return Some(2);

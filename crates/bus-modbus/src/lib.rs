@@ -61,8 +61,8 @@ pub use table::{Span, Table, put_bits, take_bits};
 pub use tables::{Map, Side, Tables};
 pub use tag_address::TagAddress;
 
-/// The default holding register at which `%I` begins in a server, PLC or machine: behind the outputs except
-/// for very large ones, and where `OpenPLC` has its memory words.
+/// The default holding register at which `%I` begins in a server, PLC or machine: after the outputs except for very
+/// large ones, and where `OpenPLC` has its memory words.
 const INPUTS: usize = 1024;
 
 /// Serial ports are not supported on this system yet.

@@ -19,7 +19,7 @@ const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
 pub enum Line {
     /// Modbus TCP.
     Tcp(Address),
-    /// RTU telegrams over TCP, as serial device servers carry them.
+    /// RTU telegrams over TCP, as transported by serial device servers.
     RtuOverTcp(Address),
     /// Modbus RTU over a serial port.
     Serial(Serial),
@@ -30,11 +30,11 @@ pub enum Line {
 pub struct Serial {
     /// The system's name of the port.
     pub device: String,
-    /// Its settings.
+    /// The settings.
     pub settings: SerialSettings,
     /// The silence that ends a telegram.
     pub silence: Nanos,
-    /// Whether the line echoes what is sent, so that the echo must be dropped.
+    /// True if the line echoes sent bytes, so that the echo must be dropped.
     pub echo: bool,
 }
 
@@ -59,12 +59,12 @@ impl Serial {
 }
 
 impl Line {
-    /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address. The
-    /// framing of an address stays.
+    /// Replaces the address or the serial line of the driver.cfg, if `check` accepts the new address. The framing of an
+    /// address is kept.
     ///
     /// # Errors
     ///
-    /// What is wrong with the address.
+    /// The address is invalid.
     pub fn set_address(
         &mut self,
         address: &str,

@@ -74,7 +74,7 @@ pub fn parse(telegram: &[u8]) -> Option<(u8, &[u8])> {
     (checksum(body) == *sum).then(|| (body[0], &body[1..]))
 }
 
-/// Why bytes in a stream are not a telegram. Nothing there tells where the next one begins.
+/// Why bytes in a stream are not a telegram. The start of the next one is then unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StreamError {
     /// A telegram with this function code has no known length, or none that is possible.
@@ -93,7 +93,8 @@ pub enum StreamError {
 /// A telegram of a stream: unit, PDU, and the length of the whole, in bytes.
 pub type Streamed<'a> = (u8, &'a [u8], usize);
 
-/// The telegram at the start of a stream's `bytes`; `None` if it is not complete yet. `length` gives the length of a PDU, in bytes, once enough of its beginning is there.
+/// The telegram at the start of a stream's `bytes`; `None` if it is not complete yet. `length` returns the length of a
+/// PDU, in bytes, once enough of its beginning is there.
 ///
 /// # Errors
 ///
@@ -142,8 +143,7 @@ impl Framer {
         }
     }
 
-    /// These bytes arrived at `now`. A telegram that silence has ended before must have been
-    /// [taken](Self::take).
+    /// These bytes arrived at `now`. A telegram that silence has ended before must already be [taken](Self::take).
     pub fn arrived(&mut self, now: Nanos, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -155,18 +155,17 @@ impl Framer {
             .extend_from_slice(&bytes[..bytes.len().min(room)]);
     }
 
-    /// Until when to wait for silence; [`Nanos::MAX`] if nothing has arrived.
+    /// How long to wait for silence; [`Nanos::MAX`] if nothing has arrived.
     pub fn deadline(&self) -> Nanos {
         self.last.map_or(Nanos::MAX, |last| last + self.silence)
     }
 
-    /// Whether the line has been silent for long enough at `now`.
+    /// True if the line has been silent for long enough at `now`.
     fn is_silent(&self, now: Nanos) -> bool {
         self.last.is_none_or(|last| now >= last + self.silence)
     }
 
-    /// If silence has ended a telegram by `now`, passes it to `take`; or `None` if it was longer than any
-    /// telegram.
+    /// If silence has ended a telegram by `now`, passes it to `take`; or `None` if it was longer than any telegram.
     pub fn take<R>(&mut self, now: Nanos, take: impl FnOnce(Option<&[u8]>) -> R) -> Option<R> {
         if self.last.is_none() || !self.is_silent(now) {
             return None;
@@ -189,7 +188,7 @@ pub struct Echo {
     /// Duration of one character.
     character: Nanos,
     expected: Vec<u8>,
-    /// After this the rest of it will not arrive.
+    /// After this time the rest of the echo will not arrive.
     until: Nanos,
 }
 
@@ -216,8 +215,8 @@ impl Echo {
         self.until = now + self.character.times(characters) + Self::SLACK;
     }
 
-    /// How many of the bytes that arrived at `now` are the echo of sent ones. The first byte that differs
-    /// ends the echo.
+    /// The number of bytes, among those that arrived at `now`, that are the echo of sent ones. The first byte that
+    /// differs ends the echo.
     pub fn strip(&mut self, now: Nanos, bytes: &[u8]) -> usize {
         if now > self.until {
             self.expected.clear();
@@ -269,7 +268,7 @@ mod tests {
     #[test]
     fn telegrams_in_a_stream_are_split_by_their_length_wherever_it_is_cut() {
         let mut stream = Vec::new();
-        // Every function has another length; 7, 8, 17 and 24 are of the standard, and refused here.
+        // Every function has another length; 7, 8, 17 and 24 are in the standard, but refused here.
         let requests: [&[u8]; 9] = [
             &[3, 0, 0, 0, 2],
             &[7],

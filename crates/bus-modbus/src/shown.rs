@@ -6,7 +6,7 @@ use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 use super::{Block, ClientOptions, ElementAddress, Request, ServerOptions, Side, Table};
 
 impl ServerOptions {
-    /// What the line is and does, given the signal table.
+    /// Describes the line, given the signal table.
     pub fn shown(&self, signals: &SignalTable) -> Vec<String> {
         let mut parts = vec![format!("listens on {}", self.line)];
         parts.extend(self.stations.shown(None));
@@ -28,7 +28,7 @@ impl ServerOptions {
             ));
         }
         if outputs > 0 && self.input == Side::Sends {
-            // A client that expects %I there would read plausible numbers: the outputs that it wrote itself.
+            // A client that expects %I there would read plausible numbers: its own written outputs.
             parts.push(format!(
                 "{} and the {} behind it are %Q: read, they give back what was written last",
                 ElementAddress { table, offset: 0 },
@@ -58,7 +58,7 @@ impl ServerOptions {
 }
 
 impl ClientOptions {
-    /// What the line is and does, for the end with `role`, given the signal table.
+    /// Describes the line, for the end with `role`, given the signal table.
     pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
         let (writes, reads) = role.areas();
         let mut parts = vec![format!("asks {}", self.line)];

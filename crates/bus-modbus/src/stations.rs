@@ -12,14 +12,14 @@ pub(super) enum UnitRange {
     Tcp,
     /// With RTU 0 is the broadcast, and numbers above 247 are reserved.
     Serial,
-    /// As `Serial`, for a server: it has to know which requests on the line are addressed to it.
+    /// Like `Serial`, for a server, which has to know which requests on the line are addressed to it.
     ServedOnSerial,
 }
 
 /// The keys of one station, or of all of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Keys {
-    /// Its unit.
+    /// The unit.
     pub unit: Option<u8>,
     /// The identity of the device that may be written to.
     pub write_to: Option<String>,
@@ -99,7 +99,7 @@ impl Stations {
         own.or(self.common.unit)
     }
 
-    /// The units as text; `default` is that of a station without one. `None` if any number is accepted.
+    /// The units as text; `default` is the unit of a station that states none. `None` if any number is accepted.
     pub fn shown(&self, default: Option<u8>) -> Option<String> {
         let stations = 0..self.own.len().max(1);
         let units = stations.map(|station| Some(self.unit(station).or(default)?.to_string()));

@@ -27,7 +27,7 @@ impl Table {
         Self::HoldingRegisters,
     ];
 
-    /// The name of one of its elements, as addresses spell it.
+    /// The name of one element, as spelled in addresses.
     pub const fn element(self) -> &'static str {
         match self {
             Self::Coils => "coil",
@@ -37,7 +37,7 @@ impl Table {
         }
     }
 
-    /// The first digit of its elements' numbers.
+    /// The first digit of the elements' numbers.
     pub const fn digit(self) -> char {
         match self {
             Self::Coils => '0',
@@ -47,12 +47,12 @@ impl Table {
         }
     }
 
-    /// Whether its elements are bits; otherwise they are 16-bit words.
+    /// True if the elements are bits; otherwise they are 16-bit words.
     pub const fn is_bits(self) -> bool {
         matches!(self, Self::Coils | Self::DiscreteInputs)
     }
 
-    /// Whether a client may write it.
+    /// True if a client may write the table.
     pub const fn is_writable(self) -> bool {
         matches!(self, Self::Coils | Self::HoldingRegisters)
     }
@@ -109,8 +109,8 @@ impl fmt::Display for Span {
     }
 }
 
-/// Copies `count` bits from bit `from` of `source` on to the beginning of `target`; unused bits of the last
-/// byte become zero.
+/// Copies `count` bits of `source`, from bit `from` on, to the beginning of `target`; unused bits of the last byte
+/// become zero.
 ///
 /// # Panics
 ///
@@ -132,7 +132,7 @@ pub fn take_bits(source: &[u8], from: usize, count: usize, target: &mut [u8]) {
     }
 }
 
-/// Copies the first `count` bits of `source` to bit `to` of `target` and on; other bits do not change.
+/// Copies the first `count` bits of `source` to `target`, from bit `to` on; other bits do not change.
 ///
 /// # Panics
 ///
@@ -141,8 +141,7 @@ pub fn put_bits(source: &[u8], count: usize, target: &mut [u8], to: usize) {
     copy_bits(source, 0, count, target, to);
 }
 
-/// Copies `count` bits from bit `from` of `source` on to bit `to` of `target` and on; other bits do not
-/// change.
+/// Copies `count` bits of `source`, from bit `from` on, to `target`, from bit `to` on; other bits do not change.
 ///
 /// # Panics
 ///

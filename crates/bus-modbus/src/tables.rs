@@ -89,7 +89,7 @@ impl Tables<'_> {
     ///
     /// # Errors
     ///
-    /// They do not exist.
+    /// The elements do not exist.
     pub fn check_read(&self, table: Table, span: Span) -> Result<(), Exception> {
         self.place(table, span).map(|_| ())
     }
@@ -98,7 +98,7 @@ impl Tables<'_> {
     ///
     /// # Errors
     ///
-    /// They do not exist, or are in the frame that this end writes.
+    /// The elements do not exist, or are in the frame that this end writes.
     pub fn check_write(&self, table: Table, span: Span) -> Result<(), Exception> {
         match self.place(table, span)?.side {
             Side::Holds => Ok(()),
@@ -111,7 +111,7 @@ impl Tables<'_> {
     ///
     /// # Errors
     ///
-    /// They do not exist.
+    /// The elements do not exist.
     pub fn read(
         &self,
         table: Table,
@@ -144,7 +144,7 @@ impl Tables<'_> {
     ///
     /// # Errors
     ///
-    /// They do not exist, or are in the frame that this end writes.
+    /// The elements do not exist, or are in the frame that this end writes.
     pub fn write(
         &mut self,
         table: Table,

@@ -47,7 +47,7 @@ impl FromStr for TagAddress {
                 "write a signal for each element; they are read in one request all the same",
             ));
         }
-        // After the last colon is a type if it starts with a letter, otherwise a number.
+        // The part after the last colon is a type if it starts with a letter, otherwise a number.
         let (rest, data_type) = match text.rsplit_once(':') {
             Some((rest, name)) if name.starts_with(|c: char| c.is_ascii_alphabetic()) => {
                 let data_type = name.parse::<DataType>().map_err(|error| {

@@ -35,7 +35,7 @@ pub struct Block {
     pub first: usize,
     /// The first byte of the image.
     pub byte: usize,
-    /// How many bytes. If the number is odd, the last register carries one byte only, in its high half.
+    /// The number of bytes. If it is odd, the last register carries only one byte, in its high half.
     pub bytes: usize,
 }
 
@@ -122,7 +122,7 @@ impl AreaMapping {
     ///
     /// # Errors
     ///
-    /// It does not fit: what is wrong, and what would be right.
+    /// The area does not fit; the message has the remedy.
     pub(super) fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, Mistake> {
         let mut blocks = Vec::new();
         let mut byte = 0;
@@ -168,7 +168,7 @@ impl AreaMapping {
     ///
     /// # Errors
     ///
-    /// Two blocks overlap: what is wrong, and what would be right.
+    /// Two blocks overlap; the message has the remedy.
     pub(super) fn check_apart(area: Area, blocks: &[Block]) -> Result<(), Mistake> {
         for (index, block) in blocks.iter().enumerate() {
             let other = blocks[..index].iter().find(|other| {
@@ -210,7 +210,7 @@ fn read_place(value: &Value<'_>, table: Table, writes: bool) -> Option<ElementAd
     Some(place)
 }
 
-/// The error for writing to a read-only table: what is wrong, and what would be right.
+/// The error for writing to a read-only table, with the remedy.
 pub(super) fn nobody_writes(table: Table) -> Mistake {
     Mistake::new(
         format!("nobody can write {table}"),

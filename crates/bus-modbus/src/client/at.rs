@@ -9,8 +9,8 @@ use super::area_mapping::nobody_writes;
 use super::{ClientOptions, Piece};
 
 impl ClientOptions {
-    /// Takes the lines, and reports those that are invalid, that do not fit their signals, or that would make
-    /// two signals write to the same place.
+    /// Takes the lines, and reports those that are invalid, do not fit their signals, or would make two signals write
+    /// to the same place.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         let (writes, _) = self.role.areas();
         let mut placed = Vec::new();
@@ -40,7 +40,7 @@ impl ClientOptions {
         }
     }
 
-    /// The signals that are written where another one is read, each with that one.
+    /// The signals that are written to a place where another one is read, each with the other one.
     pub fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
         let (writes, _) = self.role.areas();
         let is_placed = |signal: &Signal| self.at.contains_key(&signal.name);
@@ -66,12 +66,12 @@ impl ClientOptions {
         })
     }
 
-    /// Reports lines of signals that would be written into bits that are another one's.
+    /// Reports lines of signals that would be written into bits of another signal.
     fn check_claims(&self, lines: &[&At<'_>], table: &SignalTable, station: usize) {
         let (writes, _) = self.role.areas();
         let blocks = self.blocks(writes, table.stations[station].bytes(writes));
         let blocks = blocks.unwrap_or_default();
-        // Everything that is written: the bits, and the signal that they belong to.
+        // All writes: the bits, and their signal.
         let mut claims: Vec<(Piece, usize)> = Vec::new();
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.station != station || signal.area != writes {

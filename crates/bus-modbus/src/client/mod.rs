@@ -24,7 +24,7 @@ pub use plan::{Capabilities, queries};
 pub use request::{AnswerError, Region, Request};
 use session::{ClientSession, Framing, Station};
 
-/// For how many times `max_age` a server may leave sent data unacknowledged.
+/// The time for a server to acknowledge sent data, as a multiple of `max_age`.
 const PATIENCE: i64 = 4;
 
 /// The bus of kind `modbus-client`.

@@ -45,7 +45,7 @@ pub struct ClientOptions {
     pub at: BTreeMap<String, TagAddress>,
     /// The time-out for an answer, if stated.
     pub timeout: Option<Nanos>,
-    /// Whether a single request may write and read.
+    /// True if a single request may write and read.
     pub combine: bool,
     pub(super) role: Role,
 }
@@ -132,7 +132,7 @@ impl ClientOptions {
         }
     }
 
-    /// Whether `inputs` or `outputs` has an effect: whether any signal of the area has no place of its own.
+    /// True if `inputs` or `outputs` has an effect: if any signal of the area lacks a separate place.
     pub(crate) fn lies_as_a_whole(&self, area: Area, table: &SignalTable) -> bool {
         let mut signals = table.signals.iter().filter(|signal| signal.area == area);
         self.at.is_empty() || signals.any(|signal| !self.at.contains_key(&signal.name))
@@ -164,7 +164,7 @@ impl ClientOptions {
     ///
     /// # Errors
     ///
-    /// It does not fit: what is wrong, and what would be right.
+    /// The area does not fit; the message has the remedy.
     pub fn blocks(&self, area: Area, bytes: usize) -> Result<Vec<Block>, Mistake> {
         self.mapping(area).blocks(area, bytes)
     }

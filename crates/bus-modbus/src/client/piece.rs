@@ -17,10 +17,9 @@ pub struct Piece {
     pub wire: usize,
     /// The first bit in the frame; bit n of byte k is 8k + n.
     pub bit: usize,
-    /// How many bits; at most [`LONGEST`](Self::LONGEST).
+    /// The number of bits; at most [`LONGEST`](Self::LONGEST).
     pub bits: usize,
-    /// Whether the rest of a register that it does not fill belongs to the image as well, and is written as
-    /// zero.
+    /// True if the rest of a partly filled register belongs to the image as well, and is written as zero.
     pub fills: bool,
 }
 
@@ -28,7 +27,7 @@ impl Piece {
     /// Number of bits of the longest signal.
     pub const LONGEST: usize = 64;
 
-    /// The elements that it touches.
+    /// The elements that the piece touches.
     pub const fn span(self) -> Span {
         let width = self.table.width();
         let first = self.wire / width;
@@ -51,7 +50,7 @@ impl Piece {
         })
     }
 
-    /// The bits that writing it affects: whole registers if it fills them.
+    /// The bits that writing the piece affects: whole registers if it fills them.
     pub(super) fn claim(self) -> std::ops::Range<usize> {
         if self.fills {
             let (span, width) = (self.span(), self.table.width());
@@ -79,7 +78,7 @@ impl Piece {
     ///
     /// # Errors
     ///
-    /// It does not fit there: what is wrong, and what would be right.
+    /// The signal does not fit there; the message has the remedy.
     pub(super) fn of_tag(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
         let ElementAddress { table, offset } = spot.place;
         let data_type = signal.data_type;

@@ -10,7 +10,7 @@ use crate::table::{Span, Table};
 use super::Piece;
 use super::request::{Region, Request};
 
-/// The capabilities of a device, which decide how requests are made.
+/// The capabilities of a device, which determine the requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(
     clippy::struct_excessive_bools,
@@ -21,11 +21,11 @@ pub struct Capabilities {
     pub combine: bool,
     /// The widest gap in a table, in bits, that is read over to save a request.
     pub gap: usize,
-    /// It has function 15; otherwise coils are written one at a time.
+    /// The device has function 15; otherwise coils are written one at a time.
     pub many_coils: bool,
-    /// It has function 16; otherwise registers are written one at a time.
+    /// The device has function 16; otherwise registers are written one at a time.
     pub many_registers: bool,
-    /// It has function 22; otherwise bits of registers are not written.
+    /// The device has function 22; otherwise bits of registers are not written.
     pub masks: bool,
 }
 
@@ -44,9 +44,8 @@ impl Capabilities {
 
 /// The requests of one cycle, writes first.
 ///
-/// Every piece is read or written once. A read may include gaps between pieces; a write never includes
-/// anything else. A piece is split only if it shares registers with others and they exceed the limit of a
-/// request.
+/// Every piece is read or written once. A read may include gaps between pieces; a write never includes anything else. A
+/// piece is split only if it shares registers with others and together they exceed the limit of a request.
 pub fn queries(reads: &[Piece], writes: &[Piece], able: &Capabilities) -> Vec<Request> {
     let is_holding = |piece: &Piece| piece.table == Table::HoldingRegisters;
     let combine = able.combine
@@ -189,7 +188,7 @@ fn mask(from: usize, bits: usize) -> u16 {
     (from..from + bits).fold(0, |mask, bit| mask | 1 << bit)
 }
 
-/// How many elements of `run` one request writes, at most `most`, avoiding a split of a piece if possible.
+/// The number of elements of `run` that one request writes, at most `most`, if possible without splitting a piece.
 fn cut(run: Span, most: usize, pieces: &[Piece]) -> usize {
     if run.count <= most {
         return run.count;

@@ -15,9 +15,9 @@ pub struct Region {
     pub table: Table,
     /// The elements.
     pub span: Span,
-    /// The pieces that they carry, in order of place; adjacent ones are merged.
+    /// The pieces in the elements, in order of place; adjacent ones are merged.
     pub pieces: Vec<Piece>,
-    /// Whether there are elements between the pieces that belong to none.
+    /// True if there are elements between the pieces that belong to none of them.
     pub joined: bool,
 }
 
@@ -78,7 +78,7 @@ impl Region {
         }
     }
 
-    /// The bits that pieces cover in its only register.
+    /// The bits that pieces cover in the region's only register.
     fn mask(&self) -> u16 {
         let mut mask = [0; 2];
         for piece in &self.pieces {
@@ -118,9 +118,9 @@ pub enum Request {
     Mask(Region),
     /// Writes, then reads; both holding registers.
     Both {
-        /// What is written.
+        /// The elements to write.
         write: Region,
-        /// What is read.
+        /// The elements to read.
         read: Region,
     },
 }
@@ -135,7 +135,7 @@ pub enum AnswerError {
 }
 
 impl Request {
-    /// Its function code.
+    /// The function code.
     pub const fn function(&self) -> Function {
         match self {
             Self::Both { .. } => Function::ReadWriteRegisters,
@@ -153,7 +153,7 @@ impl Request {
         }
     }
 
-    /// What it reads.
+    /// The elements that the request reads.
     pub const fn read(&self) -> Option<&Region> {
         match self {
             Self::Read(read) | Self::Both { read, .. } => Some(read),
@@ -161,7 +161,7 @@ impl Request {
         }
     }
 
-    /// What it writes.
+    /// The elements that the request writes.
     pub const fn write(&self) -> Option<&Region> {
         match self {
             Self::Write(write)
@@ -172,7 +172,7 @@ impl Request {
         }
     }
 
-    /// Whether it only checks that the device is there: what it reads is ignored.
+    /// True if the request only checks that the device is there: the values read are ignored.
     pub(super) fn is_look(&self) -> bool {
         matches!(self, Self::Read(read) if read.pieces.is_empty())
     }
@@ -185,7 +185,7 @@ impl Request {
         }
     }
 
-    /// Appends its PDU, with values from `sends`.
+    /// Appends the request's PDU, with values from `sends`.
     ///
     /// # Panics
     ///
@@ -228,7 +228,7 @@ impl Request {
     pub fn take(&self, asked: &[u8], pdu: &[u8], receives: &mut [u8]) -> Result<(), AnswerError> {
         let data = expect(self.function(), pdu)?;
         let Some(read) = self.read() else {
-            // An answer to writing several elements has their address and count; to writing one, the whole
+            // An answer to writing several elements has their address and count; an answer to writing one has the whole
             // request.
             let echo = match self {
                 Self::Write(_) => asked.get(1..5),
@@ -286,7 +286,7 @@ impl fmt::Display for Request {
     }
 }
 
-/// What follows the function code of an answer, if that is the expected one.
+/// The bytes after the function code of an answer, if that is the expected one.
 pub(super) fn expect(function: Function, pdu: &[u8]) -> Result<&[u8], AnswerError> {
     let code = function.code();
     match *pdu {
@@ -302,8 +302,8 @@ pub(super) fn expect(function: Function, pdu: &[u8]) -> Result<&[u8], AnswerErro
     }
 }
 
-/// The length of an answer that starts like this, function code first, as soon as it can be told. With RTU
-/// there is no other way to know it before the silence.
+/// The length of an answer that starts like this, function code first, as soon as it is determined. With RTU there is
+/// no other way to know the length before the silence.
 pub(super) fn length(beginning: &[u8]) -> Option<usize> {
     let (&code, data) = beginning.split_first()?;
     if code & EXCEPTION_BIT != 0 {

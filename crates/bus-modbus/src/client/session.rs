@@ -24,7 +24,7 @@ use super::request::{AnswerError, length};
 use identify::Identity;
 pub(super) use station::Station;
 
-/// How telegrams are delimited.
+/// The framing of telegrams.
 #[derive(Debug)]
 pub(super) enum Framing {
     /// By their header.
@@ -57,10 +57,10 @@ pub(super) enum Framing {
     },
 }
 
-/// What the server was asked.
+/// A request to the server.
 #[derive(Clone, Debug)]
 enum Asked {
-    /// Its identity.
+    /// For the identity.
     Identity {
         so_far: Identification,
         requests: usize,
@@ -90,14 +90,14 @@ pub(super) struct ClientSession<'a> {
     peer: String,
     cycle: Nanos,
     pace: Pace,
-    /// When it last checked what is due.
+    /// When the session last checked for due work.
     looked: Nanos,
     asking: Option<Asking>,
-    /// The request as sent over the line, the range of its PDU, and how much of it the system has accepted.
+    /// The request in the line's format, the range of its PDU, and how much of it the system has accepted.
     request: Vec<u8>,
     pdu: Range<usize>,
     written: usize,
-    /// Whether the line is reported as lost because no station works.
+    /// True if the line is reported as lost because no station works.
     lost: bool,
 }
 
@@ -213,9 +213,9 @@ impl Caller for ClientSession<'_> {
                     self.clear();
                     return Ok(());
                 }
-                // The beginning of an answer tells its length. So pauses within an answer, as some adapters
-                // make, do no harm, and there is no silence to wait for; nor does noise after it, when the
-                // transmitter is switched off.
+                // The beginning of an answer determines its length. So pauses within an answer, as some adapters make,
+                // do no harm, and there is no silence to wait for. Noise after the answer, when the transmitter is
+                // switched off, does no harm either.
                 let expected = inbox.get(1..).and_then(length);
                 match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
                     Some(expected) if inbox.len() >= expected => {
@@ -244,7 +244,7 @@ impl Caller for ClientSession<'_> {
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        // A device is not blamed for a question that it has not got.
+        // A device is not blamed for a question that it has not received.
         if self.written == self.request.len() {
             self.hung_up();
         }
@@ -323,8 +323,8 @@ impl ClientSession<'_> {
         }
     }
 
-    /// Not a telegram arrived over TCP. This end closes the connection now; if it was asking for the identity,
-    /// that counts as if the device had closed it.
+    /// Bytes that are no telegram arrived over TCP. This end now closes the connection; if it was asking for the
+    /// identity, that counts as if the device had closed it.
     fn violated(&mut self, error: impl fmt::Display) -> BusError {
         self.hung_up();
         BusError::Protocol(format!("of {}: {error}", self.peer))
@@ -431,7 +431,7 @@ impl ClientSession<'_> {
         let polled = &self.stations[station];
         if let Some(query) = polled.queries.get(index) {
             if polled.is_to_be_prepared() {
-                // The identity of the device has become doubtful in the meantime: nothing more is written.
+                // The identity of the device is in doubt now: nothing more is written.
                 return self.begin(station + 1, now, port);
             }
             let (code, answer) = (query.function().code(), query.answer_length());
@@ -464,8 +464,7 @@ impl ClientSession<'_> {
         self.begin(station + 1, now, port)
     }
 
-    /// Sends a request with this function code, whose PDU `write` appends; an answer of `answer` bytes is
-    /// expected.
+    /// Sends a request with this function code, whose PDU `write` appends; the expected answer has `answer` bytes.
     fn ask(
         &mut self,
         station: usize,

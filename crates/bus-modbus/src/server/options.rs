@@ -29,7 +29,7 @@ pub struct ServerOptions {
     pub stations: Stations,
     /// The most clients at the same time.
     pub clients: usize,
-    /// Whether a client is refused that writes what another one has written lately.
+    /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
 }
 

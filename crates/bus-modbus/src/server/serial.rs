@@ -20,7 +20,7 @@ const ECHOES: u32 = 20;
 ///
 /// # Errors
 ///
-/// The serial port does not exist, or is gone.
+/// The serial port does not exist or has disappeared.
 pub(super) fn serve(
     line: &Serial,
     units: &mut ServedUnits,
@@ -53,7 +53,7 @@ struct Server<'a> {
     units: &'a mut ServedUnits,
     source: Source,
     framer: Framer,
-    /// The echo of what is sent, if the line is known to have one.
+    /// The echo of sent bytes, if the line is known to have one.
     echo: Option<Echo>,
     suspicion: Suspicion,
     /// The answer being sent, and how much of it the system has accepted.
@@ -84,7 +84,7 @@ impl Server<'_> {
             if !port.is_up(now) {
                 return;
             }
-            // Requests never have this bit: it is another unit's answer, or an echo of one.
+            // Requests never have this bit: it is another unit's answer, or the echo of an answer.
             if pdu[0] & EXCEPTION_BIT != 0 {
                 port.count("modbus-server.answers_heard");
                 return;
@@ -110,7 +110,7 @@ impl Server<'_> {
                 }
                 return;
             }
-            // With other units on the line, silence is the rule for units that are not addressed.
+            // With other units on the line, a unit must not answer unless it is addressed.
             let Some(station) = units.station(number) else {
                 port.count("modbus-server.unknown_unit");
                 return;
@@ -168,13 +168,13 @@ impl Caller for Server<'_> {
     }
 }
 
-/// Detects answers that come back as requests: those of functions 5, 6 and 22 look like requests.
+/// Detects answers that return as requests: those of functions 5, 6 and 22 look like requests.
 #[derive(Debug, Default)]
 struct Suspicion(u32);
 
 impl Suspicion {
-    /// Another request arrived, equal to the last answer or not; returns whether that has now happened often
-    /// enough.
+    /// Another request arrived; `is_last_answer` if it equals the last answer. Returns whether that has now happened
+    /// often enough.
     fn is_confirmed(&mut self, is_last_answer: bool) -> bool {
         self.0 = if is_last_answer { self.0 + 1 } else { 0 };
         self.0 >= ECHOES && self.0.is_multiple_of(ECHOES)

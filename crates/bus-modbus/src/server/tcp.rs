@@ -26,7 +26,7 @@ pub(super) struct TcpService<'a> {
 /// One client.
 #[derive(Debug)]
 pub(super) struct Client {
-    /// What its unconfirmed answers carry.
+    /// The values in the client's unconfirmed answers.
     carried: Vec<Carried>,
     source: Source,
 }
@@ -42,7 +42,7 @@ impl Client {
 }
 
 impl TcpService<'_> {
-    /// As [`telegram`](Service::telegram), for RTU.
+    /// Like [`telegram`](Service::telegram), for RTU.
     fn rtu_telegram(
         &mut self,
         client: &mut Client,
@@ -65,7 +65,7 @@ impl TcpService<'_> {
             });
             client.remember(carried);
         } else {
-            // It may be the unit of another device on the same serial line.
+            // The unit may belong to another device on the same serial line.
             port.count("modbus-server.unknown_unit");
         }
         Ok(length)

@@ -15,29 +15,29 @@ pub(super) const BROADCAST: u8 = 0;
 #[derive(Debug)]
 pub(super) struct ServedUnits {
     identification: Identification,
-    /// Whether a write is an event even if it changes nothing.
+    /// True if a write is an event even without a change.
     every_write: bool,
     all: Box<[Unit]>,
 }
 
 #[derive(Debug)]
 struct Unit {
-    /// Its number; `None` for any.
+    /// The number; `None` for any.
     number: Option<u8>,
     map: Map,
     /// The values written by clients, initially the fail-safe values; with an additional byte if the size is
     /// odd, to complete the last register.
     holds: Box<[u8]>,
     holds_len: usize,
-    /// The frame used for the last answer, and how many different frames there were before it.
+    /// The frame in the last answer, and the number of different frames before it.
     shown: Box<[u8]>,
     generation: u64,
-    /// Whether any client has ever written.
+    /// True if any client has ever written.
     has_writer: bool,
     writers: Writers,
 }
 
-/// Where requests come from.
+/// The source of requests.
 #[derive(Debug)]
 pub(super) struct Source {
     /// Per station, whether its requests keep the values young.
@@ -46,7 +46,7 @@ pub(super) struct Source {
     pub(super) writer: Option<Writer>,
 }
 
-/// What an answer carries of a station's frame: it counts as sent once the client has the answer.
+/// The values of a station's frame in an answer: they count as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Carried {
     station: usize,
@@ -105,7 +105,7 @@ impl ServedUnits {
         let unit = &mut self.all[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
-        // If nothing goes out, the request takes effect, and its answer is lost.
+        // If the line is down, the request takes effect, but its answer is lost.
         let is_up = port.is_station_up(station, now);
         let receipt = if writes_only || !is_up {
             None
@@ -121,7 +121,7 @@ impl ServedUnits {
         };
         let is_lost = !is_up || !writes_only && receipt.is_none();
         let before = reply.len();
-        // Only what is refused is restored.
+        // Only refused writes are undone.
         let held = unit.writers.is_single().then(|| unit.holds.clone());
         let mut tables = Tables {
             map: unit.map,
@@ -180,8 +180,8 @@ impl ServedUnits {
         })
     }
 
-    /// Carries out a broadcast that arrived at `now`, for all units, and returns whether its function may
-    /// be broadcast; it has no answer.
+    /// Carries out a broadcast that arrived at `now`, for all units, and returns whether its function may be broadcast;
+    /// there is no answer.
     pub(super) fn broadcast(
         &mut self,
         now: Nanos,
@@ -199,10 +199,9 @@ impl ServedUnits {
         true
     }
 
-    /// A client has received an answer that carries this.
+    /// A client has received an answer with these values.
     pub(super) fn carried(&self, carried: &Carried, port: &mut Port) {
-        // If another frame has been answered since, it is unknown which bits of this one were new; they are
-        // sent again.
+        // If another frame has been answered since, the new bits of this one are unknown; they are sent again.
         if self.all[carried.station].generation == carried.generation {
             port.sent(&carried.receipt);
         }

@@ -23,7 +23,7 @@ fn words(table: Table, first: usize, count: usize) -> Vec<Piece> {
     (0..count).map(word).collect()
 }
 
-/// The queries as messages show them.
+/// The queries as in messages.
 fn told(queries: &[Request]) -> Vec<String> {
     queries.iter().map(Request::to_string).collect()
 }
@@ -177,7 +177,7 @@ fn pieces(writes: bool) -> impl Strategy<Value = Vec<Piece>> {
             } else {
                 [1, 8, 16, 32, 64, 64][size]
             };
-            // A piece of a whole area may start at any byte, one with its own place only at a register.
+            // A piece of a whole area may start at any byte, a separately placed one only at a register.
             let within = match (table.is_bits(), bits, fills) {
                 (true, ..) => 0,
                 (_, 1, _) => within,

@@ -12,24 +12,25 @@ use super::{Asked, ClientSession};
 /// The most requests made to read an identity.
 const IDENTIFYING: usize = 8;
 
-/// How long until a device that did not report its identity is asked again.
+/// The pause before a device that did not report its identity is asked again.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// How many times in a row a device may be silent, fail or close the connection when asked for its identity,
 /// before it counts as a device without one. In between it answers other requests, so it is there.
 const SILENCES: u8 = 2;
 
-/// How long until a device that seemed to have no identity is asked again, if `write_to` names another one: two connections
-/// may have broken by chance while it was asked. Doubled each time, since a device that hangs up loses its connection by that.
+/// The pause before a device that seemed to have no identity is asked again, if `write_to` names another one: two
+/// connections may have broken by chance during the question. Doubled each time, since a device that hangs up loses its
+/// connection by the question.
 const AGAIN: Nanos = Nanos::from_secs(10);
 
 /// How often that pause is doubled.
 const DOUBLINGS: u32 = 8;
 
-/// What is known about the identity of a device.
+/// The state of a device's identity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    /// To be asked for, not before this time.
+    /// Still to be asked for, but not before this time.
     Unknown { silences: u8, not_before: Nanos },
     /// Reported, or the device has none.
     Known,
@@ -116,7 +117,7 @@ impl ClientSession<'_> {
         }
     }
 
-    /// The device seems to have no identity. If that keeps this end from writing, it is asked again later.
+    /// The device seems to have no identity. If that prevents this end from writing, the device is asked again later.
     fn presume_none(&mut self, station: usize, now: Nanos, port: &mut Port) {
         self.meet(station, &Identification::default(), port);
         let guard = &self.guards[station];
@@ -130,8 +131,8 @@ impl ClientSession<'_> {
         }
     }
 
-    /// The device's answer to the request for its identity cannot be understood. As it does answer, it does
-    /// not count as a device without an identity.
+    /// The device's answer to the request for its identity cannot be understood. Since the device does answer, it does
+    /// not count as one without an identity.
     pub(super) fn is_unclear(&mut self, station: usize, what: &str, port: &Port) {
         if let Identity::Unknown { silences, .. } = &mut self.stations[station].identity {
             *silences = 0;
@@ -177,8 +178,8 @@ impl ClientSession<'_> {
         self.stations[station].forget_queries();
     }
 
-    /// Whether to ask a station for its identity. If it has closed the connection too often when asked, it
-    /// counts as having none.
+    /// True if a station is to be asked for its identity. A station that has closed the connection too often when asked
+    /// counts as one without an identity.
     pub(super) fn may_ask(&mut self, station: usize, now: Nanos, port: &mut Port) -> bool {
         if self.stations[station].hang_ups < SILENCES {
             return true;

@@ -17,11 +17,11 @@ pub(in super::super) struct Station {
     reads: Vec<Piece>,
     writes: Vec<Piece>,
     pub(super) able: Capabilities,
-    /// `Some` if the queries are up to date; then whether they may write.
+    /// `Some` if the queries are up to date; true if they may write.
     prepared: Option<bool>,
     pub(super) queries: Vec<Request>,
     pub(super) sends: Vec<u8>,
-    /// For the frame in `sends`.
+    /// The receipt for the frame in `sends`.
     pub(super) receipt: Option<Receipt>,
     pub(super) receives: Vec<u8>,
     pub(super) identity: Identity,
@@ -57,7 +57,7 @@ impl Station {
         }
     }
 
-    /// A connection begins: nothing is known about the device.
+    /// A connection begins: the device is unknown.
     pub(super) fn connect(&mut self, able: Capabilities) {
         self.able = able;
         self.prepared = None;
@@ -65,12 +65,12 @@ impl Station {
         self.trouble = Trouble::default();
     }
 
-    /// Whether it is skipped in this cycle.
+    /// True if the station is skipped in this cycle.
     pub(super) fn rests(&self, now: Nanos) -> bool {
         now < self.trouble.rests_until
     }
 
-    /// Whether to ask its device for its identity now: before anything is written, and never if nothing is.
+    /// True if its device is to be asked for its identity now: before anything is written, and never if nothing is.
     pub(super) fn wants_identity(&self, now: Nanos) -> bool {
         !self.writes.is_empty() && self.identity.is_due(now)
     }
@@ -92,7 +92,7 @@ impl Station {
         let writes: &[Piece] = if may_write { &self.writes } else { &[] };
         self.queries = queries(&self.reads, writes, &self.able);
         if self.queries.is_empty() {
-            // Something has to be read even so, to see whether it is alive.
+            // Even so, read something to check that the device is alive.
             let look = |piece: &Piece| {
                 let Span { first, .. } = piece.span();
                 Request::Read(Region::new(piece.table, Span { first, count: 1 }))

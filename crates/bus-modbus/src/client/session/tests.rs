@@ -198,14 +198,14 @@ impl Line<'_> {
         self.answer_as(1, pdu);
     }
 
-    /// Has its register read: answers the request.
+    /// The device's register is read: answers the request.
     #[track_caller]
     fn read(&mut self) {
         assert_eq!(self.asked(), READ);
         self.answer(&[3, 2, 0, 7]);
     }
 
-    /// Is written to and read: answers both requests.
+    /// The device is written to and read: answers both requests.
     #[track_caller]
     fn write_and_read(&mut self) {
         assert_eq!(self.asked(), WRITE);
@@ -213,7 +213,7 @@ impl Line<'_> {
         self.read();
     }
 
-    /// Reports its identity when asked.
+    /// The device is asked for its identity, and reports it.
     #[track_caller]
     fn introduce(&mut self, product: &str) {
         assert_eq!(self.asked(), WHO);
@@ -224,7 +224,7 @@ impl Line<'_> {
         self.answer(&pdu);
     }
 
-    /// Stays silent until the time-out.
+    /// The device stays silent until the time-out.
     fn stay_silent(&mut self) {
         self.now = self.now + TIMEOUT + MILLISECOND;
     }
@@ -249,7 +249,7 @@ fn a_device_that_was_away_is_asked_who_it_is_before_it_is_written_to() {
     for _ in 0..3 {
         line.write_and_read();
     }
-    // It is replaced by another device.
+    // Another device replaces this one.
     assert_eq!(line.asked(), WRITE);
     line.stay_silent();
     line.read();
@@ -270,7 +270,7 @@ fn a_device_that_is_silent_when_asked_who_it_is_is_read_and_counts_as_nameless_a
             while line.asked() == READ {
                 line.answer(&[3, 2, 0, 7]);
             }
-            // Its identity was asked for.
+            // The client asked for the identity.
             line.stay_silent();
         }
         line.write_and_read();
@@ -326,7 +326,7 @@ fn a_late_answer_to_something_else_does_not_make_a_device_nameless() {
     assert_eq!(line.asked(), WHO);
     line.answer(&[3, 2, 0, 7]);
     assert_eq!(line.statistic("identity"), None, "it has not said it yet");
-    // The data that it does send are used even so.
+    // The data that the device does send are still used.
     let identification = Identification::of_driver("7");
     let mut pdu = Vec::new();
     identification
@@ -528,7 +528,7 @@ fn a_device_that_cannot_mask_is_read_and_gets_all_but_the_bits() {
     assert_eq!(line.asked(), [22, 0, 0, 0xFF, 0xFE, 0, 0]);
     line.answer(&[0x96, 1]);
     for _ in 0..2 {
-        // Never read to write the other bits.
+        // The other bits are never read in order to write them.
         let written = line.asked();
         assert_eq!(written[..5], [16, 0, 5, 0, 1]);
         line.answer(&[16, 0, 5, 0, 1]);

@@ -1,4 +1,4 @@
-//! Stations that do not answer, or refuse: they are skipped for a while, and the others are polled on.
+//! Stations that do not answer, or refuse: they are skipped for a while, and polling of the others continues.
 
 use crate::Exception;
 use tickbus_base::time::Nanos;
@@ -7,20 +7,20 @@ use tickbus_fieldbus::{BusError, Port};
 use super::super::request::Request;
 use super::{Asked, Asking, ClientSession, Framing};
 
-/// How long a station is skipped after it refused.
+/// How long a refusing station is skipped.
 const REST: Nanos = Nanos::from_secs(1);
 
-/// The longest that a silent station is skipped while others answer, as a multiple of that: each attempt
-/// makes the others wait.
+/// The longest time that a silent station is skipped while others answer, as a multiple of that: each attempt makes the
+/// others wait.
 const LONGEST: i64 = 8;
 
 /// The trouble of a station.
 #[derive(Debug, Default)]
 pub(super) struct Trouble {
     kind: Option<Kind>,
-    /// Until when it is skipped.
+    /// The end of the time for which the station is skipped.
     pub(super) rests_until: Nanos,
-    /// How long it is skipped next time, if it is silent again.
+    /// How long the station is skipped next time, if it is silent again.
     rest: i64,
 }
 
@@ -78,7 +78,7 @@ impl ClientSession<'_> {
             if !matches!(self.framing, Framing::Rtu { .. }) {
                 return Err(error);
             }
-            // They keep no other station waiting, and are tried at once so that a repaired line is noticed.
+            // All stations are silent, so none keeps another waiting; retry them at once to notice a repaired line.
             for polled in &mut *self.stations {
                 polled.trouble.rests_until = now;
             }
@@ -104,7 +104,7 @@ impl ClientSession<'_> {
         }
         let query = &self.stations[station].queries[index];
         if query.is_look() && exception.is_about_the_request() {
-            // It is alive, and the element that was read need not exist.
+            // The device is alive, and the element of this check need not exist.
             return self.go_on(station, index + 1, now, port);
         }
         let right = match (exception, query) {
@@ -127,7 +127,7 @@ impl ClientSession<'_> {
             exception,
             Exception::GATEWAY_PATH_UNAVAILABLE | Exception::GATEWAY_TARGET_FAILED
         ) {
-            // The gateway says so, not the device: the next answer may come from another device.
+            // The gateway refuses, not the device: the next answer may come from another device.
             port.count("modbus-client.unanswered");
             self.doubt(station);
         }
@@ -136,25 +136,25 @@ impl ClientSession<'_> {
             exception,
             Exception::ACKNOWLEDGE | Exception::SERVER_DEVICE_BUSY
         ) {
-            // It may be ready in the next cycle.
+            // The device may be ready in the next cycle.
             self.stations[station].trouble.rests_until = now;
         }
         Ok(())
     }
 
-    /// Whether the device can be asked in another way; if so, that is used from now on.
+    /// True if the device can be asked in another way; if so, that is used from now on.
     fn adapts(&mut self, station: usize, index: usize, exception: Exception, port: &Port) -> bool {
         let unit = self.named(station);
         let polled = &mut self.stations[station];
         let (query, able) = (&polled.queries[index], &mut polled.able);
         let is_unknown = exception == Exception::ILLEGAL_FUNCTION;
         let instead = match query {
-            // Some servers do not have it, or only for some registers.
+            // Some servers lack this function, or have it only for some registers.
             Request::Both { .. } if !exception.passes() => {
                 able.combine = false;
                 "it is asked in two requests"
             }
-            // Some report a failure where an address does not exist.
+            // Some report a failure for an address that does not exist.
             Request::Read(read)
                 if read.joined
                     && (exception.is_about_the_request()

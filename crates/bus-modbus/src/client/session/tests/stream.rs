@@ -14,7 +14,7 @@ fn rtu_telegrams_in_a_stream_may_be_cut_and_merged_and_come_late() {
     for byte in seven(1) {
         line.hear(&[byte]).expect("it goes on");
     }
-    // Nobody waits for silence: the next request goes out at once.
+    // There is no need to wait for silence: the next request goes out at once.
     assert_eq!(line.poll.to_write(line.now)[0], 2);
     assert_eq!(line.asked_of(), (2, READ.to_vec()));
     line.stay_silent();

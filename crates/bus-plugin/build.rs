@@ -1,4 +1,4 @@
-//! Looks for what the tests need beside Rust.
+//! Looks for the tools that the tests need besides Rust.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

@@ -27,11 +27,11 @@ pub struct DispatcherBus {
 }
 
 impl DispatcherBus {
-    /// The bus that `options` describe. It connects to nothing yet.
+    /// The bus that `options` describe, not connected yet.
     ///
     /// # Errors
     ///
-    /// No dispatcher takes what the options make of the driver.
+    /// No dispatcher accepts a driver with these options.
     pub fn new(options: &Options, setup: &BusSetup<'_>) -> Result<Self, Mistake> {
         let channels = options.channels(setup.table);
         let sign = Nanos((setup.max_age.0 / SIGNS_OF_LIFE).max(1));
@@ -75,41 +75,41 @@ struct Membership<'b> {
     bus: &'b mut DispatcherBus,
     peer: SocketAddr,
     pace: Pace,
-    /// For the values on their way.
+    /// The receipt for the values on their way.
     receipt: Option<Receipt>,
     progress: Progress,
-    /// Why a connection, or another line, was refused last, if that was not reported yet.
+    /// The last refusal of a connection, or of another line, if it was not reported yet.
     refusal: Option<String>,
 }
 
-/// What was reported of the line.
+/// The last report about the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Progress {
-    /// That it joins.
+    /// Joining.
     Joining,
-    /// It has joined, and that is still to be reported.
+    /// Joined, but not reported yet.
     Joined,
-    /// That no input has a source.
+    /// No input has a source.
     Waiting,
-    /// That it runs.
+    /// Running.
     Running,
 }
 
 impl Membership<'_> {
-    /// Says what has changed, once the dispatcher has all of before.
+    /// Sends changed values, once the dispatcher has all earlier ones.
     fn make(&mut self, now: Nanos, port: &mut Port) {
         let DispatcherBus {
             outputs, client, ..
         } = &mut *self.bus;
         let stations = 0..port.stations();
-        // While the line is down nothing is said, and what has changed is said when it is up.
+        // While the line is down nothing is sent; changes are sent when it is up again.
         let Some(mut frames) = port.look(stations.clone(), now) else {
             return;
         };
         let (receipt, is_ending) = (frames.receipt(), frames.is_ending());
         if !outputs.look(&mut frames) {
             if is_ending {
-                // The dispatcher has been told the last values before.
+                // The dispatcher already has the last values.
                 self.receipt.get_or_insert(receipt);
             }
             return;
@@ -127,7 +127,7 @@ impl Membership<'_> {
         }
     }
 
-    /// Reports how the line is, when that changes.
+    /// Reports the state of the line when it changes.
     fn report(&mut self, port: &mut Port) {
         if self.progress == Progress::Joining {
             return;
@@ -179,7 +179,7 @@ impl Caller for Membership<'_> {
         let heard = client.hear(now, bytes, &mut |event| match event {
             Event::Value(channel, value) => inputs.value(channel, value, port),
             Event::Lost(channel) => inputs.lost(channel, port),
-            // Until all first values are there, they wait.
+            // Values wait until all first values have arrived.
             Event::LineEnd if *progress != Progress::Joining => inputs.deliver(now, port),
             Event::Settled => *progress = Progress::Joined,
             Event::Refused { cable, code, text } => {

@@ -1,4 +1,4 @@
-//! Which signal is which channel.
+//! Maps signals to channels.
 
 use std::collections::BTreeMap;
 
@@ -9,13 +9,13 @@ use tickbus_image::signal::{DataType, Signal, SignalTable};
 /// The channels of the signals of one end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Channels {
-    /// Per signal of the table. Its number may be too large for a dispatcher.
+    /// The channel of each signal of the table. The number may be too large for a dispatcher.
     pub list: Vec<Channel>,
-    /// How many there are of each kind.
+    /// The number of channels of each kind.
     pub counts: Counts,
 }
 
-/// What a signal is at the end with `role`: an output if that end writes it, and digital if it is a BOOL.
+/// The kind of a signal at the end with `role`: an output if that end writes it, and digital if it is a BOOL.
 pub(super) fn kind_of(signal: &Signal, role: Role) -> Kind {
     let (writes, _) = role.areas();
     match (signal.data_type, signal.area == writes) {
@@ -27,8 +27,8 @@ pub(super) fn kind_of(signal: &Signal, role: Role) -> Kind {
 }
 
 impl Channels {
-    /// Channels in the order of stations and addresses, from 1; `placed` has those that some signals have by name, which
-    /// the others leave out.
+    /// Channels in the order of stations and addresses, from 1; `placed` has the channels that some signals have by
+    /// name, which the others leave out.
     pub fn new(table: &SignalTable, role: Role, placed: &BTreeMap<String, Channel>) -> Self {
         let signals = &table.signals;
         let mut order: Vec<usize> = (0..signals.len()).collect();

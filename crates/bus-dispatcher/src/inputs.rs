@@ -11,7 +11,7 @@ use super::Channels;
 #[derive(Debug)]
 pub(super) struct Inputs {
     list: Box<[Input]>,
-    /// Where in the list a channel is: digital ones and analog ones, by number less 1.
+    /// The index of a channel in the list: digital ones and analog ones, by number less 1.
     places: [Box<[Option<usize>]>; 2],
     raw: RawValues,
     stations: Box<[Station]>,
@@ -24,9 +24,9 @@ struct Input {
     channel: Channel,
     data_type: DataType,
     fail_safe: u64,
-    /// It has a value from its source.
+    /// The input has a value from its source.
     is_alive: bool,
-    /// Its last value was out of range.
+    /// The last value was out of range.
     is_out: bool,
 }
 
@@ -34,7 +34,7 @@ struct Input {
 struct Station {
     frame: Box<[u8]>,
     inputs: usize,
-    /// How many of these have a source.
+    /// The number of these inputs with a source.
     alive: usize,
     is_changed: bool,
 }
@@ -96,7 +96,7 @@ impl Inputs {
         }
     }
 
-    /// Whether this end exchanges data: an input has a source, or there are no inputs.
+    /// True if this end exchanges data: an input has a source, or there are no inputs.
     pub(super) fn is_served(&self) -> bool {
         self.list.is_empty() || self.stations.iter().any(|station| station.alive > 0)
     }
@@ -107,10 +107,10 @@ impl Inputs {
         Some(&mut self.list[(*at)?])
     }
 
-    /// An input has a value. What its signal cannot hold is refused.
+    /// An input has a value. Values that do not fit the signal are refused.
     pub(super) fn value(&mut self, channel: Channel, value: Number, port: &Port) {
         let Some(input) = self.input(channel) else {
-            // A number that [fieldbus.at] has left out.
+            // A number that [fieldbus.at] leaves out.
             return;
         };
         let (signal, data_type, station) = (input.signal, input.data_type, input.station);
@@ -152,7 +152,7 @@ impl Inputs {
         station.is_changed = true;
     }
 
-    /// Hands in the stations that have changed, and touches the others that have a source, or need none.
+    /// Passes on the stations that have changed, and touches the others that have a source, or need none.
     pub(super) fn deliver(&mut self, now: Nanos, port: &mut Port) {
         if !port.is_up(now) {
             return;
@@ -183,7 +183,7 @@ fn bits(data_type: DataType, value: Number, before: u64) -> Option<u64> {
         DataType::Real => Some(u64::from((real as f32).to_bits())),
         DataType::Lreal => Some(real.to_bits()),
         _ => {
-            // What is written without a fraction needs no rounding, and may be longer than a double is exact.
+            // A value without a fraction needs no rounding, and may have more digits than a double keeps.
             let whole = value.as_str().parse::<i128>();
             let whole = whole.unwrap_or_else(|_| real.round() as i128);
             let range = data_type.range()?;

@@ -18,13 +18,13 @@ use super::channels::{Channels, kind_of};
 /// The options of the bus `dispatcher`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Where the dispatcher listens.
+    /// The address of the dispatcher.
     pub address: Address,
     /// The name in the laboratory, if stated.
     pub name: Option<String>,
-    /// The connections that it asks for, each with its offset in the file.
+    /// The connections to request, each with its offset in the file.
     pub cables: Vec<(usize, Cable)>,
-    /// Signals with a channel of their own, by name: `[fieldbus.at]`.
+    /// Signals with their own channel, by name: `[fieldbus.at]`.
     pub at: BTreeMap<String, Channel>,
     pub(super) role: Role,
     /// The offset of the `[fieldbus]` table, for mistakes.
@@ -32,7 +32,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `address`, `name` and `connect`. `moved` says that `set_address` follows.
+    /// Reads `address`, `name` and `connect`. With `moved`, `set_address` follows.
     pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let name = table.take("name");
@@ -97,7 +97,7 @@ impl Options {
         }
     }
 
-    /// Reports what the signals lack.
+    /// Reports problems of the signals.
     pub(super) fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let counts = self.channels(table).counts;
         for kind in Kind::ALL {
@@ -117,11 +117,11 @@ impl Options {
         }
     }
 
-    /// What it says of itself to the dispatcher.
+    /// The driver's description of itself to the dispatcher.
     ///
     /// # Errors
     ///
-    /// No name is stated, and the driver's cannot be one.
+    /// No name is stated, and the driver's name is not valid.
     pub(super) fn profile(&self, setup: &BusSetup<'_>) -> Result<Profile, Mistake> {
         let name = match (&self.name, self.role) {
             (Some(name), _) => name.clone(),
@@ -142,13 +142,13 @@ impl Options {
             name,
             counts: self.channels(setup.table).counts,
             cables: self.cables.iter().map(|(_, cable)| cable.clone()).collect(),
-            // Clients that this driver feeds lose their source if the driver falls silent for longer than its `max_age`.
+            // Clients fed by this driver lose their source if it falls silent for longer than its `max_age`.
             alive: Some(setup.max_age.clamp(LEAST_PROMISE, LONGEST_PROMISE)),
         };
         profile.check().map(|()| profile)
     }
 
-    /// What it is in the laboratory.
+    /// The part in the laboratory.
     pub(super) const fn part(&self) -> Part {
         match self.role {
             Role::Device => Part::Process,
@@ -176,7 +176,7 @@ fn read_cables(value: &Value<'_>) -> Option<Vec<(usize, Cable)>> {
         let cable = cable.map_err(|mistake| value.refuse(mistake)).ok()?;
         Some((value.at(), cable))
     };
-    // All mistakes are reported, not the first alone.
+    // Report all mistakes, not only the first.
     let cables: Vec<_> = value.list(RIGHT)?.iter().map(read).collect();
     cables.into_iter().collect()
 }

@@ -1,4 +1,4 @@
-//! What this end writes, as values of its outputs.
+//! The values of this end's outputs.
 
 use tickbus_dispatcher::client::Client;
 use tickbus_dispatcher::{Channel, Number, ON_VOLTS};
@@ -7,13 +7,13 @@ use tickbus_image::signal::{DataType, RawValues, SignalTable};
 
 use super::Channels;
 
-/// The outputs, and the frames that were said last.
+/// The outputs, and the last frames sent.
 #[derive(Debug)]
 pub(super) struct Outputs {
     list: Box<[Output]>,
     raw: RawValues,
     stations: Box<[Frame]>,
-    /// Nothing was said on this connection.
+    /// Nothing was sent on this connection yet.
     is_first: bool,
 }
 
@@ -22,9 +22,9 @@ struct Output {
     signal: usize,
     channel: Channel,
     data_type: DataType,
-    /// The bits that were said last.
+    /// The last bits sent.
     last: Option<u64>,
-    /// Its value cannot be said.
+    /// The value cannot be sent.
     is_unsayable: bool,
 }
 
@@ -72,7 +72,7 @@ impl Outputs {
         }
     }
 
-    /// Looks at the frames; whether there is something to say.
+    /// Looks at the frames; returns whether there is something to send.
     pub(super) fn look(&mut self, frames: &mut Frames<'_>) -> bool {
         let mut differs = self.is_first;
         for (station, Frame { last, now, bands }) in self.stations.iter_mut().enumerate() {
@@ -82,7 +82,7 @@ impl Outputs {
         differs
     }
 
-    /// Sets what has changed in the frames that were looked at; without a client it gets lost.
+    /// Sets the values that have changed in these frames; without a client they are lost.
     pub(super) fn say(&mut self, mut client: Option<&mut Client>, port: &Port) {
         self.is_first = false;
         for (station, frame) in self.stations.iter_mut().enumerate() {
@@ -118,7 +118,7 @@ impl Outputs {
     }
 }
 
-/// The value of these bits; `None` for what is not finite, and for what is too long.
+/// The value of these bits; `None` for infinities, NaN, and values that are too long.
 #[expect(clippy::cast_possible_truncation, reason = "a REAL has 32 bits")]
 fn number(data_type: DataType, bits: u64) -> Option<Number> {
     match data_type {

@@ -57,7 +57,7 @@ impl Hand {
     }
 }
 
-/// A machine on a clock of its own.
+/// A machine with its own clock.
 struct Machine {
     end: End,
     clock: Arc<Manual>,
@@ -80,7 +80,7 @@ impl Machine {
         });
     }
 
-    /// Lets time pass until a client by hand has heard such a line.
+    /// Lets time pass until a client by hand has received such a line.
     fn until_heard(&mut self, hand: &mut Hand, start: &str) -> String {
         thread::scope(|scope| {
             let hearing = scope.spawn(|| hand.until(start));
@@ -166,7 +166,7 @@ fn an_input_without_its_source_has_its_fail_safe_value_and_without_all_it_is_sta
     );
     machine.until("it is stale", |end| end.tick().code == Code::Stale);
     assert_eq!(machine.end.get("run"), 0.0);
-    // The connections that were left sleep, and wake by the name.
+    // The connections of clients that have left sleep, and wake by the name.
     let mut plc = Hand::join(&laboratory, PLC);
     plc.say("P Q1=24 AQ2=8");
     machine.until("it is back", |end| {
@@ -192,7 +192,7 @@ fn the_last_line_of_a_controller_has_the_fail_safe_values() {
             .config("controller", further)
             .replace("300ms", "20s");
         let mut controller = End::open(&text, &Monotonic::shared());
-        // While it is stale it says fail-safe values as well.
+        // While the data are stale, the controller sends fail-safe values as well.
         while controller.tick().code == Code::Stale {
             thread::yield_now();
         }

@@ -1,6 +1,6 @@
 //! Sending and receiving values allocates nothing.
 //!
-//! All threads of the process are counted, so this test is alone in its file.
+//! The count covers all threads of the process, so this test is alone in its file.
 #![allow(missing_docs, reason = "a test")]
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
@@ -72,7 +72,7 @@ fn values_go_both_ways() {
             slots[0] = Slot::from_real(f64::from(u8::from(is_odd)));
             slots[1] = Slot::from_real(speed + 0.1);
             driver.exchange(None, &mut slots);
-            // Its fraction says that it is one of this round.
+            // The fraction shows that the line belongs to this round.
             while !line.contains(".1") || !line.contains("AQ1=") {
                 hear(&mut line);
             }

@@ -16,7 +16,7 @@ use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
 pub struct Done {
     /// The bits written, in the frame that clients write.
     pub wrote: Option<Range<usize>>,
-    /// The bits that the answer carries, of the frame that this end writes.
+    /// The bits in the answer, of the frame that this end writes.
     pub read: Option<Range<usize>>,
     /// Why the request was refused, if so; it then had no effect.
     pub refused: Option<Exception>,

@@ -72,7 +72,7 @@ pub(super) struct Layout {
     pub(super) stations: *const *const Station,
 }
 
-/// `tickbus_bus`, which only the library can look into.
+/// `tickbus_bus`, which is opaque outside the library.
 #[repr(C)]
 #[derive(Debug)]
 pub(super) struct Bus {

@@ -12,14 +12,14 @@ const TEXT_LIMIT: usize = 8000;
 /// A message from a helper to its host.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Answer {
-    /// It is there. Sent first, without a request. Another version is told apart by it.
+    /// Hello: sent first, unrequested; carries the protocol version.
     Hello {
-        /// The version of its tickbus; both ends must have the same.
+        /// The version of the helper's tickbus; both ends must have the same.
         version: String,
     },
     /// The library is loaded and its bus is open.
     Opened,
-    /// The exchange is complete; what was received is in the shared memory.
+    /// The exchange is complete; the received data are in the shared memory.
     Done(Outcome),
     /// The last request failed in the library.
     Failed(#[serde(with = "Failure")] BusError),
@@ -36,7 +36,7 @@ enum Failure {
 }
 
 impl Answer {
-    /// Its name in messages.
+    /// The name in messages.
     pub(super) const fn name(&self) -> &'static str {
         match self {
             Self::Hello { .. } => "a hello",

@@ -14,7 +14,7 @@ pub(super) struct Direct {
     setup: Setup,
     limits: Limits,
     calls: Calls,
-    /// Stays loaded between attempts: many libraries cannot be loaded twice in a process.
+    /// Stays loaded between attempts, since many libraries cannot be loaded twice in a process.
     library: Option<Library>,
 }
 

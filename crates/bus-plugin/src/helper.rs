@@ -92,8 +92,8 @@ struct Host {
 }
 
 impl Host {
-    /// Moves the socket and the memory's file away from stdin and stdout. A library that then reads from
-    /// stdin finds nothing, and what it prints goes to stderr.
+    /// Moves the socket and the memory's file away from stdin and stdout. A library that then reads from stdin finds
+    /// nothing, and its prints go to stderr.
     fn take_over() -> io::Result<(Self, OwnedFd)> {
         let line = io::stdin().as_fd().try_clone_to_owned()?;
         let memory = io::stdout().as_fd().try_clone_to_owned()?;
@@ -114,7 +114,7 @@ impl Host {
         self.line.write_all(&answer.write())
     }
 
-    /// The host's next request; `None` if it asks the helper to end.
+    /// The host's next request; `None` if the host asks the helper to end.
     fn next<M: Message>(&mut self) -> io::Result<Option<M>> {
         loop {
             if let Some(message) = self.inbox.take().map_err(io::Error::other)? {
@@ -138,7 +138,7 @@ impl Host {
     }
 }
 
-/// Kills this process if its host has gone and the library does not let it end within `grace`: nothing else
+/// Kills this process if its host has gone and the library does not let the process end within `grace`: nothing else
 /// would. Dropping the returned sender cancels that.
 fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
     let line = line.try_clone()?;
@@ -146,7 +146,7 @@ fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
     std::thread::Builder::new()
         .name("guard".to_owned())
         .spawn(move || {
-            // No event is requested, so only the loss of the other end wakes it.
+            // No event is requested, so only the loss of the other end ends the wait.
             let mut watched = [PollFd::new(&line, PollFlags::empty())];
             while poll(&mut watched, None).is_err() {}
             if end.recv_timeout(grace) == Err(mpsc::RecvTimeoutError::Timeout) {

@@ -23,7 +23,7 @@ use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Exchange, Exchanged, Free, Port};
 
-/// How long a helper may take to end after it was killed.
+/// The time for a killed helper to end.
 const END: Nanos = Nanos::from_secs(1);
 
 /// Lets a helper process call the library.
@@ -79,7 +79,7 @@ impl Free for Isolated {
     }
 
     fn close_timeout(&self) -> Nanos {
-        // First the library has its time to close, then the helper is killed.
+        // The library first has its time to close, then the helper is killed.
         self.setup.timeout() + self.limits.close + END
     }
 }
@@ -122,7 +122,7 @@ impl Exchange for OpenBus<'_> {
     }
 }
 
-/// What the host is waiting for.
+/// The event that the host is waiting for.
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
     /// For the helper to start.
@@ -135,17 +135,17 @@ enum Waiting {
 #[derive(Debug)]
 struct Helper {
     child: Child,
-    /// Waits for `line`, and is dropped before it.
+    /// Waits for `line`, and is dropped first.
     set: PollSet,
     interest: Interest,
     line: UnixStream,
     inbox: Inbox,
     memory: SharedMemory,
-    /// The system's time, in which the helper runs whatever clock the driver has.
+    /// The system's time, in which the helper runs regardless of the driver's clock.
     clock: Arc<Monotonic>,
     program: PathBuf,
     library: String,
-    /// How long it may take to end by itself.
+    /// The time for the helper to end on its own.
     grace: Nanos,
 }
 
@@ -179,7 +179,7 @@ impl Helper {
         })
     }
 
-    /// Makes it load the library and open the bus; `false` if it was stopped meanwhile.
+    /// Makes the helper load the library and open the bus; `false` if it was stopped meanwhile.
     fn open(&mut self, bus: &Isolated, stop: &Stop) -> Result<bool, BusError> {
         let limit = bus.limits.open;
         match self.ask(None, Waiting::ForHello, limit, stop)? {
@@ -295,7 +295,7 @@ impl Helper {
     /// The helper's end of the socket is closed: the helper has died, or the library has closed a descriptor
     /// that is not its own.
     fn lost(&mut self, what: Waiting, detail: &str) -> BusError {
-        // If it has died already, it keeps its exit status.
+        // If the helper has died already, it keeps its exit status.
         let _ = self.child.kill();
         let status = self.child.wait();
         let killed = Some(Signal::KILL.as_raw());
@@ -376,14 +376,14 @@ impl Drop for Helper {
                 self.grace
             );
         }
-        // If it has ended by itself, it keeps its exit status.
+        // If the helper has ended on its own, it keeps its exit status.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// Writes to a socket whose other end may be gone, without SIGPIPE: the process belongs to the host's
-/// application, which may not ignore that signal.
+/// Writes to a socket whose other end may be gone, without SIGPIPE: the process belongs to the host's application,
+/// which may not ignore that signal.
 #[cfg(not(target_vendor = "apple"))]
 fn send_quietly(line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
     Ok(rustix::net::send(
@@ -398,8 +398,8 @@ fn send_quietly(mut line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
     line.write(bytes)
 }
 
-/// Starts a helper with its socket and its memory in place of stdin and stdout. What it prints goes to
-/// stderr, and Ctrl-C at the terminal reaches only the host.
+/// Starts a helper with its socket and its memory in place of stdin and stdout. The helper's prints go to stderr, and
+/// Ctrl-C at the terminal reaches only the host.
 fn spawn(program: &Path, line: OwnedFd, memory: OwnedFd) -> io::Result<Child> {
     Command::new(program)
         .arg("plugin-helper")

@@ -43,12 +43,12 @@ use tickbus_fieldbus::{BusSetup, Free, OpenError};
 #[cfg(unix)]
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// How long library calls may last.
+/// The time limits of library calls.
 #[derive(Clone, Copy, Debug)]
 struct Limits {
-    /// Loading it, and opening the bus.
+    /// Loading the library, and opening the bus.
     open: Nanos,
-    /// An exchange, beyond the time-out that it is given.
+    /// An exchange, in addition to its own time-out.
     call: Nanos,
     /// Closing the bus.
     close: Nanos,
@@ -58,7 +58,8 @@ struct Limits {
 ///
 /// # Errors
 ///
-/// The library's file does not exist, or there is no helper for it: what was searched for, and what to do.
+/// The library's file does not exist, or there is no helper for it: the message has the places searched, and the
+/// remedy.
 pub fn open(options: &Options, line: &BusSetup<'_>) -> Result<Box<dyn Free>, OpenError> {
     let library = absolute(line.folder, &options.library);
     if !library.is_file() {

@@ -1,8 +1,8 @@
 //! A vendor's shared library behind safe functions.
 //!
-//! This is the only place where the plug-in bus calls foreign code. Whatever can be checked is checked here:
-//! the symbols, the version, the return codes, the texts, and the bytes behind `out`. What cannot be checked
-//! (that it does not damage the rest of the process) is what `isolated = true` is for.
+//! This is the only place where the plug-in bus calls foreign code. Everything that can be checked is checked here: the
+//! symbols, the version, the return codes, the texts, and the bytes after `out`. For everything else (such as damage to
+//! the rest of the process) there is `isolated = true`.
 
 #![allow(unsafe_code, reason = "a vendor's library is loaded and called")]
 
@@ -16,7 +16,7 @@ use super::setup::Setup;
 use tickbus_base::os::{self, one_line};
 use tickbus_fieldbus::{BusError, Role};
 
-/// Bytes behind `out` that a library must not change.
+/// Bytes after `out` that a library must not change.
 const GUARD: usize = 256;
 
 /// The longest text accepted from a library, in bytes.
@@ -81,7 +81,7 @@ impl Library {
     ///
     /// # Errors
     ///
-    /// What the library reports, by its code.
+    /// The error that the library reports, by its code.
     pub(super) fn open(&self, setup: &Setup) -> Result<Bus<'_>, BusError> {
         let texts = Texts::new(setup);
         let options = texts.options();
@@ -200,7 +200,7 @@ impl Bus<'_> {
     ///
     /// # Errors
     ///
-    /// What the library reports, by its code, or that it violates the interface.
+    /// The error that the library reports, by its code, or a violation of the interface.
     pub(super) fn exchange(&mut self, timeout_ms: u32) -> Result<Outcome, BusError> {
         let (input, output) = (self.input.as_ptr(), self.output.as_mut_ptr());
         // SAFETY: the function is of the library that `self.library` keeps loaded, with the type of the header;
@@ -221,8 +221,8 @@ impl Bus<'_> {
         })
     }
 
-    /// Checks that the bytes behind `out` are unchanged, and restores them, so that the next exchange is
-    /// checked on its own.
+    /// Checks that the bytes after `out` are unchanged, and restores them, so that the next exchange is checked on its
+    /// own.
     fn check_guard(&mut self) -> Result<(), BusError> {
         let behind = &mut self.output[self.rx..];
         let last = behind

@@ -19,12 +19,12 @@ type Candidate = (&'static str, Result<PathBuf, String>);
 ///
 /// # Errors
 ///
-/// Every place that was searched, and what to do.
+/// The message has every place that was searched, and the remedy.
 pub(super) fn helper(named: Option<PathBuf>, directory: &Path) -> Result<PathBuf, Mistake> {
     search(places(named, directory))
 }
 
-/// A named command is the only candidate: running any other one would not be what was asked for.
+/// A named command is the only candidate: running any other would ignore the user's choice.
 fn places(named: Option<PathBuf>, directory: &Path) -> Vec<Candidate> {
     if let Some(path) = named {
         return vec![("`helper` in the driver.cfg", Ok(path))];

@@ -21,15 +21,15 @@ pub struct Options {
     pub library: PathBuf,
     /// The options for the library itself, as key-value pairs sorted by key.
     pub options: Vec<(String, String)>,
-    /// How long one exchange may wait for the peer; `None` leaves it to the cycle. Positive.
+    /// The time limit of one exchange; `None` leaves it to the cycle. Positive.
     pub timeout: Option<Nanos>,
-    /// How long opening may take. Positive.
+    /// The time limit for opening. Positive.
     pub open_timeout: Nanos,
-    /// How long past `timeout` a call may take before it counts as hung. Positive.
+    /// The time past `timeout` after which a call counts as hung. Positive.
     pub call_timeout: Nanos,
-    /// How long closing waits for the library. Positive.
+    /// The time limit for closing. Positive.
     pub close_timeout: Nanos,
-    /// Whether the library runs in a separate process.
+    /// True if the library runs in a separate process.
     pub isolated: bool,
     /// The tickbus command for starting that process; `None` searches for it. Relative to the folder of the
     /// driver.cfg.

@@ -37,7 +37,7 @@ impl Outcome {
         self != Self::NOTHING
     }
 
-    /// What came of its exchange.
+    /// The result for the port.
     pub(super) fn exchanged(self) -> Exchanged {
         Exchanged::Data {
             is_taken: self.is_taken(),

@@ -1,4 +1,4 @@
-//! What a library needs to open its bus.
+//! The data that a library needs to open its bus.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -16,15 +16,15 @@ const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
 /// One station's frames.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Station {
-    /// Its name; empty when it is the only one.
+    /// The name; empty for a single station.
     pub name: String,
-    /// Bytes that it sends.
+    /// Bytes that the station sends.
     pub tx: u32,
-    /// Bytes that it receives.
+    /// Bytes that the station receives.
     pub rx: u32,
 }
 
-/// What a library needs to open its bus, and the library's file.
+/// The data that a library needs to open its bus, and the library's file.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setup {
     /// The library's file, absolute. It need not be UTF-8, as a path would have to be to be sent.
@@ -33,7 +33,7 @@ pub struct Setup {
     pub name: String,
     /// The folder of the driver.cfg.
     pub directory: String,
-    /// Which end of the bus this is.
+    /// The end of the bus that this is.
     #[serde(with = "Sent")]
     pub role: Role,
     /// The library's own options, as key-value pairs without NUL.
@@ -98,7 +98,7 @@ impl Setup {
         bytes.sum()
     }
 
-    /// How exchanges are paced.
+    /// The pacing of exchanges.
     pub(super) fn cycles(&self) -> Cycles {
         Cycles {
             cycle: Nanos(i64::try_from(self.cycle_ns).unwrap_or(i64::MAX)),

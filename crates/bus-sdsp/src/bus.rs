@@ -12,7 +12,7 @@ use tickbus_virtual_time::{Declaration, Ended, Meeting, Step};
 use super::run::{End, Run};
 use super::{Options, Variables};
 
-/// The most steps that one tick catches up on. A longer one is taken for a wrong time.
+/// The most steps that one tick catches up on. More steps are assumed to be a wrong time.
 const MOST_STEPS: i64 = 100_000;
 
 /// A client of a run on virtual time.
@@ -29,16 +29,16 @@ pub struct Sdsp {
 
 #[derive(Debug)]
 enum State {
-    /// It has not joined yet.
+    /// The client has not joined yet.
     Apart,
     /// In a step; the next one is due at this time of the simulation.
     Joined { run: Box<Run>, due: Nanos },
-    /// The run is over, or goes on without this client.
+    /// The run has ended, or continues without this client.
     Over(Result<(), BusError>),
 }
 
 impl Sdsp {
-    /// A client with these options. It connects in its first cycle.
+    /// A client with these options, which connects in its first cycle.
     ///
     /// # Errors
     ///
@@ -48,7 +48,7 @@ impl Sdsp {
         let declaration = options.declaration(setup, &writes, &reads)?;
         let (_, area) = setup.role.areas();
         let stations = setup.table.stations.iter();
-        // Others are waited for in real time, also by a driver whose clock stands still until it is set.
+        // The wait for others is in real time, even if the driver's clock stands still until it is set.
         let clock = if setup.clock.passes_alone() {
             Arc::clone(setup.clock)
         } else {
@@ -134,7 +134,7 @@ impl Sdsp {
         port.running(&format!("in step with the server at {}", self.meeting));
     }
 
-    /// The run is over: says so, and makes what was received invalid.
+    /// The run has ended: reports that, and makes the received data invalid.
     fn end(end: &End, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         let result = match end {
             End::Finished(outcome) => {
@@ -208,16 +208,16 @@ struct Values {
     writes: Variables,
     reads: Variables,
     types: Vec<DataType>,
-    /// What it writes, as it is sent next.
+    /// The values to send next.
     slots: Vec<u64>,
-    /// For what is in the slots.
+    /// The receipt for the values in the slots.
     receipt: Option<Receipt>,
-    /// Per station, what it reads.
+    /// Per station, the frame that it reads.
     frames: Vec<Box<[u8]>>,
 }
 
 impl Values {
-    /// Takes what the simulation writes. If a fault swallows it, the values of before are sent again.
+    /// Takes the simulation's values. If a fault swallows them, the previous values are sent again.
     fn collect(&mut self, now: Nanos, port: &mut Port) {
         let Some(mut frames) = port.take_all(now) else {
             return;
@@ -229,14 +229,14 @@ impl Values {
         self.writes.get(&mut self.slots);
     }
 
-    /// The server will have what is in the slots.
+    /// The server will get the values in the slots.
     fn are_sent(&mut self, port: &mut Port) {
         if let Some(receipt) = self.receipt.take() {
             port.sent(&receipt);
         }
     }
 
-    /// Hands in what was read in a step.
+    /// Passes on the values read in a step.
     fn deliver(&mut self, now: Nanos, reads: &[u64], port: &mut Port) {
         self.reads.set(reads);
         port.together(|port| {
@@ -249,7 +249,7 @@ impl Values {
         });
     }
 
-    /// Nobody can have written anything since: between two steps only the simulation's own time passes.
+    /// No new values are possible since: between two steps only the simulation's own time passes.
     fn touch(&self, now: Nanos, port: &mut Port) {
         if port.is_up(now) {
             port.together(|port| {

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus.
+//! The bus's section of a driver.cfg.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU32;
@@ -16,30 +16,30 @@ use super::Variables;
 /// The longest name of a client, in characters.
 const NAME_LIMIT: usize = 120;
 
-/// How long the server may be silent. While it waits for clients or is paused, it says so every second.
+/// How long the server may be silent. While it waits for clients or is paused, it sends a message every second.
 const TIMEOUT: Nanos = Nanos::from_secs(60);
 
 /// The options of the bus `sdsp`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// Where the server is met.
+    /// The meeting place of the server and its clients.
     pub meeting: Meeting,
     /// The name in the run, if stated.
     pub client: Option<String>,
-    /// How often it has a step.
+    /// The client's period.
     pub every: Every,
     /// How long the server may be silent.
     pub timeout: Nanos,
-    /// Variables with a name of their own, by signal: `[fieldbus.at]`.
+    /// Variables with their own name, by signal: `[fieldbus.at]`.
     pub at: BTreeMap<String, String>,
 }
 
-/// How often a client has a step.
+/// The period of a client's steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Every {
-    /// Each time after this many steps of the server.
+    /// This many steps of the server.
     Steps(NonZeroU32),
-    /// Each time after this virtual time: a whole multiple of the server's step, and above zero.
+    /// This virtual time: a whole multiple of the server's step, and above zero.
     Time(Nanos),
 }
 
@@ -67,7 +67,7 @@ impl Options {
             }
             (Some(address), None) => read_address(&address, moved).map(Meeting::Tcp),
             (None, Some(name)) => Meeting::read_name(&name).map(Meeting::SharedMemory),
-            // To be replaced.
+            // A dummy, replaced later.
             (None, None) => moved.then(|| Meeting::Tcp(Address::local(0))),
         };
         let client = client.map_or(Some(None), |value| {
@@ -156,11 +156,11 @@ impl Options {
         (of(writes), of(reads))
     }
 
-    /// What the end declares.
+    /// The declaration of this end.
     ///
     /// # Errors
     ///
-    /// Its names break a rule.
+    /// The names break a rule.
     pub(super) fn declaration(
         &self,
         setup: &BusSetup<'_>,

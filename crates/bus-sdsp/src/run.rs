@@ -7,18 +7,18 @@ use tickbus_image::signal::DataType;
 use tickbus_virtual_time::client::{Asked, Client, Connection};
 use tickbus_virtual_time::{Cause, Declaration, Ended, Meeting, Outcome, Step};
 
-/// How long to wait until a server that was not there is tried again.
+/// The pause before retrying a server that was not there.
 const PAUSE: Nanos = Nanos::from_millis(100);
 
 /// How long closing waits for the others to finish the step, too.
 const FAREWELL: Nanos = Nanos::from_secs(2);
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum End {
     /// As planned.
     Finished(Outcome),
-    /// Before its time.
+    /// Prematurely.
     Broken(Ended),
 }
 
@@ -40,8 +40,8 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// Joins the run of the server at `meeting`, waits until it starts, and sends the initial values. A server that is
-    /// not there is waited for.
+    /// Joins the run of the server at `meeting`, waits until it starts, and sends the initial values. Waits for a
+    /// server that is not there yet.
     pub(super) fn join(
         (meeting, timeout, clock): (&Meeting, Nanos, &Arc<dyn Clock>),
         declaration: &Declaration,
@@ -90,20 +90,21 @@ impl Run {
         }
     }
 
-    /// Finishes the step that this client is in, as its last one. If it was the last one of the run, that ends as planned.
+    /// Finishes the step that this client is in, as its last one. If it was the last step of the run, the run ends as
+    /// planned.
     pub(super) fn finish(&mut self, writes: &[u64]) {
         self.connection.answer(writes);
         self.timeout = self.timeout.min(FAREWELL);
-        // Whatever is asked next is not answered.
+        // The next request gets no answer.
         let _ = self.wait();
     }
 
-    /// What this client reads in its step.
+    /// The values that this client reads in its step.
     pub(super) fn reads(&self) -> &[u64] {
         self.connection.client().reads()
     }
 
-    /// Tells the server why this client does not go on, which ends the run for everyone.
+    /// Reports to the server why this client gives up, which ends the run for everyone.
     pub(super) fn give_up(&mut self, reason: &str) -> End {
         self.connection.give_up(reason);
         loop {
@@ -136,11 +137,11 @@ impl Drop for Run {
     }
 }
 
-/// Connects with the server at `meeting` as soon as that is there, and joins. Times are those of the clock.
+/// Connects with the server at `meeting` as soon as it is there, and joins. `clock` provides the times.
 ///
 /// # Errors
 ///
-/// It does not appear within `timeout`, or the declaration breaks a rule.
+/// The server does not appear within `timeout`, or the declaration breaks a rule.
 pub fn connect(
     (meeting, clock): (&Meeting, &Arc<dyn Clock>),
     timeout: Nanos,

@@ -3,17 +3,16 @@
 use tickbus_image::signal::{Area, DataType, RawValues, Signal, SignalTable};
 use tickbus_virtual_time::Variable;
 
-/// The signals of one area of all stations as variables: one each, of the signal's type, which holds the raw value that
-/// lies in the image.
+/// The signals of one area of all stations as variables: one per signal, with its type, and its raw value in the image.
 #[derive(Debug)]
 pub struct Variables {
     raw: RawValues,
-    /// In the order in which they are declared, each with its signal's position in the table.
+    /// In the order of their declaration, each with its signal's position in the table.
     list: Vec<(usize, Variable)>,
 }
 
 impl Variables {
-    /// The variables of those signals of `area` for which `name` gives the name of one.
+    /// The variables of those signals of `area` for which `name` returns a name.
     pub fn new(table: &SignalTable, area: Area, name: impl Fn(&Signal) -> Option<String>) -> Self {
         let signals = table.signals.iter().enumerate();
         let signals = signals.filter(|(_, signal)| signal.area == area);
@@ -59,13 +58,13 @@ impl Variables {
     ///
     /// # Panics
     ///
-    /// As [`take`](Self::take).
+    /// The same as for [`take`](Self::take).
     pub fn give(&self, station: usize, frame: &mut [u8]) {
         self.raw.give(station, frame);
     }
 }
 
-/// The bits of a value as a slot has them: extended by the sign, or by zeros.
+/// The bits of a value in the format of a slot: extended by the sign, or by zeros.
 const fn extended(data_type: DataType, bits: u64) -> u64 {
     let unused = 64 - data_type.width().bits();
     if data_type.is_signed() {

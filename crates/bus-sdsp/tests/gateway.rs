@@ -1,4 +1,4 @@
-//! The gateway: a PLC that knows nothing of virtual time but two signals and a clock, in lock-step.
+//! The gateway: a PLC that knows only two signals and a clock of virtual time, in lock-step.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
 mod server;
@@ -54,16 +54,17 @@ fn text(link: &str, role: &str) -> String {
     )
 }
 
-/// A free-running PLC with a scheduler. Its program counts its steps, adds them to the position, and runs after a random
-/// time; in between its outputs are nonsense.
+/// A free-running PLC with a scheduler. Its program counts its steps, adds them to the position, and runs after a
+/// random time; in between its outputs are meaningless.
 struct Plc {
     stop: Stop,
     thread: JoinHandle<u32>,
 }
 
 impl Plc {
-    /// It has finished steps up to `done` before, and hangs in the step after `last`. Its outputs say so when this returns: a
-    /// gateway that is opened afterwards never sees the zeros of a bus that has begun before its PLC.
+    /// A PLC that has already finished the steps up to `done`, and hangs in the step after `last`. Its outputs show
+    /// that by the time this returns: a gateway opened afterwards never sees the zeros of a bus that started before its
+    /// PLC.
     fn start(link: &'static str, done: u32, last: u32, seed: u64) -> Self {
         let stop = Stop::new();
         let (says, is_said) = channel();
@@ -102,7 +103,7 @@ impl Plc {
         Self { stop, thread }
     }
 
-    /// Stops it; the number of its steps.
+    /// Stops the PLC; returns the number of its steps.
     fn end(self) -> u32 {
         self.stop.stop();
         self.thread.join().expect("no panic")
@@ -157,7 +158,7 @@ fn run(gateway: &mut Gateway, steps: u64) -> Result<Outcome, Ended> {
 
 #[test]
 fn a_plc_that_answers_at_random_times_is_in_step_and_the_trace_is_the_same() {
-    // The second PLC was not restarted: it goes on to count where it was.
+    // The second PLC was not restarted: it continues counting.
     let runs = [("one", 0, 1), ("other", 4711, 99)].map(|(link, done, seed)| {
         thread::spawn(move || {
             let plc = Plc::start(link, done, u32::MAX, seed);

@@ -18,7 +18,7 @@ use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, Slot};
 use tickbus_virtual_time::{Outcome, Settings, StartCondition};
 
-/// The machine's step, which is the server's, too; the PLC scans every 10 ms.
+/// The step of the machine and the server; the PLC scans every 10 ms.
 const STEP: Nanos = Nanos::from_millis(2);
 
 /// Twenty seconds of virtual time.
@@ -38,7 +38,7 @@ fn config(port: u16, role: Role, file: &Path) -> Config {
     Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// A machine that acts at random, partly on what it reads, always the same way.
+/// A machine that acts at random, partly depending on its inputs, but always in the same way.
 fn act(machine: &mut End, random: &mut u64) {
     for index in 0..machine.slots.len() {
         let signals = &machine.driver.config().table.signals;

@@ -44,7 +44,7 @@ fn open(port: u16, role: &str, extra: &str) -> End {
     End::open(&config(port, role, extra), &Manual::new())
 }
 
-/// The other end on a thread of its own: ticks as long as the line gives data, and lets `each` see and change them.
+/// The other end on a separate thread: ticks as long as the line has data, and lets `each` see and change them.
 fn controller(
     port: u16,
     extra: &'static str,
@@ -127,7 +127,8 @@ fn a_tick_between_two_steps_waits_for_nobody_and_one_over_several_takes_all_of_t
         let echo = machine.slots[2].real();
         (found.code, found.granted.0 / STEP.0, echo)
     };
-    // Its own time begins at 100 ms. The PLC's first value is of step 1, which it sees in step 5.
+    // The machine's own time begins at 100 ms. The PLC's first value is that of step 1, which the machine sees in step
+    // 5.
     assert_eq!(at(100), (Code::Fresh, 104, 0.0));
     assert_eq!(at(101), (Code::Unchanged, 104, 0.0));
     assert_eq!(at(103), (Code::Unchanged, 104, 0.0));
@@ -162,7 +163,7 @@ fn a_simulation_of_halves_answers_within_its_step() {
     plc.join().expect("no panic");
 }
 
-/// A pulse of one tick between two steps is carried in a step, and its edge counted.
+/// A pulse of one tick between two steps is transferred in a step, and its edge counted.
 #[test]
 fn no_pulse_between_two_steps_is_lost() {
     let server = of_two(80);
@@ -191,7 +192,7 @@ fn no_pulse_between_two_steps_is_lost() {
     assert!(server.end().is_ok());
 }
 
-/// A client that does what a test says.
+/// A client that a test controls.
 struct Foreign<F> {
     declaration: Declaration,
     run: F,
@@ -324,7 +325,7 @@ fn what_does_not_fit_the_run_is_refused_by_name() {
         let server = of_two(100);
         let plc = foreign(server.port, speed, |_, _, _| Ok(()));
         if extra.starts_with("client") {
-            // So that it is the second one of that name.
+            // The other client must be the second one of that name.
             server.says("\"foreign PLC\" has joined");
         }
         let mut machine = open(server.port, "device", extra);
@@ -461,7 +462,7 @@ fn a_program_scans_in_steps_of_its_interval_until_the_run_ends() {
         let mut steps = 0;
         while machine.tick().code != Code::Stale {
             steps += 1;
-            // Scans in steps 1, 6, 11, …; what it writes there is seen in the next one, and its first values are 0.
+            // The PLC scans in steps 1, 6, 11, …; its values appear in the next step, and its first values are 0.
             let scans = f64::from((steps + 3) / 5);
             assert_eq!(machine.get("echo"), scans, "step {steps}");
             machine.set("position", f64::from(steps));
@@ -516,7 +517,7 @@ where
     })
 }
 
-/// Where the ends meet makes no difference.
+/// The meeting place makes no difference.
 #[cfg(unix)]
 #[test]
 fn a_run_in_shared_memory_is_that_over_tcp() {
@@ -552,7 +553,7 @@ fn a_run_in_shared_memory_is_that_over_tcp() {
     assert_eq!(outcomes[0], outcomes[1]);
 }
 
-/// Neither a pause nor a client that joins late is a server that hangs.
+/// Neither a pause nor a client that joins late counts as a server that hangs.
 #[test]
 fn a_pause_longer_than_the_time_out_is_waited_for() {
     let name = format!("bus-sdsp-pause-{}", std::process::id());
@@ -672,7 +673,7 @@ fn a_server_that_is_lost_ends_the_run_for_good() {
         stream.write_all(start).expect("it is there");
         frame(&mut stream);
         stream.write_all(step).expect("it is there");
-        // Nothing is left unread when the connection is closed.
+        // Leave no byte unread when the connection is closed.
         frame(&mut stream);
     });
     let mut machine = open(port, "device", "");

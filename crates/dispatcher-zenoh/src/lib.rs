@@ -1,7 +1,7 @@
 //! Dispatchers on many hosts as one laboratory, over Zenoh.
 //!
-//! Who is there is known by liveliness tokens, and each dispatcher subscribes to the letters that are addressed to it. What
-//! the letters say, and what happens when some get lost, is the dispatcher's own business.
+//! Liveliness tokens show which dispatchers are there, and each dispatcher subscribes to its letters. The content of
+//! letters, and the loss of some, are left to the dispatcher.
 
 use std::fs;
 
@@ -11,11 +11,11 @@ use tickbus_dispatcher::{Door, HostId, Post, is_name};
 #[cfg(feature = "zenoh")]
 mod network;
 
-/// How a dispatcher finds the others.
+/// The settings for finding other dispatchers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The name of the laboratory, by the rules for names of clients. Laboratories of other names on the same network are
-    /// not seen.
+    /// The name of the laboratory, by the rules for names of clients. Laboratories with other names on the same network
+    /// are ignored.
     pub laboratory: String,
     /// Endpoints of Zenoh to connect to, such as `tcp/192.168.0.10:7447`: of routers or other dispatchers. Without any,
     /// peers in the local network are found by multicast.
@@ -29,15 +29,15 @@ pub struct Options {
 pub enum Failure {
     /// An option is wrong.
     Options(Mistake),
-    /// Zenoh cannot do it; the text says why, and what would help.
+    /// Zenoh failed; the text has the reason and the remedy.
     Network(String),
 }
 
 /// A network that is joined.
 pub struct Joined {
-    /// Who this dispatcher is there.
+    /// The identity of this dispatcher in the laboratory.
     pub host: HostId,
-    /// Takes its letters. When it is dropped, the network is left.
+    /// Transports letters. Dropping it leaves the network.
     pub post: Box<dyn Post>,
 }
 
@@ -49,7 +49,7 @@ impl std::fmt::Debug for Joined {
     }
 }
 
-/// Joins a laboratory. What comes from the others goes through `door`, of a dispatcher that is a member of a federation.
+/// Joins a laboratory. Letters from the others go through `door`; its dispatcher must be a member of a federation.
 ///
 /// # Errors
 ///
@@ -76,7 +76,7 @@ pub fn join(options: &Options, door: &Door) -> Result<Joined, Failure> {
     }
 }
 
-/// The name of this computer, as far as it has one that can be found.
+/// The name of this computer, if it can be determined.
 pub fn computer_name() -> String {
     let kernel = fs::read_to_string("/proc/sys/kernel/hostname");
     let kernel = kernel.ok().map(|name| name.trim().to_owned());

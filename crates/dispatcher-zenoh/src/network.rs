@@ -16,15 +16,15 @@ use zenoh::{Config, Session, Wait as _};
 
 use crate::{Failure, Joined, Options};
 
-/// At most this many letters wait for Zenoh. What comes on top of that waits on the board, where a new value of a channel
-/// replaces an old one.
+/// The most letters that wait for Zenoh. Further values wait on the board, where a new value of a channel replaces an
+/// old one.
 const MOST_LETTERS: usize = 64;
 
-/// How long a letter waits for a host that takes nothing before it gets lost, in microseconds. Meanwhile no other host gets
-/// one, so this is far below the silence after which a host counts as cut off.
+/// How long a letter waits for a host that accepts nothing before the letter is dropped, in microseconds. Meanwhile no
+/// other host gets a letter, so this is far below the silence after which a host is cut off.
 const PATIENCE: &str = "100000";
 
-/// Any error of Zenoh, as a failure of what was tried.
+/// Any error of Zenoh, as a failure of this operation.
 fn failed<E: std::fmt::Display>(what: &'static str) -> impl FnOnce(E) -> Failure {
     move |why| Failure::Network(format!("{what} ({why})"))
 }
@@ -36,7 +36,7 @@ pub(crate) fn join(options: &Options, door: &Door) -> Result<Joined, Failure> {
     let host = HostId(u128::from_le_bytes(session.zid().to_le_bytes()));
     let laboratory = format!("tickbus/{}", options.laboratory);
 
-    // Who appears is sent letters at once, so this must be able to get them before it appears itself.
+    // A dispatcher that appears is sent letters at once, so it must be able to receive them first.
     let letters = session.declare_subscriber(format!("{laboratory}/to/{host}"));
     let letters = letters.callback({
         let door = door.clone();
@@ -114,13 +114,13 @@ fn config(options: &Options) -> Result<Config, Failure> {
     ] {
         for text in endpoints {
             let endpoint: EndPoint = text.parse().map_err(|why| wrong(text, format!("{why}")))?;
-            // Zenoh would notice later, and go on without.
+            // Zenoh would notice later, and continue without the endpoint.
             if endpoint.protocol().as_str() != "tcp" {
                 return Err(wrong(text, "its transport is not built in".to_owned()));
             }
         }
         if !endpoints.is_empty() {
-            // What can stand in an endpoint is the same in both notations.
+            // The possible characters of an endpoint have the same form in both notations.
             set(key, &format!("{endpoints:?}"))?;
         }
     }
@@ -135,7 +135,7 @@ fn parse(id: &str) -> Option<HostId> {
     u128::from_str_radix(id, 16).ok().map(HostId)
 }
 
-/// What keeps a dispatcher in its laboratory.
+/// The declarations that keep a dispatcher in its laboratory.
 type Here = (LivelinessToken, Subscriber<()>, Subscriber<()>, Session);
 
 struct Network {
@@ -151,7 +151,7 @@ impl Post for Network {
 
     fn send(&mut self, to: HostId, letter: Vec<u8>) {
         self.waiting.fetch_add(1, Ordering::AcqRel);
-        // It ends after this.
+        // The carrier ends after this.
         let _ = self.sender.send((to, letter));
     }
 }
@@ -168,7 +168,7 @@ impl Carrier {
     fn carry(&self, letters: &Receiver<(HostId, Vec<u8>)>) {
         while let Ok((to, letter)) = letters.recv() {
             let put = self.session.put(format!("{}{to}", self.address), letter);
-            // Whatever is lost is noticed by the other side.
+            // The other side notices lost letters.
             let _ = put.congestion_control(CongestionControl::Drop).wait();
             if self.waiting.fetch_sub(1, Ordering::AcqRel) == MOST_LETTERS {
                 self.door.send(|_, _| {});

@@ -6,7 +6,7 @@ use tickbus_plc::blocks::{Ctu, Rs, Tof, Ton, Tp};
 use crate::week::{Cam, WallTime};
 use crate::wires::{Quantity, Signals, Wire};
 
-/// What a block is.
+/// The kind of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     And,
@@ -24,7 +24,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// All kinds, as programs write them.
+    /// All kinds, with their names in programs.
     pub(crate) const NAMES: [(&str, Self); 12] = [
         ("AND", Self::And),
         ("OR", Self::Or),
@@ -87,7 +87,7 @@ pub(crate) enum Block {
 }
 
 impl Block {
-    /// Evaluates the block at `place`. Returns when it would change although nothing else does; [`Nanos::MAX`] if never.
+    /// Evaluates the block at `place`. Returns when it would change without any other change; [`Nanos::MAX`] if never.
     pub(crate) fn evaluate(
         &mut self,
         place: usize,

@@ -7,7 +7,7 @@ use crate::program::Program;
 use crate::week::WallTime;
 use crate::wires::{Signals, Terminals};
 
-/// A controller with its program: inputs and time in, outputs out. It allocates only when it is made.
+/// A controller with its program: inputs and time in, outputs out. Allocates only during construction.
 ///
 /// All inputs are off, or 0, until they are set.
 #[derive(Clone, Debug)]
@@ -15,7 +15,7 @@ pub struct Controller {
     program: Program,
     blocks: Vec<Block>,
     signals: Signals,
-    /// The outputs of the scan that runs: outputs that read outputs read those of the last one.
+    /// The outputs of the current scan: outputs that read outputs read those of the last scan.
     next_outputs: Vec<bool>,
     next_analog_outputs: Vec<f64>,
 }
@@ -33,7 +33,7 @@ impl Controller {
         }
     }
 
-    /// Its terminals.
+    /// The terminals.
     pub fn terminals(&self) -> Terminals {
         self.program.terminals
     }
@@ -56,11 +56,10 @@ impl Controller {
         self.signals.analog_inputs[number - 1] = value;
     }
 
-    /// Runs the program once. Returns the time at which the next scan is due for a timer, although no input changes;
+    /// Runs the program once. Returns the time at which the next scan is due for a timer, even if no input changes;
     /// [`Nanos::MAX`] if no timer runs.
     ///
-    /// Blocks are evaluated in the order of the program. What comes later in it, or is an output, has its value of the
-    /// last scan.
+    /// Blocks are evaluated in the order of the program. Later blocks, and outputs, have the values of the last scan.
     pub fn scan(&mut self, now: Nanos, wall: WallTime) -> Nanos {
         let mut due = Nanos::MAX;
         for (place, block) in self.blocks.iter_mut().enumerate() {

@@ -14,7 +14,7 @@ use crate::wires::{Quantity, Terminal, Terminals, Wire};
 /// The most wires of an AND or an OR.
 const MOST_WIRES: usize = 16;
 
-/// A program: blocks in the order of evaluation, and what the outputs are wired to.
+/// A program: blocks in the order of evaluation, and the wires of the outputs.
 #[derive(Clone, Debug)]
 pub struct Program {
     pub(crate) terminals: Terminals,
@@ -116,7 +116,7 @@ fn read<'a>(
             table.finish();
             program.blocks.extend(block);
         } else {
-            // Which keys it should have is unknown.
+            // The expected keys are unknown.
             table.finish_open();
         }
     }
@@ -142,15 +142,15 @@ fn read<'a>(
     program
 }
 
-/// What names in a program can mean.
+/// The possible meanings of names in a program.
 struct Reader<'a> {
     terminals: Terminals,
-    /// All blocks, those with mistakes too, so that a place is that of the evaluation.
+    /// All blocks, including those with mistakes, so that indices match the evaluation.
     blocks: Vec<(&'a str, Option<Kind>)>,
     outputs: Vec<(&'a str, Value<'a>)>,
 }
 
-/// What a text in a program means.
+/// The meaning of a text in a program.
 enum Meaning {
     Terminal(Terminal, usize),
     Block(usize),
@@ -158,7 +158,7 @@ enum Meaning {
 
 impl<'a> Reader<'a> {
     fn block(&self, table: &mut Table<'a>, kind: Kind) -> Option<Block> {
-        // Every key is taken before the first one that is wrong ends it, since a key that was not taken is unknown.
+        // Every key is taken before the first wrong one ends this, since a key that was not taken counts as unknown.
         Some(match kind {
             Kind::And => Block::And(self.wires(table)?),
             Kind::Or => Block::Or(self.wires(table)?),
@@ -270,17 +270,17 @@ impl<'a> Reader<'a> {
         wires.into_iter().collect()
     }
 
-    /// The wire of a key that must be there.
+    /// The wire of a required key.
     fn input(&self, table: &mut Table<'a>, key: &'static str) -> Option<Wire> {
         self.wire(&table.require(key, "write a block or an input, such as \"I1\"")?)
     }
 
-    /// The number of a key that must be there.
+    /// The number of a required key.
     fn number(&self, table: &mut Table<'a>, key: &'static str) -> Option<Quantity> {
         self.quantity(&table.require(key, ANALOG)?)
     }
 
-    /// Something that is on or off.
+    /// A source that is on or off.
     fn wire(&self, value: &Value<'a>) -> Option<Wire> {
         let text = value.text("write the name of a block or an input in quotes, such as \"I1\"")?;
         Some(match self.meaning(value, text)? {
@@ -297,7 +297,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Something that is a number.
+    /// A source of a number.
     fn quantity(&self, value: &Value<'a>) -> Option<Quantity> {
         if !value.written().is_empty() {
             return value.number(ANALOG).map(Quantity::Constant);
@@ -349,7 +349,7 @@ impl<'a> Reader<'a> {
         Some(Meaning::Terminal(kind, number - 1))
     }
 
-    /// Which terminals of a kind there are.
+    /// The existing terminals of a kind.
     fn range(&self, kind: Terminal) -> String {
         let letters = kind.letters();
         match self.terminals.of(kind) {

@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
-/// The days as programs write them.
+/// The days in the notation of programs.
 pub(crate) const DAYS: [(&str, usize); 7] = [
     ("Mon", 0),
     ("Tue", 1),
@@ -44,7 +44,7 @@ impl Cam {
         }
     }
 
-    /// How long it is until the time of day at which this cam may switch next.
+    /// The time until the next time of day at which this cam may switch.
     pub(crate) fn until_change(&self, wall: WallTime) -> Nanos {
         let until = |at: Nanos| match (at - wall.time).0.rem_euclid(DAY.0) {
             0 => DAY,

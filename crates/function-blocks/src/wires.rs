@@ -1,6 +1,6 @@
-//! What inputs of blocks and outputs of the controller can be wired to.
+//! The possible wires of blocks' inputs and the controller's outputs.
 
-/// How many terminals of each kind a controller has.
+/// The number of terminals of each kind of a controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Terminals {
     /// `I1` and on.
@@ -83,7 +83,7 @@ impl Terminals {
     }
 }
 
-/// Where a value that is on or off comes from; places count from 0.
+/// The source of a value that is on or off; places count from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wire {
     Input(usize),
@@ -91,7 +91,7 @@ pub(crate) enum Wire {
     Block(usize),
 }
 
-/// Where a number comes from.
+/// The source of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Quantity {
     Input(usize),
@@ -101,7 +101,8 @@ pub(crate) enum Quantity {
     Constant(f64),
 }
 
-/// All values of a controller, as of now; of blocks that are still to come in this scan, and of outputs, as of the last scan.
+/// All current values of a controller; blocks still to come in this scan, and outputs, have the values of the last
+/// scan.
 #[derive(Clone, Debug)]
 pub(crate) struct Signals {
     pub(crate) inputs: Vec<bool>,

@@ -1,4 +1,4 @@
-//! The examples in docs/virtual-lab.md: what each block does, and whole programs.
+//! The examples in docs/virtual-lab.md: the behaviour of each block, and whole programs.
 #![allow(missing_docs, reason = "tests")]
 
 use std::collections::BTreeSet;
@@ -13,7 +13,7 @@ fn document() -> String {
     std::fs::read_to_string(path).expect("the document")
 }
 
-/// The insides of the code blocks that begin like this.
+/// The contents of the code blocks that begin like this.
 fn code<'d>(document: &'d str, beginning: &'d str) -> impl Iterator<Item = &'d str> {
     let blocks = document.split(beginning).skip(1);
     blocks.map(|block| block.split_once("\n```").expect("an end").0)

@@ -124,7 +124,7 @@ fn a_program_has_outputs() {
 
 #[test]
 fn a_loop_reads_the_last_scan() {
-    // A blinker out of a NOT of itself, and a chain against the order of the file, one scan per block.
+    // A blinker made of a NOT of itself, and a chain against the order of the file, one scan per block.
     let mut controller = controller(
         "[blocks]\n\
          third = { type = \"AND\", inputs = [\"second\"] }\n\
@@ -160,7 +160,7 @@ fn analog_outputs_pass_on_inputs_counts_and_constants() {
     assert_eq!(controller.outputs(), [false; 4]);
 }
 
-/// Everything that has a time in it.
+/// All blocks with times.
 const TIMERS: &str = "[blocks]\n\
     on = { type = \"on-delay\", input = \"I1\", time = \"30ms\" }\n\
     off = { type = \"off-delay\", input = \"I1\", time = \"70ms\" }\n\
@@ -184,7 +184,7 @@ fn nothing_changes_before_the_next_scan_is_due() {
             WallTime { day: 0, time }
         }
     };
-    // One is scanned each millisecond, the other only when its input changes and when it is due.
+    // One is scanned each millisecond, the other only when its input changes and when a scan is due.
     let (mut busy, mut lazy) = (controller(TIMERS), controller(TIMERS));
     let mut due = Nanos::ZERO;
     let mut scans = 0;

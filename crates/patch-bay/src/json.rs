@@ -4,10 +4,10 @@ use std::fmt::{self, Display, Write as _};
 
 use tickbus_dispatcher::{ClientState, Number, Snapshot};
 
-/// The state of the page, in one line. Names, channels and numbers consist of characters that stand for themselves.
+/// The state of the page, in one line. Names, channels and numbers contain no characters to escape.
 pub(crate) fn state(snapshot: &Snapshot) -> String {
     let mut json = String::new();
-    // Into a text, which takes everything.
+    // Writing to a String cannot fail.
     let _ = write(snapshot, &mut json);
     json
 }

@@ -1,6 +1,6 @@
 //! The patch bay: the board of a dispatcher as a web page.
 //!
-//! docs/dispatcher.md has it, for users and for programs.
+//! docs/dispatcher.md describes it, for users and for programs.
 
 mod json;
 
@@ -87,7 +87,7 @@ impl Site for PatchBay {
     }
 }
 
-/// The order that a change is.
+/// The order in a change.
 fn order(change: &Change) -> Result<Order, Refused> {
     let path = &*change.path;
     let wrong = |status, text: &str| Refused {
@@ -131,7 +131,7 @@ fn order(change: &Change) -> Result<Order, Refused> {
     })
 }
 
-/// The beginning of what was sent, to be quoted in an answer.
+/// The beginning of a body, to be quoted in an answer.
 fn short(body: &str) -> &str {
     match body.char_indices().nth(40) {
         _ if body.is_empty() => "an empty body",

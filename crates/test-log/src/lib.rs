@@ -6,7 +6,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// The log of this process, as far as it was not expected.
+/// The unexpected log of this process.
 struct Ledger {
     /// Drivers that are open.
     open: usize,
@@ -57,7 +57,7 @@ impl Ledger {
     }
 }
 
-/// Whether a line reports a line state other than a defect, or a fault that a test has injected.
+/// True if a line reports a line state other than a defect, or a fault that a test has injected.
 fn is_asked_for(line: &str) -> bool {
     if line.contains("\": injected fault \"") {
         return true;

@@ -11,7 +11,7 @@ use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Patch, Pin, Settings};
 use tickbus_fieldbus::tcp::Address;
 
-/// A dispatcher that may be stopped, and started again on the same port.
+/// A dispatcher that can be stopped, and restarted on the same port.
 pub struct Laboratory {
     port: u16,
     patch: Patch,
@@ -19,14 +19,14 @@ pub struct Laboratory {
 }
 
 enum State {
-    /// Something holds the port: nobody serves it.
+    /// Something holds the port, but no dispatcher serves it.
     Reserved(TcpListener),
     Lied,
     Serving(Stop, JoinHandle<Patch>),
 }
 
 impl Laboratory {
-    /// One without connections.
+    /// A laboratory without connections.
     pub fn empty() -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
         Self {
@@ -36,7 +36,8 @@ impl Laboratory {
         }
     }
 
-    /// One in which the machine `device` and its PLC `device-PLC`, and `controller-PLC` of the suite, are connected.
+    /// A laboratory in which the machine `device` and its PLC `device-PLC`, and `controller-PLC` of the suite, are
+    /// connected.
     pub fn patched() -> Self {
         let mut laboratory = Self::empty();
         let pin = |client: &str, channel: &str| {
@@ -128,7 +129,7 @@ impl Bus for Laboratory {
             move || {
                 while !stop.is_stopped() {
                     let (mut stream, _) = listener.accept().expect("a machine");
-                    // The machine may be gone before it has heard all.
+                    // The machine may be gone before it has received everything.
                     let _ = stream.write_all(b"OK VP\r\nP I1=24 AI1=7\r\nP Q1=24\r\n");
                 }
             }
@@ -183,7 +184,7 @@ struct Lying {
 impl Drop for Lying {
     fn drop(&mut self) {
         self.stop.stop();
-        // It wakes by a last connection.
+        // The thread wakes by a last connection.
         let _last = std::net::TcpStream::connect(self.address);
         if let Some(thread) = self.thread.take() {
             thread.join().expect("no panic");

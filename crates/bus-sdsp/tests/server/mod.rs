@@ -1,4 +1,4 @@
-//! A server of virtual time on a thread of its own.
+//! A server of virtual time on a separate thread.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::sync::mpsc;
@@ -8,7 +8,7 @@ use tickbus_base::time::Monotonic;
 use tickbus_fieldbus::tcp::Address;
 use tickbus_virtual_time::{Controls, Ended, Hosting, Logic, Outcome, Settings, tcp};
 
-/// A server on a thread of its own.
+/// A server on a separate thread.
 pub struct Server {
     pub port: u16,
     pub controls: Controls,
@@ -60,7 +60,7 @@ impl Server {
         }
     }
 
-    /// Waits until the server says this.
+    /// Waits until the server reports this.
     pub fn says(&self, part: &str) {
         while !self.news.recv().expect(part).contains(part) {}
     }

@@ -16,7 +16,7 @@ const IDENTIFYING: usize = 8;
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// How many times in a row a device may be silent, fail or close the connection when asked for its identity,
-/// before it counts as a device without one. In between it answers other requests, so it is there.
+/// before it counts as a device without one. In between the device answers other requests, so it is there.
 const SILENCES: u8 = 2;
 
 /// The pause before a device that seemed to have no identity is asked again, if `write_to` names another one: two

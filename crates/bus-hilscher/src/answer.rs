@@ -1,4 +1,4 @@
-//! What an error code says of data that were to be moved.
+//! The meaning of an error code for a transfer of data.
 
 use tickbus_fieldbus::{BusError, Failing, Meaning, Verdict};
 
@@ -9,7 +9,7 @@ pub(crate) enum Answer {
 }
 
 impl Answer {
-    /// That of `code` with this meaning; an error if the card has to be opened again, which `failing` tells.
+    /// The answer for `code` with this meaning; the error of `failing` if the card has to be opened again.
     pub(crate) fn of(
         code: i32,
         meaning: Option<&'static Meaning>,

@@ -1,6 +1,6 @@
-//! The bus `hilscher-cif`: the cards before cifX, by the vendor's driver for Windows.
+//! The bus `hilscher-cif`: the cards before cifX, through the vendor's driver for Windows.
 //!
-//! The old driver for Linux has functions of the same names with other parameters: it is not used here.
+//! The old driver for Linux has functions with the same names but different parameters, and is not supported.
 
 mod errors;
 mod library;
@@ -26,10 +26,10 @@ use library::{Area, Board, Driver, Library};
 /// The vendor's library.
 const NAME: &str = "CIF32DLL.DLL";
 
-/// How long a reset may take.
+/// The time limit of a reset.
 const RESET: Nanos = Nanos::from_secs(5);
 
-/// How long the card may take to note that this program is ready or not.
+/// The time for the card to register that this program is ready or not.
 const STATE: Nanos = Nanos::from_millis(200);
 
 /// The options of the bus `hilscher-cif`.
@@ -41,7 +41,7 @@ pub struct Options {
     pub device: u16,
     /// How the card is reset when it is opened: the mode of the driver's call.
     pub reset: u16,
-    /// How long the card may take to exchange the process data.
+    /// The time for the card to exchange the process data.
     pub io_timeout: Nanos,
 }
 
@@ -93,7 +93,7 @@ impl BusOptions for Options {
     }
 }
 
-/// The way to the card that the options name.
+/// The way to the card in the options.
 struct Cif(Options);
 
 impl Vendor for Cif {
@@ -151,8 +151,8 @@ impl Vendor for Cif {
 }
 
 impl Cif {
-    /// Checks that the signals fit into a card with this many KiB of memory: the last KiB is the card's own, the rest
-    /// holds the two images.
+    /// Checks that the signals fit into a card with this many KiB of memory: the card itself uses the last KiB, the
+    /// rest holds the two images.
     fn check_sizes(&self, kib: u8, [writes, reads]: [usize; 2]) -> Result<(), BusError> {
         let image = usize::from(kib).saturating_sub(1) * 1024 / 2;
         let card = &self.0.card;
@@ -172,7 +172,7 @@ impl Cif {
     }
 }
 
-/// A card, and how far it was started; dropping it goes back the same way.
+/// A card that was started to some extent; dropping it reverses the steps.
 struct OpenCard<'l> {
     board: Board<'l>,
     is_ready: bool,
@@ -183,7 +183,7 @@ struct OpenCard<'l> {
 impl OpenCard<'_> {
     fn start(&mut self) -> Result<(), Failing> {
         let is_up = |result: Result<(), Failing>| match result {
-            // Its bus may come up later.
+            // The card's bus may come up later.
             Err(failing) if failing.verdict == Verdict::NoPeer => Ok(()),
             other => other,
         };
@@ -214,7 +214,7 @@ impl Card for OpenCard<'_> {
             card, io_timeout, ..
         } = &self.options;
         match self.trigger() {
-            // The exchange says so, too, and the next cycle triggers it again.
+            // The exchange reports that, too, and the next cycle triggers the watchdog again.
             Err(Failing {
                 verdict: Verdict::Again | Verdict::NoPeer,
                 ..
@@ -243,7 +243,7 @@ impl Card for OpenCard<'_> {
 
 impl Drop for OpenCard<'_> {
     fn drop(&mut self) {
-        // What fails now has failed before, or the card is gone: the rest is closed all the same.
+        // A failure here was reported before, or the card is gone: continue closing in any case.
         if self.is_watched {
             let _ = self.board.watchdog(false);
         }

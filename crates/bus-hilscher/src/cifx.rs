@@ -23,10 +23,10 @@ use crate::timeout::{millis, read};
 use errors::{failing, moved};
 use library::{Channel, Driver, Library, NAME, OFF, ON};
 
-/// How long the card may take to note that this program is ready or not, and to switch its bus off.
+/// The time for the card to register that this program is ready or not, and to switch its bus off.
 const STATE: Nanos = Nanos::from_secs(1);
 
-/// The longest name of a board, as the driver has them.
+/// The longest name of a board in the driver.
 const BOARD_LIMIT: usize = 15;
 
 /// The options of the bus `hilscher-cifx`.
@@ -36,9 +36,9 @@ pub struct Options {
     pub card: CardOptions,
     /// The board's name or alias.
     pub board: String,
-    /// Its channel.
+    /// The channel.
     pub channel: u32,
-    /// How long the card may take to hand over the process data.
+    /// The time for the card to pass the process data on.
     pub io_timeout: Nanos,
     /// How long opening waits for the bus to communicate.
     pub bus_on_timeout: Nanos,
@@ -94,7 +94,7 @@ impl BusOptions for Options {
     }
 }
 
-/// The way to the card that the options name.
+/// The way to the card in the options.
 struct Cifx(Options);
 
 impl Vendor for Cifx {
@@ -125,7 +125,7 @@ impl Vendor for Cifx {
             is_watched: false,
             options: self.0.clone(),
         };
-        // Only for people: a driver that cannot tell is no reason to stop.
+        // Only for people: continue if a driver does not provide this.
         if let Ok(information) = card.channel.information() {
             port.tell("card", &information.to_string());
             port.tell("card.state", &information.state());
@@ -135,7 +135,7 @@ impl Vendor for Cifx {
     }
 
     fn limits(&self) -> [Nanos; 2] {
-        // The driver for Linux looks for its cards at its start.
+        // The driver for Linux searches for its cards when it starts.
         let start = Nanos::from_secs(10);
         [
             start + STATE + self.0.bus_on_timeout,
@@ -148,7 +148,7 @@ impl Vendor for Cifx {
     }
 }
 
-/// An open channel, and how far it was started; dropping it goes back the same way.
+/// An open channel that was started to some extent; dropping it reverses the steps.
 struct OpenCard<'l> {
     channel: Channel<'l>,
     is_ready: bool,
@@ -164,7 +164,7 @@ impl OpenCard<'_> {
         self.is_on = true;
         let timeout = millis(self.options.bus_on_timeout);
         match self.channel.bus_state(ON, timeout) {
-            // Its bus may come up later.
+            // The card's bus may come up later.
             Err(failing) if failing.verdict == Verdict::NoPeer => {}
             other => other?,
         }
@@ -196,7 +196,7 @@ impl Card for OpenCard<'_> {
         } = &self.options;
         let timeout = millis(*io_timeout);
         match self.trigger() {
-            // The exchange says so, too, and the next cycle triggers it again.
+            // The exchange reports that, too, and the next cycle triggers the watchdog again.
             Err(Failing {
                 verdict: Verdict::Again | Verdict::NoPeer,
                 ..
@@ -227,7 +227,7 @@ impl Card for OpenCard<'_> {
 
 impl Drop for OpenCard<'_> {
     fn drop(&mut self) {
-        // What fails now has failed before, or the card is gone: the rest is closed all the same.
+        // A failure here was reported before, or the card is gone: continue closing in any case.
         if self.is_watched {
             self.channel.watchdog(OFF);
         }

@@ -2,7 +2,7 @@
 //! `hilscher-cifx`, cifX and netX.
 //!
 //! A kind has three files: the table of its errors, the library behind safe functions, and the order of the calls.
-//! No library of the vendor's belongs to tickbus.
+//! tickbus contains no library of the vendor.
 
 mod answer;
 pub mod cif;

@@ -3,10 +3,10 @@
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Value;
 
-/// The longest one: a card that is silent for longer is not coming.
+/// The longest time-out: a card that is silent for longer will not answer.
 const LIMIT: Nanos = Nanos::from_secs(600);
 
-/// Reads a time-out of whole milliseconds; without one it is `default`.
+/// Reads a time-out of whole milliseconds; the default is `default`.
 pub(crate) fn read(value: Option<Value<'_>>, default: Nanos) -> Option<Nanos> {
     let Some(value) = value else {
         return Some(default);
@@ -22,7 +22,7 @@ pub(crate) fn read(value: Option<Value<'_>>, default: Nanos) -> Option<Nanos> {
     Some(span)
 }
 
-/// A time-out as the vendor's functions take it.
+/// A time-out in the unit of the vendor's functions.
 pub(crate) fn millis(span: Nanos) -> u32 {
     u32::try_from(span.0 / 1_000_000).unwrap_or(u32::MAX)
 }

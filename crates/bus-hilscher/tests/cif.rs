@@ -12,7 +12,7 @@ use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::Verdict;
 
-/// Two cards whose process images are joined.
+/// Two cards with connected process images.
 struct Cards {
     library: Arc<StandIn>,
     extra: &'static str,
@@ -86,7 +86,7 @@ const CLOSING: [&str; 4] = [
     "DevCloseDriver(0)",
 ];
 
-/// How many of the closing calls follow when the call of this index fails.
+/// The number of closing calls that follow when the call of this index fails.
 const UNDONE: [usize; 8] = [0, 1, 2, 2, 2, 3, 4, 4];
 
 /// All calls of an opening with the card's watchdog, and one exchange.
@@ -124,7 +124,7 @@ fn calls_are_made_in_the_order_of_the_vendor_and_undone_in_the_reverse() {
 #[test]
 fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
     for (index, call) in all().iter().enumerate() {
-        // What is only told to people may fail.
+        // Information that is only for people may fail.
         if index == 2 || index == 3 {
             continue;
         }
@@ -140,7 +140,7 @@ fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
         let mut expected: Vec<&str> = all().into_iter().take(index + 1).collect();
         expected.extend(&CLOSING[4 - UNDONE[index]..]);
         let mut calls = cards.library.calls();
-        // The same call again is recorded once: it is triggered when it starts, and in each cycle.
+        // A repeated call is recorded once: the watchdog is triggered when it starts, and in each cycle.
         calls.dedup();
         assert_eq!(calls, expected, "{name}");
     }
@@ -152,7 +152,7 @@ fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do() {
     let codes = ERRORS.iter().map(|row| row.code.cast_signed());
     for code in codes.chain([-80, -83, -100, -105, -110, -128, 1000, 1017, 1255]) {
         for (index, call) in all().iter().enumerate() {
-            // The watchdog is off, and information is only told to people.
+            // The watchdog is off, and information is only for people.
             if [2, 3, 6].contains(&index) {
                 continue;
             }
@@ -174,7 +174,7 @@ fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do() {
                     clock.advance(CYCLE);
                     end.driver.statistics().contains("\nhilscher-cif.again=")
                 }),
-                // The stand-in treats this code as one with which it goes on.
+                // The stand-in continues in spite of this code.
                 Verdict::NoPeer => {}
                 Verdict::Refused => {
                     let reason = until(&mut end, &clock, "failed", "refused");

@@ -13,7 +13,7 @@ use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::{BusError, Cause, Failing, Meaning, Verdict};
 
-/// Two cards whose process images are joined.
+/// Two cards with connected process images.
 struct Cards {
     library: Arc<StandIn>,
     extra: &'static str,
@@ -77,7 +77,7 @@ impl Bus for Cards {
 
 conformance!(suite, crate::Cards::new());
 
-/// The calls in their order, and those by which each is undone, with the arguments of the first card.
+/// The calls in their order, and the calls that undo each, with the arguments of the first card.
 const OPENING: [&str; 6] = [
     "cifXDriverInit(1, defaults, 0)",
     "xDriverOpen()",
@@ -98,7 +98,7 @@ const CLOSING: [&str; 5] = [
     "cifXDriverDeinit()",
 ];
 
-/// How many of the closing calls follow when the function of this index fails.
+/// The number of closing calls that follow when the function of this index fails.
 const UNDONE: [usize; 8] = [0, 1, 2, 5, 4, 5, 5, 5];
 
 fn function(call: &str) -> &str {
@@ -133,7 +133,7 @@ fn calls_are_made_in_the_order_of_the_vendor_and_undone_in_the_reverse() {
 #[test]
 fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
     for (index, call) in OPENING.iter().chain(&MOVING).enumerate() {
-        // Only told to people.
+        // Only for people.
         if index == 3 {
             continue;
         }
@@ -157,7 +157,7 @@ fn a_call_that_fails_is_named_and_all_before_it_is_undone() {
     }
 }
 
-/// What becomes of an error code at a function.
+/// The effect of an error code at a function.
 #[test]
 fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do() {
     let cards = Cards::new();
@@ -187,7 +187,7 @@ fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do() {
                         end.link().reason == format!("the bus is open; {words}")
                     });
                 }
-                // The other end is off, which the other direction says.
+                // The other end is off, as the other direction reports.
                 Verdict::Again if is_moving => await_that("it is counted", || {
                     clock.advance(CYCLE);
                     end.driver.statistics().contains("\nhilscher-cifx.no_com=")
@@ -339,9 +339,9 @@ fn inputs_that_never_arrive_are_stale_although_the_card_takes_outputs() {
     let mut device = cards.open("device", &clock);
     let _controller = cards.open("controller", &clock);
     until(&mut device, &clock, "running", "running");
-    // The other end reads on, so that this one can write.
+    // The other end continues reading, so that this one can write.
     cards.library.script("xChannelIORead(0 0x800C0022\n");
-    // Time waits for the bus threads here: the line is not stale because these are late.
+    // Time waits for the bus threads here: late threads do not make the line stale.
     for _ in 0..400 {
         pass(&clock, 2);
         device.tick();

@@ -11,19 +11,19 @@ use super::library::{Library, Node, WatchDog};
 use super::options::Options;
 use super::state::State;
 
-/// Reads a value: of one variable, that of the plug-and-play mode.
+/// Reads the value of a single variable, that of the plug-and-play mode.
 const READ_PLUG_AND_PLAY: [u16; 4] = [0x0351, 2, 1, 0x2240];
 
-/// Where the mode stands in the words of the answer.
+/// The position of the mode in the words of the answer.
 const MODE: usize = 5;
 
-/// Starts the transfer of data: no parameters.
+/// Starts the data transfer: no parameters.
 const START: [u16; 2] = [0x0701, 0];
 
-/// Messages that are thrown away before the first one of this opening: more do not fit into a mailbox.
+/// The most old messages discarded before the first one of this opening: a mailbox holds no more.
 const OLD: usize = 64;
 
-/// The way to the board that the options name.
+/// The way to the board in the options.
 pub(super) struct Ddi(pub(super) Options);
 
 impl Vendor for Ddi {
@@ -75,12 +75,12 @@ impl Vendor for Ddi {
     }
 }
 
-/// How far the bus is.
+/// The phase of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
     /// The board was asked for its plug-and-play mode.
     Asked,
-    /// The transfer of data was started.
+    /// The data transfer was started.
     Started,
     Running,
 }
@@ -95,7 +95,7 @@ struct OpenCard<'l> {
     since: Nanos,
     options: Options,
     state: State,
-    /// The state has not been told yet.
+    /// The state has not been reported yet.
     is_news: bool,
 }
 
@@ -109,7 +109,7 @@ impl OpenCard<'_> {
         now - self.since > self.options.start_timeout
     }
 
-    /// Looks for the answer of the plug-and-play mode, and starts the bus when it has come.
+    /// Checks for the answer about the plug-and-play mode, and starts the bus once it has come.
     fn ask(&mut self, now: Nanos) -> Result<(), BusError> {
         let Some(answer) = self.mailbox.receive()? else {
             if self.is_late(now) {
@@ -117,7 +117,7 @@ impl OpenCard<'_> {
             }
             return Ok(());
         };
-        // A short answer is that of a board without this variable.
+        // A board without this variable sends a short answer.
         if let Some(mode) = answer.get(MODE).filter(|mode| **mode != 0) {
             return Err(BusError::Refused(format!(
                 "the board is in plug-and-play mode {mode}, in which nobody can write; switch that off with the vendor's tool"
@@ -131,7 +131,7 @@ impl OpenCard<'_> {
         Ok(())
     }
 
-    /// Looks at the state of the bus.
+    /// Checks the state of the bus.
     fn look(&mut self, now: Nanos) -> Result<(), BusError> {
         let state = self.data.state()?;
         self.is_news |= state != self.state;
@@ -195,7 +195,7 @@ impl Card for OpenCard<'_> {
 impl Drop for OpenCard<'_> {
     fn drop(&mut self) {
         if self.phase == Phase::Running && self.options.card.watchdog {
-            // If it fails, the board is gone.
+            // On failure, the board is gone.
             let _ = self.data.watchdog(WatchDog::Clear);
         }
     }

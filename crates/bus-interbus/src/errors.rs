@@ -1,9 +1,9 @@
-//! The error codes of the DDI, by their low parts: on Windows NT and later they stand on a base.
+//! The error codes of the DDI, by their low parts: on Windows NT and later they have a base added.
 
 use tickbus_fieldbus::Verdict::{Broken, Refused};
 use tickbus_fieldbus::{Failing, Meaning};
 
-/// What Windows adds to each code.
+/// The base that Windows adds to each code.
 const BASE: u32 = 0xE007_0000;
 
 /// There is no message in the mailbox.

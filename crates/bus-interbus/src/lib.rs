@@ -1,6 +1,6 @@
 //! INTERBUS controller boards through the vendor's device driver interface (DDI): the bus `interbus-ddi`.
 //!
-//! `state` is what a board says of its bus, `card` the order of the calls, `library` the calls themselves.
+//! `state` is a board's report about its bus, `card` the order of the calls, `library` the calls themselves.
 
 mod card;
 mod errors;

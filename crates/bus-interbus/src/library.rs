@@ -12,7 +12,7 @@ use tickbus_fieldbus::BusError;
 use super::errors::{NO_MESSAGE, failing, low};
 use super::state::State;
 
-/// An access to process data, as the vendor's header packs it.
+/// An access to process data, packed as in the vendor's header.
 #[repr(C, packed(2))]
 struct Access {
     length: u16,
@@ -35,7 +35,7 @@ type OfData = unsafe extern "system" fn(u32, *mut Access) -> u32;
 type OfMessage = unsafe extern "system" fn(u32, *mut Message) -> u32;
 
 vendor_functions! {
-    /// Those that tickbus calls. Handles and results are of 32 bits, with a sign or without.
+    /// The functions that tickbus calls. Handles and results have 32 bits, with or without a sign.
     struct Functions {
         open: unsafe extern "system" fn(*mut c_char, i16, *mut u32) -> u32 = "DDI_DevOpenNode",
         close: OfHandle = "DDI_DevCloseNode",
@@ -69,7 +69,7 @@ fn check(function: &str, code: u32) -> Result<(), BusError> {
 /// Reading and writing.
 const BOTH: i16 = 3;
 
-/// How data are moved: word by word, or byte by byte.
+/// The transfer of data: word by word, or byte by byte.
 const WORDS: u16 = 0;
 /// The same.
 const BYTES: u16 = 2;

@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus.
+//! The bus's section of a driver.cfg.
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::Table;
@@ -23,7 +23,7 @@ pub struct Options {
     pub device: String,
     /// The service that activates the configuration, if it is to be requested.
     pub activate: Option<u16>,
-    /// How long the board may take to answer, and its bus to start.
+    /// The time for the board to answer, and for its bus to start.
     pub start_timeout: Nanos,
 }
 

@@ -19,7 +19,7 @@ const NAMES: [&str; 16] = [
 const RUNS: u16 = 0xE0;
 
 impl State {
-    /// Whether the bus exchanges data.
+    /// True if the bus exchanges data.
     pub(crate) const fn runs(self) -> bool {
         self.bits & RUNS == RUNS
     }

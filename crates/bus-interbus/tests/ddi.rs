@@ -12,7 +12,7 @@ use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
 use tickbus_fieldbus::Verdict;
 
-/// Two boards that are joined.
+/// Two connected boards.
 struct Boards {
     library: Arc<StandIn>,
     extra: &'static str,
@@ -73,7 +73,7 @@ impl Bus for Boards {
 
 conformance!(suite, crate::Boards::new());
 
-/// All calls with the board's watchdog, as far as they depend on nobody else.
+/// All calls with the board's watchdog that are independent of others.
 const CALLS: [&str; 11] = [
     "DDI_DevOpenNode(IBB1N1_M, 3)",
     "DDI_DevOpenNode(IBB1N1_D, 3)",
@@ -129,7 +129,7 @@ fn calls_are_made_in_the_order_of_the_vendor_and_undone_in_the_reverse() {
     assert_eq!(calls[calls.len() - 3..], CLOSING);
 }
 
-/// The functions, and how many of the closing calls follow when one fails.
+/// The functions, each with the number of closing calls that follow when it fails.
 const FUNCTIONS: [(&str, usize); 8] = [
     ("DDI_DevOpenNode(IBB1N1_D", 1),
     ("DDI_MXI_RcvMessage(11", 2),
@@ -148,7 +148,7 @@ fn each_error_code_at_each_call_is_told_with_its_name_and_what_to_do_and_what_wa
         let boards = Boards::with(switches, WATCHED);
         for row in ERRORS {
             for (call, undone) in FUNCTIONS {
-                // It means that the answer has not come yet, and has a test of its own.
+                // The code means that the answer has not come yet, and has a separate test.
                 if row.code == 0x9B && call.starts_with("DDI_MXI_RcvMessage") {
                     continue;
                 }

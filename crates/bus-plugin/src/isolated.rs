@@ -125,9 +125,9 @@ impl Exchange for OpenBus<'_> {
 /// The event that the host is waiting for.
 #[derive(Clone, Copy, Debug)]
 enum Waiting {
-    /// For the helper to start.
+    /// The start of the helper.
     ForHello,
-    /// For this function of the library to return.
+    /// The return of this function of the library.
     For(&'static str),
 }
 

@@ -1,4 +1,4 @@
-//! One connection without its socket: the session, and what it transfers to and from the port.
+//! One connection without its socket: the session, and its transfers to and from the port.
 
 use std::io;
 use std::net::SocketAddr;
@@ -15,11 +15,11 @@ use super::{ConnectionFrames, EndReason, Session, SessionParameters};
 pub(super) struct Connection {
     peer: SocketAddr,
     session: Session,
-    /// For the record on its way.
+    /// The receipt for the record on its way.
     receipt: Option<Receipt>,
-    /// Whether the peer's presence was reported.
+    /// True if the peer's presence was reported.
     announced: bool,
-    /// How many skipped cycles were reported to the port.
+    /// The number of skipped cycles that were reported to the port.
     skipped: u64,
 }
 
@@ -41,7 +41,7 @@ impl Connection {
         self.peer
     }
 
-    /// Until when to wait for it.
+    /// How long to wait for the connection.
     pub(super) fn deadline(&self) -> Nanos {
         self.session.deadline()
     }
@@ -63,7 +63,7 @@ pub(super) struct Transfer<'a> {
 }
 
 impl Transfer<'_> {
-    /// Makes the record that is due.
+    /// Makes the record if one is due.
     fn make(&mut self, now: Nanos, port: &mut Port) {
         let session = &mut self.connection.session;
         if let Some(space) = session.due(now) {
@@ -73,13 +73,14 @@ impl Transfer<'_> {
                 .any(|station| port.is_station_up(station, now));
             let frames = is_up.then(|| port.look(stations.clone(), now)).flatten();
             let Some(mut frames) = frames else {
-                // The line is down, or all its stations are: the record stays as it is, and what has changed is sent when the line is back.
+                // The line is down, or all its stations are: the record stays unchanged, and changes are sent when the
+                // line is back.
                 session.made(now, |_, _| false);
                 session.withdraw();
                 return;
             };
             self.frames.fill(space, &mut frames);
-            // Of these frames: the driver may begin to close now.
+            // The receipt of these frames: the driver may begin to close now.
             let receipt = frames.receipt();
             // A check that sends nothing cannot be lost.
             if session.made(now, |before, now| self.frames.differ(before, now)) {

@@ -12,7 +12,7 @@ use super::parts::{Messages, Parts};
 #[derive(Debug)]
 pub(super) struct ConnectionFrames {
     stations: Range<usize>,
-    /// Sizes of outgoing frames, and how each is compared.
+    /// Sizes of outgoing frames, and the comparison of each.
     sent: Box<[(usize, DeadBands)]>,
     /// `Some` if a message has one axis rather than the whole image.
     messages: Option<Messages>,
@@ -33,7 +33,7 @@ impl ConnectionFrames {
         }
     }
 
-    /// The parts of the single station, each in its own message: outgoing and incoming.
+    /// Splits the single station into parts, each in its own message: outgoing and incoming.
     pub(super) fn in_parts(self, sent: Parts, received: Parts) -> Self {
         Self {
             messages: Some(Messages::new(sent, received)),
@@ -62,11 +62,11 @@ impl ConnectionFrames {
         }
     }
 
-    /// Hands in a record that arrived at `now`.
+    /// Passes on a record that arrived at `now`.
     ///
     /// # Errors
     ///
-    /// The record has a part that does not exist; the text says so.
+    /// The record contains a part that does not exist; the text says so.
     pub(super) fn received(
         &mut self,
         now: Nanos,
@@ -102,7 +102,7 @@ impl ConnectionFrames {
         }
     }
 
-    /// Whether the last filled record differs enough from the one sent `before` to be sent.
+    /// True if the last filled record differs enough from the one sent `before` to be sent.
     pub(super) fn differ(&mut self, mut before: &[u8], mut now: &[u8]) -> bool {
         if let Some(messages) = &self.messages {
             return messages.is_news();

@@ -1,9 +1,9 @@
 //! Records of fixed size over TCP.
 //!
-//! A record is the frames of all stations in one direction, one after another in the order of the driver.cfg,
-//! with no header and no trailer: any program that can open a TCP connection can be the other end. An end
-//! that listens may do so at a separate address for each station; a record is then the frame of that station.
-//! If the image consists of axes, they may be sent one at a time, each in a message with its number.
+//! A record is the frames of all stations in one direction, one after another in the order of the driver.cfg, with no
+//! header and no trailer: any program that can open a TCP connection can be the other end. An end that listens may do
+//! so at a separate address for each station; a record is then the frame of that station. If the image consists of
+//! axes, they can be sent one at a time, each in a message with its number.
 //!
 //! [`Session`] is the complete protocol, without I/O; the rest transfers its bytes.
 

@@ -15,7 +15,7 @@ use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;
 use super::{ConnectionFrames, Session, SessionParameters};
 
-/// How long no client is accepted after the system had no socket.
+/// The pause in accepting after the system had no free socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// One address to listen on, and its stations.
@@ -41,7 +41,7 @@ pub(super) fn listen(
 ) -> Result<(), BusError> {
     let mut lines = ConnectionStates::new(places.iter().map(|place| place.name.clone()));
     let mut servers = Vec::new();
-    // A client may come as soon as the system listens, and this thread later.
+    // A client may connect as soon as the system listens, before this thread continues.
     let since = port.clock().now();
     for (line, place) in places.into_iter().enumerate() {
         let Some((listener, bound)) = tcp::listen(place.address, port, stop)? else {
@@ -81,7 +81,7 @@ pub(super) fn listen(
     Ok(())
 }
 
-/// Waits for all servers, and lets each do what is due.
+/// Waits for all servers, and lets each do its due work.
 fn turn(
     servers: &mut [Server<'_>],
     lines: &mut ConnectionStates,
@@ -89,7 +89,7 @@ fn turn(
     port: &mut Port,
 ) -> Result<(), BusError> {
     let now = port.clock().now();
-    // Held-back frames must be handed in on time, even without a client.
+    // Held-back frames must be passed on in time, even without a client.
     let mut deadline = port.due().min(port.next_look());
     for server in &mut *servers {
         server.watch(now, set).map_err(|error| no_wait(&error))?;
@@ -117,7 +117,7 @@ fn turn(
 }
 
 struct Server<'a> {
-    /// Its index among the lines.
+    /// The index among the lines.
     line: usize,
     listener: TcpListener,
     bound: SocketAddr,
@@ -125,15 +125,15 @@ struct Server<'a> {
     terms: SessionParameters,
     frames: &'a mut ConnectionFrames,
     served: Option<(Call<TcpStream>, Connection)>,
-    /// What the set waits for on the connection, if there is one; and whether it waits for the listener.
+    /// The interest in the connection, if there is one; and whether the set waits for the listener.
     watched: Option<Interest>,
     hears: bool,
-    /// Until when no client is accepted, after the system had no socket.
+    /// The end of the pause in accepting, after the system had no free socket.
     accept_paused_until: Nanos,
 }
 
 impl Server<'_> {
-    /// The key of its connection in the poll set; the listener's is the next one.
+    /// The key of the connection in the poll set; the listener's is the next one.
     fn key(&self) -> usize {
         2 * self.line
     }
@@ -175,7 +175,7 @@ impl Server<'_> {
         now < self.accept_paused_until
     }
 
-    /// Lets the connection do what is due.
+    /// Lets the connection do its due work.
     fn serve(
         &mut self,
         readable: bool,
@@ -236,12 +236,12 @@ impl Server<'_> {
             lines.lost(self.line, &error, &format!("{peer} takes its place"), port);
         }
         let patience = Session::patience(self.terms.max_age);
-        // If it cannot be prepared, it is gone already.
+        // A client whose connection cannot be prepared has gone already.
         if let Err(error) = prepare(stream.os(), patience) {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
         }
-        // What it has sent waits for the next look, and may have waited as long as its connection.
+        // Its bytes wait for the next look, and may have waited as long as the connection.
         port.look_leaves_some();
         let connection = Connection::new(peer, self.terms, port);
         let reason = format!("{peer} has connected; waiting for its first record");

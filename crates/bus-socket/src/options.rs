@@ -13,7 +13,7 @@ use super::Sending;
 /// The default port.
 const PORT: u16 = 20_030;
 
-/// Which end listens, and which connects.
+/// The end that listens or connects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TcpRole {
     /// Listens.
@@ -46,7 +46,7 @@ pub struct Options {
     tables: usize,
     /// The content of a record or message.
     pub message: Message,
-    /// Whether this end listens or connects.
+    /// The role of this end: to listen or to connect.
     pub tcp: TcpRole,
     /// When a record is sent.
     pub sending: Sending,
@@ -59,7 +59,7 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// The text is not an address, or one that this end cannot use.
+    /// The text is not an address, or the address is not usable by this end.
     pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
         let address: Address = address.parse()?;
         check_port(&address, self.tcp)?;

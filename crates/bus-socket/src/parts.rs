@@ -5,7 +5,7 @@ use std::ops::Range;
 /// Size of the part number at the start of every message.
 const SELECTOR: usize = 2;
 
-/// How an area is split into parts: each axis is one, numbered from 1; everything else is part 0.
+/// The split of an area into parts: each axis is one, numbered from 1; everything else is part 0.
 ///
 /// A message is the part's number as a big-endian UINT, then its bytes, then zeros up to the common size of
 /// all messages in this direction.
@@ -108,11 +108,11 @@ impl Parts {
 pub(super) struct Messages {
     sends: Parts,
     receives: Parts,
-    /// The frame as the peer has it, and as the last message would change it.
+    /// The frame as the peer has it, and as it will be after the last message.
     there: Box<[u8]>,
-    /// Whether the peer has received each part.
+    /// True if the peer has received the part, for each.
     known: Box<[bool]>,
-    /// The frame made of the parts received so far; the others are zeros.
+    /// The frame made of the parts received so far; the others are zero.
     come: Box<[u8]>,
     /// The last message: its part, its bytes, and whether they are new to the peer.
     part: usize,
@@ -144,13 +144,13 @@ impl Messages {
         self.part = 0;
     }
 
-    /// The whole frame after the part in this message.
+    /// The whole frame after this message's part was received.
     pub(super) fn received(&mut self, message: &[u8]) -> Result<&[u8], String> {
         self.receives.read(message, &mut self.come)?;
         Ok(&self.come)
     }
 
-    /// Makes a message of the part that is due: the next changed one, or else simply the next one.
+    /// Makes a message of the part that is due: the next changed one, or otherwise simply the next one.
     pub(super) fn fill(&mut self, frame: &[u8], message: &mut [u8]) {
         let count = self.sends.count();
         let next = || (1..=count).map(|step| (self.part + step) % count);

@@ -19,7 +19,7 @@ pub struct Records {
     end: usize,
 }
 
-/// How much of a record has arrived.
+/// The received part of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Partial {
     /// Bytes that have arrived.
@@ -47,7 +47,7 @@ impl Records {
         }
     }
 
-    /// Where to put the next bytes of the stream. Never empty once all records have been taken.
+    /// The space for the next bytes of the stream. Never empty once all records have been taken.
     pub fn space(&mut self) -> &mut [u8] {
         if self.start > 0 {
             self.buffer.copy_within(self.start..self.end, 0);
@@ -84,13 +84,12 @@ impl Records {
         Some(&self.buffer[record])
     }
 
-    /// How many bytes have arrived and have not been taken.
+    /// The number of bytes that have arrived and have not been taken.
     pub fn waiting(&self) -> usize {
         self.end - self.start
     }
 
-    /// How much of an incomplete record has arrived; `None` between two records, and while whole ones have
-    /// not been taken.
+    /// The received part of an incomplete record; `None` between two records, and while whole ones have not been taken.
     pub fn partial(&self) -> Option<Partial> {
         let (have, of) = (self.waiting(), self.size);
         (have > 0 && (of == 0 || have < of)).then_some(Partial { have, of })
@@ -173,7 +172,7 @@ mod tests {
         records.arrived(space + 1);
     }
 
-    /// A stream, and where the network segments it.
+    /// A stream, and the positions where the network segments it.
     fn cut_stream() -> impl Strategy<Value = (usize, Vec<u8>, Vec<usize>)> {
         let stream = proptest::collection::vec(any::<u8>(), 0..2_000);
         let cuts = proptest::collection::vec(1..700_usize, 1..40);
@@ -181,8 +180,8 @@ mod tests {
     }
 
     proptest! {
-        /// Any stream with any segmentation (and so with any truncation) gives its whole records and no
-        /// others, and the rest is counted.
+        /// Any stream with any segmentation (and so with any truncation) gives its whole records and no others, and the
+        /// rest is counted.
         #[test]
         fn every_cutting_gives_the_same_records((size, stream, cuts) in cut_stream()) {
             let mut records = Records::new(size);

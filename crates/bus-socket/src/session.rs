@@ -42,12 +42,11 @@ pub struct SessionParameters {
 /// One connection, from its beginning to its end.
 ///
 /// Whenever the owner of the socket wakes up, it reads into [`space`](Self::space) and reports that by
-/// [`arrived`](Self::arrived), takes all records by [`take`](Self::take), fills the buffer that
-/// [`due`](Self::due) returns and reports that by [`made`](Self::made), writes [`to_write`](Self::to_write)
-/// and reports how much the system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to
-/// see whether the connection may go on; then it waits for the socket until [`deadline`](Self::deadline).
-/// Time-outs are checked last, after everything that had already arrived: if this process was held up, the
-/// peer is not to blame.
+/// [`arrived`](Self::arrived), takes all records by [`take`](Self::take), fills the buffer that [`due`](Self::due)
+/// returns and reports that by [`made`](Self::made), writes [`to_write`](Self::to_write) and reports how much the
+/// system accepted by [`wrote`](Self::wrote), and calls [`check`](Self::check) to see whether the connection may
+/// continue; then it waits for the socket until [`deadline`](Self::deadline). Time-outs are checked last, after
+/// everything that had already arrived: if this process was held up, the peer is not to blame.
 #[derive(Debug)]
 pub struct Session {
     terms: SessionParameters,
@@ -76,9 +75,9 @@ struct Inbox {
 #[derive(Debug)]
 struct Outbox {
     record: Box<[u8]>,
-    /// How much of it the system has accepted.
+    /// The number of bytes of the record that the system has accepted.
     written: usize,
-    /// Since when it has been waiting to be accepted completely; `None` if there is nothing to send.
+    /// The time since which the record has been waiting to be accepted completely; `None` if there is nothing to send.
     waiting_since: Option<Nanos>,
     /// When the last record was made.
     made: Option<Nanos>,
@@ -120,7 +119,7 @@ impl Session {
         max_age.times(SILENCE)
     }
 
-    /// Where to put the next bytes from the peer; never empty once all records have been taken.
+    /// The space for the next bytes from the peer; never empty once all records have been taken.
     pub fn space(&mut self) -> &mut [u8] {
         self.inbox.records.space()
     }
@@ -204,8 +203,8 @@ impl Session {
         Nanos((self.terms.max_age.0 / SIGNS_OF_LIFE).max(1))
     }
 
-    /// The image for `now` is in the buffer from [`due`](Self::due). When sending on change, `differs` is
-    /// called to compare it with the last record sent. Returns whether the record is to be sent.
+    /// The buffer from [`due`](Self::due) has the image for `now`. When sending on change, calls `differs` to compare
+    /// it with the last record sent. Returns whether the record is to be sent.
     pub fn made(&mut self, now: Nanos, differs: impl FnOnce(&[u8], &[u8]) -> bool) -> bool {
         let life = self.sign_of_life();
         let outbox = &mut self.outbox;
@@ -231,7 +230,8 @@ impl Session {
         }
     }
 
-    /// The record last [made](Self::made) is not sent after all; whether there was one of which nothing was written.
+    /// The record last [made](Self::made) is not sent after all; returns true if there was one, and none of it was
+    /// written.
     pub fn withdraw(&mut self) -> bool {
         let outbox = &mut self.outbox;
         outbox.written == 0 && outbox.waiting_since.take().is_some()
@@ -267,7 +267,7 @@ impl Session {
         whole
     }
 
-    /// Checks whether the connection may go on at `now`.
+    /// Checks that the connection may continue at `now`.
     ///
     /// # Errors
     ///
@@ -298,7 +298,7 @@ impl Session {
         Ok(())
     }
 
-    /// How much of an incomplete record has arrived.
+    /// The received part of an incomplete record.
     pub fn partial(&self) -> Option<Partial> {
         self.inbox.records.partial()
     }
@@ -313,7 +313,7 @@ impl Session {
         }
     }
 
-    /// Until when the owner of the socket may wait if nothing arrives and nothing can be written.
+    /// How long the owner of the socket may wait if nothing arrives and nothing can be written.
     pub fn deadline(&self) -> Nanos {
         let SessionParameters {
             max_age,
@@ -348,7 +348,7 @@ impl Session {
                 given_up
             });
         } else {
-            // Nothing is received, so the connection itself must be checked regularly.
+            // No records come in, so the connection itself must be checked regularly.
             deadline = deadline.min(self.checked + self.sign_of_life());
         }
         deadline
@@ -362,12 +362,12 @@ impl Session {
         now - self.inbox.heard.unwrap_or(self.began)
     }
 
-    /// Whether the peer has been silent for longer than `max_age`, so that its data are stale.
+    /// True if the peer has been silent for longer than `max_age`, so that its data are stale.
     pub fn is_stale(&self, now: Nanos) -> bool {
         self.silence(now) > self.terms.max_age
     }
 
-    /// Whether a whole record has arrived; always true for a peer with nothing to send.
+    /// True if a whole record has arrived; always true for a peer with nothing to send.
     pub fn has_heard(&self) -> bool {
         self.terms.receives == 0 || self.inbox.heard.is_some()
     }

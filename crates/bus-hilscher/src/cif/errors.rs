@@ -12,7 +12,7 @@ const fn row(code: i32, name: &'static str, verdict: Verdict, words: &'static st
 const SIZES: &str = "the signals reach beyond the card's process image; check their addresses, `write_offset` and `read_offset`";
 const STATE: &str = "the driver is in another state than its order of calls says; see whether another program uses the card";
 
-/// All codes that have a meaning of their own.
+/// All codes with an individual meaning.
 #[rustfmt::skip]
 pub const ERRORS: &[Meaning] = &[
     row(-1, "DRV_BOARD_NOT_INITIALIZED", Broken, "the driver does not have this card; check `device`, and the card in the vendor's driver set-up"),
@@ -61,7 +61,7 @@ pub const ERRORS: &[Meaning] = &[
     row(-49, "DRV_USR_RECVBUF_PTR_NULL", Broken, Meaning::REPORT),
 ];
 
-/// Codes that have a meaning together, by their first and last ones.
+/// Ranges of codes with a common meaning, by their first and last ones.
 const RANGES: [(i32, i32, Meaning); 4] = [
     (
         -83,
@@ -121,7 +121,7 @@ pub(crate) fn failing(function: &str, code: i32) -> Failing {
     Failing::new(function, &code.to_string(), meaning(code))
 }
 
-/// What `code` says of data that were to be exchanged.
+/// The meaning of `code` for an exchange of data.
 pub(crate) fn moved(code: i32) -> Result<Answer, BusError> {
     Answer::of(code, meaning(code), || failing("DevExchangeIO", code))
 }

@@ -11,9 +11,9 @@ use tickbus_fieldbus::Failing;
 
 use super::errors::failing;
 
-// For 32-bit Windows, where a library may export the decorated names alone.
+// On 32-bit Windows, a library may export only the decorated names.
 vendor_functions! {
-    /// Those that tickbus calls.
+    /// The functions that tickbus calls.
     struct Functions {
         open_driver: unsafe extern "system" fn(u16) -> i16 = "DevOpenDriver" or "_DevOpenDriver@4",
         close_driver: unsafe extern "system" fn(u16) -> i16 = "DevCloseDriver" or "_DevCloseDriver@4",
@@ -100,7 +100,7 @@ impl<'l> Board<'l> {
         })
     }
 
-    /// Tells the card whether this program is ready.
+    /// Reports to the card whether this program is ready.
     pub(super) fn host_state(&self, ready: bool, timeout: u32) -> Result<(), Failing> {
         // SAFETY: as for `Driver::open`.
         let code = unsafe { (self.0.functions.host_state)(self.0.device, ready.into(), timeout) };

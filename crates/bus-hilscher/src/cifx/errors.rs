@@ -53,7 +53,7 @@ pub(crate) fn failing(function: &str, code: u32) -> Failing {
     )
 }
 
-/// What `code` says of data that `function` was to move.
+/// The meaning of `code` for data that `function` was to move.
 pub(crate) fn moved(function: &str, code: u32) -> Result<Answer, BusError> {
     let told = || failing(function, code);
     Answer::of(code.cast_signed(), Meaning::of(ERRORS, code), told)

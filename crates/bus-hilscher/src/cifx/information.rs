@@ -1,4 +1,4 @@
-//! What a channel says of itself.
+//! A channel's information about itself.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ const FLAGS: [(u32, &str); 7] = [
     (0x80, "DMA"),
 ];
 
-/// What a channel says of itself.
+/// A channel's information about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Information {
     board: String,
@@ -31,7 +31,7 @@ impl Information {
     pub(super) fn parse(bytes: &[u8; INFORMATION]) -> Self {
         let u32_at = |at: usize| {
             let octets = bytes[at..at + 4].try_into().expect("four octets");
-            // The driver's library has the order of this computer.
+            // The driver's library uses the byte order of this computer.
             u32::from_ne_bytes(octets)
         };
         let u16_at = |at: usize| u16::from_ne_bytes([bytes[at], bytes[at + 1]]);

@@ -21,13 +21,13 @@ pub(super) const NAME: &str = if cfg!(windows) {
 };
 
 type Handle = *mut c_void;
-/// With a command, a place for the present state, and a time-out.
+/// With a command, a place for the current state, and a time-out.
 type State = unsafe extern "system" fn(Handle, u32, *mut u32, u32) -> i32;
 /// Area, offset, length, data, time-out.
 type Move = unsafe extern "system" fn(Handle, u32, u32, u32, *mut c_void, u32) -> i32;
 
 vendor_functions! {
-    /// Those that tickbus calls.
+    /// The functions that tickbus calls.
     struct Functions {
         driver_open: unsafe extern "system" fn(*mut Handle) -> i32 = "xDriverOpen",
         driver_close: unsafe extern "system" fn(Handle) -> i32 = "xDriverClose",
@@ -42,7 +42,7 @@ vendor_functions! {
     }
 }
 
-/// What the driver for Linux wants to know at its start.
+/// The parameters for starting the driver for Linux.
 #[cfg(not(windows))]
 #[repr(C)]
 struct LinuxInit {
@@ -69,17 +69,17 @@ vendor_functions! {
     }
 }
 
-/// The loaded library. All drivers of the process share it, as it is started once for all of them.
+/// The loaded library. All drivers of the process share it, since it is started once for all of them.
 pub(super) struct Library {
     functions: Functions,
     #[cfg(not(windows))]
     start: Start,
-    /// How many have started it.
+    /// The number of users that have started it.
     #[cfg(not(windows))]
     users: Mutex<usize>,
 }
 
-/// The libraries that are loaded. Each is known by the address of a function of its: two paths may be of one.
+/// The loaded libraries, identified by the address of one of their functions: two paths may lead to one library.
 static LOADED: Mutex<Vec<(usize, Weak<Library>)>> = Mutex::new(Vec::new());
 
 impl Library {
@@ -103,13 +103,13 @@ impl Library {
         Ok(library)
     }
 
-    /// Starts the driver, unless another user has.
+    /// Starts the driver, unless another user already has.
     #[cfg(not(windows))]
     fn start(&self) -> Result<(), Failing> {
         let mut users = self.users.lock().unwrap_or_else(PoisonError::into_inner);
         if *users == 0 {
             let init = LinuxInit {
-                // Finds all cards by itself.
+                // Find all cards automatically.
                 options: 1,
                 base_dir: std::ptr::null(),
                 poll_interval: 0,
@@ -193,7 +193,7 @@ impl Drop for Driver<'_> {
 pub(super) struct Channel<'l> {
     functions: &'l Functions,
     handle: Handle,
-    /// Closed behind the channel.
+    /// Closed after the channel.
     _driver: Driver<'l>,
 }
 
@@ -232,7 +232,7 @@ impl<'l> Channel<'l> {
         Ok(Information::parse(&bytes))
     }
 
-    /// Tells the card whether this program is ready.
+    /// Reports to the card whether this program is ready.
     pub(super) fn host_state(&self, command: u32, timeout: u32) -> Result<(), Failing> {
         let mut state = 0;
         // SAFETY: as for `information`.

@@ -31,8 +31,8 @@ impl Session {
         records
     }
 
-    /// Makes and writes what is due, as long as the system accepts any of `room` more bytes; returns what it
-    /// accepted, and how many whole records that makes.
+    /// Makes and writes due records, as long as the system accepts any of `room` more bytes; returns the accepted
+    /// bytes, and the number of whole records in them.
     fn speak(&mut self, now: i64, image: u8, room: usize) -> (Vec<u8>, usize) {
         let (mut taken, mut whole) = (Vec::new(), 0);
         loop {
@@ -356,8 +356,8 @@ fn terms() -> impl Strategy<Value = SessionParameters> {
 }
 
 proptest! {
-    /// Whatever happens: no panic; the peer gets whole records, each of one image; there are as many replies
-    /// as received records; no deadline is in the past.
+    /// For any events: no panic; the peer gets whole records, each of one image; there are as many replies as received
+    /// records; no deadline is in the past.
     #[test]
     fn the_stream_out_is_whole_records(
         terms in terms(), steps in proptest::collection::vec(step(), 0..100),

@@ -13,7 +13,7 @@ use std::path::Path;
 use commands::{Running, bridge, dispatch};
 use tickbus::os::PseudoTerminal;
 
-/// A client that is connected with the dispatcher directly.
+/// A client that is connected directly with the dispatcher.
 struct Pump(BufReader<TcpStream>);
 
 impl Pump {
@@ -105,7 +105,7 @@ fn a_driver_at_a_serial_line_outlives_its_dispatcher_and_its_port() {
     pump.say("P Q1=5");
     assert_eq!(driver.until("P "), "P I1=5");
 
-    // The dispatcher is ended, and started again.
+    // The dispatcher ends, and is restarted.
     let (last, code) = lab.interrupt();
     assert!(last.starts_with("dispatch: ok "), "{last}");
     assert_eq!(code, Some(0));
@@ -151,7 +151,7 @@ fn a_virtual_port_has_the_name_that_was_asked_for_and_takes_no_file_away() {
     let address = lab.after("dispatch: listening on ");
     let name = link.to_str().expect("text").to_owned();
     let arguments = ["serial", "--pty", &name, "--dispatcher", &address];
-    // One that was killed leaves its link behind.
+    // A killed bridge leaves its link behind.
     let mut killed = bridge(&arguments);
     killed.after("bridge: connected with ");
     killed.kill();

@@ -43,7 +43,7 @@ fn library() -> PathBuf {
     here.parent().expect("it is in a folder").to_owned()
 }
 
-/// Compiles one source file as what `compiler` says, without a single warning.
+/// Compiles one source file with the `compiler` command, without a single warning.
 fn compile(compiler: &[&str], source: &str, folder: &Path) -> PathBuf {
     let program = folder.join("program");
     let library = library();

@@ -51,8 +51,8 @@ fn files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
-/// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is set,
-/// they are written there instead: review the difference before committing it.
+/// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is set, the files
+/// are rewritten instead: review the difference before committing it.
 #[test]
 fn every_wrong_file_has_exactly_its_mistakes() {
     for file in wrong_files() {
@@ -213,7 +213,7 @@ fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {
     assert!(output.status.success(), "{told}");
 }
 
-/// Every example in the documentation, on the rig that it is about.
+/// Every example in the documentation, on the rig that it concerns.
 #[test]
 fn the_faults_of_the_documentation_are_right() {
     let rig = tickbus::driver_cfg::Config::load(&repository().join("driver.cfg"))

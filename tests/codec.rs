@@ -87,7 +87,7 @@ const NOT_A_NUMBER: Conversions = Conversions {
     not_a_number: 1,
 };
 
-/// The two bytes of a rig word with bit n set alone, for n = 0 to 15, big-endian.
+/// The two bytes of a rig word with only bit n set, for n = 0 to 15, big-endian.
 const WORD_BITS: [[u8; 2]; 16] = [
     [0x00, 0x01],
     [0x00, 0x02],

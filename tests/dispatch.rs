@@ -50,14 +50,14 @@ impl Dispatch {
     }
 }
 
-/// A client: says a line, and returns what it hears up to the line that begins with `until`.
+/// A client: sends a line, and returns its received lines up to the one that begins with `until`.
 fn ask(stream: &TcpStream, line: &str, until: &str) -> Vec<String> {
     let mut writer = stream;
     writer
         .write_all(format!("{line}\r\n").as_bytes())
         .expect("it reads");
     let mut heard = Vec::new();
-    // Nothing is sent behind what is waited for, so no line is lost with the reader.
+    // Nothing is sent after the awaited line, so no line is lost with the reader.
     let mut lines = BufReader::new(stream).lines();
     while !heard
         .last()

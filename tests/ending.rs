@@ -1,5 +1,5 @@
-//! What a controller leaves behind at a device that somebody else has written: when it closes, when it is ended, when it
-//! stops, and while it sees nothing.
+//! The outputs that a controller leaves at a foreign device: when it closes, when it is ended, when it stops, and while
+//! it receives no data.
 #![cfg(unix)]
 #![allow(
     missing_docs,
@@ -33,7 +33,7 @@ use tickbus_conformance as conformance;
 
 use conformance::rig::{End, eventually, logged, statistic};
 
-/// A controller that switches a motor, register 10 of `plc`, by what it sees in register 0.
+/// A controller that switches a motor, register 10 of `plc`, depending on register 0.
 fn controller(plc: &Plc, further: &str) -> String {
     let address = plc.address;
     format!(
@@ -123,7 +123,7 @@ fn a_controller_that_sees_nothing_stops_the_motor_unless_it_shall_hold_it() {
         REFUSES.store(true, Ordering::Relaxed);
         let asked = || plc.with(|memory| memory.asked.iter().filter(|asked| asked.1 == 4).count());
         let before = asked();
-        // It is asked again every second, and writes first each time.
+        // The device is asked again every second, and each time the controller writes first.
         cell.until("it was asked thrice", |_| asked() > before + 3);
         assert_eq!(motor(&plc), left, "{further}");
         REFUSES.store(false, Ordering::Relaxed);
@@ -156,7 +156,7 @@ fn a_controller_that_stops_has_a_watchdog_unless_it_is_switched_off() {
     }
 }
 
-/// A program that starts the motor, and hangs in its second scan until it is let go.
+/// A program that starts the motor, and hangs in its second scan until released.
 #[derive(Debug)]
 struct Hangs(mpsc::Receiver<()>);
 
@@ -175,7 +175,7 @@ impl Program for Hangs {
 
     fn scan(&mut self, scan: &mut Scan<'_>) {
         if scan.outputs[1] == 1 {
-            // The test has ended, or lets it go.
+            // The test has ended, or releases it.
             let _ = self.0.recv();
         }
         scan.outputs.copy_from_slice(&[0, 1]);

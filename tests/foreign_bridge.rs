@@ -1,4 +1,4 @@
-//! `tickbus bridge` with programs of others: Mosquitto as the broker, and its clients; pyserial at the serial line.
+//! `tickbus bridge` with foreign programs: Mosquitto as the broker, and its clients; pyserial on the serial line.
 #![allow(missing_docs, reason = "a test")]
 
 #[cfg(unix)]
@@ -34,7 +34,7 @@ mod unix {
     use super::commands::{Running, bridge, dispatch};
     use super::foreign::{self, Absent};
 
-    /// A program of others. It is killed at the end.
+    /// A foreign program, killed at the end.
     struct Peer {
         child: Child,
         lines: Lines<BufReader<Box<dyn Read>>>,
@@ -48,7 +48,7 @@ mod unix {
             Self { child, lines }
         }
 
-        /// One that says on stderr what it does.
+        /// Starts a program that logs to stderr.
         fn start_log(mut command: Command) -> Self {
             let mut child = command.stderr(Stdio::piped()).spawn().expect("it runs");
             let stderr = child.stderr.take().expect("it is piped");
@@ -72,7 +72,7 @@ mod unix {
 
     impl Drop for Peer {
         fn drop(&mut self) {
-            // It may have ended.
+            // The program may have ended.
             let _ = self.child.kill();
             let _ = self.child.wait();
         }
@@ -115,7 +115,7 @@ off = \"shut\"
             let folder = tempfile::tempdir().expect("a folder");
             let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
             let dispatcher = dispatch.after("dispatch: listening on ");
-            // Mosquitto cannot say which port the system has chosen.
+            // Mosquitto does not report a port that the system has chosen.
             let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
             let port = free.local_addr().expect("it is bound").port();
             drop(free);
@@ -140,7 +140,7 @@ off = \"shut\"
             self.folder.path().join("map.toml")
         }
 
-        /// The bridge, when values go through.
+        /// The bridge, once values go through.
         fn bridge(&self) -> Running {
             let mut running = bridge(&["mqtt", self.map().to_str().expect("text")]);
             running.after("bridge: connected with the broker at ");
@@ -156,7 +156,7 @@ off = \"shut\"
             command
         }
 
-        /// What the broker has from now on, with its topic, and 1 for what it had before.
+        /// All further messages of the broker, with their topics, and 1 for retained ones.
         fn subscribe(&self) -> Peer {
             Peer::start(self.command("mosquitto_sub", &["-t", "hall/#", "-F", "%t %r <%p>"]))
         }
@@ -189,7 +189,7 @@ off = \"shut\"
         Ok(broker)
     }
 
-    /// A client that is connected with the dispatcher directly.
+    /// A client that is connected directly with the dispatcher.
     struct Tank(BufReader<TcpStream>);
 
     impl Tank {
@@ -220,7 +220,7 @@ off = \"shut\"
         let mut tank = lab.tank();
         tank.say("P AQ1=12.50");
         topics.until("hall/level 0 <12.5>");
-        // Who subscribes later gets it, too.
+        // A later subscriber gets the value, too.
         lab.subscribe().until("hall/level 1 <12.5>");
         lab.publish("hall/setpoint", "21.50");
         assert_eq!(tank.until("P "), "P AI1=21.5");
@@ -262,7 +262,7 @@ off = \"shut\"
                 .after("bridge: the broker at ")
                 .contains(" is lost (")
         );
-        // Nobody sets it now.
+        // Now there is no source.
         assert_eq!(tank.until("P "), "P AI1=0");
         tank.say("P AQ1=2");
         lab.broker = start_broker(lab.folder.path())?;
@@ -288,7 +288,7 @@ off = \"shut\"
         topics.until("<online>");
         bridge.kill();
         topics.until("hall/bridge 0 <offline>");
-        // The dispatcher gives its name to the next one.
+        // The dispatcher gives the bridge's name to the next one.
         let bridge = lab.bridge();
         topics.until("hall/bridge 0 <online>");
         assert_eq!(bridge.interrupt().1, Some(0));

@@ -1,4 +1,4 @@
-//! FMUs of tickbus in tools that others wrote, and FMUs that others made as machines of tickbus.
+//! FMUs of tickbus in foreign tools, and foreign FMUs as machines of tickbus.
 #![allow(missing_docs, reason = "a test")]
 
 #[path = "fmi/fixture.rs"]
@@ -72,7 +72,7 @@ fn tool(arguments: &[&str]) -> Result<(), Absent> {
     Ok(())
 }
 
-/// The FMU of a driver.cfg, in a folder of its own.
+/// The FMU of a driver.cfg, in a separate folder.
 fn export(config: &Path, version: &str) -> (TempDir, String) {
     let folder = tempfile::tempdir().expect("a folder");
     let fmu = folder.path().join("driver.fmu");
@@ -117,7 +117,7 @@ fn in_toolbox() -> Result<(), Absent> {
         .try_for_each(|fmu| tool(&["toolbox", fmu]))
 }
 
-/// `VDMCheck2`: a formal model of FMI 2.0 is asked whether an FMU, or its modelDescription.xml alone, is right. What it says.
+/// `VDMCheck2`, a formal model of FMI 2.0, checks an FMU, or only its modelDescription.xml. Returns its messages.
 fn ask_vdmcheck(asked: &[&Path]) -> Result<Vec<String>, Absent> {
     let folder = Path::new(ROOT).join("target/peers/java/vdmcheck");
     if !folder.join("fmi2-rule-model").exists() {
@@ -131,7 +131,7 @@ fn ask_vdmcheck(asked: &[&Path]) -> Result<Vec<String>, Absent> {
     let start =
         |file: &&Path| {
             Command::new("java")
-            // It runs for a few seconds.
+            // The program runs only a few seconds.
             .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"])
             .args(["-Dvdmj.parser.merge_comments=true"])
             .args(["-Dfmureader.noschema=true", "-Dfmureader.xsd=fmi2schema/fmi2.xsd"])
@@ -295,7 +295,7 @@ fn by_pythonfmu() -> Result<(), Absent> {
         text(&built.stdout),
         text(&built.stderr)
     );
-    // Its library is Python's, which it expects to be loaded already.
+    // The library is Python's, which the FMU expects to be loaded already.
     let mut python = self::python()?;
     let asked = python
         .args(["-c", "import sysconfig, os; print(os.path.join(sysconfig.get_config_var('LIBDIR'), sysconfig.get_config_var('INSTSONAME')))"])
@@ -310,7 +310,7 @@ fn by_pythonfmu() -> Result<(), Absent> {
     for file in ["tank.cfg", "tank.toml"] {
         let from = Path::new(ROOT).join("examples/fmu-tank").join(file);
         let text = std::fs::read_to_string(from).expect("a file");
-        // It has no such parameter.
+        // This FMU has no such parameter.
         let text = text
             .split("[parameters]")
             .next()

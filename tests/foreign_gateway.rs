@@ -1,5 +1,5 @@
-//! The gateway with PLCs behind it that speak by somebody else's software: pymodbus polls it as its remote I/O, rust7
-//! reads and writes it by S7 communication, asyncua by OPC UA.
+//! The gateway with PLCs made of foreign software: pymodbus polls it as its remote I/O, rust7 reads and writes it by S7
+//! communication, asyncua by OPC UA.
 #![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
 
 mod foreign;
@@ -69,8 +69,8 @@ const S7: &str = "kind = \"s7-server\"\n\
 const OPC_UA: &str =
     "kind = \"opcua-server\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"";
 
-/// A PLC that finds the gateway at this address, and delays its answers by this seed; what waits for its end, and tells how
-/// many steps it had.
+/// A PLC that uses the gateway at this address, and delays its answers according to this seed. The returned function
+/// waits for its end, and returns the number of its steps.
 type Plc = fn(SocketAddr, u32) -> Result<Box<dyn FnOnce() -> u64>, Absent>;
 
 fn main() -> ExitCode {
@@ -221,7 +221,7 @@ fn run(kind: &str, plc: Plc, seed: u32) -> Result<Outcome, Absent> {
     Ok(outcome)
 }
 
-/// The bus makes no difference to the trace, and neither does the time that a PLC takes.
+/// Neither the bus nor the time that a PLC takes changes the trace.
 fn plcs_in_step() -> Result<(), Absent> {
     let one = run(S7, rust7, 1)?;
     assert_eq!(one.steps, 10 * STEPS);

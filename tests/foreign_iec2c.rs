@@ -83,7 +83,7 @@ fn program(config: &Config) -> String {
     made.files.into_iter().next().expect("a program").text
 }
 
-/// Every word in its library: blocks and functions, their variables, types and keywords.
+/// Every word in the compiler's library: blocks and functions, their variables, types and keywords.
 fn words(compiler: &Compiler) -> Vec<String> {
     let files = std::fs::read_dir(&compiler.library).expect("its folder");
     let mut words = BTreeSet::new();

@@ -65,7 +65,7 @@ impl Peer {
         let separator = if cfg!(windows) { ";" } else { ":" };
         let jars = format!("java-peers-0.jar{separator}lib/*");
         let mut child = Command::new("java")
-            // It ends before a thorough compiler of its code would pay.
+            // The program ends before a thorough compilation would pay off.
             .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"])
             .args(["-cp", &jars, &format!("peers.{class}")])
             .args(arguments)
@@ -119,7 +119,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // It ends with its stdin; if it hangs, the test must not hang as well.
+        // The program ends with its stdin; if it hangs, the test must not hang as well.
         drop(self.stdin.take());
         let end = loop {
             if let Err(end) = self.lines.recv_timeout(Duration::from_secs(10)) {
@@ -133,7 +133,7 @@ impl Drop for Peer {
     }
 }
 
-/// The names by which a PLC4X client finds the signals, and its notation of booleans.
+/// The names of the signals for a PLC4X client, and its notation of booleans.
 struct Tags<'a> {
     run: &'a str,
     speed: &'a str,
@@ -285,7 +285,7 @@ fn milo_as_server() -> Result<(), Absent> {
     machine.set("pressure", 0.75);
     plc.ask_until(&mut machine, &["get", "position"], "42");
     plc.ask_until(&mut machine, &["get", "pressure"], "0.75");
-    // It was killed and is started again.
+    // The PLC was killed and is restarted.
     drop(plc);
     until_value(&mut machine, "speed", -1.0);
     let mut plc = Peer::start(&mut machine, "MiloServer", &arguments)?;

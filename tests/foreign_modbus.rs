@@ -1,5 +1,5 @@
-//! The Modbus buses with third-party software at the other end: pymodbus as client and as server, mbpoll, and
-//! tshark to check what our server sends.
+//! The Modbus buses with third-party software at the other end: pymodbus as client and as server, mbpoll, and tshark to
+//! check our server's data.
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;
@@ -72,9 +72,9 @@ fn open(fieldbus: &str, signals: &str) -> Machine {
     ))
 }
 
-/// A machine that mirrors each byte of %Q on the byte of %I at the same offset.
+/// A machine that mirrors each byte of %Q to the byte of %I at the same offset.
 trait Mirror {
-    /// A tick that brings the bytes `q N` back on `i N`.
+    /// A tick that copies the bytes `q N` to `i N`.
     fn mirror(&mut self);
     fn mirror_until_the_end_of(&mut self, command: Command) -> String;
 }
@@ -294,7 +294,7 @@ fn our_client_drives_pymodbus() -> Result<(), Absent> {
         let machine = loop_through(&format!("{client}{keys}"), count);
         machine.end.driver.close();
     }
-    // The server dies and is started again.
+    // The server dies and is restarted.
     let mut machine = loop_through(&format!("{client}inputs = \"offset:0\""), 4);
     drop(server);
     machine.until("the line is lost", |machine| {
@@ -371,7 +371,7 @@ fn our_client_reads_inputs() -> Result<(), Absent> {
     Ok(())
 }
 
-/// Runs mbpoll once; gives what it says.
+/// Runs mbpoll once; returns its output.
 fn mbpoll(machine: &mut Machine, arguments: &[&str]) -> Result<String, Absent> {
     let mut mbpoll = foreign::command("mbpoll", "mbpoll")?;
     mbpoll.args(["-1", "-q"]).args(arguments);
@@ -443,7 +443,7 @@ fn pymodbus_drives_our_server_on_a_line() -> Result<(), Absent> {
 #[cfg(unix)]
 fn serial(end: &str, device: &std::path::Path) -> String {
     let device = device.display();
-    // However slow the other end is, the values that it wrote stay.
+    // However slow the other end is, its last written values stay.
     format!(
         "kind = \"modbus-{end}\"\nmax_age = \"1h\"\ndevice = \"{device}\"\nbaud = 115200\nparity = \"none\"\nstop_bits = 1\n"
     )

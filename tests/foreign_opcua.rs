@@ -112,7 +112,7 @@ fn reads_and_writes() -> Result<(), Absent> {
     assert_eq!(device.end.statistic("identity"), IDENTITY);
     assert_eq!(device.end.statistic("writes"), "allowed");
     assert_eq!(device.end.statistic("quality"), "good");
-    // A pulse that is over before the next cycle reaches the PLC as a visible level.
+    // A pulse that ends before the next cycle reaches the PLC as a visible level.
     for level in [0.0, 1.0, 0.0] {
         device.end.set("sensor", level);
         device.end.tick();
@@ -461,7 +461,7 @@ fn serves() -> Result<(), Absent> {
         (&read["value"], &read["status"]),
         (&json!(77), &json!("Good"))
     );
-    // The subscription by itself keeps the line alive: the client keeps requesting publishes.
+    // The subscription alone keeps the line alive: the client keeps requesting publishes.
     let mut age = device.end.tick().age;
     device.until("the client is heard of again", |end| {
         assert_ne!(end.link().state, LinkState::Stale);

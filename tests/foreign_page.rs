@@ -1,5 +1,5 @@
-//! The live page with programs of others: what is forced on it is read by mbpoll over Modbus, and its metrics are read by
-//! the parser of `prometheus_client`.
+//! The live page with foreign programs: mbpoll reads forced values over Modbus, and the parser of `prometheus_client`
+//! reads the metrics.
 #![allow(missing_docs, reason = "a test")]
 
 #[path = "peers/commands.rs"]
@@ -43,12 +43,12 @@ unit = "mm"
 scale = { raw = [0, 27648], value = [0.0, 250.0] }
 "#;
 
-/// A machine that brings every %Q byte back, on a page.
+/// A machine that mirrors every %Q byte, with a page.
 struct Machine {
     command: Running,
     page: String,
     token: String,
-    /// Where its bus listens.
+    /// The port of its bus.
     port: String,
     _folder: tempfile::TempDir,
 }
@@ -95,7 +95,7 @@ impl Machine {
         serde_json::from_str(&self.ask(&format!("GET {path}"), "")).expect("JSON")
     }
 
-    /// What `/signals` says of one of them.
+    /// The entry of one signal in `/signals`.
     fn signal(&self, index: usize) -> serde_json::Value {
         self.get("/signals")["drivers"][0]["signals"][index].take()
     }
@@ -104,7 +104,7 @@ impl Machine {
         self.get("/line")["drivers"][0].take()
     }
 
-    /// Reads a table of its Modbus server until that says `expected`.
+    /// Reads a table of its Modbus server until the output is `expected`.
     fn await_register(&self, kind: &str, reference: &str, expected: &str) -> Result<(), Absent> {
         let wanted = format!("[{reference}]: \t{expected}");
         let mut told = String::new();
@@ -123,7 +123,7 @@ impl Machine {
     }
 }
 
-/// Waits until the page says so.
+/// Waits until the condition holds.
 #[track_caller]
 fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
     let limit = Instant::now() + Duration::from_secs(20);
@@ -142,7 +142,7 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
     machine.await_register("3", "2", "0")?;
     let done = machine.ask(&format!("PUT {LEVEL}"), "125.0");
     assert!(done.contains("\"done\""), "{done}");
-    // What it writes, as the PLC reads it; the page says the same.
+    // A value that the machine writes, as the PLC reads it; the page shows the same.
     machine.await_register("3", "2", "13824")?;
     let level = machine.signal(2);
     assert_eq!(
@@ -157,11 +157,11 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
     });
     assert_eq!(faults[0]["name"], "forced: Level \"left\"", "{faults}");
     assert_eq!(faults[0]["kind"], "stuck");
-    // What it reads: the PLC never wrote that, and the machine brings it back.
+    // A value that the machine reads: the PLC never wrote it, and the machine returns it.
     machine.ask("PUT /force/4711/Valve", "TRUE");
     machine.await_register("1", "1", "1")?;
     machine.await_register("0", "1", "0")?;
-    // Another value, without a gap; then neither any more.
+    // Another value, without a gap; then neither of them.
     machine.ask(&format!("PUT {LEVEL}"), "-1");
     machine.await_register("3", "2", "65425 (-111)")?;
     machine.ask("DELETE /force/4711/Valve", "");
@@ -174,7 +174,7 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
         faults.len() == 3 && faults.iter().all(|fault| fault["phase"] == "over")
     });
     assert!(machine.signal(2)["forced"].is_null());
-    // What does not fit is told, and changes nothing.
+    // A value out of range is refused with a message, and changes nothing.
     let refused = machine.ask(&format!("PUT {LEVEL}"), "300");
     assert!(
         refused.contains("goes from -296.2963 to 296.2873"),
@@ -188,7 +188,7 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
 fn forced_for_nobody() -> Result<(), Absent> {
     foreign::command("mbpoll", "mbpoll")?;
     let machine = Machine::start("kind = \"modbus-server\"", "grace = \"2s\"");
-    // A viewer with the token, who goes.
+    // A viewer with the token, who then leaves.
     let mut viewer = TcpStream::connect(&machine.page).expect("it listens");
     write!(
         viewer,
@@ -198,7 +198,7 @@ fn forced_for_nobody() -> Result<(), Absent> {
     .expect("it reads");
     machine.ask(&format!("PUT {LEVEL}"), "125.0");
     machine.await_register("3", "2", "13824")?;
-    // Longer than the grace time, nothing with the token is asked but what the viewer hears.
+    // For longer than the grace time, the viewer's events are the only activity with the token.
     let begun = Instant::now();
     let mut events = vec![0; 65536];
     while begun.elapsed() < Duration::from_secs(4) {
@@ -214,7 +214,7 @@ fn metrics() -> Result<(), Absent> {
     let machine = Machine::start("kind = \"modbus-server\"", "keep_forced = true");
     machine.ask(&format!("PUT {LEVEL}"), "125.0");
     eventually("it is forced", || machine.signal(2)["value"] == 125);
-    // The statistics are made anew twice a second.
+    // The statistics are updated twice a second.
     let mut text = String::new();
     eventually("the statistics tell of it", || {
         text = machine.ask("GET /metrics", "");
@@ -264,9 +264,9 @@ fn killed_plc() -> Result<(), Absent> {
         begun.elapsed()
     );
     let (line, said) = (machine.line(), machine.command.after("mirror: opening: "));
-    // The same sentence as the command has.
+    // The same sentence as in the command's output.
     assert_eq!(line["reason"], said, "{line}");
-    // What it had not read yet makes its system reset the connection.
+    // Unread data make its system reset the connection.
     let cause = &line["cause"];
     assert!(cause == "left" || cause == "link", "{line}");
     Ok(())

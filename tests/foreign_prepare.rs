@@ -1,4 +1,5 @@
-//! Programs on virtual time, compiled by `iec2c` and hosted: the blocks of plc/iec61131, and what `tickbus sync prepare` makes.
+//! Programs on virtual time, compiled by `iec2c` and hosted: the blocks of plc/iec61131, and the output of `tickbus
+//! sync prepare`.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 #[path = "prepare/actions.rs"]
@@ -109,7 +110,7 @@ fn text(path: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// The blocks, before a program that uses them.
+/// The blocks, followed by a program that uses them.
 fn with_blocks(program: &str) -> String {
     let blocks = tickbus::prepare::SOURCES.map(|(_, text)| text);
     blocks.join("\n") + "\n" + program
@@ -123,7 +124,7 @@ fn bench() -> Result<Stepped, Absent> {
     ))
 }
 
-/// What bench.st answers to its inputs in the step at `ms`.
+/// The answer of bench.st to its inputs in the step at `ms`.
 #[derive(Debug, PartialEq, Eq)]
 struct Answer {
     bits: u8,
@@ -184,7 +185,7 @@ fn timers_follow_the_golden_rows() -> Result<(), Absent> {
 /// Seconds from 1970 to the PDT of bench.st, 2024-05-06-07:08:09.
 const PRESET_DATE: i64 = 1_714_979_289;
 
-/// With a PT of 0 and one that changes while the timer runs, too, where iec2c's own timers differ.
+/// Also with a PT of 0, and with one that changes while the timer runs, where iec2c's own timers differ.
 fn timers_are_those_of_the_built_in_programs() -> Result<(), Absent> {
     let mut bench = bench()?;
     let mut random = Random(11);
@@ -231,7 +232,7 @@ fn time_stands_still_between_steps() -> Result<(), Absent> {
         assert_eq!(before.bits & (TON | TP | ACTION), TP, "{ms} ms");
         assert_eq!(before.et[0], ms);
         bench.idle(50);
-        // A step in which the task is not due is none for the program either.
+        // A step in which the task is not due is no step for the program either.
         bench.step(ms + 5);
         assert_eq!(bench.outputs[4], before.bits);
     }
@@ -262,7 +263,7 @@ fn a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ() 
             u16::from_be_bytes(plc.outputs[8..10].try_into().expect("two")),
         )
     };
-    // One that was reset begins anywhere; each row: go, its copy, done, steps made.
+    // After a reset, a server begins with any number; each row: go, its copy, done, steps made.
     for (go, go_end, done, steps) in [
         (0, 0, 0, 0),
         (386, 0, 0, 0),
@@ -343,7 +344,7 @@ fn prepared_with(program: &str, (go_end, done_end): (Option<String>, Option<Stri
     };
     let settings = Settings {
         addresses,
-        // Its body is a pragma.
+        // The body of this program is a pragma.
         no_clock: vec!["three".to_owned()],
     };
     let made = prepare(&[source(program.as_bytes().to_vec())], &settings);
@@ -381,7 +382,7 @@ fn a_prepared_program_is_the_one_synchronised_by_hand() -> Result<(), Absent> {
     Ok(())
 }
 
-/// In each step the same outputs as the original's in the scan at that time, hosted on that time.
+/// In each step the outputs equal those of the original in the scan at that time, hosted on that time.
 fn equal(
     original: &str,
     prepared: &str,
@@ -432,7 +433,7 @@ fn a_prepared_project_in_xml_does_what_the_original_does() -> Result<(), Absent>
     Ok(())
 }
 
-/// As an editor reads them.
+/// In the form that an editor reads.
 fn the_blocks_in_xml_compile() -> Result<(), Absent> {
     let compiler = Compiler::find()?;
     let configuration = "<configuration name=\"c\"><resource name=\"r\"/></configuration>";
@@ -448,7 +449,7 @@ fn the_blocks_in_xml_compile() -> Result<(), Absent> {
     Ok(())
 }
 
-/// Its addresses are moved, since it uses the first bytes itself.
+/// The rig's addresses are moved, since it uses the first bytes itself.
 fn the_rig_prepared_does_what_the_original_does() -> Result<(), Absent> {
     let mut moved = text("plc/rig/rig.st");
     for area in ["%IW", "%IX", "%QW", "%QB"] {

@@ -1,5 +1,5 @@
-//! The bus `profibus-device` with pyprofibus, a DP master in Python, at the other end. (profirust is at the other end in
-//! the tests of the bus's own crate.)
+//! The bus `profibus-device` with pyprofibus, a DP master in Python, at the other end. (The tests in the bus's own
+//! crate use profirust.)
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;
@@ -44,7 +44,7 @@ fn exchanges() -> Result<(), Absent> {
         ("19200", &*by_gsd, encoder, "4 bytes in and out"),
         ("187500", &*by_gsd, encoder, "4 bytes in and out"),
         ("500000", &*by_gsd, encoder, "4 bytes in and out"),
-        // By the file that "tickbus gsd" writes.
+        // With the file that "tickbus gsd" writes.
         (
             "500000",
             "ident = 0x80E1\nconfig = [0xF1]",
@@ -53,7 +53,7 @@ fn exchanges() -> Result<(), Absent> {
         ),
     ] {
         let mut master = foreign::python_with("main", &["pyprofibus", "serial"])?;
-        // A port of its own each time: one whose parity was asked for cannot be opened again with the same settings.
+        // A new port each time: a port that was opened with parity cannot be opened again with the same settings.
         let line = pty::Line::new();
         let port = line.end(0).display();
         let text = format!(
@@ -80,7 +80,7 @@ fn exchanges() -> Result<(), Absent> {
             machine.set("in", value);
         });
         assert!(told.contains("profibus_master: ok exchanges="), "{told}");
-        // Ext_Diag, the watchdog, the master; and at last a block about a channel.
+        // Ext_Diag, the watchdog, the master; and finally a block about a channel.
         let diagnoses = told.rsplit("diagnoses=").next();
         let diagnoses = diagnoses.and_then(|rest| rest.split_whitespace().next());
         let diagnoses = diagnoses.unwrap_or_default();
@@ -106,7 +106,7 @@ fn write_gsd(folder: &std::path::Path, text: &str, to: &str) {
     std::fs::write(to, output.stdout).expect("a file");
 }
 
-/// What pyprofibus makes of a file and its modules is what we make of it.
+/// pyprofibus and our reader agree about a file and its modules.
 fn reads() -> Result<(), Absent> {
     for (file, modules) in [
         (
@@ -137,7 +137,7 @@ fn reads() -> Result<(), Absent> {
         let gsd = Gsd::read(&std::fs::read(&path).expect("the file")).expect("a right file");
         let mut theirs = String::from_utf8(output.stdout).expect("UTF-8");
         let modules: Vec<String> = modules.iter().map(|name| (*name).to_owned()).collect();
-        // It does not know slots.
+        // pyprofibus does not know slots.
         let identity = Gsd {
             slots: Vec::new(),
             ..gsd.clone()
@@ -156,13 +156,13 @@ fn reads() -> Result<(), Absent> {
             hex(identity.configuration.bytes())
         );
         for (rate, wait) in gsd.rates.iter().filter(|(rate, _)| **rate <= 500_000) {
-            // Where the file does not say how long it takes, it does not guess.
+            // If the file does not state the wait, pyprofibus does not guess.
             if theirs.contains(&format!("tsdr {rate} ")) {
                 writeln!(ours, "tsdr {rate} {wait}").expect("a String takes all");
             }
         }
         if file == "drive.gsd" {
-            // It fills in the constants alone.
+            // pyprofibus fills in only the constants.
             theirs.truncate(theirs.find("parameters").expect("the last line"));
         } else {
             writeln!(ours, "parameters {}", hex(identity.user.defaults()))

@@ -54,7 +54,7 @@ fn open(fieldbus: &str) -> Machine {
     open_with(fieldbus, "")
 }
 
-/// With further signals.
+/// With additional signals.
 fn open_with(fieldbus: &str, further: &str) -> Machine {
     Machine::open(&format!(
         "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\n{fieldbus}\n{SIGNALS}{further}"
@@ -69,7 +69,7 @@ fn run(end: &mut Machine, mut python: Command, script: &str, arguments: &[String
     end.until_the_end_of(python, Machine::tick)
 }
 
-/// The last values that a client wrote stay after it is gone.
+/// A client's last written values stay after it has gone.
 const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\", offset = 2, length = 6 }]";
 
@@ -139,13 +139,13 @@ impl Cpu {
 
 impl Drop for Cpu {
     fn drop(&mut self) {
-        // The end of its stdin ends it.
+        // The CPU ends with its stdin.
         drop(self.process.stdin.take());
         let _ = self.process.wait();
     }
 }
 
-/// What the client says of a CPU that its driver.cfg does not name, and that does not tell whether it is in RUN.
+/// The client's warnings about a CPU that its driver.cfg does not name, and that does not report whether it is in RUN.
 fn expect_warnings() {
     logged::expect("nothing is written into the PLC \"6ES7 315-2EH14-0AB0");
     logged::expect("does not say whether it is in RUN");
@@ -162,7 +162,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
             cpu.port
         )
     };
-    // Of a job that writes, this server only executes the first item: so what is written has no gaps.
+    // Of a job that writes, this server only executes the first item, so the written data have no gaps.
     let mut further = String::from(
         "[[signal]]\nname = \"last\"\naddress = \"%IW598\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"last back\"\naddress = \"%QW598\"\ntype = \"INT\"\n",
@@ -241,7 +241,7 @@ fn our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop() -> Result
     let fieldbus = |further: &str| snap7_keys(&cpu, further);
     logged::expect("nothing is written into the PLC");
     let mut end = open(&fieldbus(""));
-    // What its data block holds before anybody has written, plus 1.
+    // The initial content of the data block, plus 1.
     end.until("it reads", |end| end.get("speed") == 28_399.0);
     let who = end.statistic("identity");
     end.end.driver.close();

@@ -74,7 +74,7 @@ fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
     let mut files = Vec::new();
     let (codesys, twincat, openplc) = (Target::Codesys, Target::TwinCat, Target::OpenPlc);
     for (file, targets) in [
-        // TwinCAT's file differs from the one for CODESYS only in what transfers records.
+        // TwinCAT's file differs from the one for CODESYS only in the transfer of records.
         ("driver.cfg", &[codesys, twincat, openplc][..]),
         // A hosted program serves a single station, and OpenPLC has no OPC UA.
         ("tests/export/right/everything.cfg", &[codesys]),
@@ -87,7 +87,7 @@ fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
             files.extend(write(file, *target, folder.path()));
         }
     }
-    // What is put on virtual time, and with what.
+    // Programs to put on virtual time, and the blocks for that.
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     for name in ["timers", "action_control", "scheduler", "example"] {
         files.push(root.join(format!("plc/iec61131/{name}.st")));
@@ -113,7 +113,7 @@ fn blark_reads_every_source_in_structured_text() -> Result<(), Absent> {
 fn blark_refuses_a_source_that_is_broken() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
     let mut files = write("driver.cfg", Target::Codesys, folder.path());
-    // One that is right beside it will do.
+    // One correct program next to it is enough.
     files.drain(..files.len() - 2);
     let end = files.last().expect("a program");
     let text = std::fs::read_to_string(end).expect("its text");

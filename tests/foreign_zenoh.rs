@@ -1,4 +1,4 @@
-//! `tickbus dispatch --zenoh` on three hosts, each a network namespace with its own name, of which one is cut off and joined
+//! `tickbus dispatch --zenoh` on three hosts, each a network namespace with its own name; one is cut off and joined
 //! again.
 #![cfg(unix)]
 #![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
@@ -14,7 +14,7 @@ use std::time::Duration;
 use foreign::Absent;
 use tickbus_conformance::rig::eventually;
 
-/// Far above what anything here takes, on a machine with much else to do.
+/// Far above the duration of any step here, even on a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn main() -> ExitCode {
@@ -38,7 +38,7 @@ fn ip(arguments: &str) -> Result<(), String> {
 
 /// Three namespaces on the bridge of a fourth, which is their switch.
 struct Network {
-    /// What distinguishes it from other runs at the same time.
+    /// The part of the names that distinguishes parallel runs.
     tag: String,
 }
 
@@ -91,7 +91,7 @@ impl Network {
         ip(&command).expect("the link is there");
     }
 
-    /// The TCP connections of a host with an address.
+    /// The TCP connections of a host with this address.
     fn connections(&self, host: &str, address: &str) -> String {
         let output = Command::new("ip")
             .args(["netns", "exec", &self.namespace(host)])
@@ -102,7 +102,7 @@ impl Network {
         String::from_utf8_lossy(&output.stdout).into_owned()
     }
 
-    /// A command on a host. It is told the host's name by the system.
+    /// A command on a host. The system gives it the host's name.
     fn on(&self, host: &str, program: &str) -> Command {
         let script = format!("echo {host} > /proc/sys/kernel/hostname; exec \"$0\" \"$@\"");
         let mut command = Command::new("ip");
@@ -115,7 +115,7 @@ impl Network {
 impl Drop for Network {
     fn drop(&mut self) {
         for name in HOSTS.into_iter().chain(["switch"]) {
-            // What was not made is not there.
+            // Parts that were not made do not exist.
             let _ = ip(&format!("netns delete {}", self.namespace(name)));
         }
     }
@@ -161,7 +161,7 @@ impl Program {
         written.expect("it reads");
     }
 
-    /// All lines up to the one with these words.
+    /// All lines up to the one that contains these words.
     fn until(&self, words: &str) -> Vec<String> {
         let mut all = Vec::new();
         while !all.last().is_some_and(|line: &String| line.contains(words)) {
@@ -186,7 +186,7 @@ impl Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        // It may have ended.
+        // The process may have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -205,7 +205,7 @@ fn dispatch(network: &Network, host: &str, folder: &std::path::Path, options: &[
     program
 }
 
-/// A client on a host: what is typed there and what is shown.
+/// A client on a host: its input and output.
 fn client(network: &Network, host: &str, identification: &str) -> Result<Program, Absent> {
     const RELAY: &str = "exec 3<>/dev/tcp/127.0.0.1/20070; cat <&3 & exec cat >&3";
 
@@ -259,7 +259,7 @@ fn three_hosts() -> Result<(), Absent> {
         assert!(line.ends_with(host), "{line}");
     }
 
-    // Inputs of their own, an input elsewhere, and one on the way between two others.
+    // The client's own inputs, an input elsewhere, and a connection between two others.
     logo.ask("CONNECT I1:PUMP:Q1", "OK CONNECT");
     panel.ask("CONNECT I1:PUMP:Q1 Q1:LOGO:I2 Q1:PUMP:I1", "OK CONNECT");
     let refused = pump.ask("CONNECT Q2:LOGO:I1", "ERR");
@@ -280,7 +280,7 @@ fn three_hosts() -> Result<(), Absent> {
     beta.until("the dispatcher of alpha is gone");
     let list = panel.ask("LIST", "END");
     assert!(!list.iter().any(|line| line.contains("PUMP")), "{list:?}");
-    // What changes meanwhile, and what goes on.
+    // A value that changes meanwhile, and one that continues.
     pump.say("P Q1=5");
     panel.say("P Q1=6");
     logo.until("P I2=6");
@@ -301,7 +301,7 @@ fn three_hosts() -> Result<(), Absent> {
     panel.until("P I1=5");
     pump.until("P I1=6");
 
-    // For so long that Zenoh gives its connections up.
+    // Long enough for Zenoh to give up its connections.
     network.cable("gamma", false);
     panel.until("P I1=9");
     logo.until("P I2=0");
@@ -317,7 +317,7 @@ fn three_hosts() -> Result<(), Absent> {
     panel.until("P I1=5");
     logo.until("P I2=6");
 
-    // A process that ends is noticed without waiting, and so is one that comes back.
+    // The end of a process is noticed without waiting, and so is its return.
     drop(beta);
     logo.until("P I1=9");
     panel.until("P I1=9");

@@ -68,7 +68,7 @@ impl Drop for Killed {
     }
 }
 
-/// Tells a process that it is the child of a test.
+/// Marks a process as the child of a test.
 const MARK: &str = "TICKBUS_TEST_STDERR_IS_FULL";
 
 #[test]
@@ -152,7 +152,7 @@ fn a_storm_of_connections_gives_a_bounded_number_of_log_lines() {
     log::set_boxed_logger(Box::new(Logger)).expect("the only one");
     log::set_max_level(log::LevelFilter::Info);
     let (end, address) = device();
-    // Some are still on their way when the counters are read: not so many that the next power of two is passed.
+    // Some messages are still on their way when the counters are read: too few to pass the next power of two.
     storm(&end, address, 1500);
     let (left, untold) = (number(&end, "cause.left"), number(&end, "log.untold"));
     end.driver.close();

@@ -54,20 +54,20 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // It has ended already, if all went well.
+        // The process has already ended, if all went well.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 }
 
-/// A dispatcher, and where it listens.
+/// A dispatcher, and its address.
 fn dispatcher(folder: &Path, listen: &str) -> (Running, String) {
     let mut running = Running::start(folder, &["dispatch", "--listen", listen]);
     let address = running.line("dispatch: listening on ");
     (running, address)
 }
 
-/// A client that a test plays.
+/// A client controlled by a test.
 struct House {
     stream: TcpStream,
     lines: Lines<BufReader<TcpStream>>,
@@ -100,7 +100,7 @@ impl House {
     }
 }
 
-/// The insides of the code blocks of docs/virtual-lab.md that begin like this, with their beginning.
+/// The contents of the code blocks of docs/virtual-lab.md that begin like this, including their beginning.
 fn document(beginning: &str) -> String {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/virtual-lab.md");
     let document = std::fs::read_to_string(path).expect("the document");
@@ -263,7 +263,7 @@ fn mistakes_have_the_exit_codes_of_the_house() {
          wrong.toml:3:6: there is no output Q9; write Q1 to Q4\n\
          logo: failed mistakes=2\n"
     );
-    // With more of them the same program is right; so far the mistake is another one.
+    // With more of them the same program is correct, so that the mistake is a different one.
     let more = ["--inputs", "9", "--outputs", "9", "--patch", "wrong.patch"];
     let output = run(&[&["wrong.toml", "--name", "A"], &more[..]].concat());
     assert_eq!(output.status.code(), Some(1));

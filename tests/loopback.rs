@@ -1,4 +1,4 @@
-//! The loopback: the conformance suite, and tests of its own.
+//! The loopback: the conformance suite, and specific tests.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -266,7 +266,7 @@ fn without_simulation_time_a_stepped_program_is_scanned_once_in_each_tick() {
         assert_eq!(end.tick().granted, Nanos::from_millis(10 * tick));
     }
     assert_eq!(end.statistic("plc.scans"), "5");
-    // Once a time was given, it is kept.
+    // Once a time was set, it is kept.
     end.driver.exchange(Nanos::from_millis(60), &mut end.slots);
     end.tick();
     assert_eq!(end.statistic("plc.scans"), "7");
@@ -301,7 +301,7 @@ fn a_machine_that_steps_in_large_steps_is_there_all_along() {
         end.send();
     }
     assert_eq!(end.get("out"), 1.0);
-    // Before it had sent anything, there was nothing to see.
+    // Before the first data there was nothing to see.
     assert_eq!(end.statistic("plc.stale"), "1");
     assert_eq!(end.statistic("plc.scans"), "401");
 }

@@ -151,7 +151,7 @@ fn a_pulse_is_held_until_a_client_has_read_it() {
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[4, 0, 1, 0, 2])[0], 4);
     }
-    // Nor do the other bits of its byte.
+    // Nor does reading the other bits of its byte.
     for _ in 0..3 {
         assert_eq!(ask(&mut stream, 1, &[2, 0, 1, 0, 7])[0], 2);
     }
@@ -660,6 +660,6 @@ fn function_3_reads_the_inputs_behind_the_outputs() {
     let both = [23, 4, 1, 0, 1, 0, 1, 0, 1, 2, 0, 9];
     assert_eq!(ask(&mut stream, 2, &both), [23, 2, 0, 5]);
     device.until_speed(9);
-    // They cannot be written.
+    // The registers are read-only.
     assert_eq!(ask(&mut stream, 3, &[6, 4, 1, 0, 1]), [0x86, 2]);
 }

@@ -137,7 +137,7 @@ impl Bus for OpcUa {
     }
 }
 
-/// A display that is only written to has nothing that could grow old but the server that has it.
+/// In a station that is only written, nothing can grow old except the server itself.
 #[test]
 fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
     const STATIONS: &str = "[[station]]\nname = \"drive\"\n[[station]]\nname = \"display\"\n\
@@ -159,7 +159,7 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
             .map(|name| device.statistic(&format!("station.{name}.stale")) == "true")
     };
     let mut speed = 0.0;
-    // What comes all the time leaves the server no need to say that it is there.
+    // Constant changes leave the server no need for signs of life.
     let mut ticks = |device: &mut End| {
         pass(&clock, 2);
         speed = (speed + 1.0) % 1000.0;
@@ -172,7 +172,7 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
     await_that("both stations are fresh", || {
         ticks(&mut device) && stale(&device) == [false, false]
     });
-    // Longer than nothing may be heard of a server.
+    // For longer than a server may be silent.
     for _ in 0..1000 {
         ticks(&mut device);
     }
@@ -231,7 +231,7 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
     }
 }
 
-/// Says what is no OPC UA, and leaves in good order.
+/// Sends data that are no OPC UA, and leaves properly.
 fn lie(mut stream: TcpStream) {
     // The other end may have closed first.
     let _ = stream.set_nonblocking(false);
@@ -239,7 +239,7 @@ fn lie(mut stream: TcpStream) {
     leave(stream);
 }
 
-/// A thread that is told to end, and joined.
+/// A thread that can be stopped and joined.
 struct Ending {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

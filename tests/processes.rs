@@ -162,7 +162,7 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
         assert_eq!(slots[2], Slot::from_real(255.0), "fail-safe when stale");
         drop(plc);
     }
-    // At least: on a busy machine a PLC that lives may be silent for longer than max_age.
+    // At least: on a busy machine a running PLC may be silent for longer than max_age.
     let running = statistic(&driver, "link.running").map(|count| count.parse::<u64>());
     let is_served = matches!(running, Some(Ok(count)) if count >= u64::from(KILLS));
     assert!(is_served, "each PLC is served: {running:?}");
@@ -170,8 +170,8 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
     driver.close();
 }
 
-/// A simulation is suspended, as by a virtual machine that pauses, and its PLC says one more thing meanwhile and then
-/// hangs. When the simulation goes on, that is older than `max_age` and never counts.
+/// A simulation is suspended, as by a virtual machine that pauses, and its PLC sends one more value meanwhile and then
+/// hangs. When the simulation continues, that value is older than `max_age` and never counts.
 #[test]
 fn what_waited_while_the_simulation_was_suspended_is_old() {
     const MAX_AGE: Duration = Duration::from_millis(250);
@@ -191,10 +191,10 @@ fn what_waited_while_the_simulation_was_suspended_is_old() {
     let pid = Pid::from_child(&mirror.child);
     waitpid(Some(pid), WaitOptions::UNTRACED).expect("it is our child");
     say(77);
-    // Its time passes.
+    // The suspended simulation's time passes.
     std::thread::sleep(2 * MAX_AGE);
     mirror.signal("CONT");
-    // Those that it sent before it was suspended come first.
+    // Values sent before the suspension come first.
     await_that("its data are stale", || hears() == 255);
     // Few enough: a peer that is silent for four times `max_age` is disconnected.
     let heard: Vec<u8> = (0..50).map(|_| hears()).collect();
@@ -205,7 +205,7 @@ fn what_waited_while_the_simulation_was_suspended_is_old() {
     });
 }
 
-/// What the simulation sends to `plc` next: the level.
+/// The next level that the simulation sends to `plc`.
 fn plc_hears(plc: &TcpStream) -> impl FnMut() -> u8 + use<> {
     let mut plc = plc.try_clone().expect("a second handle");
     move || {
@@ -454,7 +454,7 @@ fn a_mirror_serves_several_stations() {
     });
 }
 
-/// Server, machine and PLC are three processes that know of each other by one address.
+/// Server, machine and PLC are three processes that know each other only by one address.
 #[test]
 fn a_run_in_lock_step_of_three_processes_has_one_trace_hash() {
     let mut hashes = Vec::new();

@@ -106,8 +106,7 @@ impl Run {
         self.slots[index] = Slot::from_real(value);
     }
 
-    /// A machine that acts at random: some of the values that this end writes change, some of them depending
-    /// on what it reads.
+    /// A machine that acts at random: some of this end's values change, some depending on values that it reads.
     fn machine(&mut self) {
         for index in 0..self.driver.config().table.signals.len() {
             let signal = &self.driver.config().table.signals[index];
@@ -237,7 +236,7 @@ fn a_replay_of_a_replay_is_the_recording() {
     }
 }
 
-/// Ticks in two halves: the model answers in each to what it has received in the same tick.
+/// Ticks in two halves: in each, the model answers the values that it received in the same tick.
 fn answers(run: &mut Run, ticks: u64, step: u64) {
     for tick in 1..=ticks {
         let time = Nanos::from_millis(i64::try_from(step * tick).expect("small"));
@@ -285,7 +284,7 @@ fn a_row_has_the_answer_beside_the_question() {
         run.set("in", run.slots[out].real() + 1.0);
         run.driver.send(&mut run.slots);
     }
-    // Its answer is never sent, but it counts as a tick.
+    // The answer is never sent, but counts as a tick.
     run.driver.receive(Nanos::from_millis(4), &mut run.slots);
     run.driver.receive(Nanos::from_millis(5), &mut run.slots);
     run.driver.close();
@@ -451,7 +450,7 @@ fn a_recording_of_a_free_bus_replays_value_by_value() {
     for (was, is) in recorded.iter().zip(&replayed) {
         assert_eq!((was.number, was.time), (is.number, is.time));
         assert_eq!(was.values, is.values, "tick {}", was.number);
-        // A pulse that is over may take a frame to fall.
+        // A pulse that has ended may take a frame to fall.
         let same = was.stations.iter().zip(&is.stations);
         assert!(
             same.clone()

@@ -1,6 +1,6 @@
 //! Receiving a record over a socket, and replying, allocates nothing.
 //!
-//! All threads of the process are counted, so this test is alone in its file.
+//! The count covers all threads of the process, so this test is alone in its file.
 #![allow(missing_docs, reason = "a test")]
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 

@@ -1,4 +1,4 @@
-//! The S7 buses: the conformance suite with a server and a client of ours, and tests of their own.
+//! The S7 buses: the conformance suite with a server and a client of ours, and specific tests.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -364,7 +364,7 @@ fn a_flood_of_one_client_leaves_time_for_another() {
     flood.0.set_nonblocking(true).expect("a TCP option");
     let many = request(INPUTS, 0, 6).repeat(1000);
     for value in 0..100 {
-        // It never reads, so at some point the server stops reading from it.
+        // The client never reads, so at some point the server stops reading from it.
         let _ = std::io::Write::write(&mut flood.0, &many);
         good.write(OUTPUTS, 2, &[0, value]);
         device.end.tick();
@@ -447,7 +447,7 @@ fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
                 &[0xFF, 4, 0, 48, 0, 0, 0, 7, 0, 7],
             ];
             client.send(&packet(&answer.concat()));
-            // Until the value was taken, and the client leaves.
+            // Until the value was taken, and the client has left.
             while client.receive().is_some() {}
             return connections;
         }

@@ -1,5 +1,5 @@
-//! The buses `ivi-reader` and `ivi-client` with a second implementation of the protocol at the other end: a script of our
-//! own, since no program of others speaks it.
+//! The buses `ivi-reader` and `ivi-client` with a second implementation of the protocol at the other end: our own
+//! script, since no foreign program speaks it.
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
 mod foreign;

@@ -1,9 +1,9 @@
 //! The soak: a device that ticks as fast as it can, and a peer at the highest rate that dies again and again,
 //! in every way that a peer can.
 //!
-//! It takes some seconds by default; `make soak` runs it for minutes or hours (`make soak MINUTES=120`). It
-//! counts what the peer did to the device and what the device reports: both must agree, so that no error is
-//! unexplained. Threads, descriptors and memory must be the same at the end as at the beginning.
+//! The soak takes some seconds by default; `make soak` runs it for minutes or hours (`make soak MINUTES=120`). It
+//! counts the peer's actions and the device's reports: both must agree, so that no error is unexplained. Threads,
+//! descriptors and memory must be the same at the end as at the beginning.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -57,23 +57,23 @@ address = "%IB133"
 const RECORD: usize = 360;
 const ANSWER: usize = 134;
 
-/// How a peer dies.
+/// The way in which a peer dies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Death {
-    /// It closes properly.
+    /// The peer closes properly.
     Close,
     /// The connection is reset.
     Reset,
-    /// It dies in the middle of a record.
+    /// The peer dies in the middle of a record.
     Half,
-    /// It falls silent until the device gives up on it.
+    /// The peer falls silent until the device gives it up.
     Silence,
 }
 
 const DEATHS: [Death; 4] = [Death::Close, Death::Reset, Death::Half, Death::Silence];
 
 impl Death {
-    /// The cause that the device gives for it.
+    /// The cause that the device reports for it.
     fn cause(self) -> &'static str {
         match self {
             Self::Close => "left",
@@ -83,7 +83,7 @@ impl Death {
     }
 }
 
-/// One life of a peer: flat out for `span`, then its death. Gives how many records were answered.
+/// One life of a peer: at full speed for `span`, then its death. Returns the number of answered records.
 fn live(address: SocketAddr, span: Duration, death: Death) -> u64 {
     let mut stream = common::connect(address);
     let end = Instant::now() + span;

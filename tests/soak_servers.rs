@@ -1,10 +1,9 @@
-//! The soak of the servers: a Modbus, an S7 and an OPC UA server tick side by side, while clients connect,
-//! work and leave in every way that a client can: properly, by reset, within a telegram, silently, or sending
-//! garbage.
+//! The soak of the servers: a Modbus, an S7 and an OPC UA server tick side by side, while clients connect, work and
+//! leave in every way that a client can: properly, by reset, within a telegram, silently, or sending garbage.
 //!
-//! It takes some seconds by default; `make soak` runs it for minutes or hours. Threads, descriptors and
-//! memory must be the same at the end as after the first rounds, every well-behaved client must have been
-//! served, and no line may have failed.
+//! The soak takes some seconds by default; `make soak` runs it for minutes or hours. Threads, descriptors and memory
+//! must be the same at the end as after the first rounds, every well-behaved client must have been served, and no line
+//! may have failed.
 #![allow(
     missing_docs,
     unreachable_pub,
@@ -42,7 +41,7 @@ address = "%IW0"
 type    = "INT"
 "#;
 
-/// Rounds that fill what is filled only once, before anything is counted.
+/// Rounds that fill one-time caches, before the counting begins.
 const FIRST_ROUNDS: u32 = 5;
 
 fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
@@ -54,7 +53,7 @@ fn open(fieldbus: &str) -> (Driver, Vec<Slot>) {
     (driver, slots)
 }
 
-/// How a client ends that says only bytes.
+/// The end of a client that only sends bytes.
 #[derive(Clone, Copy, Debug)]
 enum Death {
     Close,

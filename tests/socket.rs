@@ -201,7 +201,7 @@ fn a_client_that_never_reads_is_given_up_with_its_byte_count() {
     let clock = std::sync::Arc::clone(&device.clock);
     let mut reason = String::new();
     await_that("the device gives it up", || {
-        // It sends, so it is not silent, but it does not read.
+        // The peer sends, so it is not silent, but it does not read.
         let _ = peer.write_all(&[0, 1]);
         pass(&clock, 1);
         device.end.tick();
@@ -258,7 +258,7 @@ fn a_client_that_comes_back_at_once_is_not_turned_away() {
         let mut peer = client(address);
         peer.write_all(&record(speed)).expect("the device reads");
         device.until_speed(speed);
-        // More than one read takes, right before it leaves and comes back.
+        // More than one read takes, right before the peer leaves and returns.
         let many = record(speed).repeat(8_000);
         peer.write_all(&many).expect("the device reads");
     }
@@ -339,7 +339,7 @@ fn on_change_sends_what_has_left_its_dead_band_and_signs_of_life() {
     let mut go_on = |device: &mut Alone, level: f64, cycles: u32| {
         device.end.set("level", level);
         for _ in 0..cycles {
-            // The peer sends, so that it is not silent, and records what has arrived.
+            // The peer sends, so that it is not silent, and records the received data.
             peer.write_all(&[0]).expect("the device reads");
             device.end.tick();
             pass(&device.clock, 1);

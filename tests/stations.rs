@@ -1,4 +1,4 @@
-//! One driver with a peer for each of its stations: what happens to one peer does not affect the others.
+//! One driver with a peer for each of its stations: an event at one peer does not affect the others.
 #![cfg(unix)]
 #![allow(
     missing_docs,

@@ -48,7 +48,7 @@ impl Sync {
         Self::start_logging(text, arguments, "error")
     }
 
-    /// As [`start`](Self::start), with a log of this level on stderr.
+    /// Like [`start`](Self::start), with a log of this level on stderr.
     fn start_logging(text: &str, arguments: &[&str], level: &str) -> Self {
         let file = tempfile::NamedTempFile::new().expect("a temporary file");
         std::fs::write(file.path(), text).expect("it can be written");
@@ -76,7 +76,7 @@ impl Sync {
         line.expect("text")
     }
 
-    /// Where it listens.
+    /// The address on which it listens.
     fn address(&mut self) -> tickbus::fieldbus::tcp::Address {
         let line = self.line();
         let address = line.strip_prefix("sync: listening on ").expect(&line);
@@ -234,7 +234,7 @@ fn a_script_is_the_logic_or_the_feature_is_named() {
     }
 }
 
-/// Reads what the logic has written in the step before.
+/// Reads the values that the logic has written in the previous step.
 struct Late;
 
 impl Participant for Late {

@@ -107,8 +107,8 @@ fn other_toml_files_in_a_folder_are_no_tests_and_a_closed_stderr_is_no_crash() {
     assert_eq!(status.code(), Some(1));
 }
 
-/// Each `tests/wrong-tests/NAME.toml` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is
-/// set, they are written there instead: review the difference before committing it.
+/// Each `tests/wrong-tests/NAME.toml` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is set, the
+/// files are rewritten instead: review the difference before committing it.
 #[test]
 fn every_wrong_file_has_exactly_its_mistakes() {
     let directory = repository().join("tests/wrong-tests");

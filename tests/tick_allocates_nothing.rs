@@ -1,4 +1,4 @@
-//! The tick allocates nothing: counted by the allocator of this program.
+//! The tick allocates nothing, as counted by the allocator of this program.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -116,7 +116,7 @@ const FREE: &str = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"";
 const STEPPED: &str =
     "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"\nmode = \"stepped\"";
 
-/// Somebody looks at every tick, and forces one signal after the other, of both directions.
+/// A viewer looks at every tick, and forces one signal after the other, in both directions.
 #[test]
 fn a_driver_that_is_watched_and_forced() {
     for fieldbus in [FREE, STEPPED] {
@@ -136,7 +136,7 @@ fn a_driver_that_is_watched_and_forced() {
                     watch.end_fault(id).expect("it is taken");
                 }
             } else if tick % 500 == 7 {
-                // Nothing is forced for a while.
+                // No signal is forced for a while.
                 if let Some(id) = forced.take() {
                     watch.end_fault(id).expect("it is taken");
                 }

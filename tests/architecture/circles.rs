@@ -1,26 +1,26 @@
-//! Circles inside a crate: the compiler keeps crates apart, but lets the modules of one use each other in a ring.
+//! Cycles within a crate: the compiler prevents cycles among crates, but not among the modules of one.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::rules::File;
 use super::source::{Token, texts, tokens};
 
-/// The names of a path, from the crate's own on.
+/// The names of a path, from the crate's own name on.
 pub(crate) type Path = Vec<String>;
 
-/// What one file says of others.
+/// The references of one file to others.
 pub(crate) struct Module<'a> {
-    /// Names that it imports, and what they stand for.
+    /// Imported names, and the paths that they stand for.
     pub(crate) imports: BTreeMap<String, Path>,
     /// Every path in it, with its line.
     uses: Vec<(usize, Path)>,
     pub(crate) file: File<'a>,
 }
 
-/// A tie from one module to its sibling: where it is.
+/// The references from one module to its sibling, with their positions.
 type Ties = BTreeMap<(Path, String), BTreeMap<String, String>>;
 
-/// The modules in these files of all crates, but for those of tests.
+/// The modules in these files of all crates, except those of tests.
 pub(crate) fn modules<'a>(files: &[File<'a>]) -> BTreeMap<Path, Module<'a>> {
     let paths = files.iter().map(|file| (module(file.path), *file));
     let own = paths.filter(|(path, _)| !path.iter().any(|name| name == "tests"));
@@ -28,17 +28,17 @@ pub(crate) fn modules<'a>(files: &[File<'a>]) -> BTreeMap<Path, Module<'a>> {
         .collect()
 }
 
-/// The circles among the modules of each crate, each as a line.
+/// The cycles among the modules of each crate, one per line.
 ///
-/// Modules of one parent are compared with each other: what a module uses of its parent, or a parent of its
-/// children, is no circle. Tests do not count, and neither do macros.
+/// Modules with the same parent are compared with each other: a module's use of its parent, or a parent's use of its
+/// children, is no cycle. Tests and macros do not count.
 pub(crate) fn circles(files: &[File<'_>]) -> Vec<String> {
     let modules = modules(files);
     let mut ties = Ties::new();
     for (from, module) in &modules {
         for (line, path) in &module.uses {
             let (to, _) = resolve(&modules, path);
-            // The compiler looks after those among crates.
+            // The compiler checks references between crates.
             if to.first() != from.first() {
                 continue;
             }
@@ -61,7 +61,7 @@ pub(crate) fn circles(files: &[File<'_>]) -> Vec<String> {
     found
 }
 
-/// The module that a file is: `crates/a/src/b/c.rs` and `crates/a/src/b/c/mod.rs` are `tickbus_a::b::c`.
+/// The module of a file: `crates/a/src/b/c.rs` and `crates/a/src/b/c/mod.rs` are `tickbus_a::b::c`.
 fn module(file: &str) -> Path {
     let (folder, inner) = file.split_once("src/").unwrap_or(("", file));
     let folder = folder.trim_start_matches("crates/").trim_end_matches('/');
@@ -114,7 +114,7 @@ fn read<'a>(file: File<'a>, module: &Path) -> Module<'a> {
     read
 }
 
-/// The tokens before the first inline module of tests, which stands at the end of a file here.
+/// The tokens before the first inline module of tests, which is at the end of a file here.
 fn without_tests<'a, 't>(tokens: &'a [Token<'t>]) -> &'a [Token<'t>] {
     let is_tests = |at: &usize| {
         texts(&tokens[*at..], &["mod", "tests", "{"]) || texts(&tokens[*at..], &["mod", "loom_"])
@@ -123,7 +123,7 @@ fn without_tests<'a, 't>(tokens: &'a [Token<'t>]) -> &'a [Token<'t>] {
     &tokens[..end]
 }
 
-/// Reads a tree of `use` from `at`: its leaves with the names they are given. The answer is where it ends.
+/// Reads a tree of `use` from `at`: its leaves with their names. Returns where the tree ends.
 fn tree(
     tokens: &[Token<'_>],
     mut at: usize,
@@ -156,15 +156,15 @@ fn tree(
         }
         at += 1;
     }
-    // Behind the last comma of a group nothing stands.
+    // Nothing follows the last comma of a group.
     if path.len() > before.len() {
         leaves.push((line, path, None));
     }
     at
 }
 
-/// A path with the name of its crate. One that begins with another name is relative, or of a crate that is not ours: then
-/// it leads to no module.
+/// A path with the name of its crate. A path that begins with another name is relative, or in a foreign crate: then it
+/// leads to no module.
 fn absolute(path: &[String], module: &Path) -> Path {
     let mut base = module.clone();
     let mut rest = path;
@@ -186,7 +186,7 @@ fn absolute(path: &[String], module: &Path) -> Path {
     base
 }
 
-/// The module in which the last name of `path` is, imports followed, and what of the path lies in it.
+/// The module that contains the last name of `path`, following imports, and the part of the path within that module.
 pub(crate) fn resolve(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> (Path, Path) {
     let mut path = path.clone();
     for _ in 0..8 {
@@ -213,7 +213,7 @@ pub(crate) fn resolve(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> (Pat
     (Vec::new(), path)
 }
 
-/// The rings among the children of `parent`, each told once, with a place for each of its ties.
+/// The cycles among the children of `parent`, each reported once, with a position for each of its references.
 fn rings(ties: &Ties, parent: &Path) -> Vec<String> {
     let of = |name: &str| ties.get(&(parent.clone(), name.to_owned()));
     let reaches = |from: &str| {

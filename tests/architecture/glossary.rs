@@ -21,7 +21,7 @@ pub(crate) fn unknown(text: &str, modules: &BTreeMap<Path, Module<'_>>) -> Vec<S
         .collect()
 }
 
-/// Whether a path leads to a module, to something that a module defines, or to a member of that.
+/// True if a path leads to a module, to an item that a module defines, or to a member of such an item.
 fn leads_somewhere(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> bool {
     let (at, rest) = resolve(modules, path);
     let Some(module) = modules.get(&at) else {
@@ -31,14 +31,14 @@ fn leads_somewhere(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> bool {
     let is_found = match &*rest {
         [] => true,
         [name] => is_here(name),
-        // Its `impl` may stand in another file of the crate.
+        // The item's `impl` may be in another file of the crate.
         [of, member] => {
             let mut own = modules.iter().filter(|(path, _)| path[0] == at[0]);
             is_here(of) && own.any(|(_, module)| has_member(module.file.text, of, member))
         }
         _ => false,
     };
-    // Or to what the module exports from another one as a whole.
+    // Or to a wildcard import from another module.
     is_found
         || module.imports.get("*").is_some_and(|all| {
             let path = [&all[..all.len() - 1], &rest].concat();
@@ -46,7 +46,7 @@ fn leads_somewhere(modules: &BTreeMap<Path, Module<'_>>, path: &Path) -> bool {
         })
 }
 
-/// Whether the definition of `of` or an `impl` of it in this file has `member`.
+/// True if the definition of `of` or an `impl` of it in this file has `member`.
 fn has_member(text: &str, of: &str, member: &str) -> bool {
     let tokens = tokens(text);
     let begins = |word: &str| ["struct", "enum", "trait", "impl", ">", "for"].contains(&word);
@@ -56,7 +56,7 @@ fn has_member(text: &str, of: &str, member: &str) -> bool {
     found.any(|body| names(body).contains(member))
 }
 
-/// What stands in the first pair of braces.
+/// The tokens in the first pair of braces.
 fn braces<'a, 'b>(tokens: &'b [Token<'a>]) -> &'b [Token<'a>] {
     let begin = tokens.iter().position(|token| token.text == "{");
     let tokens = &tokens[begin.unwrap_or(tokens.len())..];
@@ -83,7 +83,7 @@ fn names<'a>(tokens: &[Token<'a>]) -> HashSet<&'a str> {
         };
         let is_item = KINDS.contains(&token.text);
         let is_field = token.text == "pub" && texts(&next[1..], &[":"]);
-        // A variant stands behind `{`, `,` or an attribute, and begins with a capital.
+        // A variant follows `{`, `,` or an attribute, and begins with a capital.
         let is_variant =
             ["{", ",", "]"].contains(&token.text) && name.starts_with(char::is_uppercase);
         if is_item || is_field || is_variant {

@@ -1,5 +1,5 @@
-//! Enforces the project's structure: unsafe code and reading the system's
-//! clocks are confined to certain files, no file grows without limit, and docs/ARCHITECTURE.md shows the rooms as they are.
+//! Enforces the project's structure: unsafe code and reading the system's clocks are confined to certain files, no file
+//! grows without limit, and docs/ARCHITECTURE.md shows the current crates.
 
 mod circles;
 mod glossary;
@@ -136,7 +136,7 @@ fn the_glossary_names_what_there_is() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(root.join("docs/ARCHITECTURE.md")).expect("it is there");
     let mut sources = all_sources();
-    // build.rs makes this enum of the table of status codes.
+    // build.rs generates this enum from the table of status codes.
     let codes = sources
         .iter_mut()
         .find(|(path, _)| path == "crates/driver/src/status.rs");
@@ -153,7 +153,7 @@ fn the_glossary_names_what_there_is() {
         // Both names exist, but not there.
         ("image::Driver::exchange", false),
         ("driver::Driver::address", false),
-        // A member of its neighbour in the same file.
+        // A member of a neighbour in the same file.
         ("image::Arrival::cycles", false),
         ("nowhere::Driver", false),
     ] {
@@ -162,8 +162,7 @@ fn the_glossary_names_what_there_is() {
     }
 }
 
-/// Checks that exactly these lines of an imaginary file are complained about, each with a word of the
-/// complaint.
+/// Checks that exactly these lines of an imaginary file are reported, each with a word of the message.
 #[track_caller]
 fn finds(path: &str, text: &str, expected: &[(usize, &str)]) {
     let found = mistakes(File { path, text });

@@ -2,19 +2,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// The lines between which the picture stands.
+/// The lines that enclose the picture.
 const BEGIN: &str =
     "<!-- drawn from the manifests: TICKBUS_UPDATE=1 cargo test --test architecture -->\n";
 const END: &str = "<!-- end of the picture -->\n";
 
-/// `text` with the picture of the crates, whose manifests are given by folder.
+/// `text` with the picture of the crates; `manifests` are given by folder.
 pub(crate) fn redrawn(text: &str, manifests: &BTreeMap<String, String>) -> String {
     let (before, rest) = text.split_once(BEGIN).expect("the picture begins");
     let (_, after) = rest.split_once(END).expect("the picture ends");
     format!("{before}{BEGIN}{}{END}{after}", picture(manifests))
 }
 
-/// An arrow from each crate to those that it uses, except where another arrow leads on to the same crate.
+/// An arrow from each crate to those that it uses, except where other arrows already lead to the same crate.
 pub(crate) fn picture(manifests: &BTreeMap<String, String>) -> String {
     let uses = |manifest: &String| -> BTreeSet<String> {
         let table = manifest
@@ -34,7 +34,7 @@ pub(crate) fn picture(manifests: &BTreeMap<String, String>) -> String {
         .collect();
     let mut lines = vec!["```mermaid".to_owned(), "graph TD".to_owned()];
     for (name, direct) in &uses {
-        // What it uses by way of another one.
+        // The crates used indirectly.
         let mut open: Vec<&String> = direct.iter().flat_map(|used| &uses[used]).collect();
         let mut indirect = BTreeSet::new();
         while let Some(used) = open.pop() {

@@ -99,7 +99,7 @@ fn clocks(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
     found
 }
 
-/// Whether a function of this name reads the time: `now`, `now_utc`, `now_with_offset`.
+/// True if a function of this name reads the time: `now`, `now_utc`, `now_with_offset`.
 fn asks_time(token: &Token<'_>) -> bool {
     token.text == "now" || token.text.starts_with("now_")
 }

@@ -94,7 +94,7 @@ fn block_comment(text: &str) -> usize {
     text.len()
 }
 
-/// Length of a literal in `quote`s, escapes and all.
+/// Length of a literal in `quote`s, including escapes.
 fn quoted(text: &str, quote: char) -> usize {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -118,7 +118,7 @@ fn raw_string(text: &str) -> Option<usize> {
     Some(length.unwrap_or(text.len()))
 }
 
-/// Whether `tokens` begin with `wanted`.
+/// True if `tokens` begin with `wanted`.
 pub(crate) fn texts(tokens: &[Token<'_>], wanted: &[&str]) -> bool {
     tokens.len() >= wanted.len() && tokens.iter().zip(wanted).all(|(t, w)| t.text == *w)
 }

@@ -1,4 +1,4 @@
-//! What the driver does for axes: acknowledges, commands by number, end switches.
+//! The driver's work for axes: acknowledges, commands by number, end switches.
 
 use crate::machine::Pair;
 

@@ -46,7 +46,7 @@ impl Machine {
         lines.find_map(|line| Some(line.strip_prefix(key)?.strip_prefix('=')?.to_owned()))
     }
 
-    /// Connects to each address that it listens on.
+    /// Connects to each address on which the driver listens.
     pub(crate) fn clients(&self, count: usize) -> Vec<TcpStream> {
         let begun = Instant::now();
         let addresses = loop {

@@ -1,4 +1,4 @@
-//! The axis link: its bytes, and what the driver does for axes, with a PLC that is a bare TCP client.
+//! The axis link: its bytes, and the driver's work for axes, with a PLC that is a bare TCP client.
 #![allow(
     clippy::float_cmp,
     reason = "what went over the wire comes back to the bit"
@@ -109,7 +109,7 @@ fn each_bit_lies_where_the_structure_says() {
         let frame = bytes(&lathe, Area::Input, &[(signal, 1.0)]);
         assert_eq!((frame[30], frame[31]), (bits, 0), "{signal}");
     }
-    // −15536 is 50000 misread: an INT taken for a UINT.
+    // −15536 is 50000 misread: an INT instead of a UINT.
     let frame = bytes(
         &lathe,
         Area::Input,

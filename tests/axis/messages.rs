@@ -69,7 +69,7 @@ fn feedback_comes_axis_by_axis_what_has_changed_first() {
     );
     machine.set("B.ActualPosition", 5.0);
     machine.tick();
-    // At most what was in transit, and then B ahead of its turn.
+    // At most the messages in transit, and then B ahead of its turn.
     let mut turns = 0;
     while record[1] != 2 || record[4..8] != 5.0_f32.to_be_bytes() {
         plc.read_exact(&mut record).expect("a message");
@@ -146,7 +146,7 @@ fn both_plcs_are_two_stations_of_one_driver_each_at_a_port_of_its_own() {
         "{reason}"
     );
 
-    // It is opened again, perhaps before the driver has found the old connection closed.
+    // The connection is opened again, perhaps before the driver has found the old one closed.
     logged::expect("was turned away, since one client is served at a time");
     let mut lathe = machine.clients(2).remove(1);
     while !running(&machine) || machine.get("knife.Enable") == 0.0 {

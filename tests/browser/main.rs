@@ -1,4 +1,4 @@
-//! The report in a browser: what it shows is what was recorded, and it can be operated.
+//! The report in a browser: checks that it shows the recorded data, and can be operated.
 //!
 //! Not part of a plain `cargo test`, because it needs Chromium and chromedriver: `cargo test --test browser`
 //! runs it, and so does `make test` if both are installed.

@@ -14,7 +14,7 @@ pub(crate) struct Browser {
     driver: Child,
     port: u16,
     session: String,
-    /// Holds whatever they leave in the folder for temporary files.
+    /// Holds everything that they leave in the folder for temporary files.
     _folder: tempfile::TempDir,
 }
 
@@ -22,7 +22,7 @@ impl Browser {
     /// Starts a browser with a window of this many CSS pixels.
     pub(crate) fn start(width: u32, height: u32) -> Self {
         let folder = tempfile::tempdir().expect("there is room for a browser");
-        // It looks for a port that is free for IPv4, and ends where IPv6 has another program on it by then.
+        // chromedriver looks for a port that is free for IPv4, and ends if another program has it for IPv6 by then.
         let (driver, port) = (0..5)
             .find_map(|_| start_driver(folder.path()))
             .expect("chromedriver tells its port");
@@ -57,10 +57,10 @@ impl Browser {
         browser
     }
 
-    /// Leaves the page, for a window of this many CSS pixels: sooner there than another browser.
+    /// Leaves the page, for a window of this many CSS pixels: faster than starting another browser.
     pub(crate) fn resize(&self, width: u32, height: u32) {
         self.go("about:blank");
-        // Headless windows have a frame, whatever they are begun with, unless their size is set like this.
+        // Headless windows have a frame, whatever their initial size, unless the size is set like this.
         let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 640});
         self.devtools("Emulation.setDeviceMetricsOverride", &metrics);
     }
@@ -71,7 +71,7 @@ impl Browser {
         self.go(&format!("file://{}", file.display()));
     }
 
-    /// Opens another tab, which is the one from now on.
+    /// Opens another tab, which becomes the current one.
     pub(crate) fn new_tab(&self) {
         let tab = self.command("window/new", &json!({"type": "tab"}));
         self.command("window", &json!({"handle": tab["handle"]}));
@@ -216,7 +216,7 @@ pub(crate) fn shoot(browser: &Browser, folder: Option<&Path>, name: &str, whole:
     save(folder, name, &shot["data"]);
 }
 
-/// Saves what the browser has sent in base64.
+/// Saves the browser's base64 data.
 pub(crate) fn save(folder: Option<&Path>, name: &str, data: &Value) {
     let data = data.as_str().expect("base64");
     let Some(folder) = folder else { return };
@@ -238,8 +238,8 @@ pub(crate) fn save(folder: Option<&Path>, name: &str, data: &Value) {
         .expect("screenshots can be saved");
 }
 
-/// Starts chromedriver with a folder for its temporary files, and takes its port from what it says. If it ends at once,
-/// what it said is in the test's output.
+/// Starts chromedriver with a folder for its temporary files, and takes the port from its output. If chromedriver ends
+/// at once, its output is in the test's output.
 fn start_driver(folder: &Path) -> Option<(Child, u16)> {
     let started = Command::new("chromedriver")
         .env("TMPDIR", folder)

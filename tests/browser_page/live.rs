@@ -1,4 +1,4 @@
-//! The live page: it shows what a driver sees, forces it, and tells when it cannot.
+//! The live page: it shows a driver's signals, forces them, and reports when it cannot.
 
 mod large;
 
@@ -21,7 +21,7 @@ const END: &str = "\u{e010}";
 /// A machine without a simulator, and its page: every `%Q` byte comes back on the `%I` byte of the same offset.
 struct Machine {
     child: Child,
-    /// Where the PLC meets it, and where the page is.
+    /// The addresses for the PLC and for the page.
     bus: String,
     url: String,
     folder: Arc<tempfile::TempDir>,
@@ -92,7 +92,7 @@ impl Machine {
         let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
         let url = find(&mut lines, "mirror: page at ");
         let bus = find(&mut lines, "mirror: opening: listening on ");
-        // Nobody reads what it says later; it must not get stuck for that.
+        // Nobody reads later output; it must not block the program.
         std::thread::spawn(move || lines.count());
         Self {
             child,
@@ -107,7 +107,7 @@ impl Machine {
         self.child.wait().expect("it ends");
     }
 
-    /// Starts it again, with the page at the same address and with another token.
+    /// Restarts it, with the page at the same address but with another token.
     fn restart(&mut self) {
         self.kill();
         let page = self.url.split('#').next().expect("an address");
@@ -137,7 +137,7 @@ impl Machine {
         Plc(plc.expect("the tickbus program runs"))
     }
 
-    /// Runs mbpoll, which is libmodbus, and gives what it says.
+    /// Runs mbpoll, which is libmodbus, and returns its output.
     fn mbpoll(&self, arguments: &[&str]) -> String {
         let (host, port) = self.bus.rsplit_once(':').expect("a port");
         let output = Command::new("mbpoll")
@@ -204,7 +204,7 @@ fn open(machine: &Machine, width: u32, height: u32) -> Browser {
     browser
 }
 
-/// The row of a signal, if it can be seen.
+/// The row of a signal, if it is visible.
 fn row(name: &str) -> String {
     format!(
         "Array.from(document.querySelectorAll('.row.signal')).find((it) => !it.hidden && it.parts.name.textContent === {})",
@@ -282,12 +282,12 @@ fn values_arrive_and_a_force_reaches_the_modbus_plc_until_it_is_released() {
         "27648 * 125.5 / 500, to the nearest"
     );
     wait_marked(&browser, "Level", "forced");
-    // What does not fit says what would, and changes nothing.
+    // A wrong value gets a message with the remedy, and changes nothing.
     browser.run("document.getElementById('force-value').select()");
     browser.keys(&format!("much{ENTER}"));
     browser.wait("document.getElementById('status').classList.contains('bad')");
     assert_eq!(machine.read("3", "1"), 6940);
-    // It is about that signal alone.
+    // The message concerns that signal alone.
     choose(&browser, "Level low");
     browser.wait("document.getElementById('status').textContent === ''");
     browser.wait("!document.getElementById('status').classList.contains('bad')");
@@ -353,7 +353,7 @@ fn the_bottle_in_the_picture_moves_with_the_lift() {
     force(&browser, "SC1", "TRUE");
     browser.wait(&format!("getComputedStyle({bottle}).display !== 'none'"));
     force(&browser, "LA1 position", "0");
-    // Where it is in the drawing, wherever that is on the page.
+    // The position in the drawing, wherever that is on the page.
     let svg = "document.querySelector('.picture > div > div').shadowRoot.firstElementChild";
     let place = format!(
         "(({bottle}.getBoundingClientRect().top - {svg}.getBoundingClientRect().top) / {svg}.getScreenCTM().d)"
@@ -422,7 +422,7 @@ fn a_picture_that_would_do_harm_does_none_and_says_what_was_left_out() {
         "Math.abs({level}.getCTM().d * 80 / {level}.ownerSVGElement.getCTM().d - 40) < 0.1"
     ));
     assert_eq!(browser.run("return window.harm ?? 0"), 0);
-    // Styles that would lay it over the whole page leave it in its frame.
+    // Styles that would cover the whole page stay within the frame.
     let covered = "return ['#filter', '#title', '.driver .reason', '.picture summary'].filter((it) => { \
          const found = document.querySelector(it), box = found.getBoundingClientRect(); \
          const top = document.elementFromPoint(box.left + box.width / 2, box.top + box.height / 2); \
@@ -525,7 +525,7 @@ fn a_plc_that_is_gone_is_not_shown_as_one_that_is_there() {
     let mut machine = Machine::rig();
     let browser = open(&machine, 1280, 900);
     let overlay = "document.querySelector('.picture').classList.contains('is-stale')";
-    // Before the first contact nothing is known.
+    // Before the first contact the values are unknown.
     browser.wait(overlay);
     browser.wait("plant.signals.every((it) => it.direction !== 'Q' || it.value === null)");
     let mut plc = machine.plc();
@@ -602,7 +602,7 @@ fn the_page_fits_every_screen_in_the_light_and_in_the_dark() {
         browser.wait("document.querySelector('.row.trend:not([hidden]) canvas')");
         assert_fits(&browser);
         if width < 640 {
-            // A finger is no smaller on a phone, and what nobody may overlook is still in sight.
+            // Touch targets have their minimum size on a phone, and what must not be overlooked is still visible.
             let sizes = browser.run(
                 "return [document.querySelector('.row.signal:not([hidden]) .open').getBoundingClientRect().height, document.getElementById('forced').getBoundingClientRect().bottom]",
             );

@@ -1,5 +1,5 @@
-//! The pages that are served, in a browser: the patch bay shows what happens in the laboratory, and patches it; the live page
-//! (`live`) shows a driver, or a run (`run`).
+//! The served pages in a browser: the patch bay shows and patches the laboratory; the live page (`live`) shows a
+//! driver, or a run (`run`).
 //!
 //! Not part of a plain `cargo test`, because it needs Chromium and chromedriver:
 //! `cargo test --features page --test browser_page` runs it.
@@ -83,7 +83,7 @@ impl Lab {
         self.child.wait().expect("it ends");
     }
 
-    /// Starts it again at the same addresses, with another token.
+    /// Restarts it at the same addresses, with another token.
     fn restart(&mut self) {
         let patch = self.folder.path().join("patch.toml");
         let page = self
@@ -141,7 +141,7 @@ fn jack(name: &str) -> String {
 }
 
 fn drag(browser: &Browser, kind: &str, from: &str, to: &str) {
-    // Both are brought into view, around the middle of what the tray leaves free.
+    // Both are brought into view, around the middle of the space that the tray leaves free.
     let places = browser.run(&format!(
         "const at = () => [`{}`, `{}`].flatMap((it) => {{ \
            const box = document.querySelector(it).getBoundingClientRect(); \
@@ -243,7 +243,7 @@ fn two_clients_are_patched_by_a_drag_and_cut_by_a_click() {
     // From the input to the output, by touch.
     drag(&browser, "touch", "PUMP:I2", "LOGO:Q2");
     wait_cables(&browser, 2);
-    // What does not fit says why.
+    // A wrong connection gets a message with the reason.
     drag(&browser, "mouse", "PUMP:Q2", "LOGO:I1");
     wait_said(&browser, "ERR 409 LOGO:I1 is connected to PUMP:Q1 already");
     drag(&browser, "mouse", "PUMP:AQ1", "LOGO:I2");
@@ -311,7 +311,7 @@ fn everything_is_done_from_the_keyboard_and_announced() {
     browser.keys(ENTER);
     assert_eq!(logo.hear(), "P I1=20");
     wait_value(&browser, "LOGO:I1", "20");
-    // Escape lets go; the cable is behind the pins.
+    // Escape cancels the drag; the cable is behind the pins.
     browser.keys("\u{e00c}");
     browser.run("document.querySelector('[data-pin=\"LOGO:I1\"]').focus()");
     browser.keys(TAB);
@@ -340,7 +340,7 @@ fn a_channel_that_was_forced_is_not_the_end_of_a_cable() {
     click(&browser, &pin("PUMP:Q1"));
     wait_cables(&browser, 1);
     assert_eq!(logo.hear(), "P I1=7.5");
-    // The button that can no longer be pressed hands the focus on.
+    // The button that can no longer be pressed passes the focus on.
     click(&browser, &pin("PUMP:Q1"));
     browser.wait("!document.getElementById('release').disabled");
     browser.run("document.getElementById('release').focus()");
@@ -351,7 +351,7 @@ fn a_channel_that_was_forced_is_not_the_end_of_a_cable() {
     browser.keys(" ");
     browser.wait("document.activeElement.dataset.pin === 'LOGO:I1'");
     wait_cables(&browser, 0);
-    // A drag ends with its client, and what was chosen is not chosen any more.
+    // A drag ends when its client leaves, and the choice is cleared.
     let (x, y) = middle(&browser, &jack("PUMP:Q1"));
     browser.act(
         &json!([{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": [
@@ -410,7 +410,7 @@ fn the_page_says_when_it_is_old_and_comes_back() {
         "!document.body.classList.contains('is-old') && document.getElementById('age').hidden",
     );
     browser.wait("document.querySelector('.client[data-name=LOGO]') && !document.querySelector('.client[data-name=PUMP]')");
-    // It is another dispatcher, with another token.
+    // A different dispatcher, with another token.
     browser.wait("document.getElementById('access').textContent === 'read-only'");
 }
 
@@ -466,7 +466,7 @@ fn names_are_shown_and_a_board_with_many_fits_every_screen() {
             background
         );
         if width < 640 {
-            // A finger is no smaller on a phone.
+            // Touch targets have their minimum size on a phone.
             let height = browser
                 .run("return document.querySelector('.jack').getBoundingClientRect().height");
             assert!(height.as_f64() >= Some(40.0), "{height}");

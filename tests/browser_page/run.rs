@@ -36,11 +36,11 @@ impl Run {
         let url = find(&mut lines, "sync: page at ");
         let address = find(&mut lines, "sync: listening on ");
         let address: tickbus::fieldbus::tcp::Address = address.parse().expect("an address");
-        // Nobody reads what it says later; it must not get stuck for that.
+        // Nobody reads later output; it must not block the program.
         thread::spawn(move || lines.count());
         for mut client in [Client::plc(), Client::robot()] {
             let address = address.clone();
-            // It ends with the server.
+            // The client ends with the server.
             thread::spawn(move || tcp::join(&address, &mut client).is_ok());
         }
         Self { child, url }
@@ -133,7 +133,7 @@ fn a_run_shows_its_clients_and_their_variables_on_every_screen() {
             ["plc", "robot"]
         ]);
         assert_eq!(head, expected);
-        // It goes on, in the list and above it.
+        // The run continues, in the list and above it.
         for what in [
             "[...document.querySelectorAll('.facts dd')][1].textContent",
             "tickbusPage.value('axis 1 position')",

@@ -1,7 +1,6 @@
 //! A codec that works bit by bit and computes only with integers, to check the plan against.
 //!
-//! It shares no formula with the plan except the scale's own: (value − offset) / gain and raw × gain +
-//! offset.
+//! The oracle shares no formula with the plan except the scale's own: (value − offset) / gain and raw × gain + offset.
 
 use std::cmp::Ordering;
 
@@ -18,7 +17,7 @@ pub(crate) fn bits(data_type: DataType) -> usize {
     }
 }
 
-/// Whether a signal's slot holds an integer rather than a double.
+/// True if a signal's slot holds an integer rather than a double.
 pub(crate) fn is_integer_slot(signal: &Signal) -> bool {
     let wide = [DataType::Lword, DataType::Lint, DataType::Ulint];
     wide.contains(&signal.data_type) && signal.scale.is_none()

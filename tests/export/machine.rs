@@ -28,7 +28,7 @@ impl Value {
         }
     }
 
-    /// Its bits.
+    /// The bits.
     pub(crate) fn bits(self) -> u64 {
         match self {
             Self::Bool(value) => value.into(),

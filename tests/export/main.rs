@@ -273,7 +273,7 @@ fn the_tags_for_tia_portal_leave_out_signals_that_lie_elsewhere_in_the_plc() {
     }
 }
 
-/// `OpenPLC` keeps the registers of all its slave devices in one array, each way.
+/// `OpenPLC` keeps the registers of all its slave devices in one array per direction.
 #[test]
 fn more_registers_than_openplc_has_room_for_are_refused() {
     let made = |inputs: usize, outputs: usize| {

@@ -52,7 +52,7 @@ fn model_descriptions_are_their_golden_files() {
         }
         let expected = fs::read_to_string(&golden).unwrap_or_default();
         assert!(made == expected, "{} differs:\n{made}", golden.display());
-        // Read back by the other way's own reader: names and references are whole.
+        // Read back by the reader for foreign FMUs: names and references are complete.
         let model = Model::parse("made", &made).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         let references: BTreeSet<u32> = model.variables.iter().map(|one| one.reference).collect();
         let names: BTreeSet<&str> = model.variables.iter().map(|one| &*one.name).collect();
@@ -105,7 +105,7 @@ fn an_fmu_has_library_driver_cfg_and_what_that_names() {
             description.contains("name=\"bus.pace\"") && description.contains("name=\"pace\""),
             "{description}"
         );
-        // Twice: the same bytes, and nothing is overwritten unasked.
+        // Twice: the bytes are equal, and nothing is overwritten unless requested.
         let first = fs::read(&fmu).expect("the FMU");
         let again = export(folder.path(), &["--for", version]);
         assert_eq!(again.status.code(), Some(1));
@@ -164,7 +164,7 @@ fn what_cannot_be_packed_says_why() {
         assert!(err(&output).contains(words), "{words}\n{}", err(&output));
         assert!(!folder.path().join("driver-fmi3.fmu").exists());
     }
-    // In real time a step waits by itself, and the user is told.
+    // In real time a step waits on its own, and the user gets a note.
     fs::write(&file, bus("kind = \"socket\"\n")).expect("a file");
     let output = export(folder.path(), &["--for", "fmi3"]);
     assert!(

@@ -32,7 +32,7 @@ pub(crate) fn err(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The native library that cargo has built for this test, beside or above its program; without its debug tables, where there is
+/// The native library that cargo has built for this test, beside or above its program; without debug tables if there is
 /// `strip`.
 pub(crate) fn library() -> &'static Path {
     static LIBRARY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
@@ -108,12 +108,12 @@ pub(crate) fn description(guid: &str) -> String {
     )
 }
 
-/// Its driver.cfg.
+/// The driver.cfg of that FMU.
 pub(crate) const CONFIG: &str = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
     mode = \"stepped\"\nscan = \"10ms\"\n[[signal]]\nname = \"Level\"\naddress = \"%ID0\"\ntype = \"REAL\"\n\
     [[signal]]\nname = \"Speed\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
 
-/// What an archive has.
+/// An entry of an archive.
 pub(crate) enum Entry<'a> {
     File(&'a str, &'a [u8]),
     Link(&'a str, &'a str),

@@ -1,4 +1,4 @@
-//! FMI, without foreign programs: FMUs in C as machine and as PLC, wrong and hostile FMUs, and what the export writes.
+//! FMI, without foreign programs: FMUs in C as machine and as PLC, wrong and hostile FMUs, and exported FMUs.
 #![cfg(not(no_cc))]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 

@@ -120,7 +120,7 @@ fn a_simulation_that_is_too_slow_for_the_clock_is_told_with_the_time_that_it_los
         last.starts_with("run: ok ticks=20 time=200ms stale=0 lost="),
         "{last}"
     );
-    // Nothing is late where no clock is to be kept.
+    // Without a clock to keep pace with, nothing is late.
     let output = tickbus(folder.path(), &arguments);
     let told = out(&output);
     assert!(
@@ -195,7 +195,7 @@ fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
         .find_map(|line| {
             let (_, rest) = line.rsplit_once("127.0.0.1:")?;
             let port = rest.split(|c: char| !c.is_ascii_digit()).next()?;
-            // 0 until it listens.
+            // The port is 0 until it listens.
             (port != "0").then(|| port.to_owned())
         })
         .expect("it says where it listens");
@@ -226,8 +226,8 @@ fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
         "{told}"
     );
     let record = fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
-    // The FMU writes the time; the mirror, whose machine is beside it in another process, brings it back: a while later, and
-    // never what was not written.
+    // The FMU writes the time; the mirror, whose machine runs beside it in another process, returns that a while later,
+    // and never returns other values.
     let mut lines = record.lines();
     let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
     let column = |name: &str| {
@@ -251,7 +251,7 @@ fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
             *back >= before && *back < *written,
             "{back} at {time}, after {before}"
         );
-        // As a REAL has it.
+        // With the precision of a REAL.
         let is_it = |(one, _): &(f64, f64)| (one - back).abs() < 1e-6;
         let is_written = *back == 0.0 || ticks.iter().any(is_it);
         assert!(is_written, "{back} at {time}");
@@ -277,7 +277,7 @@ fn an_interrupted_run_ends_properly() {
         std::io::BufRead::lines(std::io::BufReader::new(child.stdout.take().expect("piped")));
     let first = lines.next().expect("a line").expect("text");
     assert!(first.ends_with("pace 1"), "{first}");
-    // Its line is up: it ticks.
+    // The line is up: the machine ticks.
     let running = lines
         .by_ref()
         .map(|line| line.expect("text"))
@@ -333,7 +333,7 @@ fn an_fmu_is_the_machine_of_a_test_file() {
             "{junit}"
         );
     }
-    // A fault that the machine's program does not know of: the test finds it.
+    // A fault unknown to the machine's program: the test finds it.
     tests_in(
         folder.path(),
         "fmu = \"tank2.fmu\"\nmap = \"tank.toml\"",
@@ -369,7 +369,8 @@ fn a_test_file_names_an_fmu_that_is_not_right() {
     }
 }
 
-/// A server of virtual time with one client and this many steps of 10 ms, and a driver.cfg beside the FMU that takes part.
+/// A server of virtual time with one client and this many steps of 10 ms, and a driver.cfg next to the FMU that takes
+/// part.
 fn with_server<R>(folder: &Path, steps: u64, work: impl FnOnce() -> R) -> (R, Outcome) {
     let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
     let bus = format!("kind = \"sdsp\"\naddress = \"{}\"\n", listener.address());
@@ -414,7 +415,7 @@ fn a_run_on_virtual_time_that_ends_ends_the_fmu_and_its_hash_is_told() {
     assert!(told.ends_with(&right), "{told}");
 }
 
-/// Our own FMU, in a line of its own behind `tickbus run`.
+/// Our own FMU, in a separate line behind `tickbus run`.
 #[test]
 fn an_exported_fmu_ends_with_its_run_on_virtual_time() {
     let library = crate::fixture::library();

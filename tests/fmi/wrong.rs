@@ -1,4 +1,4 @@
-//! FMUs that are cut, hostile, for something else, or that misbehave: each is a sentence that says what to do.
+//! FMUs that are truncated, hostile, made for something else, or misbehaving: each leads to a sentence with the remedy.
 
 use std::fs::{self, File};
 use std::io::{BufRead as _, BufReader};
@@ -15,7 +15,7 @@ use crate::fixture::{
 
 const RUN: [&str; 6] = ["run", "it.fmu", "--config", "it.cfg", "--duration", "1s"];
 
-/// What `tickbus run` says of an archive with these entries.
+/// The output of `tickbus run` for an archive with these entries.
 fn told(entries: &[Entry<'_>]) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     archive(&folder.path().join("it.fmu"), entries);
@@ -46,7 +46,7 @@ fn archives_that_are_cut_or_none_say_so() {
         );
         assert!(told.contains("; get the FMU anew; it may be cut"), "{told}");
     }
-    // A byte within the library: its checksum tells.
+    // A changed byte within the library: its checksum shows that.
     let mut bent = whole;
     bent[2000] ^= 0x55;
     fs::write(&file, bent).expect("a file");
@@ -84,7 +84,7 @@ fn archives_that_would_harm_are_refused_before_a_byte_is_written() {
 
 #[test]
 fn bombs_are_refused_by_what_they_state_and_by_what_they_are() {
-    // 1.2 GB of nothing: one entry, and 29 copies of what it was compressed to.
+    // 1.2 GB of zeros: one entry, and 29 copies of its compressed data.
     let folder = tempfile::tempdir().expect("a folder");
     let one = folder.path().join("one.zip");
     archive(&one, &[Entry::File("resources/0", &vec![0; 40 << 20])]);
@@ -193,7 +193,7 @@ fn a_library_that_is_none_or_lacks_functions_says_so() {
     }
 }
 
-/// How the FMU misbehaves in its third step, and what is said of it; in this process and in a helper.
+/// The FMU's misbehaviour in its third step, and the message about it; in this process and in a helper.
 #[test]
 fn discard_error_fatal_and_a_refused_beginning_are_told() {
     for (how, words) in [
@@ -205,7 +205,7 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "error",
             "it.fmu: the step of 0.01 s at 0.03 s failed, and does not say why; ask whoever made it",
         ),
-        // What it has said of earlier steps is not why this one failed.
+        // Messages about earlier steps are not the reason for this failure.
         (
             "grumbles",
             "it.fmu: the step of 0.01 s at 0.03 s failed, and does not say why; ask whoever made it",
@@ -218,12 +218,12 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
             "formats",
             "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
         ),
-        // Some hand in an environment of their own.
+        // Some programs pass their own environment.
         (
             "stray",
             "it.fmu: the step of 0.01 s at 0.03 s failed; it says: V7 at 0.03 s: 1 2 3|1.5 2.5 3.5 4.5 5.5 6.5 7.5 8.5 end",
         ),
-        // When it is asked how far it got.
+        // While it is asked how far it got.
         (
             "lost",
             "it.fmu: the step of 0.01 s at 0.03 s failed for good (fatal), and does not say why",
@@ -244,7 +244,7 @@ fn discard_error_fatal_and_a_refused_beginning_are_told() {
     }
 }
 
-/// By the standards, nothing of an FMU may be called after a fatal answer, in no instance.
+/// By the standards, no function of an FMU may be called after a fatal answer, in any instance.
 #[test]
 fn an_fmu_that_has_failed_for_good_is_not_begun_again_in_the_same_process() {
     for (isolated, second) in [
@@ -295,7 +295,7 @@ fn all_but_documentation_and_sources_is_unpacked_whatever_the_names_begin_with()
                 Entry::File(&names[0], description.as_bytes()),
                 Entry::File(&names[1], &library),
                 Entry::File(&names[2], b"<p>"),
-                // As programs that pack write a folder.
+                // Packing programs write an entry for a folder.
                 Entry::File(&format!("{prefix}resources/a"), b"x"),
             ],
         );
@@ -326,7 +326,7 @@ fn an_archive_with_the_same_file_twice_is_refused() {
     }
 }
 
-/// Nobody can tell which of the two another program would load.
+/// Another program could load either of the two.
 #[test]
 fn an_archive_with_the_very_same_name_twice_is_refused() {
     let folder = misbehaving_as("ok");
@@ -348,7 +348,7 @@ fn an_archive_with_the_very_same_name_twice_is_refused() {
     assert!(told.contains(words), "{told}");
 }
 
-/// Gives a file in an archive another name of the same length, also one that is there already: programs that pack do not do that.
+/// Renames a file in an archive to a name of the same length, possibly an existing one, as no packing program does.
 fn rename(archive: &Path, from: &[u8], to: &[u8]) {
     let mut bytes = fs::read(archive).expect("a file");
     for at in 0..bytes.len() - from.len() {
@@ -359,7 +359,7 @@ fn rename(archive: &Path, from: &[u8], to: &[u8]) {
     fs::write(archive, bytes).expect("room");
 }
 
-/// As the makers' own Reference FMU "Roberts" has it.
+/// As in the makers' own Reference FMU "Roberts".
 #[test]
 fn the_same_file_twice_is_accepted_where_a_run_does_not_depend_on_it() {
     let library = fs::read(misbehaving()).expect("the library");
@@ -444,7 +444,7 @@ fn a_parameter_may_be_a_text_and_arrays_say_that_they_are() {
     );
 }
 
-/// What its setup is called with.
+/// The arguments of the setup call.
 #[test]
 fn the_tolerance_of_the_description_and_the_end_of_the_run_are_handed_in() {
     for (attributes, more, words) in [
@@ -568,7 +568,7 @@ fn a_crash_in_a_helper_is_a_sentence_and_the_recording_is_whole() {
         let record = fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
         assert_eq!(record.lines().count(), 1 + 3, "{record}");
     }
-    // What it prints does not disturb the talk.
+    // The FMU's prints do not disturb the messages.
     let folder = misbehaving_as("print");
     let output = tickbus(folder.path(), &[&RUN[..], &["--isolated"]].concat());
     assert_eq!(output.status.code(), Some(0), "{}", out(&output));
@@ -592,7 +592,7 @@ fn an_fmu_that_hangs_can_be_interrupted() {
     let lines = BufReader::new(child.stdout.take().expect("piped")).lines();
     let hangs = lines.map_while(Result::ok).any(|line| line == "hangs");
     assert!(hangs, "it gets to its third step");
-    // The first one asks; one of those a second later ends it.
+    // The first signal asks for the end; one of those a second later ends it.
     let pid = rustix::process::Pid::from_child(&child);
     while child.try_wait().expect("it is known").is_none() {
         rustix::process::kill_process(pid, rustix::process::Signal::INT).expect("it runs");

@@ -1,4 +1,4 @@
-//! The compiler `iec2c`, and what it makes of programs.
+//! The compiler `iec2c`, and its output for programs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

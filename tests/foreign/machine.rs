@@ -1,4 +1,4 @@
-//! The machine in front of a program that somebody else wrote: a driver in real time, with its signals by name.
+//! The machine in front of a foreign program: a driver in real time, with its signals by name.
 
 use std::io::Read;
 use std::net::SocketAddr;
@@ -46,7 +46,7 @@ address = "%ID4"
 type    = "REAL"
 "#;
 
-/// A driver, and what takes down its sessions.
+/// A driver, and the recorder of its sessions.
 pub struct Machine {
     pub end: End,
     text: String,
@@ -90,7 +90,7 @@ impl Machine {
         }
     }
 
-    /// Ticks until `done` gives something.
+    /// Ticks until `done` returns something.
     #[track_caller]
     pub fn until_some<T>(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> Option<T>) -> T {
         let found = patiently(|| {
@@ -106,8 +106,8 @@ impl Machine {
         self.until_some(what, |machine| done(machine).then_some(()));
     }
 
-    /// Where a foreign client finds it: where it listens, or a tap before that which takes down the session `name`
-    /// with `client`, where sessions are recorded.
+    /// The address for a foreign client: that of the driver, or, if sessions are recorded, that of a tap in front of
+    /// it, which records the session `name` with `client`.
     #[track_caller]
     pub fn address_for(&mut self, name: &str, client: &str) -> SocketAddr {
         let server = self.address();
@@ -119,13 +119,12 @@ impl Machine {
         address
     }
 
-    /// The driver.cfg that it was opened with.
+    /// The driver.cfg with which the machine was opened.
     pub fn text(&self) -> &str {
         &self.text
     }
 
-    /// Runs a program to its end, which has to be a good one, with `step` again and again meanwhile; gives what it
-    /// printed.
+    /// Runs a program to its end, which must be a success, repeating `step` meanwhile; returns its output.
     #[track_caller]
     pub fn until_the_end_of(&mut self, mut command: Command, step: impl Fn(&mut Self)) -> String {
         let mut child = command

@@ -25,7 +25,7 @@ pub struct Absent(pub String);
 /// A test panics when it fails.
 pub type Test = fn() -> Result<(), Absent>;
 
-/// How many tests run at once: they mostly wait for their peers.
+/// The number of tests that run at once: they mostly wait for their peers.
 const AT_ONCE: usize = 3;
 
 /// Runs the tests selected on the command line.
@@ -109,7 +109,7 @@ pub fn command(name: &str, package: &str) -> Result<Command, Absent> {
     command_with(name, "--version", package)
 }
 
-/// A command from the Debian package `package` that does nothing but answer when it gets `argument`.
+/// A command from the Debian package `package` that only prints something when it gets `argument`.
 pub fn command_with(name: &str, argument: &str, package: &str) -> Result<Command, Absent> {
     let found = Command::new(name)
         .arg(argument)
@@ -124,7 +124,7 @@ pub fn command_with(name: &str, argument: &str, package: &str) -> Result<Command
     }
 }
 
-/// What stands behind `before` in its line of a file of this repository: the version of a program at the other end.
+/// The text after `before` in its line of a file of this repository: the version of a program at the other end.
 pub fn stated(file: &str, before: &str) -> String {
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(file);
     let text = std::fs::read_to_string(&path).unwrap_or_else(|why| panic!("{file}: {why}"));

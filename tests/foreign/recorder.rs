@@ -1,4 +1,4 @@
-//! Takes down the sessions of foreign clients with a server of ours, for tests/sessions to replay.
+//! Records the sessions of foreign clients with our servers, for tests/sessions to replay.
 
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,8 @@ use super::session::{Session, Step};
 /// The variable that names the folder for sessions.
 const VARIABLE: &str = "TICKBUS_RECORD_SESSIONS";
 
-/// After this many ticks the machine has finished the turn in which a request came, and has made another one: it has seen what was written before, and has answered to it. So an answer does not hang on how fast anybody was.
+/// After this many ticks the machine has finished the turn in which a request came, and has made another one: it has
+/// seen everything that was written before, and has answered. So an answer does not depend on the speed of either side.
 const TICKS: u64 = 4;
 
 /// A recorder; the session is written when it is dropped, unless the test has failed.
@@ -26,7 +27,7 @@ pub struct Recorder {
     heard: Arc<Shared>,
 }
 
-/// What the threads of the tap and the machine write.
+/// The data that the threads of the tap and the machine write.
 struct Shared {
     notes: Mutex<Notes>,
     ticked: Condvar,
@@ -34,18 +35,18 @@ struct Shared {
 
 struct Notes {
     steps: Vec<Step>,
-    /// The name of each signal, whether the simulation sets it, what it last was, and what of it was taken down.
+    /// The name of each signal, true if the simulation sets it, its last value, and the last recorded value.
     signals: Vec<(String, bool, f64, f64)>,
     ticks: u64,
 }
 
 impl Recorder {
-    /// The folder for sessions, where they are wanted.
+    /// The folder for sessions, if they are wanted.
     pub fn folder() -> Option<PathBuf> {
         std::env::var_os(VARIABLE).map(PathBuf::from)
     }
 
-    /// Stands before a server of `machine`; gives itself, and where clients find it.
+    /// Creates a tap in front of a server of `machine`; also returns the address for clients.
     pub fn before(
         server: SocketAddr,
         folder: &Path,
@@ -116,7 +117,7 @@ impl Shared {
         self.notes.lock().expect("nobody panics")
     }
 
-    /// Waits until the machine has ticked often enough; not for ever, as it may have been closed.
+    /// Waits until the machine has ticked often enough; not forever, since it may have been closed.
     fn lock_after_ticks(&self) -> MutexGuard<'_, Notes> {
         let notes = self.lock();
         let enough = notes.ticks + TICKS;
@@ -129,7 +130,7 @@ impl Shared {
 }
 
 impl Notes {
-    /// Takes down what has changed at the machine.
+    /// Records the changes at the machine.
     fn look(&mut self) {
         for (name, is_own, value, taken) in &mut self.signals {
             if value.to_bits() != taken.to_bits() {
@@ -181,10 +182,10 @@ impl Drop for Recorder {
     }
 }
 
-/// Masks what differs from time to time in answers of S7: the clock, and the version of this program.
+/// Masks the bytes of S7 answers that differ from time to time: the clock, and the version of this program.
 fn mask_s7(bytes: &mut [Option<u8>]) {
     let mut telegrams = bytes;
-    // Each has four bytes before it, which end with its length.
+    // Each telegram begins with four bytes, which end with its length.
     while let [Some(3), Some(0), Some(high), Some(low), ..] = telegrams {
         let length = usize::from(u16::from_be_bytes([*high, *low]));
         let Some((telegram, rest)) = telegrams.split_at_mut_checked(length.max(4)) else {

@@ -1,5 +1,5 @@
-//! A recorded session of a foreign client with a server of ours, as a file of text: tests/sessions/README.md has its
-//! form.
+//! A recorded session of a foreign client with one of our servers, as a text file: tests/sessions/README.md describes
+//! the format.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,7 +13,7 @@ pub struct Session {
     pub client: String,
     /// The driver.cfg of the server.
     pub config: String,
-    /// What happened, in order.
+    /// The events, in order.
     pub steps: Vec<Step>,
 }
 
@@ -23,7 +23,7 @@ pub enum Step {
     Set(String, f64),
     /// The simulation sees a signal of the PLC.
     Sees(String, f64),
-    /// Something is said on a connection; `None` is a byte that differs from time to time.
+    /// Data sent on a connection; `None` is a byte that differs from time to time.
     Said(usize, From, Vec<Option<u8>>),
     /// The client leaves.
     Leaves(usize),

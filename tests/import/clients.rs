@@ -152,7 +152,7 @@ fn wrong_addresses_types_and_directions_of_a_client_are_told_with_their_places()
     );
 }
 
-/// The positions and messages of lines that are left out when wrong lines may be.
+/// The positions and messages of lines that are left out, if wrong lines may be.
 fn left_out(text: &str) -> Vec<String> {
     let reading = ImportOptions {
         lenient: true,
@@ -188,7 +188,7 @@ fn a_type_that_contradicts_its_address_is_told_at_its_cell() {
             "{told:?}"
         );
     }
-    // If it is not a type, it is a comment.
+    // Text that is no type is a comment.
     assert_eq!(
         signals(&read("Level;holding-register:21:UINT;in the tank\n")).len(),
         1

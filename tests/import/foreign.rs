@@ -1,4 +1,4 @@
-//! Files in the shapes in which the editors of PLCs write them.
+//! Files in the formats of PLC editors.
 
 use std::fmt::Write as _;
 
@@ -327,7 +327,7 @@ fn openplc_counts_elements_and_its_memories_stand_apart() {
     };
     let imported = read_as("plc.xml", OPENPLC, bytes).expect("bytes");
     assert_eq!(lines(&imported)[2], "valve %QW100 INT");
-    // Where they do not overlap, all stay where they are.
+    // Where they do not overlap, all addresses are kept.
     let apart = OPENPLC.replace("%IW0\"", "%IW1\"");
     assert_eq!(lines(&read("plc.xml", &apart))[1], "level %IW2 INT");
 }

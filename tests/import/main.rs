@@ -291,7 +291,7 @@ proptest! {
         }
     }
 
-    /// Arbitrary bytes cause no panic, and what is read is a driver.cfg without mistakes.
+    /// Arbitrary bytes cause no panic; readable ones give a driver.cfg without mistakes.
     #[test]
     fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
         assert_sound(&bytes);

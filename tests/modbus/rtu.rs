@@ -9,7 +9,7 @@ use super::peers::{Alone, client, is_closed};
 #[cfg(unix)]
 use super::{AnyPort, pty};
 
-/// Of several units behind one device server this end is two.
+/// This end is two of several units behind one device server.
 #[test]
 fn rtu_over_tcp_is_served_as_on_a_serial_line() {
     let mut device = Alone::open(
@@ -30,7 +30,7 @@ fn rtu_over_tcp_is_served_as_on_a_serial_line() {
         let pdu = [6, 0, 0, 0, value];
         rtu_request(unit, &pdu)
     });
-    // Units that are another device's, and the broadcast, are not answered.
+    // Units of another device, and the broadcast, are not answered.
     let others = rtu_request(4, &[6, 0, 0, 0, 8]);
     is_answered(
         &[&five[..], &others, &six].concat(),
@@ -111,7 +111,7 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
             })
         });
         assert_eq!(answer[..], request);
-        // Everything that it sends is echoed.
+        // Everything that this end sends is echoed.
         master.write_all(&answer).expect("a line");
         device.until_speed(i16::from(speed));
     }

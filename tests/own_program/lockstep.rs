@@ -16,7 +16,7 @@ use super::{STEPPED, driver_cfg, open};
 const STEP: Nanos = Nanos::from_millis(20);
 const STEPS: u32 = 60;
 
-/// What a machine sees of the program in each step, as it changes what it sends.
+/// The machine's view of the program in each step, while it changes its own values.
 fn seen(driver: &mut Driver) -> Vec<Vec<u64>> {
     let mut slots = driver.initial_slots();
     let signals = driver.config().table.signals.clone();
@@ -78,7 +78,8 @@ fn in_lock_step_a_program_scans_as_on_the_ticks_of_a_loopback() {
     assert_eq!(outcome.steps, u64::from(STEPS));
     assert_eq!((plc.fault(), plc.close()), (None, None));
 
-    // In lock-step the machine's initial values are there in the first scan; on the loopback it comes before the machine.
+    // In lock-step the machine's initial values are present in the first scan; on the loopback that scan precedes the
+    // machine.
     assert_eq!(stepped[2..], ticked[1..ticked.len() - 1]);
     let changes = ticked.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert!(changes > 20, "{changes} changes: the program has worked");

@@ -497,7 +497,7 @@ fn the_command_hosts_it_over_a_bus() {
             text(output.stderr),
         )
     };
-    // The program runs; nobody listens where the line goes.
+    // The program runs; there is no listener at the line's address.
     let (code, out, err) = run("./program.so");
     assert_eq!(code, Some(3), "{out}{err}");
     let last = out.lines().last().expect("a line");
@@ -590,7 +590,7 @@ fn a_loop_that_never_ends_is_a_fault_of_the_program() {
 #[test]
 #[cfg_attr(any(windows, no_cc), ignore = "there is no C compiler, cc")]
 fn no_copy_is_left_behind() {
-    // Its own folder for temporary files requires a separate process.
+    // A separate folder for temporary files requires a separate process.
     let folder = folder();
     by_hand(folder.path(), &[]);
     driver_cfg(
@@ -615,7 +615,7 @@ fn no_copy_is_left_behind() {
             .output()
             .expect("tickbus runs")
     };
-    // Nobody listens where the line goes.
+    // There is no listener at the line's address.
     assert_eq!(run(&temporary).status.code(), Some(3));
     assert_eq!(fs::read_dir(&temporary).expect("a folder").count(), 0);
     let output = run(Path::new("/no/such/folder"));

@@ -59,7 +59,7 @@ pub(crate) struct Line {
     ends: [End; 2],
     pub(crate) plant: Plant,
     pub(crate) now: Nanos,
-    /// Whether each PLC receives data from the machine, and vice versa.
+    /// True if each PLC receives data from the machine, and vice versa.
     pub(crate) alive: [bool; 2],
     /// The simulation stands still.
     pub(crate) frozen: bool,
@@ -80,7 +80,7 @@ impl Line {
         }
     }
 
-    /// Ends the simulation and starts it again.
+    /// Ends the simulation and restarts it.
     pub(crate) fn restart(&mut self) {
         self.plant = Plant::new([&self.ends[0].config, &self.ends[1].config]);
     }

@@ -208,7 +208,7 @@ fn a_program_is_done_after_its_blocks() {
     assert!(!line.report(0).is_done(), "the charger was asked for none");
 }
 
-/// Three disturbances one after another, at random times; what two hold must not be released by both.
+/// Three disturbances one after another, at random times; a block that two hold must not be released by both.
 #[test]
 fn troubles_at_random_moments_lose_no_block() {
     logged::expect("all axes stop, and the sequence begins anew");

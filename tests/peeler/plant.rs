@@ -1,5 +1,4 @@
-//! A small peeling line: ideal drives, and blocks that stay where they were put. It panics when a block
-//! falls, or on a collision.
+//! A small peeling line: ideal drives, and blocks that stay in place. Panics when a block falls, or on a collision.
 
 use std::f64::consts::{SQRT_2, TAU};
 
@@ -8,7 +7,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 
 const TICK: f64 = 0.01;
-/// Half the length of a block: the position of everything that holds it at its ends.
+/// Half the length of a block: the position of everything that holds a block at its ends.
 const HALF: f64 = 650.0;
 const CORE: f64 = 41.0;
 
@@ -37,7 +36,7 @@ struct Places {
     blocks: [usize; 8],
     distances: [usize; 2],
     time: usize,
-    /// From which side to which, and the indices on both sides.
+    /// The source and the destination side, and the indices on both sides.
     wires: [(usize, usize, [usize; 2]); 4],
 }
 
@@ -133,7 +132,7 @@ impl Plant {
         }
     }
 
-    /// Whether charger and lathe hold the same block.
+    /// True if charger and lathe hold the same block.
     pub(crate) fn is_shared(&self) -> bool {
         self.shared
     }
@@ -301,7 +300,7 @@ impl Plant {
         if spindles.iter().any(|tip| *tip > HALF + 10.0) {
             let block = self.held.take().expect("it is there");
             if std::mem::take(&mut self.shared) {
-                // The clamps still hold it.
+                // The clamps still hold the block.
                 return;
             }
             assert!(
@@ -309,7 +308,7 @@ impl Plant {
                 "the core falls onto a closed core drop"
             );
             assert!(turns.abs() < 1e-6, "the core is thrown");
-            // A block that was given up half-way is also dropped with the cores.
+            // A block abandoned half-way is also dropped with the cores.
             assert!(block.radius() < CORE || self.sides[1].told[3].position > 100.0);
             self.cores += 1;
         }

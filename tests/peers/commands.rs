@@ -1,4 +1,4 @@
-//! `tickbus` commands as processes, whose lines are read as they come.
+//! `tickbus` commands as processes, with their lines read as they come.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::io::{BufRead as _, BufReader, Lines};
@@ -7,7 +7,7 @@ use std::process::{Child, ChildStdout, Command, Stdio};
 
 use rustix::process::{Pid, Signal, kill_process};
 
-/// One that runs. It is killed when a test fails before its end.
+/// A running command. It is killed when a test fails before its end.
 pub struct Running {
     child: Child,
     lines: Lines<BufReader<ChildStdout>>,
@@ -38,7 +38,7 @@ impl Running {
         Self { child, lines }
     }
 
-    /// Reads lines until one begins with `begin`; returns the rest of that.
+    /// Reads lines until one begins with `begin`; returns the rest of that line.
     pub fn after(&mut self, begin: &str) -> String {
         let mut read = Vec::new();
         for line in &mut self.lines {
@@ -51,28 +51,28 @@ impl Running {
         panic!("no \"{begin}\" in {read:?}");
     }
 
-    /// Interrupts it; returns the last line and the exit code.
+    /// Interrupts the command; returns the last line and the exit code.
     pub fn interrupt(self) -> (String, Option<i32>) {
         self.signal(Signal::INT)
     }
 
-    /// Sends it this signal; returns the last line and the exit code.
+    /// Sends the command this signal; returns the last line and the exit code.
     pub fn signal(self, signal: Signal) -> (String, Option<i32>) {
         let pid = i32::try_from(self.child.id()).ok().and_then(Pid::from_raw);
         kill_process(pid.expect("it runs"), signal).expect("it runs");
         self.end()
     }
 
-    /// Waits for its end; returns the last line and the exit code.
+    /// Waits for the end; returns the last line and the exit code.
     pub fn end(mut self) -> (String, Option<i32>) {
         let last = self.lines.by_ref().map(|line| line.expect("text")).last();
         let status = self.child.wait().expect("it ends");
         (last.unwrap_or_default(), status.code())
     }
 
-    /// Kills it.
+    /// Kills the command.
     pub fn kill(&mut self) {
-        // It may have ended.
+        // The command may have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

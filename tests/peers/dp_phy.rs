@@ -1,5 +1,5 @@
-//! One end of a pseudo-terminal as the DP master profirust wants it: it has to pretend that bytes take their time on the
-//! wire.
+//! One end of a pseudo-terminal in the form that the DP master profirust needs: it has to pretend that bytes take their
+//! time on the wire.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::fs::{File, OpenOptions};
@@ -28,7 +28,7 @@ impl Pty {
         let mut options = OpenOptions::new();
         let file = options.read(true).write(true).custom_flags(flags);
         let file = file.open(end)?;
-        // What a predecessor has not read is none of this one's.
+        // Unread bytes of a predecessor do not concern this one.
         let _ = rustix::termios::tcflush(&file, rustix::termios::QueueSelector::IOFlush);
         Ok(Self {
             file,

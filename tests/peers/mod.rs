@@ -33,7 +33,7 @@ pub fn leave(mut stream: TcpStream) {
     while matches!(stream.read(&mut [0; 4096]), Ok(count) if count > 0) {}
 }
 
-/// A thread that is told to end, and joined.
+/// A thread that can be stopped and joined.
 pub struct Ending {
     pub over: Arc<AtomicBool>,
     pub thread: Option<JoinHandle<()>>,
@@ -57,7 +57,7 @@ pub fn client(address: SocketAddr) -> TcpStream {
     stream
 }
 
-/// Whether the other end has closed; data received before that are discarded.
+/// True if the other end has closed; data received before that are discarded.
 pub fn is_closed(stream: &TcpStream) -> bool {
     stream.set_nonblocking(true).expect("a TCP option");
     let mut reader = stream;
@@ -86,7 +86,7 @@ impl Alone {
         Self { clock, end }
     }
 
-    /// Where it listens.
+    /// The address on which the end listens.
     pub fn address(&self) -> SocketAddr {
         self.end.address()
     }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
-/// What a device does with a request.
+/// The behaviour of a device for a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Habit {
     Answers,
@@ -18,7 +18,7 @@ pub enum Habit {
 /// How the unit with this number handles a function.
 pub type Habits = fn(unit: u8, function: u8) -> Habit;
 
-/// Its memory, the same for all units: coils, discrete inputs, input registers, holding registers.
+/// The memory, the same for all units: coils, discrete inputs, input registers, holding registers.
 #[derive(Debug)]
 pub struct Memory {
     pub bits: [Vec<bool>; 2],

@@ -103,7 +103,7 @@ impl Peer {
 
 impl Drop for Peer {
     fn drop(&mut self) {
-        // It ends with its stdin.
+        // The program ends with its stdin.
         drop(self.stdin.take());
         let _ = self.child.wait();
     }
@@ -185,7 +185,7 @@ impl Device {
         self.folder.path().join("pki")
     }
 
-    /// Where it listens.
+    /// The address on which the device listens.
     pub fn address(&self) -> SocketAddr {
         self.end.address()
     }

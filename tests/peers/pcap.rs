@@ -70,7 +70,7 @@ const PUSH: u8 = 8;
 const ACK: u8 = 16;
 
 struct Line<'a> {
-    /// Of the client and of the server.
+    /// The ports of the client and of the server.
     ports: [u16; 2],
     /// The sequence numbers of the next bytes.
     next: [u32; 2],
@@ -134,17 +134,17 @@ fn checksum(header: &[u8]) -> u16 {
     !u16::try_from((folded & 0xFFFF) + (folded >> 16)).expect("folded twice")
 }
 
-/// What is heard of a connection between a client and a server.
+/// An event on a connection between a client and a server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heard<'a> {
-    /// One of them says something; it is passed on when the listener has heard it.
+    /// One of them has sent data; they are forwarded once the listener has seen them.
     Said(From, &'a [u8]),
-    /// The client has said all.
+    /// The client has sent everything.
     Left,
 }
 
-/// Stands between clients and a server at `server`, and lets `hear` listen: to which connection, counted from 0, and
-/// what. Gives where clients find it.
+/// Listens between clients and a server at `server`: calls `hear` with the number of the connection, counted from 0,
+/// and the event. Returns the address for clients.
 pub fn listen_before(
     server: SocketAddr,
     hear: impl Fn(usize, Heard<'_>) + Send + Sync + 'static,
@@ -152,7 +152,7 @@ pub fn listen_before(
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     let address = listener.local_addr().expect("it is bound");
     let hear = Arc::new(hear);
-    // It ends with the process: nobody waits for it.
+    // Not joined: the thread ends with the process.
     std::thread::spawn(move || {
         for index in 0.. {
             let Ok((client, _)) = listener.accept() else {
@@ -177,7 +177,7 @@ pub fn listen_before(
     address
 }
 
-/// Stands between clients and a server, and takes down what they say.
+/// Listens between clients and a server, and records their data.
 #[derive(Debug)]
 pub struct Tap {
     /// The address for clients.
@@ -213,7 +213,7 @@ impl Tap {
 fn carry(from: From, mut stream: TcpStream, mut to: TcpStream, hear: impl Fn(Heard<'_>)) {
     let mut buffer = [0; 4096];
     while let Ok(count @ 1..) = stream.read(&mut buffer) {
-        // Before it is passed on, so that the answer comes behind the question.
+        // Before forwarding, so that the answer follows the question.
         hear(Heard::Said(from, &buffer[..count]));
         if to.write_all(&buffer[..count]).is_err() {
             break;

@@ -1,5 +1,5 @@
-//! A serial line without hardware: pseudo-terminals, and a thread that copies what is written to one of them to all
-//! others, unharmed or not.
+//! A serial line without hardware: pseudo-terminals, and a thread that copies the data written to one of them to all
+//! others, damaged if requested.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::fs::File;
@@ -22,20 +22,20 @@ pub(crate) struct Line {
     over: Arc<AtomicBool>,
     harm: Arc<Harm>,
     thread: Option<JoinHandle<()>>,
-    /// Kept open, so that it does not hang up between two programs.
+    /// Kept open, so that the line does not hang up between two programs.
     _kept: Vec<OwnedFd>,
 }
 
-/// What the line does to the bytes that it carries.
+/// The damage that the line does to its bytes.
 #[derive(Default)]
 struct Harm {
-    /// One piece of so many is damaged; 0 for none.
+    /// One piece out of this many is damaged; 0 for none.
     each: AtomicUsize,
     pieces: AtomicUsize,
 }
 
 impl Harm {
-    /// Flips a bit, cuts the last byte off, or puts noise in front.
+    /// Flips a bit, cuts off the last byte, or inserts noise in front.
     fn befall(&self, piece: &mut Vec<u8>) {
         let each = self.each.load(Ordering::Relaxed);
         let number = self.pieces.fetch_add(1, Ordering::Relaxed);
@@ -87,7 +87,7 @@ impl Line {
         }
     }
 
-    /// From now on damages one piece of so many; 0 for none.
+    /// From now on damages one piece out of `count`; 0 for none.
     pub(crate) fn damage_each(&self, count: usize) {
         self.harm.each.store(count, Ordering::Relaxed);
     }

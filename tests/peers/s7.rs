@@ -178,7 +178,7 @@ fn lie(mut stream: TcpStream, serves: bool) {
     leave(stream);
 }
 
-/// A thread that is told to end, and joined.
+/// A thread that can be stopped and joined.
 struct Ending {
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -248,7 +248,7 @@ impl Client {
         Self::in_slot(address, 1)
     }
 
-    /// As [`new`](Self::new), for the CPU in this slot.
+    /// Like [`new`](Self::new), for the CPU in this slot.
     pub fn in_slot(address: SocketAddr, slot: u8) -> Self {
         let mut client = Self::silent(address);
         let mut connect = CONNECT;
@@ -317,7 +317,7 @@ impl Client {
 /// A hand-written CPU: its blocks, its state, and the requests it has received.
 #[derive(Default)]
 pub struct Cpu {
-    /// Its data blocks; each of their bytes is the block's number.
+    /// The data blocks; each of their bytes is the block's number.
     pub blocks: Vec<u8>,
     /// The state in its list 0x0424; `None` to refuse the list.
     pub state: Option<u8>,
@@ -325,7 +325,7 @@ pub struct Cpu {
     pub asked: u32,
     /// How many more requests for this list it refuses.
     pub refuses: u32,
-    /// Whether it closes the connection when any list is requested.
+    /// True if the CPU closes the connection when any list is requested.
     pub hangs_up: bool,
 }
 

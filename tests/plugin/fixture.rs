@@ -88,7 +88,7 @@ impl Udp {
         Self::at(isolated, &address())
     }
 
-    /// The one whose machine is at this address.
+    /// The example whose machine is at this address.
     pub(crate) fn at(isolated: bool, address: &str) -> Self {
         Self {
             address: address.to_owned(),
@@ -161,7 +161,7 @@ impl Bus for Udp {
     }
 }
 
-/// A driver with the misbehaving library; what it writes to `%I` comes back on `%Q`.
+/// A driver with the misbehaving library; its `%I` values return on `%Q`.
 pub(crate) struct Misbehaving {
     pub(crate) folder: TempDir,
     pub(crate) library: PathBuf,
@@ -241,7 +241,7 @@ pub(crate) fn until_by(step: Nanos, end: &End, clock: &Manual, state: &str, caus
     reason
 }
 
-/// Lets time pass until the sent value has come back.
+/// Lets time pass until the sent value has returned.
 #[track_caller]
 pub(crate) fn until_it_echoes(end: &mut End, clock: &Manual, value: f64) {
     end.set("position", value);

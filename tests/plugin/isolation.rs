@@ -46,12 +46,12 @@ fn process(fact: &str) -> u32 {
     number.parse().expect("a number")
 }
 
-/// Whether a process exists, even as a zombie.
+/// True if a process exists, even as a zombie.
 fn exists(process: u32) -> bool {
     Path::new(&format!("/proc/{process}")).exists()
 }
 
-/// Whether a process that is not our child has ended; another process reaps it.
+/// True if a process that is not our child has ended; another process reaps it.
 fn has_ended(process: u32) -> bool {
     fs::read_to_string(format!("/proc/{process}/stat"))
         .ok()

@@ -86,7 +86,8 @@ fn a_line_that_failed_once_comes_back() {
     }
 }
 
-/// A machine by hand at the other end of the UDP example, until the controller says good-bye: the last image that it got.
+/// A machine by hand at the other end of the UDP example, until the controller says good-bye: returns its last received
+/// image.
 fn last_image(socket: &UdpSocket) -> Vec<u8> {
     const HEADER: usize = 20;
     let (mut datagram, mut last) = ([0; 100], Vec::new());
@@ -187,7 +188,7 @@ fn calls_that_are_longer_than_the_cycle_leave_cycles_out() {
         let clock = Manual::new();
         let mut end = Misbehaving::new(isolated, "exchange = \"slow\", ms = 3").open(&clock);
         await_that("slow calls are counted", || {
-            // One step is enough for a call that it falls into.
+            // One step is enough for a call in progress.
             clock.advance(SLOW);
             end.tick();
             let statistics = end.driver.statistics();
@@ -210,7 +211,7 @@ fn writing_behind_out_is_told_as_the_librarys_mistake() {
     }
 }
 
-/// Whether `library` is mapped into this process.
+/// True if `library` is mapped into this process.
 fn is_loaded(library: &Path) -> bool {
     let maps = fs::read_to_string("/proc/self/maps").expect("the system tells");
     maps.contains(library.to_str().expect("UTF-8"))
@@ -227,7 +228,7 @@ fn a_plain_call_that_never_returns_is_told_and_closing_leaves_it_behind_with_its
             "open_timeout = \"5s\"\ncall_timeout = \"5s\"\nclose_timeout = \"20ms\"\n".to_owned();
         let clock = Manual::new();
         let end = plugin.open(&clock);
-        // On a busy machine loading takes its time, which the test's clock must not count.
+        // On a busy machine loading takes some time, which the test's clock must not count.
         await_that("the library is loaded", || is_loaded(&plugin.library));
         if function == "close" {
             until(&end, &clock, "running", "running");

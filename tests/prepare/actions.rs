@@ -6,7 +6,7 @@ use super::{ACTION, CONFLICT, RAN, TOF, TON, TP, ask, bench};
 use tickbus::plc::blocks::{ActionControl, Qualifiers};
 use tickbus::time::Nanos;
 
-// Bits of the word with its qualifiers.
+// Bits of the word with the qualifiers.
 const N: u16 = 1;
 const R: u16 = 2;
 const S: u16 = 4;
@@ -82,7 +82,7 @@ pub fn actions_are_those_of_the_built_in_programs() -> Result<(), Absent> {
             if random.below(3) == 0 {
                 on ^= 1 << random.below(11);
             }
-            // Else R and latches hide the rest.
+            // Otherwise R and latches hide the rest.
             if random.below(6) == 0 {
                 on = 0;
             }

@@ -1,4 +1,4 @@
-//! Projects in `PLCopen` XML as Structured Text, as an editor makes it for its compiler.
+//! Projects in `PLCopen` XML as Structured Text, in the form that an editor passes to its compiler.
 
 use std::fmt::Write as _;
 

@@ -1,4 +1,4 @@
-//! A hosted program in step with a server of virtual time, as a PLC is: its cycles come when they like.
+//! A hosted program in step with a server of virtual time, like a PLC: its cycles come at any time.
 
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ pub struct Stepped {
     pub inputs: Vec<u8>,
     pub outputs: Vec<u8>,
     go: u32,
-    /// The time of the PLC, which runs as it likes.
+    /// The time of the PLC, which runs freely.
     now: Nanos,
     pub jumps: Random,
     _folder: TempDir,

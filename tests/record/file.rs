@@ -1,4 +1,4 @@
-//! Which file is recorded to, and what happens to it.
+//! The file of a recording: its choice and its fate.
 
 use super::*;
 
@@ -69,7 +69,7 @@ fn a_file_is_recorded_to_by_one_driver_and_must_be_possible() {
     Run::open(&folder, &rig(RIG, "run.vcd")).driver.close();
     let error = folder.refusal(&rig(RIG, "nowhere/run.vcd"));
     assert!(error.contains("the recording cannot be made: "), "{error}");
-    // When disabled, it does not touch any file.
+    // When disabled, recording does not touch any file.
     let off = rig(RIG, "off.vcd").replace("[record]", "[record]\nwhen = \"never\"");
     Run::open(&folder, &off).driver.close();
     assert!(!folder.path("off.vcd").exists());
@@ -105,7 +105,7 @@ fn only_a_tick_overwrites_a_recording() {
     assert!(folder.bytes("run.vcd").len() < recorded.len());
 }
 
-/// A file under a lock of the kind that another process would have.
+/// A file under a lock of another process' kind.
 #[cfg(unix)]
 #[test]
 fn a_file_that_another_process_uses_is_neither_recorded_to_nor_replayed() {
@@ -173,7 +173,7 @@ fn a_recording_has_what_was_on_the_line() {
     assert_eq!(rows.len(), 6);
     for row in &rows {
         for pair in row.values.chunks(2) {
-            // The peer has the same codec, and sends back what came.
+            // The peer has the same codec, and returns its received values.
             assert_eq!(pair[0], pair[1], "{row:?}");
         }
     }
@@ -184,7 +184,7 @@ fn a_recording_has_what_was_on_the_line() {
 #[test]
 fn commands_that_only_look_open_no_recording_and_no_port() {
     let folder = Folder::new();
-    // Whoever serves here fails.
+    // A server at this address fails.
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a port");
     let address = taken.local_addr().expect("bound");
     let text = format!(

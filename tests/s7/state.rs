@@ -1,4 +1,4 @@
-//! A CPU in STOP, or one that refuses something.
+//! A CPU in STOP, or one that refuses some requests.
 
 use super::*;
 
@@ -145,7 +145,7 @@ fn a_stop_said_before_a_reconnect_is_forgotten_when_it_cannot_be_asked_for_any_m
         ..Cpu::default()
     });
     machine.until("it is in STOP", |end| end.link().cause.name() == "stopped");
-    // It is replaced by one that closes the connection when a list is requested.
+    // Another CPU replaces this one, and closes the connection when a list is requested.
     cpu.lock().expect("no panic").hangs_up = true;
     machine.until("its values count", |end| both(end) == (5.0, 7.0));
     assert_eq!(machine.end.statistic("cpu"), "unknown");

@@ -1,5 +1,5 @@
-//! Replays what foreign clients once said to our servers, as `README.md` beside it tells: the answers are the same, byte for
-//! byte.
+//! Replays the recorded sessions of foreign clients with our servers, as described in `README.md` here: the answers are
+//! the same, byte for byte.
 #![allow(missing_docs, reason = "a test")]
 
 #[path = "../foreign/mod.rs"]
@@ -34,7 +34,7 @@ fn sessions() -> Vec<(String, Session)> {
     files.into_iter().map(read).collect()
 }
 
-/// Says what the client said, on a clock that stands still.
+/// Sends the client's data, on a clock that stands still.
 fn replay(session: &Session) -> Result<(), String> {
     let mut machine = Machine::open_on(&Manual::new(), &session.config);
     let address = machine.address();
@@ -90,7 +90,7 @@ fn replay(session: &Session) -> Result<(), String> {
     Ok(())
 }
 
-/// The server says nothing that it did not say then.
+/// Checks that the server sends no more than it did then.
 fn nothing_more(mut stream: TcpStream) -> Result<(), String> {
     let _ = stream.shutdown(Shutdown::Write);
     let mut rest = Vec::new();
@@ -116,8 +116,8 @@ fn every_recorded_client_is_answered_as_it_was() {
     }
 }
 
-/// Were it another one, the test above would say so: of each session the last answer is changed in one bit, and
-/// what the simulation saw.
+/// The test above detects a different answer: in each session one bit of the last answer is changed, and the values
+/// that the simulation saw.
 #[test]
 fn another_answer_is_found() {
     for (name, session) in sessions() {

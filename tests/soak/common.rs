@@ -1,4 +1,4 @@
-//! What the soaks share: how long they last, what they ask a driver, and what must not have happened to it.
+//! The common parts of the soaks: their duration, requests to a driver, and checks of its state.
 
 use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use tickbus::time::Monotonic;
 pub use tickbus_conformance::resources::Resources;
 pub use tickbus_conformance::rig::{address, eventually, statistic};
 
-/// When it is over: some seconds from now, or what `make soak` asks for.
+/// The end of the soak: some seconds from now, or as requested by `make soak`.
 pub fn end() -> Instant {
     let seconds = std::env::var("TICKBUS_SOAK_SECONDS").map_or(5, |text| {
         text.parse().expect("TICKBUS_SOAK_SECONDS is a number")
@@ -45,12 +45,12 @@ pub fn count(driver: &Driver, key: &str) -> u64 {
     statistic(driver, key).map_or(0, |text| text.parse().expect("a count"))
 }
 
-/// What the process holds when the last peer is forgotten.
+/// The resources of the process when the last peer is forgotten.
 pub fn rest() -> Resources {
     Resources::settled(|| {})
 }
 
-/// A sign of life in a soak of hours.
+/// A sign of life in soaks that last for hours.
 pub struct Told(Instant);
 
 impl Told {
@@ -58,7 +58,7 @@ impl Told {
         Self(Instant::now())
     }
 
-    /// Says how it goes, every 30 s.
+    /// Reports the progress, every 30 s.
     pub fn tell(&mut self, how: impl FnOnce() -> String) {
         if self.0.elapsed() > Duration::from_secs(30) {
             self.0 = Instant::now();
@@ -67,7 +67,7 @@ impl Told {
     }
 }
 
-/// Nothing has failed for a reason that no peer gives.
+/// Checks that every failure has a reason that a peer gave.
 #[track_caller]
 pub fn assert_all_explained(driver: &Driver) {
     for unexplained in [

@@ -29,7 +29,7 @@ impl Page {
         }
     }
 
-    /// Asks with the token; gives the status and the body.
+    /// Sends a request with the token; returns the status and the body.
     fn ask(&self, line: &str, body: &str) -> (String, String) {
         let Self { address, token } = self;
         let mut stream = TcpStream::connect(address).expect("it listens");
@@ -47,14 +47,14 @@ impl Page {
         (status.to_owned(), body.to_owned())
     }
 
-    /// What stands of the run at this path.
+    /// The document of the run at this path.
     fn run(&self, path: &str) -> Value {
         let (_, body) = self.ask(&format!("GET {path}"), "");
         let mut all: Value = serde_json::from_str(&body).expect("JSON");
         all["drivers"][0].take()
     }
 
-    /// Waits until the line has this state, and a reason that begins so.
+    /// Waits until the line has this state, and a reason that begins like this.
     fn await_line(&self, state: &str, reason: &str) -> Value {
         eventually(&format!("the run is {state}: {reason}"), || {
             let line = self.run("/line");
@@ -83,7 +83,7 @@ impl Page {
     }
 }
 
-/// A client that writes a value of each kind, and finishes a step when it is told to.
+/// A client that writes a value of each kind, and finishes a step when told to.
 struct Machine(Receiver<()>);
 
 impl Participant for Machine {
@@ -116,7 +116,7 @@ impl Participant for Machine {
     }
 }
 
-/// A client that looks at the machine in every second step, and writes what is in the way of a page.
+/// A client that reads the machine in every second step, and writes values that are difficult for a page.
 struct Plc;
 
 const MARKUP: &str = "<img src=x onerror=alert(1)>";
@@ -169,7 +169,7 @@ fn the_page_shows_a_run_its_clients_and_its_variables() {
             (depth["value"] == -5 && depth["raw"] == "16#FFFB").then_some(())
         });
 
-        // A client that takes long is told by its name, while the run waits for it.
+        // The page names a slow client, while the run waits for it.
         sync.say("step 3");
         let line = page.await_line("stale", "\"machine\" has not finished step 1 for ");
         assert!(
@@ -207,7 +207,7 @@ fn the_page_shows_a_run_its_clients_and_its_variables() {
             (&1.into(), &false.into())
         );
 
-        // The run would be another one.
+        // The run would then be a different one.
         let (status, told) = page.ask("PUT /force/1/on", "FALSE");
         assert_eq!(status, "409", "{told}");
         assert!(told.contains("have a client write it"), "{told}");
@@ -229,7 +229,7 @@ fn the_page_shows_a_run_its_clients_and_its_variables() {
     let (last, code) = sync.end();
     assert!(last.starts_with("sync: ok steps=3 time=20ms "), "{last}");
     assert_eq!(code, Some(0));
-    // Logs are shown to others: they have the address, and not what permits to change something.
+    // Logs are shown to others: they contain the address, but not the token that permits changes.
     let mut log = String::new();
     stderr.read_to_string(&mut log).expect("text");
     assert!(

@@ -73,7 +73,7 @@ impl Bus for Boards {
 
 conformance!(suite, crate::Boards::new());
 
-/// All calls with the board's watchdog that are independent of others.
+/// All calls with the board's watchdog that are independent of the other board.
 const CALLS: [&str; 11] = [
     "DDI_DevOpenNode(IBB1N1_M, 3)",
     "DDI_DevOpenNode(IBB1N1_D, 3)",

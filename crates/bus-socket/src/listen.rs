@@ -241,7 +241,7 @@ impl Server<'_> {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
         }
-        // Its bytes wait for the next look, and may have waited as long as the connection.
+        // Bytes of the client wait for the next look, and may have waited as long as the connection.
         port.look_leaves_some();
         let connection = Connection::new(peer, self.terms, port);
         let reason = format!("{peer} has connected; waiting for its first record");

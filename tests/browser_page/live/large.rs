@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{END, Machine, open, wait_shown};
 use crate::assert_quiet;
 
-/// So many signals, half of them `%I` words and half `%Q` bits.
+/// `count` signals, half of them `%I` words and half `%Q` bits.
 fn many(count: usize) -> String {
     let mut text = String::new();
     for n in 0..count / 2 {
@@ -26,7 +26,7 @@ fn ten_thousand_signals_are_scrolled_filtered_and_chosen() {
     let browser = open(&machine, 1280, 800);
     let rows = "Array.from(document.querySelectorAll('.row.signal')).filter((it) => !it.hidden)";
     browser.wait("document.getElementById('found').textContent === '10,000 signals'");
-    // Through all of them, a page in each picture.
+    // Scrolls through all of them, a page in each frame.
     browser.run(
         "const list = document.getElementById('list'); for (let top = 0; top < list.scrollHeight; top += 5000) { list.scrollTop = top; \
          await new Promise((go) => requestAnimationFrame(go)); }",

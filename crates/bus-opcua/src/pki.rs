@@ -76,7 +76,7 @@ impl Pki {
     ///
     /// # Errors
     ///
-    /// They cannot be created, or the existing certificate belongs to another application or has expired.
+    /// A part cannot be created, or the existing certificate belongs to another application or has expired.
     pub(super) fn prepare(&self) -> Result<(), BusError> {
         let cannot = |error: io::Error| {
             let folder = self.folder.display();
@@ -135,7 +135,7 @@ impl Pki {
             },
         };
         Err(BusError::Refused(format!(
-            "the own certificate \"{}\" cannot be used ({why}); delete it, and it is made anew for {}",
+            "the own certificate \"{}\" cannot be used ({why}); delete it, and a new one is made for {}",
             file.display(),
             self.uri
         )))
@@ -189,7 +189,7 @@ impl Pki {
             Ok(()) => Ok(()),
             Err(why) => refused(format!(
                 "the certificate of the server is not good ({why}); give the server a new one, or write \
-                 trust = \"any\" to take it all the same"
+                 trust = \"any\" to accept it anyway"
             )),
         }
     }

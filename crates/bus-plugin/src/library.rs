@@ -63,7 +63,7 @@ impl Library {
         if version != abi::VERSION {
             return Err(BusError::Protocol(format!(
                 "{name} is made for version {version} of the plug-in interface, this tickbus has version \
-                 {}; build it anew with the include/tickbus_fieldbus.h of this tickbus",
+                 {}; rebuild it with the include/tickbus_fieldbus.h of this tickbus",
                 abi::VERSION
             )));
         }

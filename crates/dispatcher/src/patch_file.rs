@@ -11,7 +11,7 @@ use crate::patch::{Patch, Pin};
 
 /// The heading of a file written here.
 const HEADING: &str = "\
-# The patch of a tickbus dispatcher, input = output. It is written anew with every CONNECT and DISCONNECT: edit it only
+# The patch of a tickbus dispatcher, input = output. It is rewritten with every CONNECT and DISCONNECT: edit it only
 # while the dispatcher does not run.
 [patch]
 ";

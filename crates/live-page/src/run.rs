@@ -328,7 +328,7 @@ fn hung(silent: Nanos) -> Told {
         state: LinkState::Stale,
         cause: Cause::Silent,
         reason: format!(
-            "the server has shown nothing for {}; it waits for whoever reads its output, or hangs",
+            "the server has shown nothing for {}; it waits for the reader of its output, or hangs",
             silent.rounded()
         ),
         is_hung: true,

@@ -227,7 +227,7 @@ pub fn interval(program: &dyn Program, stated: Option<Nanos>) -> Nanos {
     if interval != own && HostedProgram::is_path(program.name()) {
         log::warn!(
             "the PLC program \"{}\" was compiled for a scan every {own} and gets one every {interval}: its \
-             timers are right all the same, but its tasks run at other intervals than they state",
+             timers are still right, but its tasks run at other intervals than they state",
             program.name()
         );
     }

@@ -51,7 +51,7 @@ pub(crate) fn prepare(
         Ok(document) => document,
         Err(error) => {
             let what = format!("this XML cannot be read: {error}");
-            wrong.report(0, what, "export it anew from the PLC's editor");
+            wrong.report(0, what, "export it again from the PLC's editor");
             return None;
         }
     };
@@ -261,7 +261,7 @@ impl<'a, 'i> Project<'a, 'i> {
         let mut resources = self.named("resource");
         let Some(resource) = resources.next() else {
             let right =
-                "add it in the editor and export the project anew: intervals are taken from there";
+                "add it in the editor and export the project again: intervals are taken from there";
             let at = self.root.range().start;
             self.wrong
                 .report(at, "there is no resource with tasks", right);

@@ -174,7 +174,7 @@ pub enum RecorderError {
     Thread(std::io::Error),
 }
 
-/// Whether `path` is a named pipe: opening it would block until someone reads from it.
+/// True if `path` is a named pipe: opening one would block until someone reads from it.
 #[cfg(unix)]
 fn is_pipe(path: &Path) -> bool {
     use std::os::unix::fs::FileTypeExt as _;

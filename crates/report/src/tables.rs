@@ -180,7 +180,7 @@ pub(super) fn distributions(distributions: &[Distribution]) -> Markup {
             }
         }
     };
-    let caption = "Percentiles; in the figure, the box is p50 to p90, the line goes on to p99, the dot is the maximum";
+    let caption = "Percentiles; in the figure, the box is p50 to p90, the line extends to p99, the dot is the maximum";
     let headings = [
         "Distribution",
         ">Count",

@@ -61,7 +61,7 @@ impl ClientSession<'_> {
                 match &trouble {
                     Some(trouble) => {
                         let error = BusError::Link(trouble.clone());
-                        port.lost(&error, "it goes on when there is one");
+                        port.lost(&error, "it continues when there is one");
                     }
                     None => port.running(&self.running),
                 }

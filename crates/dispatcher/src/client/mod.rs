@@ -351,8 +351,8 @@ impl Client {
         let name = &self.profile.name;
         if code == Code::TimeOut.number() {
             return Err(ClientError::Refused(format!(
-                "the dispatcher has disconnected \"{name}\" ({text}); see whether this computer was held up, and connect \
-                 anew"
+                "the dispatcher has disconnected \"{name}\" ({text}); see whether this computer was held up, and \
+                 reconnect"
             )));
         }
         let mut cable = None;

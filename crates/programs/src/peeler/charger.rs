@@ -6,7 +6,7 @@
 //! |---|---|
 //! | feeding | the gate lets a block onto step 1; a stroke of the step feeder takes every block one step on |
 //! | centring | the linear feeder brings a block; its two ends are measured; the spindles rise to its axis, grip it, lift it and bring it to the transfer arm |
-//! | transfer | the clamps take it; the arm brings it to the lathe once that is ready, lets go when the lathe holds it, and comes back |
+//! | transfer | the clamps take it; the arm brings it to the lathe once that is ready, releases it when the lathe holds it, and returns |
 
 use std::sync::atomic::Ordering::Relaxed;
 

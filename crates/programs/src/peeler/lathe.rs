@@ -5,7 +5,7 @@
 //! | home | everything opens and draws back | all is there |
 //! | ready | the charger may come | a block is presented |
 //! | clamp | the spindles close | both have stood on the block for 100 ms |
-//! | clear | the charger lets go and draws back | nothing of it is in the way |
+//! | clear | the charger releases it and draws back | nothing of it is in the way |
 //! | approach | knife and rolls come near, the block begins to turn | it turns |
 //! | round up | the knife takes a thick veneer per turn, the rolls follow | the block is round |
 //! | peel | veneer | the core is reached |

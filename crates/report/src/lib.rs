@@ -21,6 +21,6 @@ mod tables;
 
 pub use file::{page_beside, write_file};
 pub use from::read;
-pub use page::{Contents, DRAW, LOOKUP, STYLE, write};
+pub use page::{Contents, DRAW, LOOKUP, STYLE, still_head, write};
 pub use run::{Change, DEFAULT_BUDGET, Mark, MarkKind, Run, Signal, SignalKind};
 pub use statistics::RunStatistics;

@@ -15,6 +15,18 @@ const TEMPLATE: &str = include_str!("template.html");
 const CHART: &str = include_str!("chart.html");
 /// The style of the page, for other pages with the same look.
 pub const STYLE: &str = include_str!("style.css");
+
+/// Lets a page load nothing.
+const ALONE: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+
+/// The head of a page without scripts, which loads nothing: with [`STYLE`], and `own_style` after it.
+pub fn still_head(title: &'static str, own_style: &'static str) -> String {
+    format!(
+        "<head><meta charset=\"utf-8\"><meta http-equiv=\"Content-Security-Policy\" content=\"{ALONE}\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\"><meta name=\"color-scheme\" content=\"light dark\">\
+         <link rel=\"icon\" href=\"data:,\"><title>{title}</title><style>{STYLE}{own_style}</style></head>"
+    )
+}
 /// The script that finds values by their time. Its beginning states its needs.
 pub const LOOKUP: &str = include_str!("lookup.js");
 /// The script that draws signals over time, for scripts that come after [`LOOKUP`].

@@ -20,6 +20,22 @@ pub enum Bus {
 }
 
 impl Bus {
+    /// The names of all.
+    pub(crate) const NAMES: [&str; 7] = [
+        "loopback",
+        "socket",
+        "on change",
+        "modbus",
+        "modbus rtu",
+        "s7",
+        "dispatcher",
+    ];
+
+    /// The name, as a feature of a world.
+    pub(crate) fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
     /// Whether one end asks and the other answers.
     pub(crate) fn asks(self) -> bool {
         matches!(self, Self::Modbus | Self::ModbusRtu | Self::S7)

@@ -102,6 +102,18 @@ impl Plan {
         Some((every, is_watched.then_some(within)))
     }
 
+    /// The watchdog of an end, as docs/driver-cfg.md has it.
+    pub(crate) fn watchdog(&self, end: usize) -> Option<Nanos> {
+        match self.ends[end].watchdog {
+            Watchdog::After(limit) => Some(limit),
+            Watchdog::Default if end == 1 => {
+                let least = self.max_age.max(self.cycle.times(10));
+                Some(least.max(Nanos::from_millis(250)))
+            }
+            Watchdog::Off | Watchdog::Default => None,
+        }
+    }
+
     /// The signs of life of an end.
     fn life_signs(&self, end: usize) -> Vec<String> {
         let areas = ['I', 'Q'];

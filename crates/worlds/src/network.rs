@@ -98,6 +98,8 @@ pub(crate) struct Network {
     ports: u16,
     /// Until when the cable is pulled.
     cut_until: i64,
+    /// When the newest connection of each process was made, though it may have ended.
+    last_connected: BTreeMap<usize, i64>,
     /// What each process has read.
     pub(crate) deliveries: BTreeMap<usize, Vec<Delivery>>,
 }
@@ -122,8 +124,10 @@ impl End {
 impl Network {
     /// When the newest connection of a process was made.
     pub(crate) fn last_connected(&self, process: usize) -> i64 {
-        let ends = self.ends.values().filter(|end| end.process == process);
-        ends.map(|end| end.connected).max().unwrap_or_default()
+        self.last_connected
+            .get(&process)
+            .copied()
+            .unwrap_or_default()
     }
 
     fn identity(&mut self) -> u64 {
@@ -244,6 +248,8 @@ impl Network {
         };
         listening.waiting.push_back(other);
         let theirs = listening.process;
+        self.last_connected.insert(process, back);
+        self.last_connected.insert(theirs, there);
         self.ends
             .insert(one, end(process, own, address, other, back, None));
         self.ends

@@ -1,14 +1,13 @@
 //! The page of a run: its figures, which features have met, and what was found.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use tickbus_report::STYLE;
+use tickbus_report::still_head;
 
 use crate::pairs::{never_meet, possible};
 use crate::plan::all_features;
 use crate::run::{Finding, Run};
 
 const OWN_STYLE: &str = include_str!("page.css");
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
 
 /// The number of findings that the page shows: a defect that breaks every world would fill it otherwise.
 const SHOWN: usize = 200;
@@ -36,15 +35,7 @@ impl Page<'_> {
         let page = html! {
             (DOCTYPE)
             html lang="en" {
-                head {
-                    meta charset="utf-8";
-                    meta http-equiv="Content-Security-Policy" content=(POLICY);
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    link rel="icon" href="data:,";
-                    title { (title) }
-                    style { (PreEscaped(STYLE)) (PreEscaped(OWN_STYLE)) }
-                }
+                (PreEscaped(still_head(title, OWN_STYLE)))
                 body {
                     header {
                         h1 { (title) }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 
+use crate::bus::Bus;
 use crate::features;
 use crate::plan::{Plan, all_features};
 
@@ -11,17 +12,6 @@ static NUMBERS: LazyLock<BTreeMap<&'static str, usize>> = LazyLock::new(|| {
     let names = all_features().into_iter().enumerate();
     names.map(|(number, name)| (name, number)).collect()
 });
-
-/// The buses, of which a world has one.
-const BUSES: [&str; 7] = [
-    "loopback",
-    "socket",
-    "on change",
-    "modbus",
-    "modbus rtu",
-    "s7",
-    "dispatcher",
-];
 
 /// Other features that no world has together, with the reason.
 const APART: [(&[&str], &[&str], &str); 4] = [
@@ -118,7 +108,7 @@ pub(crate) fn possible() -> usize {
 
 /// Why no world has both features; `None` if one can.
 pub(crate) fn never_meet(one: &str, other: &str) -> Option<&'static str> {
-    let is_bus = |name| BUSES.contains(&name);
+    let is_bus = |name| Bus::NAMES.contains(&name);
     if is_bus(one) && is_bus(other) {
         return Some("a world has one bus");
     }

@@ -347,15 +347,7 @@ impl Plan {
 
     /// The names of its features, for the table of pairs that have met.
     pub fn features(&self) -> Vec<&'static str> {
-        let mut features = vec![match self.bus {
-            Bus::Loopback => "loopback",
-            Bus::Socket => "socket",
-            Bus::SocketOnChange => "on change",
-            Bus::Modbus => "modbus",
-            Bus::ModbusRtu => "modbus rtu",
-            Bus::S7 => "s7",
-            Bus::Dispatcher => "dispatcher",
-        }];
+        let mut features = vec![self.bus.name()];
         let mut add = |is: bool, name| {
             if is {
                 features.push(name);
@@ -409,17 +401,10 @@ impl Plan {
 
 /// All features that a world can have, each of the buses one.
 pub(crate) fn all_features() -> Vec<&'static str> {
-    [FEATURES, features::NAMES].concat()
+    [&Bus::NAMES[..], FEATURES, features::NAMES].concat()
 }
 
 const FEATURES: &[&str] = &[
-    "loopback",
-    "socket",
-    "on change",
-    "modbus",
-    "modbus rtu",
-    "s7",
-    "dispatcher",
     "stations",
     "controller serves",
     "hold",

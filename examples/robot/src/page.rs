@@ -4,14 +4,13 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use tickbus_report::STYLE;
+use tickbus_report::still_head;
 
 use crate::experiment::{Experiment, Kind, LOCK_STEP_ERROR};
 use crate::metrics::{Metrics, thinned};
 use crate::path::{CORNERS, Point};
 
 const OWN_STYLE: &str = include_str!("page.css");
-const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
 
 /// A picture of the page: its heading, the experiment that it shows, and what one sees.
 #[derive(Clone, Copy, Debug)]
@@ -39,15 +38,7 @@ pub fn write(
     let page = html! {
         (DOCTYPE)
         html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                link rel="icon" href="data:,";
-                title { (title) }
-                style { (PreEscaped(STYLE)) (PreEscaped(OWN_STYLE)) }
-            }
+            (PreEscaped(still_head(title, OWN_STYLE)))
             body {
                 header {
                     h1 { (title) }

@@ -60,8 +60,8 @@ struct Wire {
     came: bool,
     went: bool,
     out: Outgoing,
-    /// What became of the frame that came last.
-    newest: Newest,
+    /// The outcome of the newest received frame.
+    newest: Outcome,
     /// Received frames that are held back.
     waiting: Option<Ring>,
     /// When the last of them came.
@@ -90,12 +90,12 @@ impl Taken {
     }
 }
 
-/// What became of a frame that came in.
+/// The outcome of a received frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Newest {
-    /// It was handed on, or waits.
+enum Outcome {
+    /// Handed on, or held back.
     Handed,
-    /// It was lost, and the fault that lost it is still active.
+    /// Lost by a fault that is still active.
     Lost,
 }
 
@@ -122,7 +122,7 @@ impl LineFaults {
             came: true,
             went: true,
             out: Outgoing::new(shape.last_sent, shape.latched, taken),
-            newest: Newest::Handed,
+            newest: Outcome::Handed,
             waiting: None,
             released: Nanos(i64::MIN),
             rx_len: shape.rx_len,
@@ -212,7 +212,7 @@ impl LineFaults {
         self.sum = sum;
         for wire in &mut self.stations {
             if !loses {
-                wire.newest = Newest::Handed;
+                wire.newest = Outcome::Handed;
             }
         }
         if sum.down {
@@ -268,8 +268,8 @@ impl LineFaults {
         lost
     }
 
-    /// Whether the previous frames are sent again at `now` instead of new ones. Decided once for all stations of a
-    /// cycle.
+    /// Returns true if the previous frames are sent again at `now` instead of new ones. One decision holds for all stations
+    /// of a cycle.
     pub fn repeats(&mut self, station: usize, now: Nanos) -> bool {
         if std::mem::replace(&mut self.stations[station].went, true) {
             for (index, wire) in self.stations.iter_mut().enumerate() {
@@ -363,8 +363,8 @@ impl LineFaults {
         }
         let wire = &mut self.stations[station];
         wire.newest = match self.fate {
-            Fate::Lost => Newest::Lost,
-            _ => Newest::Handed,
+            Fate::Lost => Outcome::Lost,
+            _ => Outcome::Handed,
         };
         let Fate::Passes(times) = self.fate else {
             return self.fate;
@@ -433,7 +433,7 @@ impl LineFaults {
     pub fn withholds(&self, station: usize) -> bool {
         let wire = &self.stations[station];
         let ring = wire.waiting.as_ref();
-        wire.newest == Newest::Lost || ring.is_some_and(|ring| !ring.is_empty())
+        wire.newest == Outcome::Lost || ring.is_some_and(|ring| !ring.is_empty())
     }
 
     /// When the next received frame is due; [`Nanos::MAX`] if none is held back.

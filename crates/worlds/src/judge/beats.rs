@@ -5,7 +5,7 @@ use super::reader::Reader;
 use super::seen::{Seen, Shown};
 use super::writer::Writer;
 use super::{Broken, Stamp, broken};
-use crate::plan::{FAIL_SAFE, Misfortune, Plan};
+use crate::plan::{Bus, FAIL_SAFE, Misfortune, Plan};
 
 impl Reader {
     /// Judges the heartbeat that is shown with a stamp.
@@ -91,7 +91,8 @@ impl Reader {
 /// For how long an end is suspended: what it wrote right before goes out right behind that.
 pub(super) fn suspended(plan: &Plan, end: usize) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
-        Misfortune::Suspend(process, span) if process == end => span.0,
+        // Both ends of a loopback are one process.
+        Misfortune::Suspend(process, span) if process == end || plan.bus == Bus::Loopback => span.0,
         _ => 0,
     });
     spans.sum()

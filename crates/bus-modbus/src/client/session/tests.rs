@@ -45,6 +45,16 @@ struct Client {
 }
 
 impl Client {
+    /// Two connections end while the device is asked who it is.
+    fn hang_up_twice(&mut self) {
+        for _ in 0..2 {
+            let mut line = self.connect(tcp());
+            line.read();
+            assert_eq!(line.asked(), WHO);
+            assert!(line.poll.hung_up());
+        }
+    }
+
     /// Units from 1 on, with two bytes in each direction, which may write to `write_to`.
     fn new(stations: usize, reads: &[Piece], writes: &[Piece], write_to: Option<&str>) -> Self {
         for words in [
@@ -281,12 +291,7 @@ fn a_device_that_is_silent_when_asked_who_it_is_is_read_and_counts_as_nameless_a
 #[test]
 fn a_device_that_hangs_up_when_asked_who_it_is_is_not_asked_on_the_third_connection() {
     let mut client = Client::new(1, &[register(5)], &[register(0)], Some(FALLBACK));
-    for _ in 0..2 {
-        let mut line = client.connect(tcp());
-        line.read();
-        assert_eq!(line.asked(), WHO);
-        assert!(line.poll.hung_up());
-    }
+    client.hang_up_twice();
     let mut line = client.connect(tcp());
     line.read();
     line.write_and_read();
@@ -301,12 +306,7 @@ fn a_device_that_hangs_up_when_asked_who_it_is_is_not_asked_on_the_third_connect
 fn a_device_whose_connections_broke_while_it_was_asked_who_it_is_is_asked_again_if_another_one_is_named()
  {
     let mut client = Client::new(1, &[register(5)], &[register(0)], Some("tickbus 7"));
-    for _ in 0..2 {
-        let mut line = client.connect(tcp());
-        line.read();
-        assert_eq!(line.asked(), WHO);
-        assert!(line.poll.hung_up());
-    }
+    client.hang_up_twice();
     let mut line = client.connect(tcp());
     line.read();
     line.read();

@@ -1,8 +1,8 @@
 package tickbus;
 
 /**
- * A fault injected into a driver, such as a stuck signal or a broken line. It comes from a
- * {@code [[fault]]} section of driver.cfg or from {@link Tickbus#inject}.
+ * A fault injected into a driver, such as a stuck signal or a broken line, by a {@code [[fault]]} section of driver.cfg or
+ * by {@link Tickbus#inject}.
  *
  * <pre>{@code
  * InjectedFault stuck = bus.inject("""
@@ -14,16 +14,16 @@ package tickbus;
  * stuck.end();
  * }</pre>
  *
- * <p>It can be used by any thread, like {@link Tickbus#statistics}.
+ * <p>Any thread can use a fault, as it can call {@link Tickbus#statistics}.
  */
 public final class InjectedFault implements AutoCloseable {
     /** The state of a fault. */
     public enum State {
-        /** It has not begun, or may begin again. */
+        /** The fault has not begun, or can begin again. */
         WAITING,
-        /** It has its effect. */
+        /** The fault has its effect. */
         ACTIVE,
-        /** It is over for good. */
+        /** The fault is over for good. */
         OVER
     }
 
@@ -42,34 +42,34 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * Its number.
+     * The fault's number.
      *
-     * @return numbers from 1, in order of injection
+     * @return counts from 1, in order of injection
      */
     public int id() {
         return id;
     }
 
     /**
-     * Its name.
+     * The fault's name.
      *
-     * @return as in its section, or derived from what it does
+     * @return as in the fault's section, or derived from its effect
      */
     public String name() {
         return name;
     }
 
     /**
-     * Its kind.
+     * The fault's kind.
      *
-     * @return as in its section, such as {@code link-down}
+     * @return as in the fault's section, such as {@code link-down}
      */
     public String kind() {
         return kind;
     }
 
     /**
-     * Its state.
+     * The fault's state.
      *
      * @return as of the last exchange
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
@@ -79,9 +79,9 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * Whether it has its effect.
+     * Returns whether the fault has its effect.
      *
-     * @return as of the last exchange
+     * @return true if active, as of the last exchange
      * @throws FieldbusException as {@link #state}
      */
     public boolean isActive() {
@@ -89,7 +89,7 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * How often it has begun.
+     * How often the fault has begun.
      *
      * @return 0 for never
      * @throws FieldbusException as {@link #state}
@@ -99,7 +99,7 @@ public final class InjectedFault implements AutoCloseable {
     }
 
     /**
-     * Ends it at the next exchange, which has the true values again. A fault that has not begun yet never will.
+     * Ends the fault at the next exchange, which has the true values again. A fault that has not begun yet never will.
      *
      * @throws FieldbusException as {@link #state}
      */
@@ -119,7 +119,7 @@ public final class InjectedFault implements AutoCloseable {
         }
     }
 
-    /** Name, kind, and what it does. */
+    /** Name, kind and effect. */
     @Override
     public String toString() {
         return name + " (" + kind + "): " + what;

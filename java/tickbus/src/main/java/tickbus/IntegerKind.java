@@ -19,7 +19,7 @@ enum IntegerKind {
         return (slot >>> 1 | slot & 1) * 2.0;
     }
 
-    /** Whether the value, rounded with halves away from zero, fits. */
+    /** True if the value, rounded with halves away from zero, fits. */
     boolean holds(double value) {
         return this == SIGNED ? value >= -0x1p63 && value < 0x1p63 : value > -0.5 && value < 0x1p64;
     }

@@ -8,8 +8,8 @@ import java.util.ArrayList;
 import java.util.List;
 
 /**
- * The shared buffer, and the driver's description of it: filled once by the native library while a driver is being
- * opened. The native library calls the methods by name.
+ * The shared buffer, and the driver's description of it. The native library fills it once, while a driver is being opened,
+ * and calls the methods by name.
  *
  * <p>The buffer is a header of 8-byte words in native byte order, followed by the slots: one per signal, then one for
  * the edges of each latched signal that the simulation reads.
@@ -48,7 +48,7 @@ final class Layout {
         return buffer;
     }
 
-    /** Memory for a driver that is described and not opened. */
+    /** Memory for a driver that is described but not opened. */
     void allocateAlone() {
         int slots = signals.size() + (int) signals.stream().filter(signal -> signal.edgesSlot() >= 0).count();
         allocate((SLOTS + slots) * Long.BYTES);
@@ -76,7 +76,7 @@ final class Layout {
         return words.slice(SLOTS, slotCount());
     }
 
-    /** The slots as doubles, which all of them are except unscaled 64-bit integers. */
+    /** The slots as doubles. All are doubles except unscaled 64-bit integers. */
     DoubleBuffer doubles() {
         return doubles.slice(SLOTS, slotCount());
     }
@@ -97,7 +97,7 @@ final class Layout {
         return signals;
     }
 
-    /** Throws if the native library is of another version than these classes. */
+    /** Throws if the native library and these classes differ in version. */
     void check() {
         long version = words.get(WORD_VERSION);
         if (version != VERSION) {

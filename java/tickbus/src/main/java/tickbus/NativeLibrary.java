@@ -14,8 +14,8 @@ import java.util.Locale;
 /**
  * Finds and loads the native library, once per class loader.
  *
- * <p>It looks for the file named by the system property {@code tickbus.library} (and then nowhere else); in the
- * directory named by {@code tickbus.native.dir}; beside the jar; inside the jar; in this order.
+ * <p>Searches, in this order: the file named by the system property {@code tickbus.library} (and then nowhere else); the
+ * directory named by {@code tickbus.native.dir}; the folder of the jar; the jar itself.
  */
 final class NativeLibrary {
     static final String LIBRARY = "tickbus.library";
@@ -27,13 +27,13 @@ final class NativeLibrary {
     private final String file = System.mapLibraryName("tickbus");
     private final String platform = platform(System.getProperty("os.name"), System.getProperty("os.arch"));
     private final List<String> tried = new ArrayList<>();
-    /** Whether the library was to be extracted to the temporary folder. */
+    /** True if the library was to be extracted to the temporary folder. */
     private boolean extracts;
 
     private NativeLibrary() {
     }
 
-    /** Loads the library unless it is loaded; after a failure it may be tried again. */
+    /** Loads the library unless it is loaded. A later call can try again after a failure. */
     static synchronized void load() {
         if (!loaded) {
             new NativeLibrary().search();
@@ -85,7 +85,7 @@ final class NativeLibrary {
             Path directory = Files.isDirectory(classes) ? classes : classes.getParent();
             return fromFile(place, directory.resolve(file).toString());
         } catch (URISyntaxException | RuntimeException e) {
-            // A class loader may give its classes no location, or one that is not a file.
+            // A class loader need not give its classes a location, or gives one that is not a file.
             tried.add(place + ": the classes do not come from a file (" + e + ")");
             return false;
         }

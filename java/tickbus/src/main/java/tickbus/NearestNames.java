@@ -5,7 +5,7 @@ import java.util.List;
 import java.util.Locale;
 import java.util.stream.Collectors;
 
-/** Finds existing names that may have been meant by an unknown one. */
+/** Finds the existing names that an unknown name resembles. */
 final class NearestNames {
     private static final int SHOWN = 3;
 

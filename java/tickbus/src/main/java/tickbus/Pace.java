@@ -6,7 +6,7 @@ import java.util.function.LongConsumer;
 import java.util.function.LongSupplier;
 
 /**
- * Paces a loop by the computer's clock, for a PLC in real time: one turn in each period, the first one at once.
+ * Paces a loop by the computer's clock, for a PLC in real time: one turn per period, the first one at once.
  *
  * <pre>{@code
  * Pace pace = Pace.every(Duration.ofMillis(10));
@@ -17,8 +17,8 @@ import java.util.function.LongSupplier;
  * }
  * }</pre>
  *
- * <p>A late turn does not delay the next one. Turns that were missed, as on a busy computer, are left out: a burst would
- * only carry outdated values. {@link #lagNanos} and {@link #missed} report both. For one thread.
+ * <p>A late turn does not delay the next one. Missed turns, as on a busy computer, are skipped: a burst would only carry
+ * outdated values. {@link #lagNanos} and {@link #missed} report both. For one thread.
  */
 public final class Pace {
     private final long period;
@@ -53,7 +53,8 @@ public final class Pace {
     /**
      * Waits until the next turn is due.
      *
-     * @return when it was due, in nanoseconds since the first turn: the simulation's time, if it keeps pace with the clock
+     * @return when the turn was due, in nanoseconds since the first turn: the simulation's time, if it keeps pace with the
+     * clock
      * @throws InterruptedException if this thread is interrupted
      */
     public long await() throws InterruptedException {
@@ -78,7 +79,7 @@ public final class Pace {
     }
 
     /**
-     * By how much the last turn began late.
+     * How late the last turn began.
      *
      * @return nanoseconds
      */
@@ -87,7 +88,7 @@ public final class Pace {
     }
 
     /**
-     * How many turns were left out so far.
+     * How many turns were skipped so far.
      *
      * @return counts from 0
      */

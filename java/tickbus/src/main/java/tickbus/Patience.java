@@ -2,12 +2,12 @@ package tickbus;
 
 import java.util.function.Supplier;
 
-/** Calls that wait for another thread's. */
+/** Calls that wait for another thread's call. */
 final class Patience {
     private Patience() {
     }
 
-    /** Makes a call again and again until no other thread is in its way. */
+    /** Repeats a call until no other thread is using the driver. */
     static <T> T untilIdle(Supplier<T> call) {
         while (true) {
             try {
@@ -18,7 +18,7 @@ final class Patience {
         }
     }
 
-    /** Lets a call that met another thread's be tried again; throws what is no such meeting. */
+    /** Pauses before a refused call is repeated; rethrows every exception but BUSY. */
     static void waitAfter(FieldbusException e) {
         if (e.status() != Status.BUSY) {
             throw e;

@@ -6,10 +6,10 @@ import java.nio.LongBuffer;
  * A handle on one signal of an open driver.
  *
  * <p>Get it once by {@link Tickbus#signal(String)} and keep it; getters and setters neither allocate nor look
- * anything up. They work on the memory shared with the driver: a value that is set is sent to the PLC with the next
- * {@link Tickbus#send()} or {@link Tickbus#exchange()}, a value that is read came with the last {@link
- * Tickbus#receive()} or {@code exchange()}. They belong to the ticking thread, and throw {@link FieldbusException}
- * with {@link Status#CLOSED} once the driver is closed.
+ * anything up. They work on the memory shared with the driver: a value set here is sent to the PLC with the next {@link
+ * Tickbus#send()} or {@link Tickbus#exchange()}; a value read here came with the last {@link Tickbus#receive()} or {@code
+ * exchange()}. They belong to the ticking thread, and throw {@link FieldbusException} with {@link Status#CLOSED} once the
+ * driver is closed.
  */
 public final class Signal {
     /** Beyond this, not every integer is a double. */
@@ -23,8 +23,8 @@ public final class Signal {
     /** Null if the slot holds a double. */
     private final IntegerKind integer;
     /**
-     * The signal's slot if it can be read, or written, as a double without further checks; else -1. A single
-     * comparison thus covers all checks of the common case.
+     * The signal's slot if it can be read, or written, as a double without further checks; else -1. One comparison thus
+     * covers all checks of the common case.
      */
     private int getAt;
     private int setAt;
@@ -85,7 +85,7 @@ public final class Signal {
             throw new IllegalArgumentException(
                 "signal '" + name() + "' cannot be set to " + value + "; a finite number is needed");
         }
-        // The value is finite here, so that the fail-safe value is not needed.
+        // The value is finite here, so conversion never uses the fail-safe value.
         slots.put(entry.slot(), bus.conversions().slot(integer, value, 0));
     }
 
@@ -133,8 +133,8 @@ public final class Signal {
     /**
      * The signal's value as an integer.
      *
-     * @return exact for every unscaled integer type; an LWORD or ULINT is to be read as unsigned. For other values
-     * the nearest integer, halves away from zero.
+     * @return exact for every unscaled integer type; read an LWORD or ULINT as unsigned. For other values the nearest
+     * integer, halves away from zero.
      */
     public long getLong() {
         bus.mustBeOpen();
@@ -231,16 +231,16 @@ public final class Signal {
     }
 
     /**
-     * Whether this end writes the signal: a {@code %I} when we are the machine.
+     * Returns whether this end writes the signal: a {@code %I} if this end is the machine.
      *
-     * @return false if this end reads it
+     * @return true if this end writes the signal, false if it reads it
      */
     public boolean isWritten() {
         return entry.written();
     }
 
     /**
-     * Whether {@link #edges()} are counted.
+     * Returns whether {@link #edges()} are counted.
      *
      * @return true for a signal with {@code latch} that this end reads
      */

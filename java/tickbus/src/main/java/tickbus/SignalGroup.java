@@ -4,13 +4,13 @@ import java.nio.DoubleBuffer;
 import java.nio.LongBuffer;
 import java.util.List;
 
-/** The signals that one end writes, or those that it reads, all at once as an array of doubles. */
+/** All signals that one end writes, or all that it reads, as one array of doubles. */
 final class SignalGroup {
     private final LongBuffer slots;
     private final DoubleBuffer doubles;
     /** The slot of each signal. */
     private final int[] at;
-    /** Whether the slots are consecutive, so that one bulk copy moves them. */
+    /** True if the slots are consecutive, so that one bulk copy moves them. */
     private final boolean dense;
     /** Which of the signals hold an integer; usually none. */
     private final int[] integers;
@@ -19,7 +19,7 @@ final class SignalGroup {
     private final long[] failSafe;
     private final Conversions conversions;
 
-    /** To be created when the slots hold the values of a driver that has not ticked: the fail-safe ones. */
+    /** Created while the slots hold the fail-safe values, before the driver's first tick. */
     SignalGroup(Layout layout, List<Signal> signals, Conversions conversions) {
         this.slots = layout.slots();
         this.doubles = layout.doubles();

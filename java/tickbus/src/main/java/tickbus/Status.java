@@ -37,13 +37,13 @@ public enum Status {
     /** -7: all places for drivers in this process are taken. */
     TOO_MANY_DRIVERS(-7, "all places for drivers in this process are taken",
         "close drivers that are no longer used, or spread them over several processes"),
-    /** -8: a defect in the driver itself; it stays in this state until closed. */
+    /** -8: the driver has a defect, and stays in this state until closed. */
     INTERNAL(-8, "the driver met a defect of its own and has stopped",
         "close and open it again; report the message and your driver.cfg"),
     /** -9: the native library cannot be loaded. */
     LIBRARY(-9, "the native library cannot be loaded",
         "see the message for every place that was tried, and why each failed"),
-    /** -10: a call had an argument that makes no sense. */
+    /** -10: an argument is invalid. */
     BAD_ARGUMENT(-10, "a call had an argument that makes no sense",
         "correct the calling code as the message says");
 
@@ -60,16 +60,16 @@ public enum Status {
     }
 
     /**
-     * The number by which the native library knows it.
+     * The number of this status in the native library.
      *
-     * @return 0 or more: the exchange was done; below 0: it was not
+     * @return 0 or more if the exchange was done; below 0 if it was not
      */
     public int code() {
         return code;
     }
 
     /**
-     * What the status means.
+     * The meaning of the status.
      *
      * @return one clause, without a full stop
      */
@@ -78,7 +78,7 @@ public enum Status {
     }
 
     /**
-     * What to do about it.
+     * The remedy.
      *
      * @return one clause, without a full stop
      */

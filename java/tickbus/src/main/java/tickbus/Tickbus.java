@@ -32,16 +32,16 @@ import java.util.stream.Stream;
  * }
  * }</pre>
  *
- * <p><b>A tick</b> is either {@link #receive()}, the model, {@link #send()}, or one {@link #exchange()}. The first
- * way answers within the tick: what the PLC sent is in the model at once, and the model's answer is sent at the end
- * of the same tick. {@code exchange()} sends first and then receives, so that an answer is sent with the next tick.
- * It suits simulators that pass all values in one place. Edges, age and status are the same in both. {@link
- * #receive()}, {@link #send()} and {@link #exchange()} take no lock, make no system call, and allocate nothing, in
- * either language; they never wait for the bus unless driver.cfg says {@code mode = "stepped"}.
+ * <p><b>A tick</b> is either {@link #receive()}, the model, {@link #send()}, or one {@link #exchange()}. The first way
+ * answers within the tick: the model gets at once what the PLC sent, and its answer is sent at the end of the same tick.
+ * {@code exchange()} sends first and then receives, so that an answer is sent with the next tick; it suits simulators that
+ * pass all values in one place. Edges, age and status are the same in both. {@link #receive()}, {@link #send()} and {@link
+ * #exchange()} take no lock, make no system call, and allocate nothing, neither in Java nor in native code; they never wait
+ * for the bus unless driver.cfg says {@code mode = "stepped"}.
  *
  * <p><b>Time.</b> {@link #exchange(long)} and {@link #receive(long)} take the simulation's time. Stepped buses run
- * the PLC by it, and recordings and faults use it. Without it a tick has the computer's time since the first tick,
- * which is right if the simulation keeps pace with that. A simulation that runs as fast as it can outruns a PLC with
+ * the PLC by it, and recordings and faults use it. Without it a tick has the computer's time since the first tick, which is
+ * right if the simulation keeps pace with the clock. A simulation that runs as fast as it can outruns a PLC with
  * its own clock: thousands of ticks pass between two of the PLC's scans, and the machine has long moved past the
  * point at which the PLC would have stopped it. Let such a simulation keep pace with the clock, or run the PLC in
  * simulation time, with {@code mode = "stepped"}.
@@ -49,16 +49,15 @@ import java.util.stream.Stream;
  * <p><b>Threads.</b> The first thread that ticks becomes the driver's ticking thread: ticks, events and the getters
  * and setters of the signals belong to it. Another thread's tick throws {@link Status#BUSY} and does nothing, until
  * the ticking thread has ended or has called {@link #releaseThread}. A simulation engine whose events run on changing
- * threads calls that at the end of each event that ticks. {@link #statistics}, {@link #inject}, {@link #faults} and
- * {@link #close} can be called by any thread, also by a shutdown hook. They wait for the tick that is in their way, and a
- * simulation that ticks without a pause lets them in. They throw {@link Status#BUSY} only if one tick takes longer than
- * 2 s, as on a stepped bus whose PLC is slow. A tick that meets one of them waits until it is done.
- * Different drivers are independent of each other.
+ * threads calls {@code releaseThread} at the end of each event that ticks. Any thread can call {@link #statistics}, {@link
+ * #inject}, {@link #faults} and {@link #close}, also in a shutdown hook. They wait for a tick in progress, and a simulation
+ * that ticks without a pause lets them in. They throw {@link Status#BUSY} only if one tick takes longer than 2 s, as on a
+ * stepped bus whose PLC is slow. A tick that meets one of them waits until it is done. Different drivers are independent of
+ * each other.
  *
- * <p><b>The end.</b> Close a driver by try-with-resources. A driver to which nothing refers any more is closed, and its name
- * logged, when the garbage collector finds it. When the JVM ends, open drivers are closed after its shutdown hooks (not on
- * Windows; there close them in a hook). SIGTERM and SIGINT are such an end,
- * SIGKILL is not.
+ * <p><b>The end.</b> Close a driver by try-with-resources. The garbage collector closes a driver that nothing refers to any
+ * more, and logs its name. When the JVM ends, open drivers are closed after its shutdown hooks (not on Windows; there close
+ * them in a hook). SIGTERM and SIGINT are such an end, SIGKILL is not.
  *
  * <p>After {@link #close} every method but {@link #close}, {@link #id}, {@link #name} and {@link #toString}
  * throws {@link FieldbusException} with {@link Status#CLOSED}.
@@ -108,8 +107,8 @@ public final class Tickbus implements AutoCloseable {
     private int nextEvent;
     private int endOfEvents;
     /**
-     * The thread that the slots belong to; null before the first tick and after a release. A thread that reads its own
-     * name here has put it there itself, so a plain comparison suffices on every tick except a thread's first.
+     * The thread that the slots belong to; null before the first tick and after a release. A thread that reads its own name
+     * here has written it itself, so a plain comparison suffices on every tick except a thread's first.
      */
     private Thread ticker;
     private volatile boolean closed;
@@ -132,7 +131,7 @@ public final class Tickbus implements AutoCloseable {
         this.cleanable = CLEANER.register(this, forgotten);
     }
 
-    /** Closes a driver to which nothing refers any more, and logs its name. Must not refer to it, either. */
+    /** Closes a driver that nothing refers to any more, and logs its name. Must not refer to the driver itself. */
     private static final class Forgotten implements Runnable {
         private final long handle;
         private volatile boolean closed;
@@ -233,7 +232,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * One tick at a given simulation time, which stepped fieldbuses and recordings need.
+     * One tick at a given simulation time, for stepped fieldbuses and recordings.
      *
      * @param simulationNanos nanoseconds since the simulation began, never decreasing; a stepped fieldbus refuses an
      * earlier time than the last
@@ -249,7 +248,7 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Begins a tick: receives the signals that this end reads. The model computes, and {@link #send()} ends the tick.
      *
-     * <p>Time is as in {@link #exchange()}. On a stepped fieldbus the PLC runs up to it, with what was sent in the
+     * <p>Time is as in {@link #exchange()}. On a stepped fieldbus the PLC runs up to that time, with the values sent in the
      * previous tick. Receiving again without having sent begins another tick; the previous one then has no answer.
      *
      * @return 0 fresh, 1 unchanged, 2 stale: the codes of {@link Status}
@@ -262,7 +261,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Begins a tick at a given simulation time, which stepped fieldbuses and recordings need.
+     * Begins a tick at a given simulation time, for stepped fieldbuses and recordings.
      *
      * @param simulationNanos nanoseconds since the simulation began, never decreasing; a stepped fieldbus refuses an
      * earlier time than the last
@@ -292,9 +291,9 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Retries a call that was refused because {@link #statistics}, {@link #inject} or {@link #close} of another
-     * thread was using the driver. They use it only as long as it takes to copy what they need, or to take it over;
-     * after {@code close} it is {@link Status#CLOSED}.
+     * Retries a call that was refused because another thread's {@link #statistics}, {@link #inject} or {@link #close} was
+     * using the driver. Those hold the driver only while they copy what they need, or take it over; after {@code close} the
+     * result is {@link Status#CLOSED}.
      */
     private int after(int refusal, LongToIntFunction call) {
         int code = refusal;
@@ -329,7 +328,7 @@ public final class Tickbus implements AutoCloseable {
      *
      * @param into gets one value per signal that is not {@link Signal#isWritten}, in the order of
      *     {@link #signals}; may be longer
-     * @return how many values that is
+     * @return the number of values read
      * @throws IllegalArgumentException if the array is too short
      */
     public int getAll(double[] into) {
@@ -370,7 +369,7 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Age of the data at the last exchange; if there are several stations, of the oldest.
+     * The age of the data at the last exchange; with several stations, that of the oldest.
      *
      * @return nanoseconds; {@link Long#MAX_VALUE} if nothing has arrived yet
      */
@@ -448,7 +447,7 @@ public final class Tickbus implements AutoCloseable {
     public InjectedFault inject(String fault) {
         Objects.requireNonNull(fault, "fault");
         int id = injectNative(handle, fault);
-        // The fault is injected: to throw BUSY now would say that it is not.
+        // The fault is injected: throwing BUSY now would deny that.
         return Patience.untilIdle(this::faults).stream().filter(one -> one.id() == id).findFirst().orElseThrow();
     }
 
@@ -464,8 +463,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * The address of the live page on which this driver is shown, to be opened in a browser. Who has it may force signals, since
-     * it contains the page's token.
+     * The address of the live page on which this driver is shown, for a browser. The address contains the page's token:
+     * everyone who has it can force signals.
      *
      * @return empty if driver.cfg has no {@code [page]}
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
@@ -498,9 +497,9 @@ public final class Tickbus implements AutoCloseable {
     /**
      * Hands over the pending events, oldest first: the writes of the PLC one by one, on buses that have them.
      *
-     * <p>One call hands over at most 4096, the capacity of the driver's ring, so that a PLC which writes faster than
-     * the handler works does not hold up the tick forever. If the handler throws, the event counts as handed over,
-     * and the next call continues after it. If the handler closes the driver, it gets no further event.
+     * <p>One call hands over at most 4096, the capacity of the driver's ring, so that a PLC which writes faster than the
+     * handler works cannot hold up the tick forever. If the handler throws, the event counts as handed over, and the next
+     * call continues after it. If the handler closes the driver, it gets no further event.
      *
      * @param handler called on this thread, for each event
      * @return how many events there were
@@ -527,7 +526,7 @@ public final class Tickbus implements AutoCloseable {
         if (events == null) {
             events = new long[EVENTS * EVENT_WORDS];
         }
-        // As Patience.untilIdle, which would allocate.
+        // Like Patience.untilIdle, which would allocate.
         while (true) {
             try {
                 endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
@@ -553,7 +552,7 @@ public final class Tickbus implements AutoCloseable {
         try {
             finalizeNative(handle);
         } catch (FieldbusException e) {
-            // The native side has closed the driver, unless it was in use.
+            // The native library has closed the driver, unless it was in use.
             if (e.status() != Status.BUSY) {
                 closed();
             }
@@ -623,8 +622,8 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
-     * Makes an HTML page from a recording: a chart of the signals, faults, states of the line. It is written beside
-     * the recording, is self-contained, and any browser shows it.
+     * Makes an HTML page from a recording: a chart of the signals, faults, states of the line. The page is self-contained,
+     * lies beside the recording, and opens in any browser.
      *
      * @param recording the VCD or CSV file that a {@code [record]} table named; its driver must be closed
      * @param title the page's heading
@@ -656,7 +655,7 @@ public final class Tickbus implements AutoCloseable {
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);
 
-    /** Closes a driver that nobody has closed, and logs its name; throws {@link FieldbusException}. */
+    /** Closes a driver that was never closed, and logs its name; throws {@link FieldbusException}. */
     static native void forgottenNative(long handle);
 
     /** Text for {@link StatisticsText}; throws {@link FieldbusException}. */
@@ -678,7 +677,7 @@ public final class Tickbus implements AutoCloseable {
 
     static native String pageNative(long handle);
 
-    /** Makes the page of a recording; the text's first line is its heading. Throws {@link FieldbusException}. */
+    /** Makes the page of a recording; the text's first line is the heading. Throws {@link FieldbusException}. */
     static native String reportNative(String recording, String title, String statistics, String text);
 
     /** Does nothing: the cost of a native call, the baseline of the benchmarks. */

@@ -9,7 +9,7 @@ import java.util.List;
 
 /** A separate JVM, for tests that would disturb the current one. */
 final class ChildJvm {
-    /** Its exit code, and its output. */
+    /** The exit code of the JVM, and its output. */
     record Outcome(int exit, String output) {
     }
 

@@ -264,7 +264,7 @@ class MisuseTest {
         }
     }
 
-    /** What was done is never reported as refused, however long another thread is in the way. */
+    /** A call that had its effect is never reported as refused, however long another thread is in the way. */
     @Test
     void aCallThatMustNotBeRefusedIsMadeUntilItGetsThrough() {
         AtomicInteger calls = new AtomicInteger();

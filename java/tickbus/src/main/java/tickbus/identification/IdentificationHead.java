@@ -12,9 +12,8 @@ import tickbus.Tickbus;
 /**
  * A head of a reader of code carriers, as a controller sees it over the bus {@code ivi-client}.
  *
- * <p>A command is begun by {@link #read} or {@link #write}; it goes out with the next exchange, and is over when {@link
- * #isDone} says so after one of the exchanges that follow. Then {@link #status} and {@link #data} tell what became of
- * it.
+ * <p>{@link #read} or {@link #write} begins a command. It goes out with the next exchange, and is over when {@link #isDone}
+ * returns true after one of the following exchanges. Then {@link #status} and {@link #data} return its result.
  *
  * <pre>{@code
  * head.readPallet();
@@ -26,14 +25,14 @@ import tickbus.Tickbus;
  *
  * <p>The head finds its signals by their addresses: {@code %QB0} is the command, {@code %QB1} a length, {@code %QW2} an
  * address, and the data begin at {@code %QB4}; {@code %IB0} is the command's echo, {@code %IB1} the status, {@code
- * %IX2.0} says whether a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for
- * data can be of any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Their
- * {@code order} must be the default: with {@code order = "DCBA"} the octets come in another sequence than on the
- * carrier. Like all signals it belongs to the ticking thread.
+ * %IX2.0} is on while a carrier is there, {@code %IB3} is a length, and the data begin at {@code %IB4}. Signals for data can
+ * have any unsigned type; {@code %IL4}, {@code %IL12} and {@code %IL20} are enough for a pallet. Their {@code order} must be
+ * the default: with {@code order = "DCBA"} the sequence of the octets differs from the carrier's. Like all signals the head
+ * belongs to the ticking thread.
  *
- * <p>While the line is not up, the fail-safe values are read, so that nothing is known of the last command, not even of
- * one that was done before. It is known again when the line is back. A command that was begun meanwhile goes out then,
- * unless {@link #cancel} takes it back.
+ * <p>While the line is down, the fail-safe values are read, so the result of the last command is unknown, even if the
+ * command was done before. The result is known again when the line is back. A command begun meanwhile goes out then, unless
+ * {@link #cancel} takes it back.
  */
 public final class IdentificationHead {
     /** The command was executed. */
@@ -44,7 +43,7 @@ public final class IdentificationHead {
     public static final int BATTERY_LOW = 0x10;
     /** The reader did not answer, and may have executed the command. */
     public static final int NO_ANSWER = 0xFF;
-    /** The command was taken back by {@link #cancel} before it went out. */
+    /** {@link #cancel} took the command back before it went out. */
     public static final int CANCELLED = -1;
 
     private static final int TOGGLE = 0x80;
@@ -145,7 +144,7 @@ public final class IdentificationHead {
      * @param from the address of the first one
      * @param count how many
      * @throws IllegalStateException if another command is not {@link #isDone done}
-     * @throws IllegalArgumentException if there are no signals for so many
+     * @throws IllegalArgumentException if there are not enough signals for them
      */
     public void read(int from, int count) {
         mustFit(count, receivedData, "%IB");
@@ -156,9 +155,9 @@ public final class IdentificationHead {
      * Begins to write octets.
      *
      * @param to the address of the first one
-     * @param octets what is to be written
+     * @param octets to be written
      * @throws IllegalStateException if another command is not {@link #isDone done}
-     * @throws IllegalArgumentException if there are no signals for so many
+     * @throws IllegalArgumentException if there are not enough signals for them
      */
     public void write(int to, byte[] octets) {
         mustFit(octets.length, sentData, "%QB");
@@ -185,7 +184,7 @@ public final class IdentificationHead {
     /**
      * Begins to write a record to address 0.
      *
-     * @param pallet what is to be written
+     * @param pallet the record
      * @throws IllegalStateException if another command is not {@link #isDone done}
      */
     public void writePallet(PalletRecord pallet) {
@@ -223,8 +222,8 @@ public final class IdentificationHead {
     /**
      * Takes the last command back, unless it has gone out already; does nothing if it is {@link #isDone done}.
      *
-     * <p>Which of both is known when {@link #isDone} says so, when the line is up: {@link #status} is {@link #CANCELLED}
-     * then, or that of the command.
+     * <p>When the line is up and {@link #isDone} returns true, {@link #status} is {@link #CANCELLED}, or the status of
+     * the command if it had gone out already.
      */
     public void cancel() {
         if (!isDone()) {
@@ -233,20 +232,21 @@ public final class IdentificationHead {
     }
 
     /**
-     * Whether the last command has been answered or taken back, or none was given.
+     * Returns whether the last command has been answered or taken back, or no command was given.
      *
      * @return false while the command is on its way, and while the line is not up
      */
     public boolean isDone() {
         long given = command.getLong();
         long found = echo.getLong();
-        // The echo of the command itself, which was not taken back in time, has the same toggle bit. A fail-safe 0 is none.
+        // The echo of the take-back itself has the same toggle bit if the command was not taken back in time. A fail-safe 0
+        // is no echo.
         boolean wasSent = (given & ~TOGGLE) == TAKE_BACK && found != 0 && ((found ^ given) & TOGGLE) == 0;
         return found == given || wasSent;
     }
 
     /**
-     * Whether a carrier is before the head.
+     * Returns whether a carrier is before the head.
      *
      * @return false also while the line is not up
      */
@@ -255,10 +255,10 @@ public final class IdentificationHead {
     }
 
     /**
-     * What became of the last command, as the reader's manual numbers it.
+     * The result of the last command, as numbered in the reader's manual.
      *
-     * @return {@link #DONE}, {@link #BATTERY_LOW}, or an error such as {@link #NO_CARRIER}; {@link #CANCELLED} of one that
-     *     was taken back
+     * @return {@link #DONE}, {@link #BATTERY_LOW}, or an error such as {@link #NO_CARRIER}; {@link #CANCELLED} for a command
+     * that was taken back
      * @throws IllegalStateException if it is not {@link #isDone done}
      */
     public int status() {
@@ -267,7 +267,7 @@ public final class IdentificationHead {
     }
 
     /**
-     * The octets that were read.
+     * The octets read last.
      *
      * @return the data of the last answer; none after a command that writes
      * @throws IllegalStateException if it is not {@link #isDone done}, or failed
@@ -292,7 +292,7 @@ public final class IdentificationHead {
     }
 
     /**
-     * The record that was read by {@link #readPallet}.
+     * The record read by {@link #readPallet}.
      *
      * @return the pallet's record
      * @throws IllegalStateException if the command is not {@link #isDone done}, or failed

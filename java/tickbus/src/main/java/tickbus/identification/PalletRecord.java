@@ -11,17 +11,17 @@ import java.util.Objects;
 import java.util.Set;
 
 /**
- * What the carrier of a pallet holds: 21 octets.
+ * The data on the carrier of a pallet: 21 octets.
  *
- * <p>They are 14 digits in ASCII (second, minute, hour, day and month with two each, and the year with four), the
- * octet of the {@link Piece}, and one octet for each {@link Content}, 1 if it is there.
+ * <p>Fourteen digits in ASCII (second, minute, hour, day and month with two each, and the year with four), the octet of the
+ * {@link Piece}, and one octet for each {@link Content}, 1 if it is there.
  *
  * @param time when it was written last, in whole seconds; null on a carrier that was never written
  * @param piece which piece is to be made
  * @param contents what is on the pallet
  */
 public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> contents) {
-    /** Its length in octets. */
+    /** The record's length in octets. */
     public static final int LENGTH = 21;
 
     /** The record of a carrier that was never written. */
@@ -53,19 +53,19 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
         }
     }
 
-    /** Something that is on a pallet, in the order of the octets. */
+    /** Contents of a pallet, in the order of the octets. */
     public enum Content {
         /** The sleeve of the cylinder. */
         SLEEVE,
-        /** Its piston. */
+        /** The piston of the cylinder. */
         PISTON,
-        /** Its spring. */
+        /** The spring of the cylinder. */
         SPRING,
-        /** Its head. */
+        /** The head of the cylinder. */
         HEAD,
-        /** The cap: the piece is one with a cap. */
+        /** The cap: the piece is of a kind with a cap. */
         CAP,
-        /** A piece at all. */
+        /** Any piece at all. */
         PIECE
     }
 
@@ -88,7 +88,7 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     }
 
     /**
-     * The same with this time.
+     * The same record with this time.
      *
      * @param at when it is written
      * @return the new record
@@ -98,7 +98,7 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     }
 
     /**
-     * The same for this piece.
+     * The same record for this piece.
      *
      * @param other which piece is to be made
      * @return the new record
@@ -108,9 +108,9 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     }
 
     /**
-     * The same with this on the pallet.
+     * The same record with this content added.
      *
-     * @param content what is put there
+     * @param content the addition
      * @return the new record
      */
     public PalletRecord with(Content content) {
@@ -120,9 +120,9 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     }
 
     /**
-     * The same without this on the pallet.
+     * The same record with this content removed.
      *
-     * @param content what is taken away
+     * @param content the removal
      * @return the new record
      */
     public PalletRecord without(Content content) {
@@ -151,7 +151,7 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     }
 
     /**
-     * Reads what a carrier holds.
+     * Reads the octets of a carrier.
      *
      * @param octets {@value #LENGTH} octets
      * @return the record

@@ -166,7 +166,7 @@ class IdentificationHeadTest {
         until(() -> controller.statistics().get("state").equals("opening"));
         String named = assertThrows(IllegalStateException.class, head::data).getMessage();
         assertTrue(named.contains("the line is opening: ") && named.contains("did not answer within"), named);
-        // What was done cannot be taken back.
+        // A finished command cannot be taken back.
         head.cancel();
         assertFalse(head.isDone());
         fault.end();

@@ -20,12 +20,13 @@ import tickbus.petri.control.NetController;
 import tickbus.petri.page.NetPage;
 
 /**
- * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}, with the cell's
- * driver.cfg, the tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the line to the
- * reader of code carriers, a folder for the results (each net with its marking, and its firings), and the address of a live
- * page about the nets, if there is to be one.
+ * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}. The arguments are
+ * the cell's driver.cfg, the tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the
+ * line to the reader of code carriers, a folder for the results (each net with its marking, and its firings), and optionally
+ * the address of a live page about the nets.
  *
- * <p>Until a signal ends it, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code key=value}, and an empty line.
+ * <p>Until a signal ends the process, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code
+ * key=value}, and an empty line.
  */
 public final class CellControl {
     private static final long SCAN_NANOS = 5_000_000;
@@ -96,7 +97,7 @@ public final class CellControl {
         }
     }
 
-    /** Beside the control, on a thread that may take its time. */
+    /** Analyses the nets beside the control, on a thread of low priority. */
     private void prove() {
         Thread thread = new Thread(() -> {
             try {
@@ -126,7 +127,7 @@ public final class CellControl {
         print(out);
     }
 
-    /** Prints the counts; false if their reader is gone, because it was killed. */
+    /** Prints the counts; false if the reader was killed. */
     private boolean print(PrintStream out) {
         out.print(report());
         return !out.checkError();
@@ -169,7 +170,7 @@ public final class CellControl {
         return one.firings(one.net().transition(transition).index());
     }
 
-    /** Each net with its marking, and its last firings. */
+    /** Writes each net with its marking, and the last firings. */
     private void leave(Path folder) throws IOException {
         Files.createDirectories(folder);
         StringBuilder markings = new StringBuilder();

@@ -23,7 +23,7 @@ final class CellNets {
         return all(heads, 1, 3, 4);
     }
 
-    /** The controller of the nets. After an emergency stop they continue where they were, once Rearm is pressed. */
+    /** The controller of the nets. After an emergency stop and Rearm they continue where they stopped. */
     static NetController controller(Tickbus bus, BoundNet... all) {
         return NetController.of(bus, all).failSafeWhile("S1 emergency", "S1 rearm");
     }
@@ -46,7 +46,7 @@ final class CellNets {
         return (int) Arrays.stream(pallets).filter(one -> one == stop).count();
     }
 
-    /** Lets pallets pass the stops as the cell's net says, and runs the belt back for a moment when one gets stuck. */
+    /** Lets pallets pass the stops as the cell's net commands, and reverses the belt for a moment when a pallet gets stuck. */
     private static BoundNet transport(int... pallets) {
         NetBuilder net = PetriNet.named("transport").place("forward", 1).place("backward").delay(300 * MS);
         for (int stop = 1; stop <= STOPS; stop++) {
@@ -69,7 +69,7 @@ final class CellNets {
         return bound;
     }
 
-    /** Says which station works, and sends a pallet on when the next stop has room for it. */
+    /** Decides which station works, and sends a pallet on when the next stop has room for it. */
     private static BoundNet cell(int... pallets) {
         NetBuilder net = PetriNet.named("cell").place("stopped", 1).place("running");
         net.transition("start").input("stopped").output("running").transition("stop").input("running").output("stopped");

@@ -24,13 +24,13 @@ final class Heads {
      * The heads on a line.
      *
      * @param line open, with the signals of plc/cell/identification.cfg; closed by the caller
-     * @param clock gives the time that is written into records
+     * @param clock gives the time for records
      */
     static Heads on(Tickbus line, Supplier<LocalDateTime> clock) {
         return new Heads(line, clock);
     }
 
-    /** None, for nets that are analysed and do not run. */
+    /** No heads, for nets that are analysed and do not run. */
     static Heads none() {
         return new Heads(null, () -> null);
     }
@@ -47,7 +47,7 @@ final class Heads {
         return all.get(2);
     }
 
-    /** How often something had to be tried again. */
+    /** How often a read or write had to be retried. */
     int failures() {
         return all.stream().mapToInt(StationHead::failures).sum();
     }

@@ -6,12 +6,12 @@ import tickbus.petri.Reachability;
 import tickbus.petri.Verdict;
 
 /**
- * What holds of all nets together, whatever the signals do.
+ * Properties of all nets together, whatever the signals do.
  *
- * @param markings how many they can reach
- * @param complete whether these are all
- * @param safe whether no place ever has two tokens
- * @param deadlocks markings in which nothing can happen but that somebody turns the switch
+ * @param markings the number of reachable markings that were found
+ * @param complete true if these are all
+ * @param safe true if no place ever has two tokens
+ * @param deadlocks markings in which nothing can happen unless somebody turns the switch
  */
 public record Proof(int markings, boolean complete, boolean safe, int deadlocks) {
     private static final int LIMIT = 2_000_000;

@@ -6,17 +6,17 @@ import tickbus.identification.IdentificationHead;
 import tickbus.identification.PalletRecord;
 
 /**
- * The head of a station, as its net uses it: the net begins to read or to write, and waits in a place until the answer is
- * there. What failed is tried again by the net, which says so by {@link #again}; that throws when it was often enough.
+ * The head of a station, as its net uses it. The net begins to read or to write, and waits in a place until the answer is
+ * there. The net retries after a failure, and counts the retry by {@link #again}, which throws after too many.
  */
 final class StationHead {
-    /** How often one thing is tried. */
+    /** The most attempts at one read or write. */
     static final int ATTEMPTS = 5;
 
-    /** A carrier that is not seen yet gets this time: the sensor of its pallet is on another line, which may be faster. */
+    /** The wait for a carrier that is not seen yet: the sensor of its pallet is on another line, which can be faster. */
     private static final long ARRIVAL_NANOS = 100_000_000;
 
-    /** Without an answer for this time, the line to the reader is down. The reader's own time-out is much shorter. */
+    /** The line to the reader is down after this time without an answer. The reader's own time-out is much shorter. */
     static final long PATIENCE_NANOS = 10_000_000_000L;
 
     private enum State { IDLE, WANTED, ASKED, DONE, FAILED }
@@ -39,7 +39,7 @@ final class StationHead {
      *
      * @param name of the station, for messages
      * @param head null for a net that is analysed, and does not run
-     * @param clock gives the time that is written into records
+     * @param clock gives the time for records
      */
     StationHead(String name, IdentificationHead head, Supplier<LocalDateTime> clock) {
         this.name = name;
@@ -53,7 +53,7 @@ final class StationHead {
         begin();
     }
 
-    /** Begins to write a record, with the time of now. */
+    /** Begins to write a record, with the current time. */
     void write(PalletRecord wanted) {
         writing = true;
         toWrite = wanted.at(clock.get());
@@ -70,13 +70,13 @@ final class StationHead {
         state = State.IDLE;
     }
 
-    /** Whether what was begun is done; what was read is in {@link #record} then. */
+    /** True if the read or write is done; {@link #record} then has the data read. */
     boolean isDone() {
         complain();
         return state == State.DONE;
     }
 
-    /** Whether what was begun has failed. */
+    /** True if the read or write has failed. */
     boolean hasFailed() {
         complain();
         return state == State.FAILED;
@@ -88,20 +88,20 @@ final class StationHead {
         }
     }
 
-    /** What was read last. */
+    /** The record read last. */
     PalletRecord record() {
         return record;
     }
 
-    /** How often something failed. */
+    /** How often a read or write failed. */
     int failures() {
         return allFailures;
     }
 
     /**
-     * What has failed is going to be tried again. To write twice does no harm: the net holds the pallet at its stop.
+     * Counts a retry. Writing twice does no harm: the net holds the pallet at its stop.
      *
-     * @throws IllegalStateException if it has been tried often enough
+     * @throws IllegalStateException after too many attempts
      */
     void again() {
         failures++;
@@ -121,7 +121,7 @@ final class StationHead {
         };
     }
 
-    /** Before the exchange of the line: begins what the net wants. */
+    /** Before the exchange of the line: begins what the net has requested. */
     void ask(long nanos) {
         now = nanos;
         if (state == State.WANTED && head.isDone() && (head.isPresent() || nanos - since >= ARRIVAL_NANOS)) {

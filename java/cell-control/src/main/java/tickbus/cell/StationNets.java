@@ -9,10 +9,10 @@ import tickbus.petri.NetBuilder;
 import tickbus.petri.PetriNet;
 import tickbus.petri.control.BoundNet;
 
-/** The nets of stations 1, 3 and 4. Each waits until the cell's net says "working", works, and is "done". */
+/** The nets of stations 1, 3 and 4. Each waits for "working" of the cell's net, works, and is "done". */
 final class StationNets {
     private static final long MS = 1_000_000;
-    /** What is on a pallet after station 1, and after station 3. */
+    /** The contents of a pallet after station 1, and after station 3. */
     private static final Set<Content> SLEEVE = Set.of(Content.SLEEVE, Content.PIECE);
     private static final Set<Content> CLOSED =
         Set.of(Content.SLEEVE, Content.PISTON, Content.SPRING, Content.HEAD, Content.PIECE);
@@ -26,14 +26,14 @@ final class StationNets {
         net.transition(name).input(from).output(to);
     }
 
-    /** What has failed in a place is tried again there, after a moment. */
+    /** Retries a failed step in its place, after a moment. */
     private static void retry(NetBuilder net, String name, String place) {
         net.transition(name).delay(Delay.fixed(100 * MS)).input(place).output(place);
     }
 
     /** The head works while the place is marked, and again when {@code retry} fires. */
     private static BoundNet works(BoundNet bound, StationHead head, String place, Runnable begin, String retry) {
-        // The answer is forgotten when the place is left: what waits for one is tested before the next entry.
+        // The answer is forgotten when the net leaves the place: conditions on it are tested before the next entry.
         return bound.entry(place).run((in, out) -> begin.run()).exit(place).run((in, out) -> head.rest())
             .firing(retry).run((in, out) -> head.again());
     }
@@ -47,7 +47,7 @@ final class StationNets {
             .place("swinging").place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
             .place("done");
         step(net, "feed", "supply", "loading");
-        // Before the time is over, even if a scan comes late.
+        // Fires before the time is over, even if a scan comes late.
         net.transition("loaded").priority(1).input("loading").output("looking");
         net.transition("loader jams").delay(Delay.fixed(500 * MS)).input("loading").output("freeing");
         step(net, "try again", "freeing", "loading");
@@ -65,7 +65,7 @@ final class StationNets {
         step(net, "carrier missed", "reading", "drawing back");
         step(net, "reader is back", "drawing back", "reader out");
         net.transition("swing").input("pallet empty", "sleeve ready").output("swinging");
-        // Pallets go on without a sleeve, or what is on the others would not come out.
+        // Pallets continue without a sleeve; otherwise the pieces on the other pallets would never come out.
         net.transition("pass, no sleeve").input("pallet empty").test("no sleeve", 1).output("going back");
         net.transition("pass, stopped").input("pallet empty").test("supply", 1).output("going back");
         step(net, "over the pallet", "swinging", "lowering");

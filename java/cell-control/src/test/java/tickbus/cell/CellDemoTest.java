@@ -195,7 +195,7 @@ class CellDemoTest {
         Process demo = start();
         try (BufferedReader out = demo.inputReader()) {
             List<ProcessHandle> nets = netsAfterACylinder(demo, out);
-            // Process.destroy() would close the stream from which the verdict is read.
+            // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertEquals("demo-cell: failed reason=interrupted", rest.get(rest.size() - 1));
@@ -207,7 +207,7 @@ class CellDemoTest {
         }
     }
 
-    /** A machine that stands still begins again; one whose nets were killed meanwhile has failed. */
+    /** A machine that stalled begins again; a machine whose nets were killed meanwhile has failed. */
     @Test
     @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be suspended")
     void aKilledProcessOfTheNetsIsNoStall() throws Exception {
@@ -216,7 +216,7 @@ class CellDemoTest {
             ProcessHandle nets = netsAfterACylinder(demo, out).get(0);
             signal("STOP", demo);
             nets.destroyForcibly();
-            // Longer than what counts as a stall.
+            // Longer than the limit of a stall.
             Thread.sleep(1500);
             signal("CONT", demo);
             List<String> rest = out.lines().toList();
@@ -232,7 +232,7 @@ class CellDemoTest {
         assertEquals(0, new ProcessBuilder("kill", "-" + name, String.valueOf(process.pid())).start().waitFor());
     }
 
-    /** One cylinder a round, so that no round has a mishap. */
+    /** One cylinder per round, so that no round has a mishap. */
     @Test
     @DisabledOnOs(value = OS.WINDOWS, disabledReason = "a process cannot be asked to end, only be killed")
     void withAPageTheNetsAreSeenLiveAndRoundFollowsRoundUntilASignal() throws Exception {
@@ -240,7 +240,7 @@ class CellDemoTest {
         try (BufferedReader out = demo.inputReader()) {
             String line = out.readLine();
             String page = null;
-            // If this machine stands still, all begins anew, with one cylinder and another page.
+            // If this machine stalls, the demo restarts, with one cylinder and another page.
             while (line != null && !(line.contains("cylinders=2 ") && line.contains("; the next one begins"))) {
                 page = line.contains("live at ") ? line.substring(line.indexOf("http")) : page;
                 line = out.readLine();
@@ -250,7 +250,7 @@ class CellDemoTest {
                 HttpResponse.BodyHandlers.ofString());
             assertEquals(200, state.statusCode());
             assertEquals(5, state.body().split("\"phases\":").length - 1, state.body());
-            // Process.destroy() would close the stream from which the verdict is read.
+            // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertTrue(rest.get(rest.size() - 1).matches("demo-cell: ok cylinders=[2-9] .*"), rest.toString());

@@ -153,7 +153,7 @@ class CellLoopTest {
         assertEquals(0, heads.failures());
     }
 
-    /** Through the machine's carriers, and not by what the nets believe. */
+    /** Checks the machine's carriers, not what the nets believe. */
     @Test
     void theRecordGrowsFromStationToStation() {
         List<PalletRecord> seen = new ArrayList<>();
@@ -174,7 +174,7 @@ class CellLoopTest {
         assertTrue(seen.contains(new PalletRecord(blank().time(), piece, closed)), seen::toString);
     }
 
-    /** What station 4 leaves on a pallet. */
+    /** The record that station 4 leaves on a pallet. */
     private static PalletRecord blank() {
         return PalletRecord.BLANK.at(LocalDateTime.of(2004, 3, 9, 16, 5, 59));
     }
@@ -321,7 +321,7 @@ class CellLoopTest {
         assertEquals(begun, cell.delivered().size());
     }
 
-    /** Lets the emergency stop go, which starts nothing, and presses Rearm. */
+    /** Releases the emergency stop, which starts nothing, and presses Rearm. */
     private void letGo() {
         cell.emergency(false);
         Map<String, Integer> before = Map.copyOf(fired);
@@ -352,7 +352,7 @@ class CellLoopTest {
         assertEquals(0, cell.counters().palletJams());
     }
 
-    /** Each stop is longer than every delay, and they come at other moments of the cycle each time. */
+    /** Each stop lasts longer than every delay, and comes at another moment of the cycle each time. */
     @Test
     void whatStoodStillInAnEmergencyStopDoesNotCountAsStuck() {
         while (cell.delivered().size() < 12) {

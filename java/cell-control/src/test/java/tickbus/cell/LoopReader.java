@@ -10,8 +10,8 @@ import tickbus.demo.cell.CodeCarrier;
 import tickbus.demo.cell.ManufacturingCell;
 
 /**
- * The reader between the cell and the nets in simulation time, where no serial port is: to the nets it is what an
- * ivi-client shows, to the cell what an ivi-reader does. A command takes as long as on a line at 9600 baud.
+ * Stands in for the reader between the cell and the nets, in simulation time without a serial port. The nets see an
+ * ivi-client, the cell an ivi-reader. A command takes as long as on a line at 9600 baud.
  */
 final class LoopReader {
     /** 34 characters of ten bits, as a read or a write of 21 octets has. */
@@ -39,14 +39,14 @@ final class LoopReader {
         bus.send();
     }
 
-    /** The next commands of a station's head are answered with this status; FF says that there is no answer. */
+    /** Answers the next commands of a station's head with this status; FF means no answer. */
     void fail(int station, int status, int times) {
         Head head = heads.get(List.of(1, 3, 4).indexOf(station));
         head.failure = status;
         head.failures = times;
     }
 
-    /** Nothing is answered any more. */
+    /** Answers nothing from now on. */
     void hang() {
         heads.forEach(head -> head.hangs = true);
     }

@@ -8,7 +8,7 @@ import tickbus.petri.Reachability;
 import tickbus.petri.Verdict;
 import tickbus.petri.control.BoundNet;
 
-/** What analysis says of the nets: each alone, and all together. */
+/** Analyses the nets: each alone, and all together. */
 class ProofTest {
     @Test
     void eachNetAloneIsBoundedLiveAndWithoutDeadlock() {
@@ -27,7 +27,7 @@ class ProofTest {
         assertEquals(0, proof.deadlocks(), proof::toString);
     }
 
-    /** From every marking every transition can become enabled again, which says more; with two pallets, to be quick. */
+    /** Stronger: from every marking every transition can become enabled again. With two pallets, to be quick. */
     @Test
     void withTwoPalletsTheyAreLive() {
         Reachability graph = Reachability.explore(CellNets.composition(1, 3), 2_000_000);

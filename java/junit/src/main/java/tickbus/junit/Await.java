@@ -13,7 +13,7 @@ public final class Await {
     }
 
     /**
-     * Lets ticks pass until the condition holds; none if it does already.
+     * Lets ticks pass until the condition holds; no tick if it holds already.
      *
      * @param ticks fails if the condition does not hold after this many ticks; at least 1
      * @return the number of ticks it took
@@ -34,7 +34,7 @@ public final class Await {
     }
 
     /**
-     * Lets ticks pass until the condition holds; none if it does already.
+     * Lets ticks pass until the condition holds; no tick if it holds already.
      *
      * @param duration fails if the condition does not hold after this much simulation time, such as {@code "80ms"};
      * at least one tick

@@ -10,7 +10,7 @@ import org.opentest4j.AssertionFailedError;
 import tickbus.FieldbusException;
 import tickbus.Tickbus;
 
-/** Everything that a test runs on: the line with the program behind it, the machine, the PLC under test. */
+/** Everything that a test runs on: the line with the program at its other end, the machine, the PLC under test. */
 final class Bench {
     private final Tickbus bus;
     private final Plc plc;
@@ -78,7 +78,7 @@ final class Bench {
         Throwable failure = context.getExecutionException().orElse(null);
         AssertionFailedError unfinished = failure == null ? plc.unfinished() : null;
         Map<String, String> statistics;
-        // After a defect in the library there are no statistics, but the driver has to be closed even so.
+        // After a defect in the library there are no statistics, but the driver must be closed anyway.
         try (bus) {
             statistics = bus.statistics();
         } catch (FieldbusException e) {

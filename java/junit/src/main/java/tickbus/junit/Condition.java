@@ -110,9 +110,9 @@ public abstract class Condition {
     }
 
     /**
-     * Something else, such as the state of the machine model.
+     * Any other condition, such as the state of the machine model.
      *
-     * @param what how a failure names it, such as "bottle 1 is treated"
+     * @param what the name in a failure, such as "bottle 1 is treated"
      * @param holds asked at the end of each tick
      * @return the condition
      */
@@ -170,7 +170,7 @@ public abstract class Condition {
     /**
      * The condition does not hold.
      *
-     * @return the contrary
+     * @return the opposite
      */
     public Condition negated() {
         Condition original = this;
@@ -241,14 +241,14 @@ public abstract class Condition {
     abstract static class Bound {
         abstract boolean holds();
 
-        /** Its subject, at the beginning of a failure's sentence. */
+        /** The condition's subject, which begins a failure's sentence. */
         abstract String subject();
 
         abstract String expected();
 
         abstract String seen();
 
-        /** The signals that it depends on. */
+        /** The signals that the condition depends on. */
         List<Watch> watches() {
             return List.of();
         }
@@ -332,7 +332,7 @@ public abstract class Condition {
 
                 @Override
                 String subject() {
-                    // Of two conditions that must hold together, only those that do not are reported.
+                    // Of two conditions that must both hold, only those that fail are reported.
                     return wrong().map(Bound::subject).collect(Collectors.joining(join()));
                 }
 

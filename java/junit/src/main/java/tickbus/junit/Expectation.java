@@ -1,7 +1,7 @@
 package tickbus.junit;
 
 /**
- * A condition that holds now, and may be required to keep holding: {@code plc.expect(off("Not OK")).during("5s")}.
+ * A condition that holds now, and can be required to keep holding: {@code plc.expect(off("Not OK")).during("5s")}.
  */
 public final class Expectation {
     private final Plc plc;
@@ -13,7 +13,7 @@ public final class Expectation {
     }
 
     /**
-     * Lets ticks pass, and fails at the first at whose end the condition does not hold.
+     * Lets ticks pass, and fails at the end of the first tick in which the condition does not hold.
      *
      * @param ticks how many
      * @return the PLC
@@ -28,7 +28,7 @@ public final class Expectation {
     }
 
     /**
-     * Lets simulation time pass, and fails at the first tick at whose end the condition does not hold.
+     * Lets simulation time pass, and fails at the end of the first tick in which the condition does not hold.
      *
      * @param duration such as {@code "5s"}; rounded up to whole ticks
      * @return the PLC

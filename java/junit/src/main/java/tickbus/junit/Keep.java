@@ -11,8 +11,8 @@ import tickbus.FieldbusException;
 import tickbus.Tickbus;
 
 /**
- * What is kept of a test. The folder is named by the configuration parameter or system property {@code
- * tickbus.reports}, otherwise it is the one beside the build tool's own reports.
+ * Keeps the recording of a test. The configuration parameter or system property {@code tickbus.reports} names the folder;
+ * the default is beside the build tool's own reports.
  */
 final class Keep {
     private static final String FOLDER = "tickbus.reports";
@@ -62,7 +62,7 @@ final class Keep {
     }
 
     /**
-     * Keeps what has to be kept after the driver is closed, and returns a description.
+     * Keeps or deletes the recording after the driver is closed, and returns a description.
      *
      * @param failure of the test; null if it passed
      */
@@ -79,7 +79,7 @@ final class Keep {
                 context.publishReportEntry("tickbus.report", page.toString());
                 return told + "; report: " + page;
             } catch (FieldbusException e) {
-                // The test's own failure is what matters; this one is only mentioned.
+                // The test's own failure matters more; this one is only mentioned.
                 return told + "; no report: " + e.getMessage();
             }
         }

@@ -22,14 +22,14 @@ public interface Machine {
     /**
      * Called once, before the first tick: looks up signals ({@link Plc#signal}) and sets initial values.
      *
-     * @param plc the PLC that it is connected to
+     * @param plc the PLC that this machine is connected to
      */
     default void connect(Plc plc) {
     }
 
     /**
-     * One tick: reads what the PLC has commanded ({@code %Q}), moves on, and sets the sensors ({@code %I}). It must
-     * not let time pass itself.
+     * One tick: reads the PLC's commands ({@code %Q}), moves on, and sets the sensors ({@code %I}). Must not let time pass
+     * itself.
      *
      * @param plc the PLC
      * @param simulationNanos the time at the end of this step, in nanoseconds since the test began;

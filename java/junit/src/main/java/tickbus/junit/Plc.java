@@ -15,9 +15,9 @@ import tickbus.Tickbus;
 /**
  * The PLC under test, from outside: sets its inputs, reads its outputs, and lets time pass.
  *
- * <p>In each tick the machine takes a step with the PLC's commands, its sensors and all forced values are sent to the
- * PLC, the PLC is scanned if a scan is due, and its outputs come back. All this happens on the calling thread;
- * between two calls time stands still.
+ * <p>In each tick the machine takes a step with the PLC's commands, the PLC gets the sensors and all forced values, is
+ * scanned if a scan is due, and returns its outputs. All this happens on the calling thread; between two calls time stands
+ * still.
  *
  * <p>A failure is an {@link AssertionFailedError} that reports the tick, the simulation time, the signal, the
  * expected and the actual value, and the last changes of that signal.
@@ -25,7 +25,7 @@ import tickbus.Tickbus;
  * <p>{@link PlcTest} creates one for each test. Not thread-safe.
  */
 public final class Plc {
-    /** How long {@link #press} holds a button: about as long as a finger does, and longer than any scan. */
+    /** How long {@link #press} holds a button: about as long as a finger, and longer than any scan. */
     private static final String PRESS = "200ms";
 
     /** A value that the test forces, whatever the machine sets. */
@@ -72,7 +72,7 @@ public final class Plc {
     // Signals
 
     /**
-     * A signal's handle, which is faster than its name in a {@link Machine} that reads or writes it on every tick.
+     * A signal's handle, which is faster than the name in a {@link Machine} that uses the signal on every tick.
      *
      * @param name as in driver.cfg
      * @return always the same object
@@ -172,7 +172,7 @@ public final class Plc {
     }
 
     /**
-     * Presses a push button: forces the signal on, lets 200 ms pass, and lets it go off again.
+     * Presses a push button: forces the signal on, lets 200 ms pass, and releases it.
      *
      * @param button as in driver.cfg
      * @return this
@@ -193,7 +193,7 @@ public final class Plc {
     }
 
     /**
-     * Whether a signal is on.
+     * Returns whether a signal is on.
      *
      * @param signal as in driver.cfg
      * @return false if it is 0
@@ -245,7 +245,7 @@ public final class Plc {
     }
 
     /**
-     * The faults in driver.cfg, and those that were injected.
+     * The faults of driver.cfg, and the injected ones.
      *
      * @return in the order of injection
      */
@@ -354,7 +354,7 @@ public final class Plc {
      * Fails unless the condition holds now.
      *
      * @param condition from {@link Condition}'s methods
-     * @return lets it be watched for a while: {@link Expectation#during}
+     * @return for watching it longer: {@link Expectation#during}
      */
     public Expectation expect(Condition condition) {
         Condition.Bound bound = condition.bind(this);

@@ -28,10 +28,10 @@ import org.junit.jupiter.api.extension.ExtendWith;
  * stands still unless the test lets it pass, and then passes as fast as it can be computed. The same test always
  * gives the same run, bit for bit.
  *
- * <p>On a class it applies to all its tests, including those in nested classes. On a method it makes that method a
- * test; omitted elements are taken from the class. (With {@code @ParameterizedTest} or {@code @RepeatedTest}, put it
- * on the class: on the method it would be an additional test.) It can be used as a meta-annotation, such as on an
- * annotation of your own called {@code @CellTest}.
+ * <p>On a class the annotation applies to all its tests, including those in nested classes. On a method it makes that method
+ * a test; omitted elements come from the class. (With {@code @ParameterizedTest} or {@code @RepeatedTest}, put it on the
+ * class: on the method it would be an additional test.) It can be a meta-annotation, such as on your own annotation {@code
+ * @CellTest}.
  */
 @Documented
 @Inherited
@@ -43,14 +43,14 @@ public @interface PlcTest {
     /**
      * The plant's own driver.cfg, with its signal table.
      *
-     * @return a file, as seen from the working directory or, failing that, from the test class on the class path
+     * @return a file, relative to the working directory or, failing that, to the test class on the class path
      */
     String config() default "";
 
     /**
      * The PLC program at the other end of the line, whatever the bus in driver.cfg.
      *
-     * @return its name, or its file; empty for the one named in driver.cfg
+     * @return the program's name or file; empty for the one named in driver.cfg
      */
     String program() default "";
 
@@ -69,24 +69,22 @@ public @interface PlcTest {
     String scan() default "";
 
     /**
-     * The simulation time that passes with each tick.
+     * The simulation time of each tick.
      *
      * @return such as {@code "2ms"}; {@code "1ms"} if empty
      */
     String step() default "";
 
     /**
-     * The machine that the PLC controls; it needs a constructor without parameters. Test methods may have it as a
-     * parameter.
+     * The machine that the PLC controls; needs a constructor without parameters. Test methods can have it as a parameter.
      *
-     * @return {@link Machine} itself for none: the test then plays the machine
+     * @return {@link Machine} itself for no machine: the test then plays the machine
      */
     Class<? extends Machine> machine() default Machine.class;
 
     /**
-     * When the recording of a test is kept. It is written to {@code tickbus/} beside the reports of Maven or Gradle,
-     * or to the folder in the system property {@code tickbus.reports}; failures name it. The file named in driver.cfg
-     * is never written to.
+     * When the recording of a test is kept. The folder is {@code tickbus/} beside the reports of Maven or Gradle, or the one
+     * in the system property {@code tickbus.reports}; failures name the file. The file named in driver.cfg is never written.
      *
      * @return at most one; if empty, as for the enclosing class, or {@link Recording#ON_FAILURE}
      */

@@ -61,7 +61,7 @@ final class Setup {
         return nanos;
     }
 
-    /** The class of the machine; {@link Machine} itself for none. */
+    /** The class of the machine; {@link Machine} itself for no machine. */
     Class<? extends Machine> machine() {
         return annotations.stream().<Class<? extends Machine>>map(PlcTest::machine)
             .filter(machine -> machine != Machine.class).findFirst().orElse(Machine.class);
@@ -125,12 +125,12 @@ final class Setup {
         return table.toString();
     }
 
-    /** Whether a program is given as a file rather than by name. */
+    /** True if the program is a file rather than a name. */
     private static boolean isFile(String program) {
         return program.contains("/") || program.contains("\\") || program.matches(".*\\.(so|dll|dylib)");
     }
 
-    /** A file relative to the working directory, as an absolute path; driver.cfg may be elsewhere. */
+    /** A file relative to the working directory, as an absolute path; driver.cfg can be elsewhere. */
     private static String absolute(String file) {
         return Path.of(file).toAbsolutePath().normalize().toString();
     }

@@ -5,12 +5,12 @@ import tickbus.Signal;
 
 /** The recent history of a signal, for failure messages. Allocates nothing on a tick. */
 final class Watch {
-    /** How many changes are remembered. */
+    /** The number of changes that are remembered. */
     private static final int KEPT = 8;
 
     private final Signal signal;
     private final boolean bit;
-    /** Whether the type has values that a double cannot represent. */
+    /** True if the type has values that a double cannot represent. */
     private final boolean wide;
     private final long[] ticks = new long[KEPT];
     private final double[] from = new double[KEPT];
@@ -62,17 +62,17 @@ final class Watch {
         exact = wide ? signal.getLong() : 0;
     }
 
-    /** How often it changed from 0 to another value. */
+    /** How often the signal changed from 0 to another value. */
     long rises() {
         return rises;
     }
 
-    /** How often it changed to 0. */
+    /** How often the signal changed to 0. */
     long falls() {
         return falls;
     }
 
-    /** Its current value, for people. */
+    /** The signal's current value, for people. */
     String text() {
         return text(signal.get());
     }

@@ -7,7 +7,7 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import org.junit.jupiter.api.Test;
 
-/** The example of docs/testing.md is the test that runs here, word for word. */
+/** The example of docs/testing.md must be the test that runs here, word for word. */
 class DocumentationTest {
     @Test
     void theExampleOfTheDocumentationIsTheTestThatRuns() throws IOException {

@@ -29,7 +29,7 @@ final class Samples {
     @interface LineTest {
     }
 
-    /** A machine that goes up while it is told to. */
+    /** A machine that rises while Run is on. */
     static final class Lift implements Machine {
         private double height;
         private long last;

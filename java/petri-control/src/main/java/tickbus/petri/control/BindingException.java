@@ -2,7 +2,7 @@ package tickbus.petri.control;
 
 import java.util.List;
 
-/** Nets that do not fit the driver, or each other. The message has every mistake on a line of its own. */
+/** Nets that do not fit the driver, or each other. The message has every mistake on a separate line. */
 public final class BindingException extends IllegalArgumentException {
     private static final long serialVersionUID = 1L;
 

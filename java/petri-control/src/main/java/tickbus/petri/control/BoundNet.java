@@ -21,10 +21,9 @@ import tickbus.petri.PetriNet;
  *     .entry("done").set("Lamp").exit("done").clear("Lamp");
  * }</pre>
  *
- * <p>{@link #on} and the like belong to the transition named last by {@link #when}, and all of them must hold; a
- * transition without {@code when} is always true. {@link #set} and {@link #run} belong to what was named last by
- * {@link #during}, {@link #entry}, {@link #exit} or {@link #firing}. Nothing is checked here: {@link NetController#of}
- * reports all mistakes at once.
+ * <p>{@link #on} and the like belong to the transition named last by {@link #when}, and all of them must hold; a transition
+ * without {@code when} is always true. {@link #set} and {@link #run} belong to the last {@link #during}, {@link #entry},
+ * {@link #exit} or {@link #firing}. The methods check nothing: {@link NetController#of} reports all mistakes at once.
  */
 public final class BoundNet {
     final PetriNet net;
@@ -43,7 +42,7 @@ public final class BoundNet {
         this.net = net;
     }
 
-    /** Begins to bind a net, whose name must be its own among the nets of a controller. */
+    /** Begins to bind a net, whose name must be unique among the nets of a controller. */
     public static BoundNet of(PetriNet net) {
         return new BoundNet(net);
     }
@@ -60,21 +59,21 @@ public final class BoundNet {
     }
 
     /**
-     * Lets an edge count for the whole scan. Without this, as in Grafcet, one evolution uses it: it counts for the
-     * transitions that were enabled when the scan began, and each fires once by it.
+     * Lets an edge count for the whole scan. Without this, as in Grafcet, one evolution uses the edge: it counts for the
+     * transitions that were enabled when the scan began, and fires each of them once.
      */
     public BoundNet keepEdges() {
         keepsEdges = true;
         return this;
     }
 
-    /** Hears of the firings. */
+    /** Reports the firings to a listener. */
     public BoundNet listener(FiringListener of) {
         listener = of;
         return this;
     }
 
-    /** Begins the condition of a transition; once for each. */
+    /** Begins the condition of a transition; once per transition. */
     public BoundNet when(String transition) {
         terms = new ArrayList<>();
         if (conditions.putIfAbsent(transition, terms) != null) {
@@ -93,12 +92,12 @@ public final class BoundNet {
         return term(Term.of(Term.Kind.OFF, signal, 0));
     }
 
-    /** The signal of the last {@link #on} has become so with this scan: see {@link #keepEdges}. */
+    /** The signal of the last {@link #on} has gone on with this scan: see {@link #keepEdges}. */
     public BoundNet rising() {
         return edge("rising()", Term.Kind.ON, Term.Kind.RISING);
     }
 
-    /** The signal of the last {@link #off} has become so with this scan. */
+    /** The signal of the last {@link #off} has gone off with this scan. */
     public BoundNet falling() {
         return edge("falling()", Term.Kind.OFF, Term.Kind.FALLING);
     }
@@ -128,30 +127,30 @@ public final class BoundNet {
         return term(new Term(Term.Kind.UNMARKED, net, place, 0, null));
     }
 
-    /** A condition of your own, on all signals that this end reads. It looks at the inputs alone. */
+    /** A condition of your own, on all signals that this end reads. It must use the inputs alone. */
     public BoundNet that(Condition condition) {
         return term(new Term(Term.Kind.CODE, "", null, 0, condition));
     }
 
     /**
-     * What follows happens while the place is marked: its outputs are 0 otherwise. If several marked places set one output, the
-     * one bound last gives its value.
+     * The following actions run while the place is marked; otherwise its outputs are 0. If several marked places set one
+     * output, the one bound last gives its value.
      */
     public BoundNet during(String place) {
         return at(Step.Moment.DURING, place);
     }
 
-    /** What follows happens when tokens come into the place. */
+    /** The following actions run when tokens come into the place. */
     public BoundNet entry(String place) {
         return at(Step.Moment.ENTRY, place);
     }
 
-    /** What follows happens when tokens leave the place. */
+    /** The following actions run when tokens leave the place. */
     public BoundNet exit(String place) {
         return at(Step.Moment.EXIT, place);
     }
 
-    /** What follows happens when the transition fires. */
+    /** The following actions run when the transition fires. */
     public BoundNet firing(String transition) {
         return at(Step.Moment.FIRING, transition);
     }
@@ -171,18 +170,18 @@ public final class BoundNet {
         return step("set(\"" + output + "\")", output, value, null);
     }
 
-    /** An action of your own; it may set the outputs that {@link #writes} names. */
+    /** An action of your own, which can set the outputs that {@link #writes} names. */
     public BoundNet run(Action action) {
         return step("run(...)", null, 0, action);
     }
 
-    /** Names outputs that actions of your own set. */
+    /** Names outputs that your own actions set. */
     public BoundNet writes(String... outputs) {
         declared.addAll(List.of(outputs));
         return this;
     }
 
-    /** The outputs that this net sets, with those that its own code sets. */
+    /** The outputs that this net sets, including those of its own code. */
     Set<String> outputs() {
         Set<String> outputs = new LinkedHashSet<>(declared);
         steps.stream().filter(step -> step.output() != null).forEach(step -> outputs.add(step.output()));

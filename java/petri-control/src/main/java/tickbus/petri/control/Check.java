@@ -9,7 +9,7 @@ import java.util.stream.Collectors;
 import tickbus.Signal;
 import tickbus.Tickbus;
 
-/** Finds what does not fit between nets, and between them and a driver. */
+/** Finds mismatches between nets, and between them and a driver. */
 final class Check {
     private final Map<String, BoundNet> nets = new HashMap<>();
     private final List<String> mistakes = new ArrayList<>();
@@ -34,7 +34,7 @@ final class Check {
         return new Check(list).end();
     }
 
-    /** Throws a {@link BindingException} if they do not fit each other or the driver. */
+    /** Throws a {@link BindingException} if the nets do not fit each other or the driver. */
     static Map<String, BoundNet> nets(Tickbus bus, List<BoundNet> list) {
         Check check = new Check(list);
         check.driver(bus);

@@ -10,9 +10,9 @@ import tickbus.petri.Place;
 import tickbus.petri.Transition;
 
 /**
- * Makes one net of several, for analysis: nodes are named {@code net.node}, and each {@link BoundNet#marked} and
- * {@link BoundNet#unmarked} is a test or an inhibitor arc. What the composition cannot do, the nets of one controller
- * cannot do together. Conditions on signals are left out, as analysis does.
+ * Makes one net of several, for analysis: nodes are named {@code net.node}, and each {@link BoundNet#marked} and {@link
+ * BoundNet#unmarked} is a test or an inhibitor arc. A behaviour that the composition cannot have, the nets of one controller
+ * cannot have together. Conditions on signals are left out, as in analysis.
  */
 public final class Composition {
     private Composition() {
@@ -22,8 +22,8 @@ public final class Composition {
      * The nets as one.
      *
      * @param name of the whole
-     * @param nets as they are given to a controller
-     * @throws BindingException if they refer to nets or nodes that are not there
+     * @param nets as given to a controller
+     * @throws BindingException if the nets refer to missing nets or nodes
      */
     public static PetriNet of(String name, BoundNet... nets) {
         Check.nets(List.of(nets));

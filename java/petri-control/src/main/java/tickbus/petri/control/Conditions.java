@@ -24,8 +24,8 @@ final class Conditions implements Conjunction {
     /**
      * Binds terms.
      *
-     * @param nets finds a net, of which the coordinator is built later
-     * @param coordinators has it then
+     * @param nets finds a net whose coordinator is built later
+     * @param coordinators has the coordinators from then on
      */
     Conditions(List<Term> terms, Latch latch, Function<String, BoundNet> nets, Map<String, Coordinator> coordinators) {
         this.latch = latch;
@@ -52,7 +52,7 @@ final class Conditions implements Conjunction {
         }
     }
 
-    /** When all coordinators are built. */
+    /** Called when all coordinators are built. */
     void connect() {
         for (int i = 0; i < nets.length; i++) {
             others[i] = nets[i] == null ? null : coordinators.get(nets[i]);

@@ -4,7 +4,7 @@ import java.util.List;
 import tickbus.Signal;
 import tickbus.Tickbus;
 
-/** The signals that this end reads, as they were in this scan and in the one before. */
+/** The signals that this end reads, with their values in this scan and the previous one. */
 final class Latch {
     final List<String> names;
     final double[] now;
@@ -19,7 +19,7 @@ final class Latch {
         before = new double[names.size()];
     }
 
-    /** Takes what came with the last receive. There is no edge in the first scan. */
+    /** Takes the values of the last receive. The first scan has no edges. */
     void take() {
         System.arraycopy(now, 0, before, 0, now.length);
         bus.getAll(now);

@@ -24,16 +24,16 @@ import tickbus.petri.NetWatch;
 import tickbus.petri.Stop;
 
 /**
- * Nets as the PLC of a driver: reads {@code %I}, fires, writes {@code %Q}, over any bus that has the role
- * {@code controller}.
+ * Runs nets as the PLC of a driver: reads {@code %I}, fires, writes {@code %Q}, over any bus that has the role {@code
+ * controller}.
  *
- * <p>A {@link #scan} is one exchange of the driver. It latches the inputs, lets one net after the other fire until it
- * is quiet, and sends the outputs. In the steady state it allocates nothing. A net whose condition or action throws stops
- * for good: its outputs have the fail-safe values of the driver.cfg, and {@link #stops} says which transition or place it
- * was. The other nets go on, and see its last marking.
+ * <p>A {@link #scan} is one exchange of the driver. It latches the inputs, lets one net after the other fire until it is
+ * quiet, and sends the outputs. In the steady state it allocates nothing. A net whose condition or action throws stops for
+ * good: its outputs get the fail-safe values of the driver.cfg, and {@link #stops} names the transition or place. The other
+ * nets continue, and see the last marking of the stopped net.
  *
- * <p>While the line is stale no net is scanned: values that nobody sent must not fire anything. Belongs to the driver's
- * ticking thread; the driver stays the caller's, who closes it, unless {@link #run} ends by an exception or with the JVM.
+ * <p>While the line is stale no net is scanned: values that nobody sent must not fire anything. A controller belongs to the
+ * driver's ticking thread. The caller closes the driver, unless {@link #run} ends by an exception or with the JVM.
  */
 public final class NetController {
     private static final long NANOS_TO_END = 1_000_000_000;
@@ -45,14 +45,14 @@ public final class NetController {
     private final Coordinator[] order;
     private final NetWatch watch;
     private long lastNanos;
-    /** The input that stops the nets' clock; -1 if none does. For how long it has. */
+    /** The input that stops the nets' clock, -1 for no input; and for how long the clock has stood still. */
     private int stopsClock = -1;
     private long stoodNanos;
     private final Safety safety;
     private Path file;
-    /** Whether the marking has changed since it was saved last. */
+    /** True if the marking has changed since the last save. */
     private boolean unsaved = true;
-    /** Whether the JVM ends. */
+    /** True if the JVM is ending. */
     private volatile boolean ending;
     private long scans;
     private long staleScans;
@@ -78,7 +78,7 @@ public final class NetController {
             List<String> outputs = List.copyOf(one.outputs());
             Signal[] signals = outputs.stream().map(bus::signal).toArray(Signal[]::new);
             for (Signal signal : signals) {
-                // Before the first tick a signal that this end writes has its fail-safe value.
+                // Before the first tick, a signal that this end writes has its fail-safe value.
                 builder.output(signal.name(), signal.get());
             }
             Held held = new Held(one, outputs);
@@ -112,8 +112,8 @@ public final class NetController {
     }
 
     /**
-     * Lets the nets' clock stand still while an input is on, such as that of an emergency stop: what stood still then is not
-     * late afterwards. Delays, the times of firings and a page have the time of that clock.
+     * Stops the nets' clock while an input is on, such as that of an emergency stop, so nothing is late afterwards. Delays,
+     * the times of firings and a page use the time of that clock.
      *
      * @param input not 0 while the clock is to stand still
      * @return this
@@ -126,11 +126,11 @@ public final class NetController {
 
     /**
      * Sends the fail-safe values of the driver.cfg while an input is on, such as that of an emergency stop, and afterwards
-     * until {@code rearm} goes on: letting the emergency stop go starts nothing. Meanwhile no net is scanned, their clock
-     * stands still, and edges pass unseen; that of {@code rearm} too. Then the nets continue with their markings.
+     * until {@code rearm} turns on: releasing the emergency stop starts nothing. Meanwhile no net is scanned, their clock
+     * stands still, and all edges are ignored, also that of {@code rearm}. Then the nets continue with their markings.
      *
      * @param input not 0 while the outputs are to be fail-safe
-     * @param rearm the input that has to go on after that
+     * @param rearm the input that must turn on after that
      * @return this
      * @throws IllegalArgumentException if there is no such input
      * @throws IllegalStateException if an input was named before
@@ -140,7 +140,7 @@ public final class NetController {
         return this;
     }
 
-    /** As {@link #failSafeWhile}, while the input is off: for a closed circuit, where a broken wire is a stop, too. */
+    /** As {@link #failSafeWhile}, while the input is off: for a closed circuit, where a broken wire also stops the machine. */
     public NetController failSafeUnless(String input, String rearm) {
         safety.bind(input(input), false, input, input(rearm), rearm);
         return this;
@@ -155,8 +155,8 @@ public final class NetController {
 
     /**
      * Saves the markings of all nets in a file, in the first scan and then in each scan that changes them, before its
-     * outputs are sent. The file is replaced as a whole. It survives the end of the process; power that fails in that
-     * moment may lose it. Such a scan allocates. One that cannot save throws an {@link UncheckedIOException}.
+     * outputs are sent. Each save replaces the whole file. The file survives the end of the process; a power failure at that
+     * moment can lose it. A scan that saves allocates. A scan that cannot save throws an {@link UncheckedIOException}.
      *
      * @return this
      */
@@ -167,8 +167,8 @@ public final class NetController {
 
     /**
      * Begins with the markings that {@link #keepMarkings} saved, in place of the initial ones; only before the first scan.
-     * The entry actions of marked places run and delays begin in the first scan. Nobody else knows whether the machine
-     * still is as it was.
+     * The entry actions of marked places run and delays begin in the first scan. The caller must know that the machine is
+     * still in the saved state.
      *
      * @return this
      * @throws IOException if the file cannot be read
@@ -212,7 +212,7 @@ public final class NetController {
             outputs = Arrays.stream(output).distinct().toArray();
         }
 
-        /** Computes them, unless the net has stopped. */
+        /** Computes the outputs, unless the net has stopped. */
         void update(double[] values) {
             if (coordinator.stop().isPresent()) {
                 return;
@@ -275,7 +275,7 @@ public final class NetController {
      * @throws tickbus.FieldbusException as {@link Tickbus#exchange()}
      */
     public int scan(long nanos) {
-        // A driver in simulation time would fail for good at a clock that goes back, and could not send the fail-safe values.
+        // A driver in simulation time would fail for good if the clock goes back, and could not send the fail-safe values.
         long latest = scans == 0 ? nanos : Math.max(nanos, lastNanos);
         int status = bus.receive(latest);
         int fired = 0;
@@ -303,9 +303,9 @@ public final class NetController {
     }
 
     /**
-     * Scans in real time, until {@code more} says no or the thread is interrupted. The time goes on from the last scan, or
-     * begins at 0; what passed since that scan does not count. If something throws, or if the JVM ends, the driver is
-     * closed, so that its outputs do not stay as they are.
+     * Scans in real time, until {@code more} returns false or the thread is interrupted. The time continues from the last
+     * scan, or begins at 0; the time between that scan and this call does not count. If something throws, or the JVM ends,
+     * the driver is closed, so that its outputs do not stay as they are.
      *
      * @param periodNanos from one scan to the next, above 0; a scan that is late shifts those after it
      * @param more asked once before each scan, when it is due
@@ -347,7 +347,7 @@ public final class NetController {
         }
     }
 
-    /** Ends a run as the JVM ends, and closes the driver, also behind an action that hangs. */
+    /** Ends a run when the JVM ends, and closes the driver, even while an action hangs. */
     void end(Thread running, CountDownLatch ended) {
         ending = true;
         LockSupport.unpark(running);
@@ -359,7 +359,7 @@ public final class NetController {
         bus.close();
     }
 
-    /** Whether the time has come; otherwise the thread was interrupted, or the JVM ends. */
+    /** True when the time has come; false if the thread was interrupted, or the JVM is ending. */
     private boolean waitUntil(long nanoTime) {
         while (!ending && !Thread.currentThread().isInterrupted()) {
             long wait = nanoTime - System.nanoTime();
@@ -381,8 +381,9 @@ public final class NetController {
     }
 
     /**
-     * All nets as of one scan, for a page ({@link tickbus.petri.page.NetPage}) or a view of your own: beside each condition
-     * the values of its signals. There is one, so it is for one page, which many may look at. For any thread.
+     * All nets as of one scan, for a page ({@link tickbus.petri.page.NetPage}) or a view of your own, with the values of its
+     * signals beside each condition. A controller has one watch, so it serves one page, which can have many viewers. For any
+     * thread.
      */
     public NetWatch watch() {
         return watch;
@@ -393,7 +394,7 @@ public final class NetController {
         return coordinators.values().stream().flatMap(one -> one.stop().stream()).toList();
     }
 
-    /** Whether a net has stopped; allocates nothing. */
+    /** True if a net has stopped; allocates nothing. */
     public boolean stopped() {
         for (Coordinator coordinator : order) {
             if (coordinator.stop().isPresent()) {
@@ -403,7 +404,7 @@ public final class NetController {
         return false;
     }
 
-    /** Scans so far, with the stale ones. */
+    /** The number of scans so far, including stale ones. */
     public long scans() {
         return scans;
     }

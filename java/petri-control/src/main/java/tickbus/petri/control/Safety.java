@@ -3,7 +3,7 @@ package tickbus.petri.control;
 import java.util.List;
 import tickbus.Signal;
 
-/** Keeps outputs at their fail-safe values while an input asks for it, and until another one has gone on after that. */
+/** Keeps outputs at their fail-safe values while an input is on, and afterwards until another input turns on. */
 final class Safety {
     private final Latch latch;
     private final Signal[] outputs;
@@ -38,7 +38,7 @@ final class Safety {
         return holding;
     }
 
-    /** Looks at what the latch has; if it holds, the outputs are fail-safe now. Rearm counts from the next scan on. */
+    /** Evaluates the latched inputs; while it holds, sets the outputs to fail-safe. Rearm counts from the next scan on. */
     boolean holds() {
         if (input < 0) {
             return false;

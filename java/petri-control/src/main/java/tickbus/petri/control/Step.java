@@ -3,12 +3,12 @@ package tickbus.petri.control;
 import tickbus.petri.Action;
 
 /**
- * One action, as it was written.
+ * One action, as written by the user.
  *
  * @param moment when it happens
  * @param node the place, or the transition of {@link Moment#FIRING}
- * @param output the signal that it sets; null if it is code
- * @param value what the signal is set to
+ * @param output the signal to be set; null for code
+ * @param value the signal's new value
  * @param code the user's own action
  */
 record Step(Moment moment, String node, String output, double value, Action code) {

@@ -5,12 +5,12 @@ import tickbus.petri.Condition;
 import tickbus.petri.Conjunction;
 
 /**
- * One part of a condition, as it was written.
+ * One part of a condition, as written by the user.
  *
- * @param kind what it asks for
- * @param name the signal; for a place, the net that it belongs to
+ * @param kind of the comparison
+ * @param name the signal; for a place, its net
  * @param place the place, for {@link Kind#MARKED} and {@link Kind#UNMARKED}
- * @param value what the signal is compared with
+ * @param value the limit or value that the signal is compared with
  * @param code the user's own condition, for {@link Kind#CODE}
  */
 record Term(Kind kind, String name, String place, double value, Condition code) {

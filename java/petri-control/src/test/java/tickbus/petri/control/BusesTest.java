@@ -9,10 +9,10 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
 import tickbus.petri.PetriNet;
 
-/** One net over each bus that has the role and whose other end tickbus has, too. */
+/** One net over each bus that has the role controller and whose other end tickbus also has. */
 @Tag("native")
 class BusesTest {
-    /** Nothing is written to a server that the client's driver.cfg does not name. */
+    /** The client's driver.cfg must name a server for tickbus to write to it. */
     private static final String WRITE_TO = "write_to = \"tickbus Gripper\"\n";
 
     @TempDir

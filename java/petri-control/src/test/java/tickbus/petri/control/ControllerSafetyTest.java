@@ -21,7 +21,7 @@ import tickbus.petri.NetException;
 import tickbus.petri.PetriNet;
 import tickbus.petri.Stop;
 
-/** How a controller stops, holds, ends and begins again. */
+/** How a controller stops, holds, ends and resumes. */
 @Tag("native")
 class ControllerSafetyTest {
     @TempDir
@@ -56,7 +56,7 @@ class ControllerSafetyTest {
 
     private void begin(NetController controller) {
         nets = controller;
-        // From its first tick an end is on the link; what comes before that is stale.
+        // An end is on the link from its first tick; earlier data are stale.
         machine.receive(nanos);
         nets.scan(nanos);
         scan();
@@ -186,7 +186,7 @@ class ControllerSafetyTest {
         scan();
         assertEquals("tickbus markings 1\nnet toggle\n1 on\nend\n", Files.readString(file));
         reopen();
-        // The file is read before it is written, whatever is called first.
+        // The file is read before it is written, whatever the order of the calls.
         begin(NetController.of(plc, button(toggle())).keepMarkings(file).resume(file));
         scan();
         assertTrue(out("Gripper"));

@@ -14,7 +14,7 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
 import tickbus.petri.PetriNet;
 
-/** The example of docs/petri.md, which it must have word for word. */
+/** The example of docs/petri.md, which must be there word for word. */
 @Tag("native")
 class DocumentationTest {
     private static final Path ROOT = Path.of(System.getProperty("tickbus.root"));

@@ -8,7 +8,7 @@ import java.util.concurrent.atomic.AtomicInteger;
 import java.util.function.BooleanSupplier;
 import tickbus.Tickbus;
 
-/** A gripper's driver.cfg, at either end of any bus. */
+/** A gripper's driver.cfg, for either end of any bus. */
 final class Line {
     private static final AtomicInteger LINKS = new AtomicInteger();
     static final String SIGNALS = """
@@ -61,7 +61,7 @@ final class Line {
         return new String[] {link + "\"device\"\n", link + "\"controller\"\n"};
     }
 
-    /** Lets both ends work until something is so. */
+    /** Lets both ends work until a condition holds. */
     static void until(String what, BooleanSupplier so, Runnable both) {
         long limit = System.nanoTime() + 20_000_000_000L;
         while (!so.getAsBoolean()) {

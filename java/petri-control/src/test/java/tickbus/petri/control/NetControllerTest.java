@@ -26,7 +26,7 @@ import tickbus.petri.RunningNet;
 import tickbus.petri.Stop;
 import tickbus.petri.Verdict;
 
-/** Nets on a link in simulation time, so that each tick of the machine and each scan has its place. */
+/** Nets on a link in simulation time, so that the order of the machine's ticks and the scans is fixed. */
 @Tag("native")
 class NetControllerTest {
     @TempDir
@@ -76,7 +76,7 @@ class NetControllerTest {
 
     private void bind(BoundNet... bound) {
         nets = NetController.of(plc, bound);
-        // From its first tick an end is on the link.
+        // An end is on the link from its first tick.
         machine.receive(0);
         nets.scan(0);
     }
@@ -358,7 +358,7 @@ class NetControllerTest {
         }
         assertEquals(0, allocated, fired + " firings");
         assertTrue(fired > 100_000, fired + " firings");
-        // The hook for the end of the JVM, once in a run of 20,000 scans.
+        // The hook for the end of the JVM allocates once in a run of 20,000 scans.
         long run = allocatedByRun(threads);
         assertTrue(run < 10_000, run + " bytes");
     }

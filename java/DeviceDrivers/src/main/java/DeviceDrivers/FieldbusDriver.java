@@ -12,13 +12,13 @@ import tickbus.Signal;
 import tickbus.Tickbus;
 
 /**
- * Connects a simulator to a PLC's fieldbus, as one {@code .cfg} file describes it.
+ * Connects a simulator to a PLC's fieldbus, as one {@code .cfg} file describes.
  *
- * <p>Its components are the signals in the order of the file; then {@code <name>.edges} for each latched
- * signal that the PLC writes: how many edges came with this tick; then {@code bus.age} in seconds, infinite until data arrive,
- * {@code bus.sequence} and {@code bus.status}: 0 fresh, 1 unchanged, 2 stale.
+ * <p>The components are the signals in the order of the file; then {@code <name>.edges}, the number of edges in this tick,
+ * for each latched signal that the PLC writes; then {@code bus.age} in seconds, infinite until data arrive, {@code
+ * bus.sequence} and {@code bus.status}: 0 fresh, 1 unchanged, 2 stale.
  *
- * <p>All calls come from one thread, as the control interface says.
+ * <p>All calls must come from one thread, as the control interface requires.
  */
 public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     private static final double SECONDS_PER_NANO = 1e-9;
@@ -29,7 +29,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     private final double[] inputs;
     private boolean timed;
     private long simulationNanos;
-    /** Whether this tick's inputs were delivered before the simulation's step. */
+    /** True if this tick's inputs were delivered before the simulation's step. */
     private boolean received;
 
     /**
@@ -43,7 +43,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Describes the driver of a file, and opens nothing: for a simulator that only lists its components.
+     * Describes the driver of a file without opening it: for a simulator that only lists the components.
      *
      * @param cfg the driver.cfg
      * @return a driver that has components, id and name, and cannot tick
@@ -100,7 +100,7 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Takes what has arrived from the fieldbus; {@link #updateComponentValues} then only sends.
+     * Receives from the fieldbus; {@link #updateComponentValues} then only sends.
      *
      * @throws FieldbusException if the fieldbus failed for good, or the driver was closed by {@link #exit}
      */

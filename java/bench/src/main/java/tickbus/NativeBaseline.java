@@ -5,13 +5,13 @@ public final class NativeBaseline {
     private NativeBaseline() {
     }
 
-    /** Makes {@link #call} possible. */
+    /** Loads the library, which {@link #call} needs. */
     public static void load() {
         NativeLibrary.load();
     }
 
     /**
-     * Calls the native library, which does nothing, and returns.
+     * Calls the native library, which returns at once.
      *
      * @return 0
      */

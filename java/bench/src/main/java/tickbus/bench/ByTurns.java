@@ -7,39 +7,39 @@ import tickbus.NativeBaseline;
 import tickbus.Tickbus;
 
 /**
- * Figures that are compared with each other, measured by turns in one process, a quarter of a millisecond each. How fast a
- * processor runs, and what else it has to do, changes from second to second: what is compared has to meet the same of
- * both, and two forks of JMH, half a minute apart, do not.
+ * Figures to be compared with each other, measured by turns in one process, a quarter of a millisecond each. A processor's
+ * speed and its other load change from second to second, so the compared figures must be measured close together. Two forks
+ * of JMH, half a minute apart, are not.
  *
- * <p>The drivers are open all the time, so that the bus threads of the free one run during the turns of the empty call,
- * too. The median of each figure is printed, and the median of its ratios to the first one in the same round, in the
- * format of {@code tools/bench-table}.
+ * <p>The drivers stay open all the time, so the bus threads of the free bus also run during the turns of the empty call. The
+ * output has the median of each figure, and the median of its ratios to the first figure of the same round, in the format of
+ * {@code tools/bench-table}.
  */
 public final class ByTurns {
     private static final int ROUNDS = 1_000;
-    /** Short beside what the system gives a thread at a time, so that most turns are not interrupted. */
+    /** Short compared with the system's time slice, so that most turns are not interrupted. */
     private static final long TURN_NANOS = 250_000;
-    /** The fewest calls of a turn, for those that take long themselves. */
+    /** The fewest calls of a turn, for slow calls. */
     private static final int FEWEST = 24;
-    /** Short calls before anything is measured: the compiler counts calls of a method, and takes its time. */
+    /** Short calls before the measurement: the compiler counts a method's calls, and needs time to compile it. */
     private static final int SHORT_CALLS = 5_000;
     private static final int SHORT = 20;
     private static final int WARM_UP_ROUNDS = 50;
-    /** The part of a turn that goes before it and does not count: what the last turn left in the caches is not its own. */
+    /** The part of a turn that precedes it and does not count: the previous turn's data are still in the caches. */
     private static final int LEAD = 8;
 
-    /** Where results go, so that nothing is left out as useless. */
+    /** Takes the results, so that the compiler cannot drop their computation. */
     private static volatile double sink;
 
     private ByTurns() {
     }
 
-    /** What is measured: makes a number of calls one after the other. */
+    /** A measured operation: makes a number of calls one after the other. */
     private interface Calls {
         double make(int count);
     }
 
-    /** One of those that take turns. */
+    /** One of the operations that take turns. */
     private static final class Turn {
         private final String name;
         private final Calls calls;
@@ -51,7 +51,7 @@ public final class ByTurns {
             this.calls = calls;
         }
 
-        /** Until it is compiled, and it is known how many calls a turn has. */
+        /** Calls until the code is compiled, and determines the number of calls per turn. */
         void prepare() {
             for (int i = 0; i < SHORT_CALLS; i++) {
                 sink = calls.make(SHORT);
@@ -84,7 +84,7 @@ public final class ByTurns {
         }
     }
 
-    /** A tick with REAL signals: all are set by an array, and got by an array, with a fresh frame. */
+    /** A tick with REAL signals: sets all by an array and gets all by an array, with a fresh frame. */
     private static final class Reals implements AutoCloseable {
         private final double[] values;
         private final double[] inputs;
@@ -183,7 +183,7 @@ public final class ByTurns {
         });
     }
 
-    /** By turns, each round beginning with another one. */
+    /** Measures by turns; each round begins with another operation. */
     private static void measure(List<Turn> turns) {
         turns.forEach(Turn::prepare);
         for (int round = -WARM_UP_ROUNDS; round < ROUNDS; round++) {

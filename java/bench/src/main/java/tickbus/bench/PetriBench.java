@@ -20,7 +20,7 @@ import tickbus.petri.NetBuilder;
 import tickbus.petri.PetriNet;
 import tickbus.petri.Reachability;
 
-/** What a firing of a Petri net costs, and a marking of its reachability graph. */
+/** The cost of a firing of a Petri net, and of a marking of its reachability graph. */
 @BenchmarkMode(Mode.AverageTime)
 @OutputTimeUnit(TimeUnit.NANOSECONDS)
 @Fork(3)
@@ -101,7 +101,7 @@ public class PetriBench {
         }
     }
 
-    /** How much memory a reachability graph takes; told in the form of the benches in Rust. */
+    /** The memory of a reachability graph, printed in the form of the Rust benchmarks. */
     @State(Scope.Thread)
     public static class Memory {
         private long bytes;
@@ -110,7 +110,7 @@ public class PetriBench {
         public Memory() {
         }
 
-        /** Tells it. */
+        /** Prints the memory. */
         @TearDown
         public void tell() {
             System.out.println();

@@ -16,7 +16,7 @@ import org.openjdk.jmh.annotations.Warmup;
 import tickbus.Signal;
 import tickbus.Tickbus;
 
-/** The rig's tick, 16 bits in each direction. What is compared with it is in {@link ByTurns}. */
+/** The rig's tick, 16 bits in each direction. Comparisons with it are in {@link ByTurns}. */
 @BenchmarkMode(Mode.AverageTime)
 @OutputTimeUnit(TimeUnit.NANOSECONDS)
 @Fork(value = 3, jvmArgsAppend = "--enable-native-access=ALL-UNNAMED")
@@ -163,7 +163,7 @@ public class RigTickBench {
     }
 
     /**
-     * Set 16 bits, exchange, get 16 bits; the bus is free-running, so that nearly no tick finds a new frame.
+     * Set 16 bits, exchange, get 16 bits; the bus is free-running, so hardly any tick finds a new frame.
      *
      * @param bits the signals
      * @return for JMH

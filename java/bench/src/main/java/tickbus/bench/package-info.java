@@ -1,2 +1,2 @@
-/** Benchmarks of the tick as seen from Java. Those to be compared run by turns in one process, the others under JMH. */
+/** Benchmarks of the tick as seen from Java. Figures to be compared are measured by turns in one process, the others by JMH. */
 package tickbus.bench;

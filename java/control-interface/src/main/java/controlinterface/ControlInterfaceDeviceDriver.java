@@ -7,10 +7,9 @@ import java.util.Objects;
 /**
  * Base class of every device driver that a simulator loads from its {@code DeviceDriver} folder.
  *
- * <p>The simulator creates one instance for each {@code .cfg} file in the folder by the public constructor
- * that takes the file's {@link java.nio.file.Path}, registers itself with {@link #connect}, and then calls
- * {@link #simulationTime}, {@link #updateHardwareInputs} and {@link #updateComponentValues} once per tick. All calls come
- * from one thread.
+ * <p>For each {@code .cfg} file in the folder, the simulator creates one instance by the public constructor that takes the
+ * file's {@link java.nio.file.Path}. It registers itself with {@link #connect}, and then calls {@link #simulationTime},
+ * {@link #updateHardwareInputs} and {@link #updateComponentValues} once per tick. All calls come from one thread.
  *
  * <p>Our reading of the interface that the 2003 thesis describes; the original class is not public.
  */
@@ -23,9 +22,9 @@ public abstract class ControlInterfaceDeviceDriver {
 
     /**
      * Asks, before the machine's step, for the current values of the hardware. A driver that has them calls {@link
-     * #deliverHardwareInputs} before it returns, and then only sends in the {@link #updateComponentValues} of this
-     * tick, so that the machine answers the hardware within one tick. A driver that does not override this method
-     * delivers in {@code updateComponentValues}, as in 2003; a simulator need not call it.
+     * #deliverHardwareInputs} before it returns. In this tick's {@link #updateComponentValues} it then only sends, so that
+     * the machine answers the hardware within one tick. A driver that does not override this method delivers in {@code
+     * updateComponentValues}, as in 2003; a simulator need not call it.
      *
      * @throws RuntimeException if the hardware failed for good; the simulator then ends the run
      */
@@ -61,9 +60,9 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
-     * Tells the driver the simulation time: before each {@link #updateHardwareInputs} the time at the beginning of
-     * the tick, before each {@link #updateComponentValues} the time at its end. A driver that does not use simulation
-     * time need not override it.
+     * Passes the simulation time to the driver: before each {@link #updateHardwareInputs} the time at the beginning of the
+     * tick, before each {@link #updateComponentValues} the time at its end. A driver that does not use simulation time need
+     * not override this method.
      *
      * @param nanos nanoseconds since the simulation began, never decreasing
      */
@@ -93,7 +92,7 @@ public abstract class ControlInterfaceDeviceDriver {
     public abstract String name();
 
     /**
-     * The driver's counters. May be slow; not to be called on every tick.
+     * The driver's counters. Can be slow; do not call it on every tick.
      *
      * @return names and values as text, in an order fit for printing; empty if the driver counts nothing
      */

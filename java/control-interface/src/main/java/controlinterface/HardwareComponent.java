@@ -3,7 +3,7 @@ package controlinterface;
 import java.util.Objects;
 
 /**
- * One value that a driver exchanges: a signal of the hardware as the simulator lists and connects it.
+ * One value that a driver exchanges: a signal of the hardware, as the simulator lists and connects it.
  *
  * @param name unique among the driver's components, never blank
  * @param direction who writes the value
@@ -12,7 +12,7 @@ import java.util.Objects;
  */
 public record HardwareComponent(String name, Direction direction, String type, String unit) {
     /**
-     * Checks that all parts are there.
+     * Checks that no part is missing.
      *
      * @throws NullPointerException if any part is null
      * @throws IllegalArgumentException if the name is blank

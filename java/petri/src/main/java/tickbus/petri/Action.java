@@ -1,8 +1,8 @@
 package tickbus.petri;
 
-/** What a place or a transition does to the outputs. */
+/** The effect of a place or a transition on the outputs. */
 @FunctionalInterface
 public interface Action {
-    /** Runs within the scan; what it sets is written at the end of it. */
+    /** Runs within the scan; the values that it sets are written at the end of the scan. */
     void run(Inputs inputs, Outputs outputs);
 }

@@ -3,7 +3,7 @@ package tickbus.petri;
 /**
  * One arc of a net.
  *
- * @param kind what it means
+ * @param kind its effect
  * @param place the index of its place
  * @param transition the index of its transition
  * @param weight 1 or more

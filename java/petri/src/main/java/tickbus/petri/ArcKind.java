@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** What an arc between a place and a transition means. */
+/** The meaning of an arc between a place and a transition. */
 public enum ArcKind {
     /** Place to transition: the transition needs at least as many tokens as the weight, and takes them. */
     INPUT,

@@ -6,7 +6,7 @@ import java.util.Arrays;
 final class Components {
     /** The component of each node. */
     final int[] of;
-    /** For each component whether no edge leaves it. */
+    /** For each component, true if no edge leaves it. */
     final boolean[] terminal;
     final int count;
 

@@ -1,8 +1,8 @@
 package tickbus.petri;
 
-/** Whether an enabled transition may fire. Tested at most once in a scan, so it must depend on the inputs alone. */
+/** Permits an enabled transition to fire. Tested at most once in a scan, so it must depend on the inputs alone. */
 @FunctionalInterface
 public interface Condition {
-    /** Whether it holds for these inputs. */
+    /** True if the condition holds for these inputs. */
     boolean test(Inputs inputs);
 }

@@ -7,11 +7,11 @@ import java.util.List;
 import java.util.Set;
 
 /**
- * Conflicts: pairs of transitions of which the firing of one may disable the other.
+ * Conflicts: pairs of transitions where the firing of one can disable the other.
  *
- * <p>A structural conflict is in the arcs: both take from one place, or one takes what the other tests, or one fills a
- * place that inhibits the other or whose capacity the other needs. An effective conflict also happens: in a reachable
- * marking both are enabled, and the firing of one disables the other.
+ * <p>A structural conflict is in the arcs: both take from one place, or one takes what the other tests, or one fills a place
+ * that inhibits the other or whose capacity the other needs. In an effective conflict, a reachable marking enables both, and
+ * the firing of one disables the other.
  */
 public final class Conflicts {
     /**
@@ -25,7 +25,7 @@ public final class Conflicts {
     }
 
     /**
-     * A conflict that happens.
+     * A conflict that can happen.
      *
      * @param first the one that fires
      * @param second the one that is disabled

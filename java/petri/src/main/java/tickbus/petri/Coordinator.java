@@ -9,18 +9,17 @@ import java.util.concurrent.atomic.AtomicReference;
 /**
  * Runs a net as a control program, one {@link #scan} after the other.
  *
- * <p>A scan reads the inputs once. Then it fires until no transition is enabled, due and true: conditions are tested
- * before one is chosen, so a false one starves nobody; the greatest priority fires first, and among those what was due first;
- * among ready transitions that are in conflict and equal in both, chance decides, by a seed; others fire in the order
- * of the net. Then it runs the
- * continuous actions of the marked places and writes the outputs. The same seed, times and inputs give the same
- * firings. A scan allocates nothing in the steady state.
+ * <p>A scan reads the inputs once. Then it fires until no transition is enabled, due and true: conditions are tested before
+ * a transition is chosen, so a false one starves nobody. The greatest priority fires first, and among equal priorities the
+ * one that was due first. Among ready transitions that are in conflict and equal in both, chance decides, by a seed; others
+ * fire in the order of the net. Then the scan runs the continuous actions of the marked places and writes the outputs. The
+ * same seed, times and inputs give the same firings. A scan allocates nothing in the steady state.
  *
  * <p>If something throws, or if the net does not come to rest, the controller stops for good with its outputs at their
- * fail-safe values, and {@link #stop} says why. Not for several threads at once.
+ * fail-safe values, and {@link #stop} says why. Not thread-safe.
  */
 public final class Coordinator implements RunningNet {
-    /** How many of the last firings a livelock report looks at. */
+    /** The number of recent firings in a livelock report. */
     private static final int RECENT = 256;
 
     private enum Step { CLOCK, READER, CONDITION, FIRING, ENTRY, EXIT, CONTINUOUS, WRITER }
@@ -33,16 +32,16 @@ public final class Coordinator implements RunningNet {
     private final SplitMix random;
     final Enabling enabling;
     private final boolean[] timed;
-    /** Whether the delay of an enabled transition is over. */
+    /** True if the delay of an enabled transition is over. */
     private final boolean[] ripe;
     /** Enabled, ripe, and true in this scan. */
     private final Ready ready;
-    /** When a delay made it possible to fire, in the scan of that number. */
+    /** When the end of a delay released the transition, in the scan of that number. */
     private final long[] releasedAt;
     private final long[] releasedIn;
-    /** Since which scan it has been enabled, and its edge has not been used: such an edge counts from the next one on. */
+    /** The scan since which the transition has been enabled with its edge unused: the edge counts from the next scan on. */
     private final long[] enabledIn;
-    /** The due time that led to what happens now; {@link Ready#UNTIMED} where inputs did. */
+    /** The due time that caused the current firing; {@link Ready#UNTIMED} if inputs caused it. */
     private long moment = Ready.UNTIMED;
     private boolean firing;
     /** The scan in which the condition was last tested. */
@@ -51,7 +50,7 @@ public final class Coordinator implements RunningNet {
     /** A bit for each place that is marked and has a continuous action. */
     private final long[] active;
     private final int[] recent = new int[RECENT];
-    /** How often each transition has fired, and when it did last. */
+    /** How often each transition has fired, and when last. */
     private final long[] fired;
     private final long[] lastFired;
     /** The conditions that know their parts; null for the others. */
@@ -116,7 +115,7 @@ public final class Coordinator implements RunningNet {
         return new CoordinatorBuilder(net);
     }
 
-    /** Its net. */
+    /** The net that runs. */
     @Override
     public PetriNet net() {
         return net;
@@ -143,7 +142,7 @@ public final class Coordinator implements RunningNet {
     }
 
     /**
-     * Begins with this marking in place of the initial one, such as that of a run that ended. The entry actions of its
+     * Begins with this marking in place of the initial one, such as the marking of an earlier run. The entry actions of its
      * marked places run in the first scan, and delays begin there. Only before the first scan.
      */
     public void resume(Marking marking) {
@@ -156,39 +155,39 @@ public final class Coordinator implements RunningNet {
         beginning = marking.toArray();
     }
 
-    /** The marking now, as a copy; before the first scan, the one with which it begins. */
+    /** A copy of the current marking; before the first scan, the marking with which it begins. */
     public Marking marking() {
         return new Marking(net, scans == 0 ? beginning.clone() : enabling.tokens.clone());
     }
 
-    /** The tokens in the place with this index now; before the first scan, those with which it begins. */
+    /** The current tokens in the place with this index; before the first scan, those with which it begins. */
     public int tokens(int place) {
         return scans == 0 ? beginning[place] : enabling.tokens[place];
     }
 
-    /** How many scans there have been, with the one that stopped it. */
+    /** The number of scans, including the one that stopped the controller. */
     public long scans() {
         return scans;
     }
 
-    /** Its outputs, for views; they are what was last written, unless called from an action. */
+    /** The outputs, for views: the values last written, unless called from an action. */
     public Outputs outputs() {
         return outputs;
     }
 
-    /** Why it stopped; empty while it runs. */
+    /** Why the controller stopped; empty while it runs. */
     public Optional<Stop> stop() {
         return Optional.ofNullable(stop);
     }
 
-    /** When a delay is over next; {@link Long#MAX_VALUE} if nothing waits for the time. */
+    /** When the next delay is over; {@link Long#MAX_VALUE} if nothing waits for the time. */
     public long nextDue() {
         return enabling.due.next();
     }
 
     /**
-     * One scan at the time {@code nanos}. The clock may begin anywhere: tokens of the initial marking arrive with the
-     * first scan. A clock that goes back stops the controller.
+     * One scan at the time {@code nanos}. The clock can begin anywhere: tokens of the initial marking arrive with the first
+     * scan. A clock that goes back stops the controller.
      *
      * @return how many transitions fired; 0 after the controller has stopped
      */
@@ -263,7 +262,7 @@ public final class Coordinator implements RunningNet {
         return count;
     }
 
-    /** Everything that is due, with its own time each: what was due first fires first. */
+    /** Releases everything that is due, each with its own time: the earliest due time fires first. */
     private void release() {
         while (enabling.due.isDue(now)) {
             moment = enabling.due.next();
@@ -287,7 +286,7 @@ public final class Coordinator implements RunningNet {
         }
     }
 
-    /** An enabled transition waits for its delay, anew after each firing of its own. */
+    /** Starts the delay of an enabled transition; each of its firings starts it again. */
     private void arm(int t) {
         if (timed[t]) {
             long delay = net.transition(t).delay().draw(random);
@@ -320,7 +319,7 @@ public final class Coordinator implements RunningNet {
         }
     }
 
-    /** An edge is for what was enabled when the scan began, and for one firing. */
+    /** An edge counts for the transitions enabled when the scan began, and for one firing of each. */
     private boolean isEdgeOver(int t) {
         return bound.edge[t] && enabledIn[t] == scans;
     }
@@ -340,7 +339,7 @@ public final class Coordinator implements RunningNet {
         if (timed[t] && enabling.enabled.contains(t)) {
             arm(t);
         }
-        // The conditions of what has become enabled came in between.
+        // The conditions of newly enabled transitions were tested in between.
         step = Step.FIRING;
         at = t;
         bound.listener.fired(scans, now, t, choices);

@@ -3,11 +3,11 @@ package tickbus.petri;
 import java.util.ArrayList;
 import java.util.List;
 
-/** Binds conditions and actions to a net. An unknown name is an {@link IllegalArgumentException} at once. */
+/** Binds conditions and actions to a net. An unknown name throws an {@link IllegalArgumentException} at once. */
 public final class CoordinatorBuilder {
     final PetriNet net;
     final Condition[] conditions;
-    /** Whether the condition is an edge. */
+    /** True if the condition is an edge. */
     final boolean[] edge;
     final Action[] firing;
     final Action[] entry;
@@ -57,7 +57,7 @@ public final class CoordinatorBuilder {
         return this;
     }
 
-    /** How many firings in one scan are a livelock, 1 or more; 10,000 unless given. */
+    /** The number of firings in one scan that counts as a livelock, 1 or more; 10,000 unless given. */
     public CoordinatorBuilder limit(int firings) {
         if (firings < 1) {
             throw new IllegalArgumentException("a limit of " + firings + " firings; expected 1 or more");
@@ -78,7 +78,7 @@ public final class CoordinatorBuilder {
         return this;
     }
 
-    /** Names an output. It begins with its fail-safe value, and has it again when the controller stops. */
+    /** Names an output. The output has its fail-safe value at first, and again when the controller stops. */
     public CoordinatorBuilder output(String name, double failSafeValue) {
         outputs.add(name);
         failSafe.add(failSafeValue);
@@ -133,13 +133,13 @@ public final class CoordinatorBuilder {
         return this;
     }
 
-    /** Hears of the firings. */
+    /** Reports the firings to a listener. */
     public CoordinatorBuilder listener(FiringListener of) {
         listener = of;
         return this;
     }
 
-    /** A coordinator that has not scanned yet; what is bound later is not bound to it. */
+    /** A coordinator that has not scanned yet. Later bindings do not affect it. */
     public Coordinator build() {
         return new Coordinator(new CoordinatorBuilder(this));
     }

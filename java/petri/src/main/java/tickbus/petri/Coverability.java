@@ -8,18 +8,18 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * The coverability graph of Karp and Miller: which places can grow without bound, and which markings can be covered. It
- * is finite for every net, but may be huge; so there is a limit. Delays, priorities and conditions are left out.
+ * The coverability graph of Karp and Miller: which places can grow without bound, and which markings can be covered. The
+ * graph is finite for every net but can be huge, so there is a limit. Delays, priorities and conditions are left out.
  *
- * <p>Places with a capacity get a complement inside, and inhibitor arcs on them become tests of it. An inhibitor arc on
- * a place without a capacity is refused with an {@link UnsupportedOperationException}: for such nets the questions are
- * undecidable; give the place a capacity, or use {@link Reachability}.
+ * <p>Internally, places with a capacity get a complement, and inhibitor arcs on them become tests of the complement. An
+ * inhibitor arc on a place without a capacity throws an {@link UnsupportedOperationException}, because the questions are
+ * undecidable for such nets; give the place a capacity, or use {@link Reachability}.
  */
 public final class Coverability {
     /** No bound: for any number there is a reachable marking with more tokens than that. */
     public static final int OMEGA = Integer.MAX_VALUE;
 
-    /** For each marking beside its tokens: array, key, entry and slot of the map. */
+    /** For each marking, in addition to its tokens: array, key, entry and slot of the map. */
     private static final long BYTES_BESIDE = 120;
 
     private final PetriNet net;
@@ -66,7 +66,7 @@ public final class Coverability {
                         + net.transition(arc.transition()).name() + ": coverability is undecidable with inhibitor arcs on "
                         + "places without a capacity; give " + place.name() + " one, or explore with Reachability");
                 }
-                // Fewer than w tokens are at least K - w + 1 in the complement.
+                // Fewer than w tokens in the place are at least K - w + 1 in the complement.
                 int needed = place.capacity() - arc.weight() + 1;
                 if (needed > 0) {
                     builder.arc(ArcKind.TEST, "c" + arc.place(), "t" + arc.transition(), needed);
@@ -153,7 +153,7 @@ public final class Coverability {
         return next;
     }
 
-    /** Where an ancestor is less everywhere, what has grown since can grow again and again. */
+    /** If an ancestor has fewer tokens everywhere, the places that have grown since can grow without bound. */
     private void accelerate(int[] tokens, int parent) {
         boolean grown = true;
         while (grown) {
@@ -181,12 +181,12 @@ public final class Coverability {
         return true;
     }
 
-    /** Whether it came to the end. */
+    /** True if the exploration was finished. */
     public boolean isComplete() {
         return complete;
     }
 
-    /** How many markings, with or without omega, it has. */
+    /** The number of markings, with or without omega. */
     public int size() {
         return markings.size();
     }
@@ -196,23 +196,26 @@ public final class Coverability {
         return Arrays.copyOf(markings.get(number), net.places().size());
     }
 
-    /** The most tokens that a place can have; {@link #OMEGA} if there is no bound. Of what was explored, if it gave up. */
+    /**
+     * The most tokens that a place can have; {@link #OMEGA} if there is no bound. If the exploration gave up, of the
+     * explored part.
+     */
     public int bound(int place) {
         return bounds[place];
     }
 
-    /** Whether there is a bound to the tokens of every place. */
+    /** YES if the tokens of every place are bounded. */
     public Verdict isBounded() {
         return Arrays.stream(bounds).anyMatch(bound -> bound == OMEGA) ? Verdict.NO
             : complete ? Verdict.YES : Verdict.UNKNOWN;
     }
 
-    /** Whether no place ever has more than one token. */
+    /** YES if no place ever has more than one token. */
     public Verdict isSafe() {
         return Arrays.stream(bounds).anyMatch(bound -> bound > 1) ? Verdict.NO : complete ? Verdict.YES : Verdict.UNKNOWN;
     }
 
-    /** Whether a reachable marking has at least these tokens everywhere. */
+    /** YES if a reachable marking has at least these tokens everywhere. */
     public Verdict isCoverable(Marking marking) {
         for (int number = 0; number < markings.size(); number++) {
             if (isCoveredBy(marking.tokens, tokens(number))) {
@@ -222,12 +225,12 @@ public final class Coverability {
         return complete ? Verdict.NO : Verdict.UNKNOWN;
     }
 
-    /** Whether the transition fires in some reachable marking. */
+    /** YES if the transition fires in some reachable marking. */
     public Verdict canFire(int transition) {
         return fired.get(transition) ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
     }
 
-    /** How far it came. */
+    /** The extent of the exploration. */
     @Override
     public String toString() {
         return "net " + net.name() + ": " + (complete ? "" : "gave up at ") + size() + " markings";

@@ -1,9 +1,9 @@
 package tickbus.petri;
 
 /**
- * How long a timed transition waits, in nanoseconds. Drawn anew each time the transition becomes enabled.
+ * The waiting time of a timed transition, in nanoseconds. A new delay is drawn each time the transition becomes enabled.
  *
- * @param kind how {@code first} and {@code second} are read
+ * @param kind the meaning of {@code first} and {@code second}
  * @param first the fixed delay, the mean, or the least delay
  * @param second the greatest delay of {@link Kind#UNIFORM}; otherwise 0
  */
@@ -23,7 +23,7 @@ public record Delay(Kind kind, long first, long second) {
         UNIFORM
     }
 
-    /** Checks the figures: an {@link IllegalArgumentException} names the one that is out of range. */
+    /** Checks the figures: an {@link IllegalArgumentException} names the figure that is out of range. */
     public Delay {
         if (first < 0 || second < 0) {
             throw new IllegalArgumentException("a delay of " + Math.min(first, second) + " ns; expected 0 or more");
@@ -57,7 +57,7 @@ public record Delay(Kind kind, long first, long second) {
         return switch (kind) {
             case NONE -> 0;
             case FIXED -> first;
-            // A draw is never 0, so the logarithm is finite; a cast of what is too great saturates.
+            // A draw is never 0, so the logarithm is finite; the cast saturates.
             case EXPONENTIAL -> (long) (-first * Math.log(random.unit()));
             case UNIFORM -> Math.min(second, first + (long) (random.fraction() * (second - first + 1.0)));
         };

@@ -1,9 +1,9 @@
 package tickbus.petri;
 
-/** What is due when: a binary heap of indexes by time, then by index, with each index at most once. */
+/** Due times: a binary heap of indexes by time, then by index, with each index at most once. */
 final class DueHeap {
     private final int[] heap;
-    /** One more than the position in the heap; 0 if it is not there. */
+    /** One more than the position in the heap; 0 if the index is not there. */
     private final int[] position;
     private final long[] due;
     private int size;
@@ -19,7 +19,7 @@ final class DueHeap {
         return size == 0 ? Long.MAX_VALUE : due[heap[0]];
     }
 
-    /** When this index is due; {@link Long#MAX_VALUE} if it is not there. */
+    /** When this index is due; {@link Long#MAX_VALUE} if it is not in the heap. */
     long at(int index) {
         return position[index] == 0 ? Long.MAX_VALUE : due[index];
     }

@@ -5,7 +5,7 @@ import java.util.List;
 
 /**
  * The arcs of a net as arrays. {@code needFirst[t]} to {@code needFirst[t + 1]} are the needs of transition t, and
- * likewise for its changes; {@code dependentFirst[p]} leads to the needs that look at place p.
+ * likewise for its changes; {@code dependentFirst[p]} leads to the needs that depend on place p.
  */
 final class Effects {
     /** At least {@code needLevel} available tokens. */
@@ -103,7 +103,7 @@ final class Effects {
         return true;
     }
 
-    /** Changes the tokens; an {@link ArithmeticException} if there would be too many, with nothing changed. */
+    /** Changes the tokens; on overflow throws an {@link ArithmeticException} and changes nothing. */
     void fire(int[] tokens, int t) {
         for (int i = changeFirst[t]; i < changeFirst[t + 1]; i++) {
             Math.addExact(tokens[changePlace[i]] - changeTakes[i], changePuts[i]);

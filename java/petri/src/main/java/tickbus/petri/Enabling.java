@@ -1,14 +1,14 @@
 package tickbus.petri;
 
 /**
- * The marking of a running net, and which transitions it enables. A firing looks only at the arcs of the places that
- * it changes, so its cost does not grow with the net.
+ * The marking of a running net, and the transitions that it enables. A firing looks only at the arcs of the places that it
+ * changes, so its cost does not grow with the net.
  */
 final class Enabling {
     private final PetriNet net;
     private final Effects effects;
     final int[] tokens;
-    /** The tokens that input and test arcs may use; as many as there are in an untimed place. */
+    /** The tokens that input and test arcs may use; in an untimed place, all its tokens. */
     private final int[] available;
     private final TokenAges[] ages;
     private final int[] unmet;
@@ -17,10 +17,10 @@ final class Enabling {
     private final Watcher watcher;
     /** Timed transitions by index, then timed places. */
     final DueHeap due;
-    /** How many needs have been looked at. */
+    /** The number of needs evaluated so far. */
     long visits;
 
-    /** Hears which transitions become enabled or disabled by a change as a whole. */
+    /** Called for the transitions that a change as a whole enables or disables. */
     interface Watcher {
         void enabled(int transition);
 
@@ -45,7 +45,7 @@ final class Enabling {
         due = new DueHeap(transitions + places);
     }
 
-    /** Puts a marking, whose tokens arrive now. */
+    /** Sets a marking whose tokens arrive now. */
     void start(int[] marking, long now) {
         for (int t = 0; t < unmet.length; t++) {
             unmet[t] = 0;
@@ -86,7 +86,7 @@ final class Enabling {
         settle();
     }
 
-    /** The time after a delay; {@link Long#MAX_VALUE}, which is never, if it is too late for a long. */
+    /** The time after a delay; {@link Long#MAX_VALUE}, which is never, if it exceeds a long. */
     static long after(long now, long delay) {
         return delay > Long.MAX_VALUE - Math.max(0, now) ? Long.MAX_VALUE : now + delay;
     }
@@ -114,7 +114,7 @@ final class Enabling {
         return available[place];
     }
 
-    /** When tokens of a place become available next; {@link Long#MAX_VALUE} if all are. */
+    /** When the next tokens of a place become available; {@link Long#MAX_VALUE} if all are. */
     long nextOf(int place) {
         return ages[place] == null ? Long.MAX_VALUE : ages[place].next();
     }
@@ -147,7 +147,7 @@ final class Enabling {
         }
     }
 
-    /** Only the change as a whole enables and disables. */
+    /** Evaluates the change as a whole: its parts neither enable nor disable. */
     private void settle() {
         for (int i = 0; i < touched.size(); i++) {
             int t = touched.get(i);

@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** Hears of each firing, in order. */
+/** Called for each firing, in order. */
 @FunctionalInterface
 public interface FiringListener {
     /**
@@ -8,8 +8,8 @@ public interface FiringListener {
      *
      * @param scan the number of the scan, from 1
      * @param nanos the time of the scan
-     * @param transition its index
-     * @param choices among how many conflicting transitions it was chosen; 1 if there was no choice
+     * @param transition the transition's index
+     * @param choices the number of conflicting transitions that it was chosen from; 1 if there was no choice
      */
     void fired(long scan, long nanos, int transition, int choices);
 }

@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** Keeps the last firings. Its size is fixed, so that logging allocates nothing. */
+/** Keeps the last firings. The size is fixed, so that logging allocates nothing. */
 public final class FiringLog implements FiringListener {
     private final PetriNet net;
     private final long[] scans;
@@ -30,12 +30,12 @@ public final class FiringLog implements FiringListener {
         choices[at] = choicesOfIt;
     }
 
-    /** How many firings there have been, kept or not. */
+    /** The number of firings so far, kept or not. */
     public long total() {
         return total;
     }
 
-    /** One line for each firing that is kept: scan, nanoseconds, transition, and the number of choices if above 1. */
+    /** One line for each kept firing: scan, nanoseconds, transition, and the number of choices if above 1. */
     @Override
     public String toString() {
         StringBuilder text = new StringBuilder();

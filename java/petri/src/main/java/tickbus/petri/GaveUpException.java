@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** An analysis that has reached its limit of size. The message says how far it came. */
+/** An analysis has reached its size limit. The message says how far it came. */
 public final class GaveUpException extends RuntimeException {
     private static final long serialVersionUID = 1L;
 

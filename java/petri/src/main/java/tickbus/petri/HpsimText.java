@@ -12,10 +12,10 @@ import java.util.Set;
 /**
  * Reads the text that HPSim exports: names, incidence matrix, marking, arc types and time models.
  *
- * <p>HPSim writes the incidence matrix as input minus output weights, the other way round than the field does. It
- * does not write the weights of inhibitor and test arcs, which are taken to be 1 with a warning, nor the figures of
- * delays, which the caller gives. Nor does it write both arcs if a place is input and output of one transition; the
- * {@code .hpx} file ({@link Hpx}) has all of that.
+ * <p>HPSim writes the incidence matrix as input minus output weights, the other way round than the field does. The export
+ * lacks the weights of inhibitor and test arcs, which are taken to be 1 with a warning, and the figures of delays, which the
+ * caller gives. If a place is both input and output of one transition, the export lacks one of the two arcs. The {@code
+ * .hpx} file ({@link Hpx}) has all of that.
  */
 public final class HpsimText {
     private enum Section { TRANSITIONS, PLACES, INCIDENCE, MARKING, TYPES, TIMES }
@@ -112,7 +112,7 @@ public final class HpsimText {
         return given;
     }
 
-    /** Finds the sections by a keyword of their comments: the spelling of the headings varies between versions. */
+    /** Finds the sections by a keyword of their comments, because the spelling of the headings varies between versions. */
     private void split() {
         for (int i = 0; i < headings.length; i++) {
             sections.add(new ArrayList<>());
@@ -173,7 +173,7 @@ public final class HpsimText {
         return comment.contains("time model") ? Section.TIMES : null;
     }
 
-    /** Without parentheses, and without the {@code _T(} that one version writes for them. */
+    /** The text without parentheses, and without the {@code _T(} that one version writes for them. */
     private static String bare(String text) {
         return text.replace("_T(", " ").replaceAll("[(){}]", " ");
     }

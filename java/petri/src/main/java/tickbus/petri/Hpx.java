@@ -15,7 +15,7 @@ import java.util.regex.Pattern;
 /**
  * Reads the interchange files of HPSim 0.9, {@code .hpx}: weights, capacities, arcs of all kinds and delays.
  *
- * <p>A delay in HPSim is a number without a unit; the caller says how long that is.
+ * <p>A delay in HPSim is a number without a unit; the caller gives the unit.
  */
 public final class Hpx {
     /** HPSim's arc types, by number. */
@@ -113,7 +113,7 @@ public final class Hpx {
         }
     }
 
-    /** Ids of objects that were deleted are not given again, so a gap at the end may be a file that is cut off. */
+    /** HPSim does not reuse the ids of deleted objects, so a gap at the end can mean that the file is cut off. */
     private void complete(Section document, String key, TreeMap<Integer, Section> found, int first, String what) {
         int next = document.number(key, 0);
         int after = found.isEmpty() ? first : found.lastKey() + 1;
@@ -156,7 +156,7 @@ public final class Hpx {
             case "CHTransition" -> add(section, "TRANSITION_ID", transitions);
             case "CHConnector" -> add(section, "ARC_ID", connectors);
             case "CHLabel" -> {
-                // Sub-label 0 of a place or transition is its name; the others are figures that are drawn.
+                // Sub-label 0 of a place or transition is its name; the others are figures in the drawing.
                 int owner = section.number("OWNER_IDENT", 0);
                 String text = section.text("TEXT");
                 if (section.number("SUB_IDENT", 0) == 0 && !text.isEmpty()) {
@@ -178,7 +178,7 @@ public final class Hpx {
         to.put(id, section);
     }
 
-    /** The labels, if all have one and no two the same; otherwise a letter and the id. */
+    /** The labels, if every node has a label and all differ; otherwise a letter and the id. */
     private Map<Integer, String> names(Map<Integer, Section> nodes, String letter) {
         Map<Integer, String> names = new LinkedHashMap<>();
         nodes.forEach((id, section) -> names.put(id, labels.getOrDefault(id, "")));
@@ -190,7 +190,10 @@ public final class Hpx {
         return names;
     }
 
-    /** The middle of the rectangle in which HPSim draws a node. What cannot be read is left out: the net does not need it. */
+    /**
+     * The middle of the rectangle in which HPSim draws a node. Unreadable positions are left out: the net does not need
+     * them.
+     */
     private static Optional<double[]> centre(Section section) {
         Matcher sides = RECTANGLE.matcher(section.values.getOrDefault("BOUNDING_RECT", ""));
         if (!sides.matches()) {

@@ -3,10 +3,10 @@ package tickbus.petri;
 import java.util.List;
 
 /**
- * A net from a file of a format that does not hold all of it.
+ * A net from a file whose format does not hold all of the net.
  *
  * @param net the net
- * @param warnings what was assumed, each with file and line; empty if nothing was
+ * @param warnings the assumptions, each with file and line; empty if there were no assumptions
  */
 public record Imported(PetriNet net, List<String> warnings) {
 }

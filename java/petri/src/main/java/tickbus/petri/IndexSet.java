@@ -1,9 +1,9 @@
 package tickbus.petri;
 
-/** A set of indexes with members side by side: adding, removing and asking take a constant time. */
+/** A set of indexes in an array: adding, removing and testing take constant time. */
 final class IndexSet {
     private final int[] members;
-    /** One more than the position among the members; 0 if it is not one. */
+    /** One more than the position among the members; 0 if the index is no member. */
     private final int[] position;
     private int size;
 
@@ -43,7 +43,7 @@ final class IndexSet {
         return size;
     }
 
-    /** The member at a position from 0; removing another one may move it. */
+    /** The member at a position from 0; removing another member can move it. */
     int get(int at) {
         return members[at];
     }

@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** The inputs of a scan. They are read once at its start, and stay as they are until its end. */
+/** The inputs of a scan, read once at its start and constant until its end. */
 public final class Inputs {
     final Signals signals;
 
@@ -23,12 +23,12 @@ public final class Inputs {
         return signals.values[signals.index(name)];
     }
 
-    /** Whether the input with this index is not 0. */
+    /** True if the input with this index is not 0. */
     public boolean isOn(int index) {
         return signals.values[index] != 0;
     }
 
-    /** Whether the input with this name is not 0. */
+    /** True if the input with this name is not 0. */
     public boolean isOn(String name) {
         return get(name) != 0;
     }

@@ -41,7 +41,7 @@ final class Ints {
         return 4L * values.length;
     }
 
-    /** The bytes while a longer array takes the place of the one that is full. */
+    /** The bytes needed while a longer array replaces the full one. */
     long bytesToGrow() {
         return size < values.length ? 0 : bytes() / 2 * 3;
     }

@@ -9,18 +9,18 @@ import java.util.List;
 import java.util.stream.IntStream;
 
 /**
- * Draws a net in layers from top to bottom (after Sugiyama, Tagawa and Toda), each connected part on its own. The marked
- * places begin: arcs back to them run upwards. An arc over several layers gets a bend in each, which is laid out like a
- * node. No chance, so the same net always looks the same.
+ * Draws a net in layers from top to bottom (after Sugiyama, Tagawa and Toda), each connected part separately. The marked
+ * places come first: arcs back to them run upwards. An arc over several layers gets a bend in each, which is laid out like a
+ * node. Nothing is random, so the same net always looks the same.
  */
 final class Layers {
     private static final double STEP = 62;
     private static final double GAP = 18;
     /** Half of the height of a straight piece at a bend. */
     private static final double STRAIGHT = 14;
-    /** Parts of the net are put side by side up to this width. */
+    /** The width up to which parts of the net are put side by side. */
     private static final double PAGE = 1100;
-    /** More bends than that would take too long: then arcs do not mind what they run through. */
+    /** The limit of bends, beyond which the layout would take too long: then arcs can cross nodes. */
     private static final int MOST_BENDS = 20_000;
     private static final int SWEEPS = 24;
 
@@ -53,7 +53,7 @@ final class Layers {
     }
 
     void draw() {
-        // A drawing of the file that was not used may have left one.
+        // An unused drawing of the file can have left a width.
         layout.width = 0;
         direct();
         assignLayers();
@@ -110,7 +110,7 @@ final class Layers {
         routes(y);
     }
 
-    /** Turns arcs around so that there are no circles: those to marked places, and those that close one. */
+    /** Reverses arcs so that there are no circles: arcs to marked places, and arcs that close a circle. */
     private void direct() {
         List<Arc> arcs = layout.net.arcs();
         List<List<Integer>> leaving = new ArrayList<>();
@@ -157,7 +157,7 @@ final class Layers {
         }
     }
 
-    /** By the longest way from above; what nothing leads to stands just above what it leads to. */
+    /** Assigns layers by the longest way from above; a node without incoming arcs is just above its nearest successor. */
     private void assignLayers() {
         layer = new int[nodes];
         int[] waits = new int[nodes];
@@ -257,7 +257,7 @@ final class Layers {
                 layer[next] = layer[above[a]] + i;
                 chain[i] = next++;
             }
-            // Without bends, a long arc does not take part in the order of the rows.
+            // Without bends, a long arc does not affect the order of the rows.
             for (int i = 1; i < length && layer[chain[i]] - layer[chain[i - 1]] == 1; i++) {
                 down.get(chain[i - 1]).add(chain[i]);
                 up.get(chain[i]).add(chain[i - 1]);
@@ -282,7 +282,7 @@ final class Layers {
         }
     }
 
-    /** Moves each node and bend towards the middle of its neighbours, as far as its row allows. */
+    /** Moves each node and bend towards the middle of its neighbours, as far as the order of its row allows. */
     private void align(List<List<Integer>> rows) {
         for (List<Integer> row : rows) {
             double at = 0;
@@ -313,7 +313,7 @@ final class Layers {
             double all = 0;
             for (List<Integer> side : List.of(up.get(v), down.get(v))) {
                 for (int w : side) {
-                    // Long arcs are to be straight first of all.
+                    // Straight long arcs matter most.
                     double pull = v >= nodes && w >= nodes ? 8 : v >= nodes || w >= nodes ? 2 : 1;
                     mean += pull * x[w];
                     all += pull;
@@ -321,7 +321,7 @@ final class Layers {
             }
             double wish = (all == 0 ? x[v] : mean / all) - offset[i];
             all = Math.max(all, 0.1);
-            // The closest that keeps the order: neighbours that would collide move together.
+            // The closest position that keeps the order: neighbours that would collide move together.
             int count = 1;
             double total = wish * all;
             while (blocks > 0 && sum[blocks - 1] / weight[blocks - 1] >= total / all) {
@@ -342,7 +342,7 @@ final class Layers {
         }
     }
 
-    /** Puts all bends of an arc on top of each other where their rows leave the room. */
+    /** Aligns all bends of an arc vertically where their rows have room. */
     private void straighten(List<List<Integer>> rows) {
         double[] low = new double[layer.length];
         double[] high = new double[layer.length];
@@ -386,7 +386,7 @@ final class Layers {
         }
     }
 
-    /** Spreads the ends of the arcs along each node, in the order of where they go, and joins them through the bends. */
+    /** Spreads the ends of the arcs along each node, in the order of their targets, and joins them through the bends. */
     private void routes(double[] y) {
         double[][] route = new double[chains.length][];
         List<List<Integer>> tops = new ArrayList<>();
@@ -495,7 +495,7 @@ final class Layers {
             return copy;
         }
 
-        /** Counts, for each end in turn, the ends before it that lie further to the right (a Fenwick tree). */
+        /** Counts, for each end in turn, the earlier ends that are further to the right (a Fenwick tree). */
         private long crossings() {
             long crossings = 0;
             for (int r = 1; r < rows.size(); r++) {

@@ -3,7 +3,7 @@ package tickbus.petri;
 import java.util.Arrays;
 import java.util.List;
 
-/** Where a drawing has the nodes of a net, and how the arcs run between them, in pixels from the upper left. */
+/** The positions of a net's nodes in a drawing, and the routes of the arcs between them, in pixels from the upper left. */
 final class Layout {
     /** The radius of a place. */
     static final double RADIUS = 16;
@@ -13,12 +13,12 @@ final class Layout {
     /** Half of a transition that is a square. */
     static final double HALF_SQUARE = 10;
     static final double MARGIN = 12;
-    /** How far an enabled transition's frame stands off; arcs end there. */
+    /** The distance of an enabled transition's frame; arcs end there. */
     static final double FRAME = 4;
-    /** Longer lines of names are shortened, and names of two words that are wider than this are put on two lines. */
+    /** The most letters in a line of a name: longer lines are shortened, and longer names of two words get two lines. */
     private static final int MOST_LETTERS = 28;
     private static final double WIDE = 75;
-    /** The least distance of two nodes of a file's drawing. */
+    /** The least distance of two nodes in a file's drawing. */
     private static final double NEAREST = 64;
 
     final PetriNet net;
@@ -30,9 +30,9 @@ final class Layout {
     final double[] halfHeight;
     /** Of each arc: x and y of its points in turn, from the edge of its source to the edge of its target. */
     final double[][] routes;
-    /** Whether arcs leave and reach all their points vertically; otherwise they are straight between them. */
+    /** True if arcs leave and reach all their points vertically; otherwise they are straight between them. */
     boolean curved;
-    /** Whether names stand to the right of their nodes; otherwise below them, right of the middle. */
+    /** True if names are to the right of their nodes; otherwise below them, right of the middle. */
     boolean namesBeside;
     double width;
     double height;
@@ -70,7 +70,7 @@ final class Layout {
         return node < net.places().size();
     }
 
-    /** The name of a node as it is drawn: one line, or two if it is long and has a place to break near the middle. */
+    /** The name of a node in the drawing: one line, or two if it is long and has a place to break near the middle. */
     List<String> label(int node) {
         String name = isPlace(node) ? net.place(node).name() : net.transition(node - net.places().size()).name();
         int at = -1;
@@ -90,17 +90,17 @@ final class Layout {
         return letters <= MOST_LETTERS ? line : line.substring(0, line.offsetByCodePoints(0, MOST_LETTERS - 1)) + "…";
     }
 
-    /** The width of the name of a node as it is drawn. */
+    /** The width of a node's name in the drawing. */
     double labelWidth(int node) {
         return label(node).stream().mapToDouble(Layout::width).max().orElse(0);
     }
 
-    /** The width of a text in the drawing's letters, about: what draws it chooses the font. */
+    /** The approximate width of a text in the drawing: the viewer's program chooses the font. */
     private static double width(String text) {
         return text.codePoints().mapToDouble(c -> c > 0x2E7F ? 13 : Character.isUpperCase(c) ? 8.4 : 6.8).sum();
     }
 
-    /** Whether the file's positions give a drawing: nodes on top of each other, or lost far away, do not. */
+    /** True if the file's positions are usable: no nodes on top of each other, and none far away. */
     private boolean asInFile() {
         double[][] nodes = net.positions.nodes();
         double nearest = Double.MAX_VALUE;
@@ -156,13 +156,13 @@ final class Layout {
         high[1] = Math.max(high[1], atY);
     }
 
-    /** Whether another arc runs between the same nodes. */
+    /** True if another arc connects the same nodes. */
     private boolean hasTwin(Arc arc) {
         return net.arcs().stream().anyMatch(other -> other != arc && other.place() == arc.place()
             && other.transition() == arc.transition());
     }
 
-    /** A route with a bend to the right of its direction, so that there and back do not lie on top of each other. */
+    /** A route with a bend to the right of its direction, so that the arcs of both directions do not overlap. */
     private double[] aside(Arc arc) {
         int from = source(arc);
         int to = target(arc);

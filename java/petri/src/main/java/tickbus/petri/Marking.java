@@ -2,7 +2,7 @@ package tickbus.petri;
 
 import java.util.Arrays;
 
-/** The tokens in the places of a net. Mutable, and not for several threads at once. */
+/** The tokens in the places of a net. Mutable and not thread-safe. */
 public final class Marking {
     private final PetriNet net;
     final int[] tokens;
@@ -33,7 +33,7 @@ public final class Marking {
         tokens[place] = count;
     }
 
-    /** A marking of its own with the same tokens. */
+    /** A separate marking with the same tokens. */
     public Marking copy() {
         return new Marking(net, tokens.clone());
     }
@@ -43,7 +43,7 @@ public final class Marking {
         return tokens.clone();
     }
 
-    /** Whether it has the same tokens in the same net. */
+    /** True if the other marking has the same tokens in the same net. */
     @Override
     public boolean equals(Object other) {
         return other instanceof Marking that && net == that.net && Arrays.equals(tokens, that.tokens);

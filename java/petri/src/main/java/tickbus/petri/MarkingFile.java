@@ -10,8 +10,8 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * Markings in a file, for a program that is to continue after a restart. The file is replaced as a whole, so a reader
- * finds the markings of one moment whenever the program ended.
+ * Markings in a file, for a program that is to continue after a restart. Each write replaces the whole file, so a reader
+ * finds the markings of one moment, whenever the program ended.
  */
 public final class MarkingFile {
     private static final String FIRST = "tickbus markings 1";
@@ -39,7 +39,7 @@ public final class MarkingFile {
     /**
      * Reads the markings of these nets, in their order.
      *
-     * @throws NetException with file and line if it does not hold a marking of exactly these nets
+     * @throws NetException with file and line if the file does not hold a marking of exactly these nets
      */
     public static List<Marking> read(Path file, List<PetriNet> nets) throws IOException {
         SourceText source = SourceText.read(file);
@@ -87,7 +87,7 @@ public final class MarkingFile {
         return all;
     }
 
-    /** On one line. */
+    /** The name on one line. */
     private static String name(PetriNet net) {
         return net.name().replaceAll("\\p{Cntrl}", " ");
     }

@@ -3,8 +3,8 @@ package tickbus.petri;
 import java.util.Arrays;
 
 /**
- * Different markings, numbered from 0 in the order in which they come. Each place has 1, 2, 4, … or 32 bits, as many as
- * the greatest count so far needs; when one needs more, all are packed anew.
+ * Different markings, numbered from 0 in the order of their addition. Each place has 1, 2, 4, … or 32 bits, as many as the
+ * greatest count so far needs; a count that needs more repacks all markings.
  */
 final class MarkingStore {
     private final int places;
@@ -35,13 +35,13 @@ final class MarkingStore {
         return 8L * packed.length + 4L * table.length;
     }
 
-    /** The bytes while longer arrays take the place of those that are full; 0 if another marking fits in. */
+    /** The bytes needed while longer arrays replace the full ones; 0 if another marking fits. */
     long bytesToGrow() {
         return ((size + 1L) * words > packed.length ? 12L * packed.length : 0)
             + (size + 1 > table.length / 2 ? 8L * table.length : 0);
     }
 
-    /** The number of this marking, which is the size before if it is new. */
+    /** The number of this marking; a new marking gets the current size. */
     int add(int[] tokens) {
         fit(tokens);
         pack(tokens);
@@ -53,7 +53,7 @@ final class MarkingStore {
         return size - 1;
     }
 
-    /** The number of this marking; -1 if it is not there. */
+    /** The number of this marking; -1 if it is not stored. */
     int find(int[] tokens) {
         for (int count : tokens) {
             if (bits < 32 && count >>> bits != 0) {
@@ -120,7 +120,7 @@ final class MarkingStore {
         table = wider.table;
     }
 
-    /** Where the scratch is in the table, or would be. */
+    /** The slot of the scratch marking in the table, or its free slot. */
     private int slot() {
         int slot = hash(scratch, 0) & table.length - 1;
         while (table[slot] != 0 && !isAt(table[slot] - 1)) {

@@ -5,7 +5,7 @@ final class Memory {
     private Memory() {
     }
 
-    /** Whether an analysis may have this many bytes: three quarters of the heap. The rest is for its answers. */
+    /** True if an analysis may have this many bytes: three quarters of the heap. The rest is for its answers. */
     static boolean has(long bytes) {
         return bytes < Runtime.getRuntime().maxMemory() / 4 * 3;
     }

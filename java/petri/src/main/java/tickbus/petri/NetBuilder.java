@@ -7,9 +7,9 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * Builds a net step by step. {@link #capacity} and the delays belong to the place or transition named last,
- * {@link #priority} and the arcs to the transition named last. Arcs may name places that come later. {@link #build}
- * reports all mistakes at once.
+ * Builds a net step by step. {@link #capacity} and the delays belong to the last named place or transition, {@link
+ * #priority} and the arcs to the last named transition. Arcs can name places that come later. {@link #build} reports all
+ * mistakes at once.
  */
 public final class NetBuilder {
     private final String name;
@@ -56,7 +56,7 @@ public final class NetBuilder {
         return this;
     }
 
-    /** The most tokens that the place named last may hold, 1 or more. A transition has no capacity. */
+    /** The most tokens that the last place may hold, 1 or more. A transition has no capacity. */
     public NetBuilder capacity(int most) {
         if (!placeIsLast) {
             mistakes.add("capacity " + most + (transition == null ? ": there is no place yet" : " of transition " + transition)
@@ -72,8 +72,8 @@ public final class NetBuilder {
     }
 
     /**
-     * A fixed delay in nanoseconds, 0 or more, of what was named last: how long a token that arrives in that place is
-     * unavailable, or how long that transition must be enabled before it fires.
+     * A fixed delay in nanoseconds, 0 or more, of the last place or transition: how long a token that arrives in that place
+     * is unavailable, or how long that transition must be enabled before it fires.
      */
     public NetBuilder delay(long nanos) {
         if (place == null && transition == null) {
@@ -110,7 +110,7 @@ public final class NetBuilder {
         return this;
     }
 
-    /** The delay of what was named last, as {@link #delay(long)}; that of a place is fixed or {@link Delay#NONE}. */
+    /** The delay of the last place or transition, as {@link #delay(long)}; that of a place is fixed or {@link Delay#NONE}. */
     public NetBuilder delay(Delay delay) {
         if (placeIsLast) {
             if (delay.kind() == Delay.Kind.FIXED || delay.kind() == Delay.Kind.NONE) {
@@ -175,17 +175,17 @@ public final class NetBuilder {
         return this;
     }
 
-    /** Where the file draws a place. */
+    /** The position of a place in the file's drawing. */
     void placeAt(String name, double[] at) {
         placesAt.put(name, at);
     }
 
-    /** Where the file draws a transition. */
+    /** The position of a transition in the file's drawing. */
     void transitionAt(String name, double[] at) {
         transitionsAt.put(name, at);
     }
 
-    /** Where the file bends an arc. */
+    /** The bends of an arc in the file's drawing. */
     void bends(ArcKind kind, String with, String by, double[][] at) {
         bends.put(new Pending(kind, with, by, 0).text(), at);
     }
@@ -210,12 +210,12 @@ public final class NetBuilder {
         }
     }
 
-    /** Whether a character has no look of its own but turns what stands around it, as U+202E does. */
+    /** True if a character is invisible but reverses the text around it, as U+202E does. */
     private static boolean turnsText(int c) {
         return c == 0x61C || c == 0x200E || c == 0x200F || c >= 0x202A && c <= 0x202E || c >= 0x2066 && c <= 0x2069;
     }
 
-    /** The net; a {@link NetException} with all mistakes if there are any. */
+    /** The net; throws a {@link NetException} with all mistakes if there are any. */
     public PetriNet build() {
         Map<String, String> seen = new HashMap<>();
         List<Arc> made = new ArrayList<>();

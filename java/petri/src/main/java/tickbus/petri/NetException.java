@@ -1,8 +1,8 @@
 package tickbus.petri;
 
 /**
- * A net that cannot be built or read. The message says where, what was found, what was expected and what to do;
- * each mistake of a builder is on a line of its own.
+ * A net that cannot be built or read. The message has the location, what was found, what was expected and what to do; each
+ * mistake of a builder is on a separate line.
  */
 public final class NetException extends RuntimeException {
     private static final long serialVersionUID = 1L;
@@ -23,7 +23,7 @@ public final class NetException extends RuntimeException {
         return source;
     }
 
-    /** The line in the file, from 1; 0 if there is none. */
+    /** The line in the file, from 1; 0 without a line. */
     public int line() {
         return line;
     }

@@ -3,18 +3,18 @@ package tickbus.petri;
 import java.util.Optional;
 
 /**
- * What a running net was like at one moment, for views. It is filled in again and again, which allocates nothing.
+ * The state of a running net at one moment, for views. The object is refilled again and again, which allocates nothing.
  */
 public final class NetState {
-    /** Whether a transition can fire. */
+    /** The readiness of a transition. */
     public enum Phase {
-        /** The marking does not enable it. */
+        /** The marking does not enable the transition. */
         DISABLED,
-        /** It is enabled, and its delay is not over. */
+        /** The transition is enabled, and its delay is not over. */
         DELAYED,
-        /** It is enabled, its delay is over, and its condition does not hold. */
+        /** The transition is enabled, its delay is over, and its condition does not hold. */
         HELD,
-        /** It may fire. */
+        /** The transition may fire. */
         READY
     }
 
@@ -51,12 +51,12 @@ public final class NetState {
         return tokens[place];
     }
 
-    /** Those of them that are old enough to be used; fewer than all only in a timed place. */
+    /** The tokens in a place that are old enough to be used; fewer than all only in a timed place. */
     public int available(int place) {
         return available[place];
     }
 
-    /** Whether a transition can fire. */
+    /** The readiness of a transition. */
     public Phase phase(int transition) {
         return phases[transition];
     }
@@ -76,7 +76,7 @@ public final class NetState {
         return lastFired[transition];
     }
 
-    /** The {@link Conjunction#failed} part of the condition of a held transition; -1 if that is not known. */
+    /** The {@link Conjunction#failed} part of the condition of a held transition; -1 if it is not known. */
     public int failed(int transition) {
         return failed[transition];
     }
@@ -91,7 +91,7 @@ public final class NetState {
         return outputs[index];
     }
 
-    /** How many scans there had been. */
+    /** The number of scans. */
     public long scans() {
         return scans;
     }
@@ -101,7 +101,7 @@ public final class NetState {
         return nanos;
     }
 
-    /** Why it stopped; empty while it runs. */
+    /** Why the net stopped; empty while it runs. */
     public Optional<Stop> stop() {
         return Optional.ofNullable(stop);
     }

@@ -6,10 +6,10 @@ import java.util.List;
 /**
  * Draws a net with a marking as SVG.
  *
- * <p>Up to five tokens are dots, more a number. Enabled transitions are coloured and framed; a timed transition is hollow.
- * An inhibitor arc ends in a ring, a test arc is dashed, a weight above 1 stands beside its arc. Nodes stand where the
- * file draws them that the net was read from, if it does; otherwise in layers. The colours follow whether the screen is
- * light or dark. All names are escaped, so the text may stand in a page as it is.
+ * <p>Up to five tokens are dots, more are a number. Enabled transitions are coloured and framed; a timed transition is
+ * hollow. An inhibitor arc ends in a ring, a test arc is dashed, a weight above 1 is beside its arc. Nodes have their
+ * positions from the net's file if it has a drawing; otherwise they are in layers. The colours follow the screen's light or
+ * dark mode. All names are escaped, so the text can be put into a page unchanged.
  */
 public final class NetSvg {
     /** x and y of the dots of 0 to 5 tokens, from the middle of the place. */
@@ -55,7 +55,8 @@ public final class NetSvg {
     /**
      * The net with a marking, without the style: for a page that has {@link #style} once.
      *
-     * <p>A view may change it: {@code <g class="net-place" data-place="0">} has its tokens in {@code <g class="net-tokens">},
+     * <p>A view can change it: {@code <g class="net-place" data-place="0">} has its tokens in {@code <g
+     * class="net-tokens">},
      * and {@code <g class="net-transition" data-transition="0">} has the class {@code net-enabled} while it is enabled.
      */
     public static String writeWithoutStyle(PetriNet net, Marking marking) {
@@ -94,7 +95,7 @@ public final class NetSvg {
         for (Transition transition : net.transitions()) {
             transition(layout, transition, net.isEnabled(marking, transition.index()));
         }
-        // Above the arcs of all others.
+        // Above all arcs.
         for (int a = 0; a < arcs.size(); a++) {
             weight(arcs.get(a), layout.routes[a], layout.curved);
         }
@@ -211,7 +212,7 @@ public final class NetSvg {
         }
     }
 
-    /** Beside the middle of the arc; above it if the arc may be level. */
+    /** Places the weight beside the middle of the arc, or above it if the arc can be level. */
     private void weight(Arc arc, double[] route, boolean curved) {
         if (arc.weight() > 1) {
             int i = route.length / 4 * 2;
@@ -224,7 +225,7 @@ public final class NetSvg {
         Arrays.stream(parts).forEach(out::append);
     }
 
-    /** With at most one decimal. */
+    /** The number with at most one decimal. */
     private static String number(double value) {
         long tenths = Math.round(value * 10);
         String sign = tenths < 0 ? "-" : "";
@@ -232,7 +233,7 @@ public final class NetSvg {
         return sign + size / 10 + (size % 10 == 0 ? "" : "." + size % 10);
     }
 
-    /** For text and for attributes in double quotes. */
+    /** The text escaped for elements and for attributes in double quotes. */
     static String escaped(String text) {
         return PnmlWriter.escaped(text).replace("\"", "&quot;");
     }

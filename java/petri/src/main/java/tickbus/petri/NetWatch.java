@@ -4,12 +4,12 @@ import java.util.List;
 import java.util.concurrent.atomic.AtomicInteger;
 
 /**
- * Hands the state of running nets from the thread that runs them to one that shows them. Neither waits for the other: the
- * one that shows asks, the one that runs hands over a copy at the end of its scan, and then the copies belong to the one that
- * shows until it asks again. While nobody asks, a scan reads one flag. Handing over allocates nothing.
+ * Passes the state of running nets from the thread that runs them to a thread that shows them. Neither waits for the other:
+ * the viewer thread asks, and at the end of its scan the running thread hands over a copy, which belongs to the viewer
+ * thread until it asks again. While nobody asks, a scan reads one flag. Handing over allocates nothing.
  *
- * <p>A {@link Coordinator} and a {@link Stepper} hand over by themselves. Whoever runs several in turn, and wants them shown
- * as of one moment, calls {@link #offer} after the last one.
+ * <p>A {@link Coordinator} and a {@link Stepper} hand over automatically. A program that runs several nets in turn, and
+ * wants them shown as of one moment, calls {@link #offer} after the last one.
  */
 public final class NetWatch implements AutoCloseable {
     private static final int FREE = 0;
@@ -29,8 +29,8 @@ public final class NetWatch implements AutoCloseable {
     }
 
     /**
-     * Watches a coordinator, which hands over at the end of each scan; an {@link IllegalStateException} if it is watched
-     * already. For any thread, at any time.
+     * Watches a coordinator, which hands over at the end of each scan; throws an {@link IllegalStateException} if it is
+     * watched already. For any thread, at any time.
      */
     public static NetWatch of(Coordinator net) {
         NetWatch watch = new NetWatch(List.of(net), net);
@@ -38,7 +38,7 @@ public final class NetWatch implements AutoCloseable {
         return watch;
     }
 
-    /** Watches nets that one thread runs, which calls {@link #offer}. */
+    /** Watches nets that one thread runs; that thread calls {@link #offer}. */
     public static NetWatch of(List<? extends RunningNet> nets) {
         return new NetWatch(nets, null);
     }
@@ -48,12 +48,12 @@ public final class NetWatch implements AutoCloseable {
         return nets;
     }
 
-    /** For the thread that runs the nets: hands over their state if somebody has asked for it. */
+    /** For the thread that runs the nets: hands over their state if it was requested. */
     public void offer() {
         offer("");
     }
 
-    /** Like {@link #offer()}, with what is to be said of all nets, such as that the line is stale; empty if nothing is. */
+    /** Like {@link #offer()}, with a note about all nets, such as that the line is stale; empty for no note. */
     public void offer(String aboutAll) {
         if (turn.getAcquire() != ASKED) {
             return;
@@ -65,12 +65,12 @@ public final class NetWatch implements AutoCloseable {
         turn.setRelease(FILLED);
     }
 
-    /** For the thread that shows: asks for a state. The last one must not be read any more. */
+    /** For the viewer thread: asks for a state. The last one must not be read any more. */
     public void ask() {
         turn.set(ASKED);
     }
 
-    /** For the thread that shows: whether the state that was asked for is there. */
+    /** For the viewer thread: true if the requested state is there. */
     public boolean isThere() {
         return turn.getAcquire() == FILLED;
     }
@@ -80,12 +80,12 @@ public final class NetWatch implements AutoCloseable {
         return states.get(index);
     }
 
-    /** What was said of all nets; only while {@link #isThere}. */
+    /** The note about all nets; only while {@link #isThere}. */
     public String note() {
         return note;
     }
 
-    /** Lets a coordinator go, so that another one may watch it. */
+    /** Releases a coordinator, so that another watch can watch it. */
     @Override
     public void close() {
         if (own != null) {

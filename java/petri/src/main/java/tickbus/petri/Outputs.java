@@ -1,6 +1,6 @@
 package tickbus.petri;
 
-/** The outputs of a controller. They keep their values until an action changes them, and are written after the scan. */
+/** The outputs of a controller, which keep their values until an action changes them, and are written after the scan. */
 public final class Outputs {
     final Signals signals;
 

@@ -7,11 +7,11 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * A net of places and transitions with weighted, test and inhibitor arcs. Immutable, so it may be shared by threads.
+ * A net of places and transitions with weighted, test and inhibitor arcs. Immutable and thread-safe.
  *
  * <p>A transition is enabled if each input and test arc finds at least its weight of tokens, each inhibitor arc fewer,
  * and if no place would hold more than its capacity after the firing. A place that is both input and output of a
- * transition counts with the difference. Priorities and delays are for the {@link Coordinator}.
+ * transition counts with the difference. Only the {@link Coordinator} uses priorities and delays.
  */
 public final class PetriNet {
     private final String name;
@@ -20,9 +20,9 @@ public final class PetriNet {
     private final List<Arc> arcs;
     private final Map<String, Integer> placesByName = new HashMap<>();
     private final Map<String, Integer> transitionsByName = new HashMap<>();
-    /** What each transition needs and changes, in the order of its places. */
+    /** The needs and changes of each transition, in the order of its places. */
     final Effects effects;
-    /** Where its file draws it; null if it does not come from a file that does. */
+    /** The positions in the net's file; null if the net comes from no file, or the file has no positions. */
     final Positions positions;
 
     PetriNet(String name, List<Place> places, List<Transition> transitions, List<Arc> arcs, Positions positions) {
@@ -52,24 +52,24 @@ public final class PetriNet {
     }
 
     /**
-     * A net from its incidence matrix, output minus input weights; row = place, column = transition. Only a pure net
-     * has all its arcs in it: a place that is input and output of one transition does not.
+     * A net from its incidence matrix, output minus input weights; row = place, column = transition. Only a pure net is
+     * complete in this matrix: a place that is both input and output of one transition loses arcs.
      */
     public static PetriNet fromIncidence(String name, int[][] incidence, int[] marking) {
         return Matrices.net(name, Matrices.positive(incidence, -1), Matrices.positive(incidence, 1), marking);
     }
 
-    /** Its name. */
+    /** The net's name. */
     public String name() {
         return name;
     }
 
-    /** Its places, by index. */
+    /** The net's places, by index. */
     public List<Place> places() {
         return places;
     }
 
-    /** Its transitions, by index. */
+    /** The net's transitions, by index. */
     public List<Transition> transitions() {
         return transitions;
     }
@@ -89,12 +89,15 @@ public final class PetriNet {
         return transitions.get(index);
     }
 
-    /** The place with this name; an {@link IllegalArgumentException} lists what there is if it is not there. */
+    /** The place with this name; if there is no such place, an {@link IllegalArgumentException} lists all places. */
     public Place place(String named) {
         return places.get(find("place", named, placesByName));
     }
 
-    /** The transition with this name; an {@link IllegalArgumentException} lists what there is if it is not there. */
+    /**
+     * The transition with this name; if there is no such transition, an {@link IllegalArgumentException} lists all
+     * transitions.
+     */
     public Transition transition(String named) {
         return transitions.get(find("transition", named, transitionsByName));
     }
@@ -113,7 +116,7 @@ public final class PetriNet {
         return new Marking(this, places.stream().mapToInt(Place::initial).toArray());
     }
 
-    /** A marking with these tokens, one figure for each place; out of range is an {@link IllegalArgumentException}. */
+    /** A marking with these tokens, one figure per place; a figure out of range throws an {@link IllegalArgumentException}. */
     public Marking marking(int... tokens) {
         if (tokens.length != places.size()) {
             throw new IllegalArgumentException("net " + name + ": a marking of " + tokens.length
@@ -133,12 +136,12 @@ public final class PetriNet {
         }
     }
 
-    /** Whether the transition is enabled, apart from time, priority and conditions. */
+    /** True if the transition is enabled, apart from time, priority and conditions. */
     public boolean isEnabled(Marking marking, int transition) {
         return effects.isEnabled(marking.tokens, transition);
     }
 
-    /** Fires a transition; an {@link IllegalStateException} if it is not enabled. */
+    /** Fires a transition; throws an {@link IllegalStateException} if it is not enabled. */
     public void fire(Marking marking, int transition) {
         if (!isEnabled(marking, transition)) {
             throw new IllegalStateException("net " + name + ": transition " + transition(transition).name()
@@ -184,12 +187,12 @@ public final class PetriNet {
         return matrix;
     }
 
-    /** Whether the other net has the same places, transitions and arcs; the names of the nets may differ. */
+    /** True if the other net has the same places, transitions and arcs; the names of the nets can differ. */
     public boolean isSameAs(PetriNet other) {
         return places.equals(other.places) && transitions.equals(other.transitions) && arcs.equals(other.arcs);
     }
 
-    /** Its name and size. */
+    /** The net's name and size. */
     @Override
     public String toString() {
         return "net " + name + ": " + places.size() + " places, " + transitions.size() + " transitions, "

@@ -13,7 +13,7 @@ public record Place(int index, String name, int initial, int capacity, long dela
     /** The capacity of a place without a limit. */
     public static final int UNLIMITED = Integer.MAX_VALUE;
 
-    /** Whether there is a limit to its tokens. */
+    /** True if the place has a capacity. */
     public boolean isLimited() {
         return capacity != UNLIMITED;
     }

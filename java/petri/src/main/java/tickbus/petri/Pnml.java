@@ -28,9 +28,9 @@ public final class Pnml {
         return read(file, Dialect.STANDARD).net();
     }
 
-    /** Reads a file with one net in a dialect; warnings name what was left out, a {@link NetException} what is wrong. */
+    /** Reads a file with one net in a dialect; warnings name omitted parts, a {@link NetException} the mistake. */
     public static Imported read(Path file, Dialect dialect) throws IOException {
-        // From bytes, as the document itself says how it is encoded.
+        // From bytes, because the document declares its own encoding.
         try (InputStream bytes = new BufferedInputStream(Files.newInputStream(file))) {
             return new PnmlReader(file.toString(), dialect, factory -> factory.createXMLStreamReader(bytes)).net();
         }

@@ -10,11 +10,11 @@ import java.util.List;
 import java.util.Map;
 import java.util.Set;
 
-/** The nodes and arcs of a PNML document as they were read; makes the net of them. */
+/** The nodes and arcs of a PNML document as read; makes the net from them. */
 final class PnmlGraph {
     final Map<String, Node> nodes = new LinkedHashMap<>();
     final List<Link> links = new ArrayList<>();
-    /** Pages with nodes; each has coordinates of its own. */
+    /** Pages with nodes; each page has its own coordinates. */
     final Set<String> drawnOn = new HashSet<>();
     String name = "";
     private final SourceText source;
@@ -127,7 +127,7 @@ final class PnmlGraph {
         }
     }
 
-    /** The names, if all nodes of the kind have one of their own; otherwise their ids. */
+    /** The names, if all nodes of the kind have different names; otherwise their ids. */
     private void names(Map<String, String> names, String tag) {
         List<Node> all = nodes.values().stream().filter(node -> node.tag.equals(tag)).toList();
         Set<String> different = new HashSet<>();

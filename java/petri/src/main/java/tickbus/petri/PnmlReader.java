@@ -12,11 +12,11 @@ import javax.xml.stream.XMLStreamException;
 import javax.xml.stream.XMLStreamReader;
 
 /**
- * Reads one net from PNML. The reader refuses elements and attributes that it does not know, so that no net loses what
- * it means.
+ * Reads one net from PNML. The reader refuses elements and attributes that it does not know, so that no net changes its
+ * meaning.
  */
 final class PnmlReader {
-    /** Pages in pages. */
+    /** The most levels of pages in pages. */
     private static final int MOST_DEPTH = 100;
 
     private final SourceText source;
@@ -27,7 +27,7 @@ final class PnmlReader {
     private final Opening opening;
     private XMLStreamReader xml;
     private int nets;
-    /** The colour of PIPE's tokens; more than one make a coloured net. */
+    /** The colour of PIPE's tokens; a second colour would make a coloured net. */
     private String token;
 
     /** Opens the document. */
@@ -219,7 +219,7 @@ final class PnmlReader {
         node.initial = initial.value(0);
     }
 
-    /** Reads what PIPE says of a node in elements of its own; false if this one is not known. */
+    /** Reads PIPE's own elements of a node; false if this element is not one of them. */
     private boolean pipe(String element, String tag, PnmlGraph.Node node) throws XMLStreamException {
         boolean place = node.tag.equals("place");
         boolean transition = node.tag.equals("transition");
@@ -249,7 +249,7 @@ final class PnmlReader {
         }
     }
 
-    /** A number that an attribute or an element gives; where both do, they must agree. */
+    /** A number from an attribute or an element; if both have it, they must agree. */
     private final class Figure {
         private final String element;
         private final String what;
@@ -313,7 +313,7 @@ final class PnmlReader {
                 case "graphics" -> link.bends = points();
                 case "name", "toolspecific" -> skip();
                 default -> {
-                    // PIPE's bends and its tagged tokens, which fire as others do.
+                    // PIPE's bends and its tagged tokens, which fire like other tokens.
                     if (dialect == Dialect.STANDARD || !tag.equals("arcpath") && !tag.equals("tagged")) {
                         throw unexpected(element, tag);
                     }
@@ -376,7 +376,7 @@ final class PnmlReader {
         }
     }
 
-    /** The positions in graphics. What cannot be read there is left out, as it does not matter to the net. */
+    /** The positions in graphics. Unreadable ones are left out, because the net does not need them. */
     private double[][] points() throws XMLStreamException {
         List<double[]> points = new ArrayList<>();
         int depth = 1;
@@ -392,7 +392,7 @@ final class PnmlReader {
                             points.add(new double[] {x, y});
                         }
                     } catch (NumberFormatException unreadable) {
-                        // Left out.
+                        // Unreadable: left out.
                     }
                 }
             } else if (event == XMLStreamConstants.END_ELEMENT) {
@@ -414,7 +414,7 @@ final class PnmlReader {
         return value;
     }
 
-    /** Refuses attributes that are not known here, without those of other namespaces. */
+    /** Refuses unknown attributes, except those of other namespaces. */
     private void attributes(String element, String... known) {
         for (int i = 0; i < xml.getAttributeCount(); i++) {
             String namespace = xml.getAttributeNamespace(i);

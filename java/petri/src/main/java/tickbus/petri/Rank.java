@@ -3,9 +3,9 @@ package tickbus.petri;
 import java.util.Arrays;
 
 /**
- * The rank of the incidence matrix, exactly. Modulo a prime it is at most as great as over the integers, and as great
- * unless the prime divides every minor of that size. So it is computed modulo several primes, until their product is
- * greater than any greater minor can be (Hadamard).
+ * The exact rank of the incidence matrix. The rank modulo a prime is at most the rank over the integers, and equal to it
+ * unless the prime divides every minor of that size. So it is computed modulo several primes, until their product exceeds
+ * the greatest possible value of a larger minor (Hadamard).
  */
 final class Rank {
     /** Entries in memory, and steps of elimination, of all primes together. */
@@ -16,7 +16,7 @@ final class Rank {
     private final int transitions;
     private final int places;
     private long steps;
-    /** The last place where the row at hand may be other than 0. */
+    /** The last column where the current row can be other than 0. */
     private int last;
     private long prime = Integer.MAX_VALUE;
 
@@ -78,7 +78,7 @@ final class Rank {
         return true;
     }
 
-    /** Takes the transitions as rows one after the other; each that is not 0 in the end has a first place of its own. */
+    /** Takes the transitions as rows one after the other; each row that is not 0 in the end has its own first place. */
     private int modulo() {
         Effects effects = net.effects;
         int[][] at = new int[places][];

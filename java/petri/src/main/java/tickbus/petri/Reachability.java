@@ -10,12 +10,12 @@ import java.util.Optional;
 import java.util.Set;
 
 /**
- * The reachable markings of a net, breadth first, up to a limit. Delays, priorities and conditions are left out: they
- * only take firings away. So what is bounded here is bounded in a controller; a deadlock or dead transition here may be
- * another one there.
+ * The reachable markings of a net, breadth first, up to a limit. Delays, priorities and conditions are left out: they only
+ * prevent firings. So a net that is bounded here is bounded in a controller; deadlocks and dead transitions can differ
+ * there.
  *
- * <p>If it gave up, answers that need all markings are {@link Verdict#UNKNOWN}. Markings are numbered from 0, the
- * initial one, in the order of their distance from it.
+ * <p>If the exploration gave up, answers that need all markings are {@link Verdict#UNKNOWN}. Markings are numbered from 0,
+ * the initial one, in the order of their distance from it.
  */
 public final class Reachability {
     private final PetriNet net;
@@ -91,7 +91,7 @@ public final class Reachability {
         complete = true;
     }
 
-    /** Fires, unless a place would have more tokens than an int can count. */
+    /** Fires the transition unless a place would have more tokens than an int can count; returns whether it did. */
     private boolean hasFired(int[] tokens, int t) {
         try {
             net.effects.fire(tokens, t);
@@ -106,17 +106,17 @@ public final class Reachability {
         return net;
     }
 
-    /** Whether all reachable markings were found. */
+    /** True if all reachable markings were found. */
     public boolean isComplete() {
         return complete;
     }
 
-    /** How many markings were found; with {@link #isComplete} that is all. */
+    /** The number of markings found; all of them if {@link #isComplete}. */
     public int size() {
         return Math.min(store.size(), limit);
     }
 
-    /** How many firings between them were found. */
+    /** The number of firings found between the markings. */
     public int edges() {
         return targets.size();
     }
@@ -139,7 +139,7 @@ public final class Reachability {
         return found < size() ? found : -1;
     }
 
-    /** Whether the marking is reachable. */
+    /** YES if the marking is reachable. */
     public Verdict isReachable(Marking marking) {
         return find(marking) >= 0 ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
     }
@@ -170,12 +170,12 @@ public final class Reachability {
         return low;
     }
 
-    /** The most tokens that a place has had in the markings that were found. */
+    /** The most tokens of a place in the markings found. */
     public int bound(int place) {
         return bounds[place];
     }
 
-    /** Whether no place ever has more than one token. */
+    /** YES if no place ever has more than one token. */
     public Verdict isSafe() {
         for (int bound : bounds) {
             if (bound > 1) {
@@ -185,7 +185,7 @@ public final class Reachability {
         return complete ? Verdict.YES : Verdict.UNKNOWN;
     }
 
-    /** Whether the net is bounded; an exploration can only confirm it, {@link Coverability} also denies it. */
+    /** YES if the net is bounded; an exploration can only confirm this, {@link Coverability} can also deny it. */
     public Verdict isBounded() {
         return complete ? Verdict.YES : Verdict.UNKNOWN;
     }
@@ -193,7 +193,7 @@ public final class Reachability {
     /**
      * A marking in which nothing is enabled.
      *
-     * @param marking it
+     * @param marking the deadlock
      * @param firings a shortest sequence of transitions that leads there, by name
      */
     public record Deadlock(Marking marking, List<String> firings) {
@@ -211,10 +211,10 @@ public final class Reachability {
         return Optional.empty();
     }
 
-    /** The numbers of all deadlocks that were found. */
+    /** The numbers of all deadlocks found. */
     public List<Integer> deadlocks() {
         List<Integer> dead = new ArrayList<>();
-        // Where it gave up, the last marking was not looked at to the end.
+        // If the exploration gave up, the last marking was not explored completely.
         for (int number = 0; number < firstEdge.size() - 1; number++) {
             if (firstEdge.get(number) == firstEdge.get(number + 1)) {
                 dead.add(number);
@@ -223,12 +223,12 @@ public final class Reachability {
         return dead;
     }
 
-    /** Whether something is enabled in every reachable marking. */
+    /** YES if every reachable marking enables a transition. */
     public Verdict isDeadlockFree() {
         return !deadlocks().isEmpty() ? Verdict.NO : complete ? Verdict.YES : Verdict.UNKNOWN;
     }
 
-    /** Whether the transition fires in some reachable marking. */
+    /** YES if the transition fires in some reachable marking. */
     public Verdict canFire(int transition) {
         return fired.get(transition) ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
     }
@@ -240,12 +240,12 @@ public final class Reachability {
         return components;
     }
 
-    /** Whether the transition can fire again from every reachable marking (it is live, level 4). */
+    /** YES if the transition can fire again from every reachable marking (it is live, level 4). */
     public Verdict isLive(int transition) {
         return complete ? Verdict.of(liveTransitions().get(transition)) : Verdict.UNKNOWN;
     }
 
-    /** Whether every transition can fire again from every reachable marking. */
+    /** YES if every transition can fire again from every reachable marking. */
     public Verdict isLive() {
         return complete ? Verdict.of(liveTransitions().cardinality() == net.transitions().size()) : Verdict.UNKNOWN;
     }
@@ -273,7 +273,7 @@ public final class Reachability {
         return live;
     }
 
-    /** The numbers of the home states: markings that can be reached from every reachable one. Empty if there is none. */
+    /** The numbers of the home states: markings reachable from every reachable one. Empty if the net has no home state. */
     public BitSet homeStates() {
         if (!complete) {
             throw new GaveUpException(this + "; home states need all of them");
@@ -297,12 +297,12 @@ public final class Reachability {
         return home;
     }
 
-    /** Whether the initial marking is a home state. */
+    /** YES if the initial marking is a home state. */
     public Verdict isReversible() {
         return complete ? Verdict.of(homeStates().get(0)) : Verdict.UNKNOWN;
     }
 
-    /** The conflicts that were seen to happen, each ordered pair once. */
+    /** The effective conflicts found, each ordered pair once. */
     public List<Conflicts.Effective> effectiveConflicts() {
         List<Conflicts.Effective> found = new ArrayList<>();
         Set<Long> seen = new HashSet<>();
@@ -330,7 +330,7 @@ public final class Reachability {
         return found;
     }
 
-    /** How far it came. */
+    /** The extent of the exploration. */
     @Override
     public String toString() {
         return "net " + net.name() + ": " + (complete ? size() + " markings, " + edges() + " firings"

@@ -4,24 +4,24 @@ import java.util.HashMap;
 import java.util.Map;
 
 /**
- * The transitions that may fire now. The first one has the greatest priority; among those it was due first, and among
- * those it comes first in the net. Adding and removing take a time that grows with the logarithm of how many there are.
+ * The transitions that may fire now. The first one has the greatest priority, among those the earliest due time, and among
+ * those the lowest index. Adding and removing take logarithmic time.
  */
 final class Ready {
-    /** Since when a transition may fire that does not wait for the time. */
+    /** The due time of a transition that does not wait for the time. */
     static final long UNTIMED = Long.MIN_VALUE;
 
     private final int[] priority;
     private final long[] since;
     private final int[] heap;
-    /** One more than the position in the heap; 0 if it is not there. */
+    /** One more than the position in the heap; 0 if the transition is not there. */
     private final int[] position;
     private int size;
-    /** The transitions of one cluster and one priority share a bucket; -1 for one without conflicts. */
+    /** Transitions of one cluster and one priority share a bucket; -1 for a transition without conflicts. */
     private final int[] bucket;
     private final int[] bucketFirst;
     private final int[] bucketSize;
-    /** How many in the bucket were due at a time of their own. */
+    /** The number of transitions in the bucket with a due time. */
     private final int[] bucketTimed;
     private final int[] members;
     private final int[] memberAt;
@@ -106,7 +106,10 @@ final class Ready {
         }
     }
 
-    /** How many chance chooses from: the first one, and those in conflict with it that stand at the same place. */
+    /**
+     * The number of transitions that chance chooses from: the first one, and those in conflict with it that have the same
+     * rank.
+     */
     int choices() {
         int first = heap[0];
         int b = bucket[first];

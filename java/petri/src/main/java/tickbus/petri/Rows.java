@@ -2,7 +2,7 @@ package tickbus.petri;
 
 import java.util.Arrays;
 
-/** Rows of integers that are added one by one and taken out by column. */
+/** Rows of integers, added one by one and removed by column. */
 final class Rows {
     private final int[][] columns;
     private int size;

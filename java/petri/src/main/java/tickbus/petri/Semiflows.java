@@ -10,24 +10,24 @@ import java.util.TreeMap;
  * Minimal semiflows by Farkas' algorithm, and the rank of the incidence matrix.
  *
  * <p>A P-semiflow weights the places so that the weighted sum of tokens never changes; a T-semiflow counts firings that
- * together change nothing. Minimal ones have no other one's support within theirs, and no common divisor. Test and
- * inhibitor arcs do not matter to either.
+ * together change nothing. The support of a minimal semiflow contains no other one's support, and its weights have no common
+ * divisor. Test and inhibitor arcs do not matter to either.
  */
 public final class Semiflows {
     private Semiflows() {
     }
 
-    /** The minimal P-semiflows, a weight for each place; a {@link GaveUpException} at more than {@code limit} rows. */
+    /** The minimal P-semiflows, a weight per place; throws a {@link GaveUpException} at more than {@code limit} rows. */
     public static List<int[]> places(PetriNet net, int limit) {
         return farkas(net, "P-semiflows", true, limit);
     }
 
-    /** The minimal T-semiflows, a count for each transition; a {@link GaveUpException} at more than {@code limit} rows. */
+    /** The minimal T-semiflows, a count per transition; throws a {@link GaveUpException} at more than {@code limit} rows. */
     public static List<int[]> transitions(PetriNet net, int limit) {
         return farkas(net, "T-semiflows", false, limit);
     }
 
-    /** Some columns of a row, in ascending order, and what is there. */
+    /** Some columns of a row, in ascending order, and their values. */
     private record Sparse(int[] at, long[] value) {
         long get(int column) {
             int found = Arrays.binarySearch(at, column);
@@ -63,9 +63,9 @@ public final class Semiflows {
         }
     }
 
-    /** What remains to become 0, and the combination of rows that gives it. */
+    /** The rest that must become 0, and the combination of rows that gives it. */
     private record Row(Sparse rest, Sparse weights) {
-        /** Whether all that has a weight here has one in the other row. */
+        /** True if every weight here is also in the other row. */
         boolean supports(Row other) {
             int j = 0;
             for (int one : weights.at) {
@@ -80,7 +80,7 @@ public final class Semiflows {
         }
     }
 
-    /** How many rows are above and below 0 in each column. */
+    /** The number of rows above and below 0 in each column. */
     private static final class Columns {
         final int[] above;
         final int[] below;
@@ -173,7 +173,7 @@ public final class Semiflows {
         return flows;
     }
 
-    /** The rows that are 0 in the column, with all positive combinations that become so; null above the limit. */
+    /** The rows that are 0 in the column, and all positive combinations that become 0 there; null above the limit. */
     private static List<Row> eliminate(List<Row> rows, int column, int limit, Columns counts) {
         List<Row> kept = new ArrayList<>();
         List<Row> above = new ArrayList<>();
@@ -228,7 +228,7 @@ public final class Semiflows {
         return b == 0 ? a : gcd(b, a % b);
     }
 
-    /** The rank of the incidence matrix; a {@link GaveUpException} if that takes too much memory or time. */
+    /** The rank of the incidence matrix; throws a {@link GaveUpException} if that takes too much memory or time. */
     public static int rank(PetriNet net) {
         return new Rank(net).compute();
     }

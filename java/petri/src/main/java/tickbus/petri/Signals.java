@@ -4,7 +4,7 @@ import java.util.HashMap;
 import java.util.List;
 import java.util.Map;
 
-/** Named values side by side. */
+/** An array of named values. */
 final class Signals {
     private final String kind;
     private final List<String> names;

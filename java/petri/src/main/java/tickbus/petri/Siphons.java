@@ -6,9 +6,9 @@ import java.util.Comparator;
 import java.util.List;
 
 /**
- * Minimal siphons and traps. Once a siphon is empty it stays empty: every transition that puts into it also takes from
- * it. Once a trap is marked it stays marked: every transition that takes from it also puts into it (with weights of 1).
- * Test and inhibitor arcs do not matter. There may be exponentially many, so there is a limit.
+ * Minimal siphons and traps. An empty siphon stays empty: every transition that puts into it also takes from it. A marked
+ * trap stays marked: every transition that takes from it also puts into it (with weights of 1). Test and inhibitor arcs do
+ * not matter. There can be exponentially many, so there is a limit.
  */
 public final class Siphons {
     private static final int NONE = -1;
@@ -50,12 +50,12 @@ public final class Siphons {
         return of.stream().mapToInt(Integer::intValue).sorted().toArray();
     }
 
-    /** The minimal siphons as sets of places; a {@link GaveUpException} after {@code limit} steps of the search. */
+    /** The minimal siphons as sets of places; throws a {@link GaveUpException} after {@code limit} steps of the search. */
     public static List<BitSet> siphons(PetriNet net, long limit) {
         return new Siphons(net, false, limit).search();
     }
 
-    /** The minimal traps as sets of places; a {@link GaveUpException} after {@code limit} steps of the search. */
+    /** The minimal traps as sets of places; throws a {@link GaveUpException} after {@code limit} steps of the search. */
     public static List<BitSet> traps(PetriNet net, long limit) {
         return new Siphons(net, true, limit).search();
     }
@@ -80,8 +80,8 @@ public final class Siphons {
     }
 
     /**
-     * Adds places until every putter also takes; all ways, without the barred places. Only the putters of the open places
-     * are to be looked at: what takes from a set takes from a larger one.
+     * Adds places until every putter also takes, in all ways that avoid the barred places. Only the putters of the open
+     * places need a check: a transition that takes from a set also takes from a larger one.
      */
     private void extend(BitSet set, BitSet barred, Ints open) {
         step();
@@ -129,7 +129,7 @@ public final class Siphons {
         }
     }
 
-    /** A transition that puts into the place and takes nothing from the set; -1 if there is none. */
+    /** A transition that puts into the place and takes nothing from the set; -1 if no transition does. */
     private int putter(BitSet set, int place) {
         for (int t : puttersOf[place]) {
             boolean takes = false;
@@ -143,7 +143,7 @@ public final class Siphons {
         return -1;
     }
 
-    /** The one place that the transition takes from and that is not barred. */
+    /** The only unbarred place that the transition takes from. */
     private int only(int t, BitSet barred) {
         int only = NONE;
         for (int q : takesFrom[t]) {

@@ -8,9 +8,9 @@ import java.nio.charset.StandardCharsets;
 import java.nio.file.Files;
 import java.nio.file.Path;
 
-/** The text of a file with the name that messages give it. */
+/** The text of a file, and its name in messages. */
 record SourceText(String source, String text) {
-    /** UTF-8, or else Windows-1252, which HPSim wrote. */
+    /** Reads UTF-8, or else Windows-1252, which HPSim wrote. */
     static SourceText read(Path file) throws IOException {
         byte[] bytes = Files.readAllBytes(file);
         String text;
@@ -44,7 +44,7 @@ record SourceText(String source, String text) {
         return (int) value;
     }
 
-    /** At most 40 characters for a message, without control characters, which a terminal would obey. */
+    /** At most 40 characters for a message, without control characters, which a terminal would execute. */
     static String shortened(String text) {
         return (text.length() > 40 ? text.substring(0, 40) + "…" : text).replaceAll("\\p{Cntrl}", "\uFFFD");
     }

@@ -6,11 +6,10 @@ import java.util.Arrays;
 import java.util.List;
 
 /**
- * A net step by step: fires what its caller chooses, lets time pass, and takes steps back.
+ * A net step by step: fires the transitions that its caller chooses, lets time pass, and takes steps back.
  *
- * <p>It knows no inputs and no conditions. A transition can fire when the marking enables it and its delay is over; the
- * priorities count only in {@link #choose}. The same seed and the same steps give the same delays. Not for several
- * threads at once.
+ * <p>A stepper has no inputs and no conditions. A transition can fire when the marking enables it and its delay is over;
+ * priorities count only in {@link #choose}. The same seed and the same steps give the same delays. Not thread-safe.
  */
 public final class Stepper implements RunningNet {
     /** A step that lets time pass; any other one is the index of a transition. */
@@ -19,7 +18,7 @@ public final class Stepper implements RunningNet {
     private final PetriNet net;
     private final long seed;
     private final SplitMix choices;
-    /** What was done, and the time after it. */
+    /** The steps taken, and the time after each. */
     private int[] steps = new int[64];
     private long[] times = new long[64];
     private int size;
@@ -31,11 +30,11 @@ public final class Stepper implements RunningNet {
     private Enabling enabling;
     private long now;
 
-    /** At the time 0, with the initial marking; the seed is that of random delays and of {@link #choose}. */
+    /** Begins at time 0 with the initial marking; the seed is for random delays and for {@link #choose}. */
     public Stepper(PetriNet net, long seed) {
         this.net = net;
         this.seed = seed;
-        // Another sequence than that of the delays.
+        // A different sequence from that of the delays.
         choices = new SplitMix(~seed);
         int transitions = net.transitions().size();
         fired = new long[transitions];
@@ -93,25 +92,25 @@ public final class Stepper implements RunningNet {
         return net;
     }
 
-    /** None. */
+    /** No inputs. */
     @Override
     public List<String> inputNames() {
         return List.of();
     }
 
-    /** None. */
+    /** No outputs. */
     @Override
     public List<String> outputNames() {
         return List.of();
     }
 
-    /** None. */
+    /** No condition. */
     @Override
     public Condition condition(int transition) {
         return null;
     }
 
-    /** The marking, as a copy. */
+    /** A copy of the marking. */
     public Marking marking() {
         return new Marking(net, enabling.tokens.clone());
     }
@@ -121,12 +120,12 @@ public final class Stepper implements RunningNet {
         return now;
     }
 
-    /** How many steps were done, which is how many {@link #undo} can take back. */
+    /** The number of steps taken, all of which {@link #undo} can take back. */
     public int steps() {
         return size;
     }
 
-    /** Whether the transition with this index can fire now. */
+    /** True if the transition with this index can fire now. */
     public boolean canFire(int transition) {
         return enabling.enabled.contains(transition) && ripe[transition];
     }
@@ -141,12 +140,12 @@ public final class Stepper implements RunningNet {
         return enabling.due.at(transition);
     }
 
-    /** When something is due next; {@link Long#MAX_VALUE} if nothing waits for the time. */
+    /** When the next delay is over; {@link Long#MAX_VALUE} if nothing waits for the time. */
     public long nextDue() {
         return enabling.due.next();
     }
 
-    /** Fires a transition; an {@link IllegalStateException} says why that cannot be. */
+    /** Fires a transition; an {@link IllegalStateException} says why it cannot fire. */
     public void fire(int transition) {
         if (!canFire(transition)) {
             throw new IllegalStateException("net " + net.name() + ": transition " + net.transition(transition).name()
@@ -185,7 +184,7 @@ public final class Stepper implements RunningNet {
         times[size++] = now;
     }
 
-    /** Lets time pass, in nanoseconds, 0 or more. It passes what is due, which stays ready: nothing fires by itself. */
+    /** Lets time pass, in nanoseconds, 0 or more. Transitions that become due stay ready: none fires automatically. */
     public void advance(long nanos) {
         if (nanos < 0) {
             throw new IllegalArgumentException("a time of " + nanos + " ns; expected 0 or more");
@@ -194,7 +193,10 @@ public final class Stepper implements RunningNet {
         keep(TIME);
     }
 
-    /** Takes the last steps back, 0 or more: those before them are done again. Returns how many there were, at most as asked. */
+    /**
+     * Takes the last steps back, 0 or more, by repeating those before them. Returns the number taken back, at most as
+     * requested.
+     */
     public int undo(int count) {
         int back = Math.min(Math.max(0, count), size);
         size -= back;
@@ -205,7 +207,7 @@ public final class Stepper implements RunningNet {
         return back;
     }
 
-    /** A transition as chance has it, by the seed, among those of the greatest priority that can fire; -1 if none can. */
+    /** A random transition, by the seed, among those of the greatest priority that can fire; -1 if none can. */
     public int choose() {
         List<Transition> ready = ready();
         int greatest = ready.stream().mapToInt(Transition::priority).max().orElse(0);
@@ -213,7 +215,7 @@ public final class Stepper implements RunningNet {
         return first.isEmpty() ? -1 : first.get(choices.below(first.size())).index();
     }
 
-    /** Why a transition cannot fire, each reason a sentence without its end; empty if it can. */
+    /** The reasons why a transition cannot fire, each a sentence without a full stop; empty if it can. */
     public List<String> obstacles(int transition) {
         List<String> found = new ArrayList<>();
         int[] gains = new int[net.places().size()];
@@ -260,7 +262,7 @@ public final class Stepper implements RunningNet {
         return count == 0 ? "no token" : count == 1 ? "1 token" : count + " tokens";
     }
 
-    /** A time of nanoseconds as seconds, with its unit. */
+    /** Nanoseconds as seconds, with the unit. */
     static String seconds(long nanos) {
         return new BigDecimal(nanos).movePointLeft(9).stripTrailingZeros().toPlainString() + " s";
     }

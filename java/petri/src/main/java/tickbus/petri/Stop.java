@@ -3,10 +3,10 @@ package tickbus.petri;
 /**
  * Why a controller stopped. Its outputs have their fail-safe values.
  *
- * @param cause what kind of trouble it was
- * @param element where: {@code condition of transition T1}, {@code entry action of place P3}
+ * @param cause the kind of trouble
+ * @param element the location: {@code condition of transition T1}, {@code entry action of place P3}
  * @param message what happened, for people
- * @param thrown what was thrown; null in a livelock
+ * @param thrown the exception; null in a livelock
  * @param scan the number of the scan, from 1
  * @param marking the marking at that moment
  */

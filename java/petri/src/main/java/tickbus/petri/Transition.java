@@ -6,7 +6,7 @@ package tickbus.petri;
  * @param index its column in the matrices, from 0
  * @param name unique among the transitions of the net
  * @param priority the greatest fires first; 0 unless given
- * @param delay how long it must be enabled without a break before it may fire
+ * @param delay how long it must be enabled without interruption before it may fire
  */
 public record Transition(int index, String name, int priority, Delay delay) {
 }

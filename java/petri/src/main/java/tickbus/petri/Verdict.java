@@ -2,11 +2,11 @@ package tickbus.petri;
 
 /** An answer about a net. */
 public enum Verdict {
-    /** It is so. */
+    /** The property holds. */
     YES,
-    /** It is not so. */
+    /** The property does not hold. */
     NO,
-    /** The exploration gave up before it was known. */
+    /** The exploration gave up before the answer was known. */
     UNKNOWN;
 
     static Verdict of(boolean so) {

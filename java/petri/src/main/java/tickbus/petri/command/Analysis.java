@@ -21,13 +21,13 @@ import tickbus.petri.Semiflows;
 import tickbus.petri.Siphons;
 import tickbus.petri.Verdict;
 
-/** What can be proven about a net, as text. */
+/** The provable properties of a net, as text. */
 final class Analysis {
     private static final List<String> PROPERTIES = List.of("bounded", "safe", "live", "deadlock-free", "reversible");
     private static final int MOST_ROWS = 10_000;
     private static final long MOST_STEPS = 1_000_000;
     private static final int MOST_COVERED = 20_000;
-    /** More of a kind are counted, not listed. */
+    /** The most entries of a kind that are listed; more are only counted. */
     private static final int MOST_LISTED = 50;
     private static final int LONGEST_PATH = 60;
     private static final int MOST_NAMES = 40;
@@ -53,7 +53,7 @@ final class Analysis {
         return all;
     }
 
-    /** Prints all; returns those of the required properties that are not proven. */
+    /** Prints all properties; returns the required ones that are not proven. */
     List<String> run(List<String> required) {
         line("net", net.name() + ": " + count(net.places().size(), "place") + ", " + count(net.transitions().size(), "transition")
             + ", " + count(net.arcs().size(), "arc"));
@@ -101,7 +101,7 @@ final class Analysis {
         }).toList();
     }
 
-    /** Where there are too many markings, another way may tell whether there are finitely many. */
+    /** With too many markings, the coverability graph can still show whether there are finitely many. */
     private Verdict coverability() {
         try {
             Coverability graph = Coverability.explore(net, Math.min(limit, MOST_COVERED));

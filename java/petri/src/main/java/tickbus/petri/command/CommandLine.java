@@ -5,9 +5,9 @@ import java.util.HashMap;
 import java.util.List;
 import java.util.Map;
 
-/** The words behind a command: one file, and options with a value, some of which may be repeated. */
+/** The words behind a command: one file, and options with a value, some of which can be repeated. */
 final class CommandLine {
-    /** May stand without a value, since the value looks like nothing else: an address with a port. */
+    /** An option that needs no value, because its value is unmistakable: an address with a port. */
     private static final String PAGE = "--page";
 
     private final Map<String, List<String>> options = new HashMap<>();

@@ -65,9 +65,9 @@ public final class Main {
      * Runs the command.
      *
      * @param args the command line
-     * @param in what shall be done, for {@code step}
+     * @param in the input of {@code step}
      * @param out gets results
-     * @param err gets complaints
+     * @param err gets error messages
      * @return the exit code
      */
     public static int run(String[] args, InputStream in, PrintStream out, PrintStream err) {
@@ -140,7 +140,7 @@ public final class Main {
         return OK;
     }
 
-    /** Writes a text to a file; what goes wrong names the file. */
+    /** Writes a text to a file; an exception names the file. */
     static void write(String file, String text) throws IOException {
         try {
             Files.writeString(Path.of(file), text);

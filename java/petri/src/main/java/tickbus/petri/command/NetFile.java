@@ -19,7 +19,7 @@ import tickbus.petri.Imported;
 import tickbus.petri.PetriNet;
 import tickbus.petri.Pnml;
 
-/** Reads a net from a file of any of the formats. */
+/** Reads a net from a file of any supported format. */
 final class NetFile {
     static final List<String> OPTIONS = List.of("--unit", "--delay");
     private static final int BEGINNING = 512;
@@ -27,7 +27,7 @@ final class NetFile {
     private NetFile() {
     }
 
-    /** Reads it; what had to be assumed goes to {@code err}. */
+    /** Reads the net; assumptions go to {@code err}. */
     static PetriNet read(CommandLine line, PrintStream err) throws IOException {
         Path file = Path.of(line.file());
         String unit = line.one("--unit", null);
@@ -54,7 +54,7 @@ final class NetFile {
             err.println("note: the delays of " + file + " have no unit; they are taken as milliseconds, --unit says otherwise");
         }
         for (String name : delays.keySet()) {
-            // Names what there is.
+            // Throws with a list of all transitions if the name is unknown.
             imported.net().transition(name);
         }
         return imported.net();
@@ -84,7 +84,7 @@ final class NetFile {
         }
     }
 
-    /** By the name, or else by how the file begins. */
+    /** The format by the file's name, or else by its beginning. */
     private static String format(Path file) throws IOException {
         String name = file.toString().toLowerCase(Locale.ROOT);
         if (!Files.exists(file)) {

@@ -20,7 +20,7 @@ import tickbus.petri.Stepper;
 import tickbus.petri.Transition;
 import tickbus.petri.page.NetPage;
 
-/** Goes through a net as its user says, line by line. */
+/** Steps through a net by the user's commands, line by line. */
 final class StepDialog {
     private static final int MOST_LISTED = 20;
     private static final long OFFER_NANOS = 20_000_000;
@@ -45,7 +45,7 @@ final class StepDialog {
     private final PrintStream err;
     private boolean over;
 
-    /** What was asked for is not possible. */
+    /** A request that is not possible. */
     private static final class Refusal extends RuntimeException {
         private static final long serialVersionUID = 1L;
 
@@ -61,7 +61,7 @@ final class StepDialog {
         stepper = new Stepper(net, seed);
     }
 
-    /** Until the input ends; false if something in it was wrong, and no person was there to say it better. */
+    /** Runs until the input ends; false if a line was wrong and no person was there to correct it. */
     boolean run(InputStream in, String page) throws IOException {
         if (page == null) {
             return converse(in);
@@ -116,7 +116,7 @@ final class StepDialog {
         return true;
     }
 
-    /** A console may be there although the input is a pipe, from JDK 22 on; then it says so. */
+    /** From JDK 22 on, a console can exist although the input is a pipe, and says so. */
     private static boolean isTerminal() {
         Console console = System.console();
         try {
@@ -161,7 +161,7 @@ final class StepDialog {
         what.run();
     }
 
-    /** By its number in the list, or else by its name. */
+    /** The transition by its number in the list, or else by its name. */
     private Transition chosen(String text) {
         List<Transition> ready = stepper.ready();
         if (text.matches("\\d{1,9}")) {

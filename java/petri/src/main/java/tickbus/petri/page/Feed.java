@@ -7,15 +7,15 @@ import java.util.List;
 import tickbus.petri.NetWatch;
 import tickbus.petri.RunningNet;
 
-/** The newest state, looked at while somebody watches. Viewers who are slow miss those between, and keep nobody waiting. */
+/** The newest state, updated while somebody watches. Slow viewers miss intermediate states, and make nobody wait. */
 final class Feed implements Runnable {
     private static final long PERIOD_MILLIS = 33;
     /** Formatting that takes long is followed by a pause of this many times its length. */
     private static final long REST = 20;
     private static final long LONGEST_REST_MILLIS = 1000;
-    /** For how long the first state is awaited, if the nets scan slowly or not at all. */
+    /** For how long the feed waits for the first state, if the nets scan slowly or not at all. */
     private static final int PATIENT_PERIODS = 6;
-    /** How often the time goes on in the page although nothing happens. */
+    /** The interval at which the page's time advances although nothing happens. */
     private static final long BEAT_NANOS = 500_000_000;
 
     private static final String PREFIX = "data: ";
@@ -25,7 +25,7 @@ final class Feed implements Runnable {
     private final Workers workers;
     private final String[][] moments;
     private final String[][] rests;
-    /** When each watch handed over last; 0 if it never did. */
+    /** When each watch handed over last; 0 for never. */
     private final long[] seen;
     private int viewers;
     private byte[] newest = {};
@@ -46,24 +46,27 @@ final class Feed implements Runnable {
         seen = new long[watches.size()];
     }
 
-    /** A viewer comes: the number of the newest state, after which it waits for another; -1 if there are enough viewers. */
+    /**
+     * Adds a viewer: returns the number of the newest state, after which it waits for another; -1 if there are enough
+     * viewers.
+     */
     synchronized long enter(int most) {
         if (viewers >= most || closed) {
             return -1;
         }
         viewers++;
-        // It gets a state of its own time, not the one that was seen last.
+        // The viewer gets a current state, not the one seen last.
         hurry = true;
         notifyAll();
         return version;
     }
 
-    /** A viewer goes. */
+    /** Removes a viewer. */
     synchronized void leave() {
         viewers--;
     }
 
-    /** Waits for another state than that of a number; null when the page is closed. */
+    /** Waits for a state with another number; null when the page is closed. */
     synchronized State after(long known) throws InterruptedException {
         while (version == known && !closed) {
             wait();
@@ -74,7 +77,7 @@ final class Feed implements Runnable {
     /**
      * A state.
      *
-     * @param version its number
+     * @param version the state's number
      * @param event as a server-sent event
      */
     record State(long version, byte[] event) {
@@ -125,7 +128,7 @@ final class Feed implements Runnable {
                 workers.look();
             }
         }
-        // What was handed over since the last viewer went may be old.
+        // A state handed over since the last viewer left can be old.
         watches.forEach(NetWatch::ask);
         for (int i = 0; i < PATIENT_PERIODS && !watches.stream().allMatch(NetWatch::isThere); i++) {
             Thread.sleep(PERIOD_MILLIS);
@@ -133,7 +136,7 @@ final class Feed implements Runnable {
         return true;
     }
 
-    /** Takes what was handed over, and asks for the next; true if more than the time has changed. */
+    /** Takes the state handed over, and asks for the next; true if more than the time has changed. */
     private boolean look(long now) {
         boolean changed = false;
         for (int i = 0; i < watches.size(); i++) {

@@ -6,11 +6,11 @@ import java.util.Locale;
 import java.util.regex.Pattern;
 
 /**
- * Whether a request is meant for this page, and comes from nowhere else.
+ * Accepts a request only if it is meant for this page and comes from this page.
  *
- * <p>A page of another site, open in the same browser, can send requests to this machine, but it cannot forge
- * {@code Origin}; by a name of its own that suddenly means this machine (DNS rebinding) it would be of one origin with
- * this page, but then {@code Host} has that name.
+ * <p>A page of another site, open in the same browser, can send requests to this machine, but it cannot forge {@code
+ * Origin}. If the other site's name suddenly resolves to this machine (DNS rebinding), its page has the same origin as this
+ * page, but then {@code Host} has that name.
  */
 final class Guard {
     private static final Pattern HOST = Pattern.compile("(\\[[^\\[\\]]*]|[^:\\[\\]@/]+)(?::\\d*)?");
@@ -24,7 +24,7 @@ final class Guard {
         this.name = name.toLowerCase(Locale.ROOT);
     }
 
-    /** Null if the request may be answered; otherwise why not. */
+    /** Null if the request may be answered; otherwise the reason for the refusal. */
     String refusal(Headers headers) {
         String host = only(headers, "Host");
         if (host == null) {
@@ -38,13 +38,16 @@ final class Guard {
         if (headers.containsKey("Origin") && !("http://" + host).equalsIgnoreCase(origin)) {
             return OTHER;
         }
-        // A browser sends no Origin with what another site loads as a picture or a script. To follow a link is another thing.
+        // A browser sends no Origin with pictures and scripts that another site loads. Following a link is different.
         List<String> sites = headers.getOrDefault("Sec-Fetch-Site", List.of());
         boolean elsewhere = sites.contains("cross-site") || sites.contains("same-site");
         return elsewhere && !"navigate".equals(only(headers, "Sec-Fetch-Mode")) ? OTHER : null;
     }
 
-    /** By an address, which cannot be rebound, or by its name. The port is not compared: a tunnel may have another one. */
+    /**
+     * True for an address, which cannot be rebound, or the page's own name. The port is not compared: a tunnel can have
+     * another.
+     */
     private boolean isOwn(String host) {
         var parts = HOST.matcher(host.toLowerCase(Locale.ROOT));
         if (!parts.matches()) {

@@ -8,14 +8,14 @@ import tickbus.petri.PetriNet;
 import tickbus.petri.RunningNet;
 import tickbus.petri.Transition;
 
-/** What the page is told. */
+/** The messages to the page. */
 final class Json {
     private final StringBuilder out = new StringBuilder();
 
     private Json() {
     }
 
-    /** The nets as they are drawn. {@code run} tells the page whether it has those of this server. */
+    /** The nets for drawing. By {@code run} the page recognises whether it has the nets of this server. */
     static String nets(String run, String title, List<RunningNet> nets) {
         Json json = new Json();
         json.raw("{\"run\":").text(run).raw(",\"title\":").text(title).raw(",\"dots\":[");
@@ -67,7 +67,7 @@ final class Json {
         raw("}");
     }
 
-    /** What changes all the time: the scan and its time. */
+    /** The part that changes all the time: the scan and its time. */
     static String moment(NetState state) {
         Json json = new Json();
         return json.raw("\"scans\":").raw(Long.toString(state.scans())).raw(",\"us\":")

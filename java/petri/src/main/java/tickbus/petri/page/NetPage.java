@@ -19,7 +19,7 @@ import tickbus.petri.NetWatch;
 import tickbus.petri.RunningNet;
 
 /**
- * A page that shows running nets live: their markings, which transitions are enabled, what holds one back, what has fired.
+ * A page that shows running nets live: markings, enabled transitions, the conditions that hold one back, and recent firings.
  *
  * <pre>{@code
  * try (NetPage page = NetPage.open("127.0.0.1:8080", "The press", NetWatch.of(press))) {
@@ -28,16 +28,16 @@ import tickbus.petri.RunningNet;
  * }
  * }</pre>
  *
- * <p>It only shows: nothing can be changed by it. It is served by threads of its own (daemons), at most 30 times a second and
- * only while somebody looks; the thread that runs the nets never waits for it. Up to {@value #MOST_VIEWERS} viewers see it at
- * once. Requests under another name than that of the address, and those that a page of another site sends, are refused. It
- * needs the JDK's module {@code jdk.httpserver}.
+ * <p>The page only shows: nobody can change anything by it. Its own threads (daemons) serve it, at most 30 times a second
+ * and only while somebody looks; the thread that runs the nets never waits for it. Up to {@value #MOST_VIEWERS} viewers see
+ * it at once. Requests under another name than that of the address, and those from a page of another site, are refused. The
+ * page needs the JDK's module {@code jdk.httpserver}.
  */
 public final class NetPage implements AutoCloseable {
     private static final int MOST_VIEWERS = 16;
-    /** Beyond the viewers, for the files of the page. */
+    /** Threads in addition to the viewers', for the files of the page. */
     private static final int MORE_THREADS = 8;
-    /** For how long a client may read or write. */
+    /** How long a client may read or write. */
     private static final long PATIENCE_NANOS = 10_000_000_000L;
     private static final long LONGEST_END_MILLIS = 2000;
     private static final int OK = 200;
@@ -71,7 +71,7 @@ public final class NetPage implements AutoCloseable {
         server = HttpServer.create(at, 0);
         server.setExecutor(workers);
         server.createContext("/", this::answer);
-        // The server's own thread is a daemon if the one that starts it is.
+        // The server's own thread is a daemon if the thread that starts it is one.
         join(Workers.start(server::start, "start of a net page"));
         looker = Workers.start(feed, "net page");
     }
@@ -81,10 +81,10 @@ public final class NetPage implements AutoCloseable {
      *
      * @param address host and port, such as {@code 127.0.0.1:8080} for this computer alone or {@code 0.0.0.0:8080} for every
      *     one that can reach it; the system chooses port 0
-     * @param title its heading
-     * @param watches what it shows; closed by the caller
-     * @throws IllegalArgumentException if the address is none
-     * @throws IOException if the address is not to be had
+     * @param title the page's heading
+     * @param watches the nets on the page; closed by the caller
+     * @throws IllegalArgumentException if the address is invalid
+     * @throws IOException if the address is not available
      */
     public static NetPage open(String address, String title, NetWatch... watches) throws IOException {
         return open(address, title, PATIENCE_NANOS, List.of(watches));
@@ -119,21 +119,21 @@ public final class NetPage implements AutoCloseable {
         }
     }
 
-    /** Where it is; at every address of this computer, where it is on this computer. */
+    /** The page's address; for a page at every address of this computer, its address on this computer. */
     public URI address() {
         InetSocketAddress at = server.getAddress();
         String host = at.getAddress().isAnyLocalAddress() ? "127.0.0.1" : name;
         return URI.create("http://" + host + ":" + at.getPort() + "/");
     }
 
-    /** Ends it: its viewers are told that what they see is old. */
+    /** Closes the page and informs its viewers that the displayed state is old. */
     @Override
     public void close() {
         feed.close();
         looker.interrupt();
         server.stop(0);
         workers.close();
-        // Another page may ask the same watches from now on.
+        // Another page can ask the same watches from now on.
         join(looker);
     }
 
@@ -181,7 +181,7 @@ public final class NetPage implements AutoCloseable {
         }
     }
 
-    /** To lay out a large net takes a while, so it is done when somebody looks. */
+    /** Laying out a large net takes a while, so the first viewer triggers it. */
     private synchronized byte[] nets() {
         if (nets == null) {
             List<RunningNet> all = watches.stream().flatMap(watch -> watch.nets().stream()).toList();
@@ -215,7 +215,7 @@ public final class NetPage implements AutoCloseable {
                 state = feed.after(state.version());
             }
         } catch (InterruptedException e) {
-            // It took nothing for too long, or the page is closed: the connection ends with this exchange.
+            // The client took nothing for too long, or the page is closed: the connection ends with this exchange.
         } finally {
             feed.leave();
         }

@@ -8,20 +8,20 @@ import java.util.Map;
 import java.util.concurrent.Executor;
 
 /**
- * The threads of a page. Whoever reads or writes for too long (a browser that sleeps, a client that never ends its request)
- * is interrupted, which closes its connection.
+ * The threads of a page. A thread that reads or writes for too long (a browser that sleeps, a client that never ends its
+ * request) is interrupted, which closes its connection.
  */
 final class Workers implements Executor, AutoCloseable {
     private final int most;
     private final long patienceNanos;
     private final Deque<Runnable> waiting = new ArrayDeque<>();
-    /** Since when each thread reads or writes. */
+    /** Since when each thread has been reading or writing. */
     private final Map<Thread, Long> busy = new HashMap<>();
     private int threads;
     private int idle;
     private boolean closed;
 
-    /** At most so many threads, each of which may read or write for so long. */
+    /** Limits the number of threads, and the time for which each may read or write. */
     Workers(int most, long patienceNanos) {
         this.most = most;
         this.patienceNanos = patienceNanos;
@@ -64,7 +64,7 @@ final class Workers implements Executor, AutoCloseable {
             try {
                 wait();
             } catch (InterruptedException e) {
-                // What it did before took too long, and is over.
+                // The previous task took too long, and is over.
             }
         }
         idle--;
@@ -76,13 +76,13 @@ final class Workers implements Executor, AutoCloseable {
         busy.put(Thread.currentThread(), System.nanoTime());
     }
 
-    /** This thread has read or written. Whatever interrupted it does not count any more. */
+    /** This thread has finished reading or writing. An earlier interrupt does not count any more. */
     synchronized void free() {
         busy.remove(Thread.currentThread());
         Thread.interrupted();
     }
 
-    /** Interrupts who reads or writes for too long. */
+    /** Interrupts threads that read or write for too long. */
     synchronized void look() {
         long now = System.nanoTime();
         for (Iterator<Map.Entry<Thread, Long>> each = busy.entrySet().iterator(); each.hasNext();) {

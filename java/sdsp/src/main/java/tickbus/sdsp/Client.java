@@ -28,9 +28,9 @@ public final class Client {
     private final Participant participant;
     private final long[] reads;
     private final long[] writes;
-    /** The step that it ran last; 0 is the initial write, and -1 before that. */
+    /** The last step that ran; 0 is the initial write, and -1 before that. */
     private long ran = -1;
-    /** Why the participant cannot go on. */
+    /** Why the participant cannot continue. */
     private Throwable failure;
 
     private Client(Frames frames, Participant participant, Declaration declaration) {
@@ -41,14 +41,15 @@ public final class Client {
     }
 
     /**
-     * Takes part in the run of the server at an address, until its end. Blocks the thread; an interrupt of it leaves the run.
+     * Takes part in the run of the server at an address, until its end. Blocks the thread; interrupting the thread leaves
+     * the run.
      *
      * @param address the server's address
-     * @param participant what runs in each step
+     * @param participant runs in each step
      * @return how the run ended
-     * @throws EndedException if there is no server, it refuses this client, or the run was broken off
-     * @throws IllegalArgumentException if a name of the declaration is empty or longer than 255 bytes, or all of them together
-     *     take more than a mebibyte
+     * @throws EndedException if no server answers, it refuses this client, or the run was broken off
+     * @throws IllegalArgumentException if a name of the declaration is empty or longer than 255 bytes, or all names together
+     * take more than a mebibyte
      */
     public static Outcome join(SocketAddress address, Participant participant) throws EndedException {
         Declaration declaration = participant.declare();
@@ -75,7 +76,7 @@ public final class Client {
         return ended;
     }
 
-    /** The size of a join without its kind. */
+    /** The size of a join message without its kind. */
     private static int size(Declaration declaration) {
         long size = MAGIC.length + Short.BYTES + Integer.BYTES + 2 * Short.BYTES + name(declaration.name()).length + 1;
         for (Variable variable : declaration.writes()) {
@@ -145,7 +146,7 @@ public final class Client {
         if (ran >= 0) {
             throw new Frames.Violation("started twice");
         }
-        // The types of what is read, which the participant knows.
+        // The types of the variables that the participant reads, which it knows.
         expectValues(frames.left());
         in.position(in.position() + frames.left());
         try {
@@ -180,7 +181,7 @@ public final class Client {
         done(sequence);
     }
 
-    /** The participant cannot go on: everyone gets its reason. An error of the virtual machine goes on to the caller. */
+    /** The participant cannot continue: everyone gets its reason. An error of the virtual machine is thrown to the caller. */
     private void failed(Throwable e) throws IOException {
         failure = e;
         // The server answers with the end.
@@ -206,7 +207,7 @@ public final class Client {
         sendIfPossible();
     }
 
-    /** If this fails, the server may have said why before: what is received next is that, or tells that it is lost. */
+    /** If this fails, the server may have sent its reason before: the next receive returns it, or reports a lost connection. */
     private void sendIfPossible() throws IOException {
         try {
             frames.send();
@@ -221,7 +222,7 @@ public final class Client {
         byte[] text = reason.getBytes(StandardCharsets.UTF_8);
         int length = Math.min(text.length, LONGEST_REASON);
         while (length < text.length && (text[length] & 0xC0) == 0x80) {
-            // Not within a character.
+            // Do not cut within a character.
             length--;
         }
         frames.begin(1 + length, GIVE_UP).put(text, 0, length);

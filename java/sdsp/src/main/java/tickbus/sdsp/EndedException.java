@@ -18,19 +18,19 @@ public final class EndedException extends Exception {
         HUNG,
         /** A client, or the server, violated the protocol. */
         PROTOCOL,
-        /** A client said that it cannot go on. */
+        /** A client reported that it cannot continue. */
         FAILED,
         /** The server's logic failed. */
         LOGIC,
         /** Somebody stopped the run before a step could be finished. */
         STOPPED,
-        /** The operating system did not play along. */
+        /** A system call failed. */
         SYSTEM
     }
 
     /** The kind of reason. */
     private final Cause cause;
-    /** The client to blame; null if there is none. */
+    /** The client to blame; null without one. */
     private final String client;
     /** The number of steps that were committed before. */
     private final long steps;
@@ -57,7 +57,7 @@ public final class EndedException extends Exception {
     /**
      * The client to blame.
      *
-     * @return its name, where there is one
+     * @return the client's name; empty if no client is to blame
      */
     public Optional<String> client() {
         return Optional.ofNullable(client);

@@ -14,7 +14,7 @@ import java.nio.channels.UnresolvedAddressException;
 import java.nio.charset.StandardCharsets;
 import jdk.net.ExtendedSocketOptions;
 
-/** Frames over a blocking socket. An interrupt of the thread that waits for one closes it. */
+/** Frames over a blocking socket. Interrupting a thread that waits for a frame closes the socket. */
 final class Frames implements Closeable {
     /** The longest frame, without the four bytes of its length. */
     private static final int LONGEST = 1 << 20;
@@ -23,7 +23,7 @@ final class Frames implements Closeable {
     private final SocketChannel channel;
     private ByteBuffer in = buffer(8192).limit(0);
     private ByteBuffer out = buffer(8192);
-    /** Where in the buffer the frame ends that was received last. */
+    /** The end of the last received frame in the buffer. */
     private int end;
 
     Frames(SocketAddress address) throws IOException {
@@ -35,7 +35,7 @@ final class Frames implements Closeable {
         try {
             channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
             channel.setOption(StandardSocketOptions.SO_KEEPALIVE, true);
-            // A server whose cable is pulled is lost after some 40 seconds, not after the system's two hours.
+            // A server whose cable is pulled is detected after some 40 seconds, not after the system's two hours.
             keepAlive(ExtendedSocketOptions.TCP_KEEPIDLE, 10);
             keepAlive(ExtendedSocketOptions.TCP_KEEPINTERVAL, 10);
             keepAlive(ExtendedSocketOptions.TCP_KEEPCOUNT, 3);
@@ -56,7 +56,7 @@ final class Frames implements Closeable {
         return ByteBuffer.allocateDirect(size).order(ByteOrder.LITTLE_ENDIAN);
     }
 
-    /** Begins a frame of this length, which counts its kind; what follows is put into the buffer. */
+    /** Begins a frame of this length, which includes its kind; the caller puts the content into the buffer. */
     ByteBuffer begin(int length, byte kind) {
         if (length > LONGEST) {
             throw new IllegalArgumentException("a message of " + length + " bytes is too long, the most is " + LONGEST
@@ -68,7 +68,7 @@ final class Frames implements Closeable {
         return out.clear().putInt(length).put(kind);
     }
 
-    /** Sends the frame that was begun. */
+    /** Sends the frame that {@link #begin} began. */
     void send() throws IOException {
         out.flip();
         while (out.hasRemaining()) {
@@ -88,7 +88,7 @@ final class Frames implements Closeable {
         return in;
     }
 
-    /** How many bytes of the frame are left. */
+    /** The number of bytes left in the frame. */
     int left() {
         return end - in.position();
     }
@@ -127,7 +127,7 @@ final class Frames implements Closeable {
         channel.close();
     }
 
-    /** How the server violates the protocol, as the continuation of "it …". */
+    /** A protocol violation by the server, as the continuation of "it …". */
     static final class Violation extends IOException {
         private static final long serialVersionUID = 1L;
 

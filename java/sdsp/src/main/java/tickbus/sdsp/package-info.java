@@ -2,7 +2,7 @@
  * A client of SDSP in plain Java: a simulation joins a run in virtual time, in lock-step with a PLC and with other
  * simulations, over TCP and without a native library.
  *
- * <p>Start at {@link tickbus.sdsp.Participant}; {@link tickbus.sdsp.Client#join} lets it take part. What goes over the wire
- * is described in {@code docs/sdsp.md}.
+ * <p>Start at {@link tickbus.sdsp.Participant}; {@link tickbus.sdsp.Client#join} lets it take part. {@code docs/sdsp.md}
+ * describes the protocol.
  */
 package tickbus.sdsp;

@@ -159,7 +159,7 @@ class ClientTest {
         }
     }
 
-    /** What the server gets as the reason of a participant that throws this in its initial values, or in its first step. */
+    /** The server gets this reason when a participant throws in its initial values, or in its first step. */
     private static void assertSaid(String reason, boolean inStep, Class<? extends Throwable> told, Throwable thrown) throws Exception {
         Counter counter = new Counter() {
             @Override
@@ -253,7 +253,7 @@ class ClientTest {
             EndedException ended = endOf(s -> {
                 s.receive();
                 wrong.script.play(s);
-                // After its answers so far, it says why it leaves.
+                // After its answers so far, the client sends the reason why it leaves.
                 while (s.receive().get() != 0x03) {
                     continue;
                 }

@@ -16,14 +16,14 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
 import org.junit.jupiter.api.io.TempDir;
 
-/** What the documents show is so. */
+/** The examples in the documents are true. */
 @Timeout(60)
 class DocumentsTest {
     private static String document(String name) throws IOException {
         return Files.readString(Path.of(System.getProperty("tickbus.root"), "docs", name));
     }
 
-    /** The first fenced block in the document that begins like this. */
+    /** The first fenced block in the document with this beginning. */
     private static String block(String name, String begin) throws IOException {
         Matcher block = Pattern.compile("^```\\w*\n(" + Pattern.quote(begin) + ".*?)^```", Pattern.DOTALL | Pattern.MULTILINE)
             .matcher(document(name));

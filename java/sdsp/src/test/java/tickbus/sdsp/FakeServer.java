@@ -11,9 +11,9 @@ import java.nio.ByteBuffer;
 import java.nio.ByteOrder;
 import java.util.concurrent.CompletableFuture;
 
-/** The other end of a client: does with one connection what a test says. */
+/** The other end of a client; a test's script handles one connection. */
 final class FakeServer implements AutoCloseable {
-    /** What is done with the connection. */
+    /** Handles the connection. */
     interface Script {
         void play(FakeServer server) throws Exception;
     }
@@ -60,7 +60,7 @@ final class FakeServer implements AutoCloseable {
         return bytes;
     }
 
-    /** Sends bytes as they are. */
+    /** Sends raw bytes. */
     void sendRaw(byte... bytes) throws IOException {
         socket.getOutputStream().write(bytes);
     }
@@ -99,7 +99,7 @@ final class FakeServer implements AutoCloseable {
         send(0x83, buffer(24).putLong(steps).putLong(nanos).putLong(hash));
     }
 
-    /** Waits until the script is done, and tells what went wrong in it. */
+    /** Waits until the script is done, and throws its failure. */
     @Override
     public void close() throws IOException {
         try {

@@ -34,7 +34,7 @@ class SimulatorTest {
     @TempDir
     Path folder;
 
-    /** What the simulator wrote and got in each tick. */
+    /** The values that the simulator wrote and got in each tick. */
     private record Tick(double height, double lift) {}
 
     /** Lifts below 100 mm. */

@@ -9,13 +9,13 @@ import java.nio.file.Path;
 import java.util.concurrent.CompletableFuture;
 import java.util.concurrent.CompletionException;
 
-/** {@code tickbus sync} on a port of its own. */
+/** {@code tickbus sync} on its own port. */
 final class Sync implements AutoCloseable {
     private final Process process;
     private final BufferedReader out;
     private final InetSocketAddress address;
 
-    /** Starts it in a folder, with the text of its file; there it listens on port 20060. */
+    /** Starts the command in a folder, with the text of its file; there it listens on port 20060. */
     Sync(Path folder, String run) throws IOException {
         Path file = Files.writeString(folder.resolve("run.toml"), run.replace(":20060", ":0"));
         String command = File.separatorChar == '\\' ? "tickbus.exe" : "tickbus";
@@ -26,12 +26,12 @@ final class Sync implements AutoCloseable {
         address = new InetSocketAddress("127.0.0.1", Integer.parseInt(line.substring(line.lastIndexOf(':') + 1)));
     }
 
-    /** Where it listens. */
+    /** The address on which it listens. */
     InetSocketAddress address() {
         return address;
     }
 
-    /** Waits for a line of its output that begins like this. */
+    /** Waits for an output line with this beginning. */
     String await(String begin) throws IOException {
         StringBuilder all = new StringBuilder();
         for (String line = out.readLine(); line != null; line = out.readLine()) {
@@ -43,7 +43,7 @@ final class Sync implements AutoCloseable {
         throw new AssertionError("no line that begins with \"" + begin + "\" in:\n" + all);
     }
 
-    /** Takes part in a thread of its own. */
+    /** Takes part in a separate thread. */
     CompletableFuture<Outcome> join(Participant participant) {
         return CompletableFuture.supplyAsync(() -> {
             try {

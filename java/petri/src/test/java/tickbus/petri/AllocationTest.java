@@ -31,7 +31,7 @@ class AllocationTest {
             builder.when("start" + i, in -> in.get("tick") > least).during("busy" + i, (in, out) -> out.set("lamp", in.get(0)));
         }
         Coordinator coordinator = builder.build();
-        // Somebody looks at every scan, which is more often than a page does.
+        // The watch asks at every scan, which is more often than a page does.
         NetWatch watch = NetWatch.of(coordinator);
         long looks = 0;
         long now = 0;

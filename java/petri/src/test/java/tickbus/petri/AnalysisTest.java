@@ -14,7 +14,7 @@ import java.util.TreeSet;
 import org.junit.jupiter.api.Test;
 
 class AnalysisTest {
-    /** Each takes the left fork, then the right one. */
+    /** Each philosopher takes the left fork, then the right one. */
     private static PetriNet greedy(int count) {
         NetBuilder builder = PetriNet.named("greedy");
         for (int i = 0; i < count; i++) {
@@ -308,7 +308,7 @@ class AnalysisTest {
         assertEquals(10, Semiflows.rank(Samples.philosophers(10)));
     }
 
-    /** A later sum of rows has a smaller support than one that was kept before it. */
+    /** A later sum of rows has a smaller support than a row that was kept earlier. */
     @Test
     void aSemiflowThatContainsALaterOneIsDropped() {
         int[][] incidence = {{0, -1, -1}, {1, 0, 1}, {-1, -1, -1}, {1, 1, 0}, {-1, 2, -1}, {1, 0, 1}, {-1, 2, 0}};

@@ -157,7 +157,7 @@ class CoordinatorTest {
         stopsAt("exit action of place p", Coordinator.of(choice()).onExit("p", badly));
         stopsAt("continuous action of place q", Coordinator.of(choice()).when("back", in -> false).during("q", badly));
         stopsAt("reader of the inputs", Coordinator.of(choice()).reader(values -> values[0] = 1));
-        // The next transition's condition has been tested already when the listener hears of the firing.
+        // The next transition's condition has been tested already when the listener is called.
         stopsAt("firing of transition a", Coordinator.of(choice()).when("a", in -> true).when("back", in -> false)
             .listener((scan, nanos, transition, choices) -> {
                 throw new IllegalStateException("log");

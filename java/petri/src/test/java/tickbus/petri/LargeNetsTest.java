@@ -14,7 +14,7 @@ import java.util.concurrent.TimeUnit;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 
-/** What analyses of large nets need of memory, and where they give up. */
+/** The memory that analyses of large nets need, and where they give up. */
 class LargeNetsTest {
     @TempDir
     Path folder;
@@ -30,7 +30,7 @@ class LargeNetsTest {
         return net.build();
     }
 
-    /** In a JVM with 128 MB, where a matrix of places and transitions would take 576 MB. */
+    /** Runs in a JVM with 128 MB, where a matrix of places and transitions would take 576 MB. */
     public static void main(String[] args) {
         PetriNet ring = ring(12_000);
         System.out.println("coverability " + Coverability.explore(ring, 100).size());

@@ -95,7 +95,7 @@ class NetSvgTest {
         assertEquals(128, layout.x[1] - layout.x[0], 1e-9);
         assertArrayEquals(new double[] {layout.x[0], layout.y[0] + 16, layout.x[0], layout.y[0] + 64, layout.x[2],
             layout.y[0] + 64, layout.x[2], layout.y[0] + 14}, layout.routes[0], 1e-9);
-        // There and back between b and t, on both sides of the straight line.
+        // The arcs in both directions between b and t, on both sides of the straight line.
         assertTrue((layout.routes[1][3] - layout.y[0]) * (layout.routes[2][3] - layout.y[0]) < 0);
         PetriNet back = Pnml.parse("back.pnml", Pnml.write(net));
         assertEquals(NetSvg.write(net), NetSvg.write(back).replace("net back", "net n"));

@@ -16,7 +16,7 @@ class NetWatchTest {
         .transition("switch off").input("on").output("off").delay(Delay.fixed(100))
         .build();
 
-    /** The state after a scan that was asked for it. */
+    /** The state after a scan with a pending request. */
     private static NetState state(NetWatch watch, Coordinator lamp, long nanos) {
         watch.ask();
         lamp.scan(nanos);
@@ -118,7 +118,7 @@ class NetWatchTest {
         assertSame(lamp, NetWatch.of(lamp).nets().get(0));
     }
 
-    /** A copy that mixes two scans would have the token in both places or in none. */
+    /** A copy that mixes two scans would have the token in both places or in neither. */
     @Test
     void anotherThreadSeesWholeScansOnly() throws InterruptedException {
         PetriNet net = PetriNet.named("ring").place("a", 1).place("b").transition("go").input("a").output("b").delay(Delay.fixed(1))

@@ -10,7 +10,7 @@ import java.util.Map;
 import java.util.function.Consumer;
 import org.junit.jupiter.api.Test;
 
-/** Nets that nobody draws, and files that nobody has written. */
+/** Nets that nobody would draw, and broken files. */
 class OddNetsTest {
     private static final int MAX = Integer.MAX_VALUE;
 
@@ -84,7 +84,7 @@ class OddNetsTest {
         }
     }
 
-    /** Its count is the sign for "no bound", which such a net has not. */
+    /** The place's count equals the sign for "no bound", although the net is bounded. */
     @Test
     void asManyTokensAsAnIntCountsAreNotTakenForNoBound() {
         PetriNet still = PetriNet.named("still").place("p", MAX).place("q", 1).transition("t").input("q").build();

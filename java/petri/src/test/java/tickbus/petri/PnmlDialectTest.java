@@ -9,7 +9,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 
-/** Nets in the shapes that other tools write. */
+/** Nets in the formats of other tools. */
 class PnmlDialectTest {
     private static final String TAPAAL = """
         <pnml xmlns="http://www.pnml.org/version-2009/grammar/pnml">

@@ -16,7 +16,7 @@ import org.junit.jupiter.api.Test;
 class PublishedNetsTest {
     /**
      * The Kanban system of Ciardo and Tilgner, "On the use of Kronecker operators for the solution of generalized
-     * stochastic Petri nets": four cells with so many tickets each. Cell 1 feeds 2 and 3, and both feed 4.
+     * stochastic Petri nets": four cells with the same number of tickets. Cell 1 feeds 2 and 3, and both feed 4.
      */
     private static PetriNet kanban(int tickets) {
         NetBuilder net = PetriNet.named("Kanban");
@@ -77,7 +77,7 @@ class PublishedNetsTest {
         assertEquals(Verdict.YES, reached.isLive());
         assertEquals(Verdict.YES, reached.isReversible());
         assertEquals(2, reached.bound(net.place("out4").index()));
-        // Cells 2 and 3 are fed together, so the free tickets of one go with the used ones of the other, too.
+        // Cells 2 and 3 are fed together, so the free tickets of one also go with the used ones of the other.
         assertEquals(4 + 2, Semiflows.places(net, 100).size());
     }
 

@@ -13,7 +13,7 @@ import java.util.List;
 import java.util.Optional;
 import org.junit.jupiter.api.Test;
 
-/** The example of docs/petri.md, which it must have word for word. */
+/** The example of docs/petri.md, which must be there word for word. */
 class ReadmeTest {
     @Test
     void theExampleOfTheDocumentationRuns() throws Exception {

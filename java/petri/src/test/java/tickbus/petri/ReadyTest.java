@@ -12,7 +12,7 @@ import java.util.TreeMap;
 import java.util.TreeSet;
 import org.junit.jupiter.api.Test;
 
-/** In which order what is ready fires. */
+/** The order in which ready transitions fire. */
 class ReadyTest {
     @Test
     void theOrderIsThatOfASearchThroughAll() {
@@ -119,7 +119,7 @@ class ReadyTest {
         }
     }
 
-    /** A delay begins with the scan in which the outputs change: so an output is on for at least as long. */
+    /** A delay begins with the scan in which the outputs change, so an output is on for at least as long. */
     @Test
     void aDelayBeginsWithTheScanThatMarkedItsPlace() {
         Coordinator chain = Coordinator.of(PetriNet.named("chain").place("p", 1).place("q").place("r")

@@ -4,19 +4,19 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 
-/** The rules of docs/petri.md by searching through everything, with fixed delays. It follows the firings that it is told. */
+/** The rules of docs/petri.md by exhaustive search, with fixed delays. It repeats the firings of the coordinator under test. */
 final class Reference {
     private static final long BEFORE = Long.MIN_VALUE;
 
     private final PetriNet net;
     private final boolean[] edge;
-    /** When each token of a place is available, of all places. */
+    /** When each token becomes available, for all places. */
     private final List<List<Long>> tokens = new ArrayList<>();
     /** When a transition may fire; null while it is not enabled. */
     private final Long[] due;
-    /** Of a transition that may fire in this scan: when what let it do so was due. */
+    /** For a transition that may fire in this scan: the due time of the event that released it. */
     private final long[] since;
-    /** Enabled since this scan began, with an edge that was not used. */
+    /** Enabled since this scan began, with an unused edge. */
     private final boolean[] fresh;
     private boolean[] holds;
     private long now = BEFORE;
@@ -30,7 +30,7 @@ final class Reference {
         fresh = new boolean[edge.length];
     }
 
-    /** A scan begins: what was due meanwhile happens, each at its own time, and a delay that begins then begins with the scan. */
+    /** Begins a scan: everything that became due happens at its own time, and delays that begin then begin with the scan. */
     void begin(long at, boolean[] conditions) {
         boolean first = now == BEFORE;
         long before = now;
@@ -60,7 +60,9 @@ final class Reference {
         return net.transition(t).delay().first() > 0;
     }
 
-    /** Which may fire now: of the greatest priority, due first, and of these one or those in conflict with it. */
+    /**
+     * The transitions that may fire now: of the greatest priority, due first, and of these one or those in conflict with it.
+     */
     List<Integer> candidates() {
         List<Integer> best = new ArrayList<>();
         for (int t = 0; t < due.length; t++) {
@@ -101,7 +103,7 @@ final class Reference {
         follow(now, since[t], t);
     }
 
-    /** Enables and disables by the tokens of a moment; {@code cause} is when what led to it was due. */
+    /** Enables and disables by the tokens of a moment; {@code cause} is the due time of the event that led to it. */
     private void follow(long moment, long cause, int fired) {
         for (int t = 0; t < due.length; t++) {
             boolean enabled = isEnabled(t, moment);
@@ -145,7 +147,10 @@ final class Reference {
         return true;
     }
 
-    /** Those that are joined with a transition by conflicts: both take, or one takes what the other tests, or one fills the other's. */
+    /**
+     * The transitions in conflict with one, directly or by others: both take, or one takes what the other tests, or one
+     * fills the other's.
+     */
     private boolean[] cluster(int of) {
         boolean[] in = new boolean[due.length];
         in[of] = true;

@@ -12,21 +12,21 @@ import java.util.Objects;
 import org.junit.jupiter.api.Test;
 
 /**
- * The coordinator against the rules of docs/petri.md, as {@link Reference} has them: random nets with all attributes, random
- * inputs, at random times. A seed that fails goes to {@code reference-seeds.txt}. For longer runs:
- * {@code TICKBUS_WORLDS_SECONDS=600 mvn -f java -pl petri test -Dtest=ReferenceTest}; for one seed: {@code TICKBUS_SEED=4711}.
+ * Compares the coordinator with the rules of docs/petri.md, which {@link Reference} implements: random nets with all
+ * attributes, random inputs, at random times. A seed that fails goes to {@code reference-seeds.txt}. For longer runs: {@code
+ * TICKBUS_WORLDS_SECONDS=600 mvn -f java -pl petri test -Dtest=ReferenceTest}; for one seed: {@code TICKBUS_SEED=4711}.
  */
 class ReferenceTest {
     private static final int SCANS = 30;
 
-    /** What a net may have; the bits of what is written behind the number of a seed. */
+    /** Features of a net; the bits of the number behind a seed's number. */
     private enum Feature {
         WEIGHTS, INHIBITORS, TESTS, CAPACITIES, PRIORITIES, TIMED_TRANSITIONS, TIMED_PLACES, CONDITIONS, EDGES, LATE_SCANS, TOKENS
     }
 
     private static final int ALL = (1 << Feature.values().length) - 1;
 
-    /** A run: all of it comes from these. */
+    /** A run, which these values determine completely. */
     private record Seed(long number, int features, int scans) {
         static Seed of(String text) {
             String[] parts = text.split(":");
@@ -39,7 +39,7 @@ class ReferenceTest {
             return number + ":" + Integer.toHexString(features) + ":" + scans;
         }
 
-        /** The fewest features and scans with which it still fails. */
+        /** Shrinks to the fewest features and scans that still fail. */
         Seed shrunk() {
             Seed smallest = this;
             for (int bit = 0; bit < Feature.values().length; bit++) {
@@ -75,7 +75,7 @@ class ReferenceTest {
             return;
         }
         String seconds = Objects.requireNonNullElse(System.getenv("TICKBUS_WORLDS_SECONDS"), "3");
-        // Others in each run, and printed.
+        // Different in each run, and printed.
         long first = ProcessHandle.current().pid() << 32;
         System.out.println("nets from " + first + " on");
         long end = System.nanoTime() + Long.parseLong(seconds) * 1_000_000_000L;
@@ -100,7 +100,7 @@ class ReferenceTest {
         return (features >> feature.ordinal() & 1) == 1;
     }
 
-    /** Lets a net run, and returns where it first differs from the reference; null if it does not. */
+    /** Runs a net, and returns where it first differs from the reference; null if it does not. */
     private static String difference(Seed seed) {
         SplitMix random = new SplitMix(seed.number);
         int features = random.below(1 << Feature.values().length) & seed.features;
@@ -114,7 +114,7 @@ class ReferenceTest {
         for (int t = 0; t < transitions; t++) {
             input[t] = random.below(5);
             edge[t] = random.below(2) == 0 && has(features, Feature.EDGES);
-            // Above 2 there is none.
+            // Above 2: no condition.
             int at = input[t] > 2 || !has(features, Feature.CONDITIONS) ? -1 : input[t];
             input[t] = at;
             Condition condition = at < 0 ? in -> true : in -> in.isOn(at);

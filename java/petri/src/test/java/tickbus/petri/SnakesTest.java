@@ -12,7 +12,7 @@ import java.util.concurrent.TimeUnit;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 
-/** Against SNAKES, a library in Python by others. */
+/** Compares with SNAKES, a third-party library in Python. */
 class SnakesTest {
     private static final int NETS = 120;
     private static final int LIMIT = 120;
@@ -31,7 +31,7 @@ class SnakesTest {
         for (int drawn = 0; nets.size() < NETS; drawn++) {
             PetriNet net = drawn % 2 == 0 ? withoutCapacities(RandomNets.any(random, 4, 4)) : RandomNets.plain(random, 5, 4);
             Reachability graph = Reachability.explore(net, LIMIT);
-            // Most are unbounded or have two markings: of those, a few.
+            // Most are unbounded or have two markings; only a few of those are compared.
             if (graph.isComplete() && graph.size() > 4 || drawn % 60 == 0) {
                 write(nets.size(), net, text);
                 nets.add(net);
@@ -55,7 +55,7 @@ class SnakesTest {
         assertTrue(explored > NETS / 2, explored + " nets were small enough");
     }
 
-    /** SNAKES has none. */
+    /** SNAKES has no capacities. */
     private static PetriNet withoutCapacities(PetriNet net) {
         NetBuilder builder = PetriNet.named(net.name());
         net.places().forEach(place -> builder.place(place.name(), place.initial()));

@@ -14,7 +14,7 @@ class StepperTest {
         return net.transition(transition).index();
     }
 
-    /** Of every net that the generator makes: what can fire is what the rule of firing says, and undo finds the way back. */
+    /** For every net that the generator makes: {@code canFire} agrees with the firing rule, and undo goes back exactly. */
     @Test
     void stepsFollowTheRuleAndAreTakenBackOneByOne() {
         SplitMix random = new SplitMix(7);

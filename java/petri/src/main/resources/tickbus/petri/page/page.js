@@ -1,12 +1,12 @@
 'use strict';
 
-// Hears the state of the nets, and shows it. Nothing can be changed from here.
+// Receives the state of the nets and shows it. The page changes nothing.
 (() => {
   const get = (id) => document.getElementById(id);
   const SVG = 'http://www.w3.org/2000/svg';
-  /** Without a word for this long, what is shown counts as old. The server says something twice a second. */
+  /** Without a message for this long, the displayed state counts as old. The server sends one twice a second. */
   const PATIENCE = 2500;
-  /** Nets that were not scanned for this long are said to stand still. */
+  /** Nets that were not scanned for this long are shown as standing still. */
   const STILL = 1500;
   const AGAIN = 1000;
   const FLASH = 1200;
@@ -49,7 +49,7 @@
     return node;
   }
 
-  /** A table's rows of a name and a value; gives the cells of the values. */
+  /** Adds a table's rows of a name and a value; returns the cells of the values. */
   function rows(details, names) {
     const body = details.querySelector('tbody');
     details.hidden = names.length === 0;
@@ -80,7 +80,7 @@
       const drawing = this.find('.drawing');
       drawing.setAttribute('aria-label', `Drawing of ${net.name}`);
       drawing.innerHTML = net.svg;
-      // As a picture it would hide its transitions, which can be chosen here, from screen readers.
+      // As a picture it would hide its transitions, which the user can choose here, from screen readers.
       drawing.querySelector('svg').setAttribute('role', 'group');
       this.places = this.nodes('net-place', 'place');
       this.transitions = this.nodes('net-transition', 'transition');
@@ -91,7 +91,7 @@
       this.flashes = new Map();
       this.placeCells = rows(this.find('.places'), net.places);
       const reads = new Set(net.transitions.flatMap((one) => one.parts ?? []).map((one) => one.input));
-      // Those that conditions name stand beside the transitions.
+      // Inputs that conditions name are shown beside the transitions.
       const isNamed = net.inputs.some((name) => reads.has(name));
       this.inputCells = rows(this.find('.inputs'), isNamed ? [] : net.inputs);
       this.outputCells = rows(this.find('.outputs'), net.outputs);
@@ -140,7 +140,7 @@
       return { row, phase, parts, fired, last };
     }
 
-    /** Marks a transition here and there, and shows the other one of the two. */
+    /** Marks a transition in drawing and table, and scrolls to it in the other one of the two. */
     choose(t, other) {
       const isChosen = this.rows[t]?.row.classList.contains('chosen');
       this.rows.forEach(({ row }, i) => row.classList.toggle('chosen', i === t && !isChosen));
@@ -209,7 +209,7 @@
         text(row.phase, what);
         text(row.fired, String(state.fired[t]));
         text(row.last, state.last[t] === null ? '' : seconds(state.last[t]));
-        // Of a condition in code nobody knows more than that it does not hold.
+        // Of a condition in code the page only knows that it does not hold.
         const failed = phase === HELD ? state.failed[t] ?? (row.parts.length === 1 ? 0 : -1) : -1;
         row.parts.forEach((one, i) => this.part(one, i, failed, state));
       }
@@ -275,7 +275,7 @@
   function display(state) {
     const now = performance.now();
     let note = '';
-    // The markings of all first: conditions look at places of other nets.
+    // First the markings of all nets, because conditions look at places of other nets.
     state.nets.forEach((one, i) => one?.tokens.forEach((count, p) => views[i].place(p, count, one.young[p] ?? 0)));
     state.nets.forEach((one, i) => {
       if (!one) {
@@ -298,7 +298,7 @@
     heard = performance.now();
     latest = state;
     if (state.run !== run) {
-      // Another server, maybe with other nets.
+      // Another server has started, perhaps with other nets.
       const answer = await fetch('/nets', { signal: AbortSignal.timeout(30000) });
       if (!answer.ok) throw new Error('no nets');
       const layout = await answer.json();
@@ -331,7 +331,7 @@
     source = mine;
     let isBusy = false;
     mine.onmessage = async (event) => {
-      // One at a time: while the nets are fetched, others come.
+      // One at a time: other states arrive while the nets are fetched.
       if (isBusy || mine !== source) return;
       isBusy = true;
       try {

@@ -24,7 +24,7 @@ final class Chromium implements AutoCloseable {
     private final Process driver;
     private final String base;
 
-    /** Whether chromedriver and a Chromium for it are there. */
+    /** True if chromedriver and a Chromium for it are installed. */
     static boolean isThere() {
         return isOnPath("chromedriver") && (isOnPath("chromium") || isOnPath("google-chrome"));
     }
@@ -39,7 +39,7 @@ final class Chromium implements AutoCloseable {
         return false;
     }
 
-    /** The port that chromedriver tells, or {@code null} if it ends before. */
+    /** The port that chromedriver prints, or {@code null} if it ends before. */
     private static String portOf(Process driver) throws IOException {
         var lines = new BufferedReader(new InputStreamReader(driver.getInputStream(), StandardCharsets.UTF_8));
         Pattern started = Pattern.compile("started successfully on port (\\d+)");
@@ -52,13 +52,13 @@ final class Chromium implements AutoCloseable {
         return null;
     }
 
-    /** Starts a browser with a window of this many CSS pixels; {@code folder} holds whatever it leaves. */
+    /** Starts a browser with a window of this many CSS pixels; {@code folder} gets its files. */
     Chromium(int width, int height, Path folder) throws IOException, InterruptedException {
         ProcessBuilder builder = new ProcessBuilder("chromedriver", "--port=0").redirectError(ProcessBuilder.Redirect.DISCARD);
         builder.environment().put("TMPDIR", folder.toString());
         Process started = builder.start();
         String port = portOf(started);
-        // It looks for a port that is free for IPv4, and ends where IPv6 has another program on it by then.
+        // Chromedriver looks for a port that is free for IPv4, and ends if another program meanwhile has it on IPv6.
         for (int attempt = 1; port == null && attempt < 5; attempt++) {
             started = builder.start();
             port = portOf(started);
@@ -122,12 +122,12 @@ final class Chromium implements AutoCloseable {
         return text;
     }
 
-    /** What the page has logged. */
+    /** The page's log. */
     String complaints() throws IOException, InterruptedException {
         return call("POST", base + "/se/log", "{\"type\":\"browser\"}");
     }
 
-    /** A picture of the window, as PNG. */
+    /** Saves a picture of the window, as PNG. */
     void shoot(Path file) throws IOException, InterruptedException {
         String answer = call("GET", base + "/screenshot", null);
         Matcher picture = Pattern.compile("\"value\":\"([^\"]+)\"").matcher(answer);
@@ -141,7 +141,7 @@ final class Chromium implements AutoCloseable {
         try {
             call("DELETE", base, null);
         } catch (IOException | InterruptedException e) {
-            // The driver ends all the same.
+            // The driver ends anyway.
         }
         driver.destroy();
     }

@@ -25,7 +25,7 @@ import tickbus.petri.Stepper;
 
 @Timeout(120)
 class NetPageTest {
-    /** A client that writes what it is told to, as no library would. */
+    /** A client that sends arbitrary bytes, which no library would. */
     private static final class Client implements AutoCloseable {
         final Socket socket;
         final BufferedReader in;
@@ -152,7 +152,7 @@ class NetPageTest {
             all.remove(0).close();
             String status = "503";
             while (status.equals("503")) {
-                // Its place is free when the next state cannot be sent.
+                // The viewer's place becomes free when the next state cannot be sent.
                 all.get(0).event();
                 status = status(page, "GET /events HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
             }
@@ -175,7 +175,7 @@ class NetPageTest {
                 end = -1;
             }
             assertEquals(-1, end);
-            // On a busy computer another request may take as long.
+            // On a busy computer another request can take as long.
             String status = "closed";
             while (status.equals("closed")) {
                 status = status(page, "GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
@@ -184,7 +184,7 @@ class NetPageTest {
         }
     }
 
-    /** Counts how often its state is asked for. */
+    /** Counts the requests for its state. */
     private static final class Counting implements RunningNet {
         final Stepper stepper;
         final AtomicInteger copies = new AtomicInteger();
@@ -256,7 +256,7 @@ class NetPageTest {
         }
     }
 
-    /** The first event after somebody has run the net. */
+    /** The first event after the net has run. */
     private static String firstOfARunNet(Client viewer) throws IOException {
         String event = viewer.event();
         while (event.contains("[null]")) {

@@ -11,7 +11,7 @@ import org.junit.jupiter.api.BeforeEach;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 
-/** The page in a real browser. Pictures of it are left in {@code target/page}. */
+/** The page in a real browser. Pictures of it are in {@code target/page}. */
 class PageInChromiumTest {
     private static final Path PICTURES = Path.of("target", "page");
     private static final String START = "document.querySelector('[data-transition=\"0\"]')";
@@ -124,7 +124,7 @@ class PageInChromiumTest {
             viewer.await("document.getElementById('old').innerText.startsWith('Nothing heard for')");
             assertEquals("true", viewer.value("document.body.classList.contains('is-old')"));
             viewer.shoot(PICTURES.resolve("old.png"));
-            // A program that was started again has other nets; this one shows the same under another title.
+            // A restarted program has other nets; this one shows the same nets under another title.
             try (NetPage again = NetPage.open("127.0.0.1:" + address.getPort(), "Second", scanning.watch)) {
                 assertEquals(address, again.address());
                 viewer.await("document.title === 'Second'");

@@ -10,7 +10,7 @@ import tickbus.petri.Inputs;
 import tickbus.petri.NetWatch;
 import tickbus.petri.PetriNet;
 
-/** A small press that is scanned every 2 ms by a thread of its own, and whose inputs a test sets. */
+/** A small press that a separate thread scans every 2 ms, and whose inputs a test sets. */
 final class Scanning implements AutoCloseable {
     static final PetriNet NET = PetriNet.named("press <1>").place("idle", 1).place("moving").place("pressing").place("made", 7)
         .transition("start").input("idle").output("moving")
@@ -27,7 +27,7 @@ final class Scanning implements AutoCloseable {
     private volatile boolean over;
     private volatile long scans;
 
-    /** Both signals have to be on; says which one is not. */
+    /** Both signals must be on; {@code failed} names the one that is not. */
     private static final class Start implements Conjunction {
         private int failed = -1;
 
@@ -90,7 +90,7 @@ final class Scanning implements AutoCloseable {
         return scans;
     }
 
-    /** Nobody scans until {@link #goOn}, by the same thread. */
+    /** Stops scanning until {@link #goOn}, called by the same thread. */
     void standStill() {
         still.lock();
     }

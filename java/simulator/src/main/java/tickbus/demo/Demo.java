@@ -20,15 +20,15 @@ import tickbus.simulator.TimeSource;
 import tickbus.simulator.text.Durations;
 
 /**
- * The demo's command line; see {@code --help} for what it takes.
+ * The demo's command line; {@code --help} describes it.
  *
- * <p>Its last line on standard output is the verdict, {@code demo: ok …} or {@code demo: failed reason=…}.
+ * <p>The last line on standard output is the verdict, {@code demo: ok …} or {@code demo: failed reason=…}.
  * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class Demo {
     private static final Verdict VERDICT = new Verdict("demo");
 
-    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
     private static final int ATTEMPTS = 5;
 
     /** The step, and the time in it, at which a picture of the rig shows most: both lifts up, the lamp on. */
@@ -46,7 +46,7 @@ public final class Demo {
     private Operator operator;
     private boolean pictured;
 
-    /** The verdict on the script, once it is over. */
+    /** The verdict on the script when it is over. */
     private String verdict;
 
     private Demo(DemoOptions options, Display display, List<String> notes) {
@@ -71,7 +71,7 @@ public final class Demo {
      *
      * @param args the command line
      * @param out gets the steps and, last, the verdict
-     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @param err gets errors in the command line, and messages of unexpected exceptions
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
@@ -93,13 +93,13 @@ public final class Demo {
                 driver -> options.plc() == null ? new HostedPlc(driver) : PlcCommand.process(options, driver), out, err);
     }
 
-    /** Where drivers come from. */
+    /** Opens drivers. */
     @FunctionalInterface
     interface Opener {
         DriverSet open();
     }
 
-    /** Where the PLC comes from, given the driver that it is the other end of. */
+    /** Makes the PLC at the other end of a driver. */
     @FunctionalInterface
     interface PlcMaker {
         Plc make(ControlInterfaceDeviceDriver driver);
@@ -144,10 +144,10 @@ public final class Demo {
         }
     }
 
-    /** Everything from opening the drivers to writing the report. */
+    /** Runs everything from opening the drivers to writing the report. */
     private String play(Opener opener, PlcMaker maker, ShutdownGuard guard, PrintStream err) {
         String verdict;
-        // The PLC is ended last: if it ended first, the driver would take it for lost.
+        // The PLC is ended last: otherwise the driver would report it as lost.
         try (Ending ending = new Ending(); Simulator simulator = new Simulator(opener.open(), rig, options.control(),
                 options.stepNanos(), TimeSource.system())) {
             verdict = verdict(simulator, maker, ending, guard, err);

@@ -7,7 +7,7 @@ public final class DemoFailure extends RuntimeException {
     /**
      * A failure.
      *
-     * @param reason what has happened, for people
+     * @param reason the event, for people
      */
     public DemoFailure(String reason) {
         super(reason);

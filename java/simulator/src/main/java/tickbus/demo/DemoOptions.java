@@ -10,15 +10,15 @@ import tickbus.simulator.TickMode;
  *
  * @param drivers the DeviceDriver folder
  * @param control the control table
- * @param report where the report goes
- * @param recording what the driver records, null for no page about it
+ * @param report the report's file
+ * @param recording the driver's recording, null for no page about it
  * @param plc the tickbus executable that is the PLC, null if the PLC is started by other means
- * @param plcCommand the arguments with which it becomes the PLC, null for the rig's program at the driver's address
+ * @param plcCommand the arguments that make it the PLC, null for the rig's program at the driver's address
  * @param mode how ticks follow one another
  * @param stepNanos simulation step size
  * @param cycles cycles to complete
  * @param timeLimitNanos longest simulation time
- * @param page whether the rig stays after its last cycle, for the live page
+ * @param page true if the rig stays after its last cycle, for the live page
  */
 record DemoOptions(Path drivers, Path control, Path report, Path recording, Path plc, List<String> plcCommand,
         TickMode mode, long stepNanos, int cycles, long timeLimitNanos, boolean page) {
@@ -66,7 +66,7 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
         return (cycles + 1) / 2;
     }
 
-    /** The cycle in which a bottle jams: the one before, or the only one. */
+    /** The cycle in which a bottle jams: the one before {@link #killCycle}, or the only one. */
     int jamCycle() {
         return Math.max(1, killCycle() - 1);
     }

@@ -11,16 +11,15 @@ import java.util.stream.Collectors;
 import tickbus.simulator.Simulator;
 
 /**
- * Counts the rising edges of every Boolean signal at the simulation's end of the link, and compares them
- * with what the PLC's end counted: for each life of the PLC, and exactly.
+ * Counts the rising edges of every Boolean signal at the simulation's end of the link, and compares them exactly with the
+ * counts of the PLC's end, for each life of the PLC.
  *
- * <p><b>While the PLC is there.</b> Edges of signals to the PLC are made by the simulation: they are counted in the
- * values handed to the driver. Edges of signals from the PLC are reported by the driver in the component {@code
- * <name>.edges}, which includes edges between two ticks.
+ * <p><b>While the PLC is there.</b> The simulation makes the edges of signals to the PLC: they are counted in the values
+ * passed to the driver. The driver reports the edges of signals from the PLC in the component {@code <name>.edges}, which
+ * includes edges between two ticks.
  *
- * <p><b>When it comes.</b> A life begins with the first tick whose data are not stale. The PLC's image starts with
- * all bits off, so a signal that is on counts once at the PLC, whatever happened before. This end counts that tick as
- * follows:
+ * <p><b>When the PLC comes.</b> A life begins with the first tick whose data are not stale. The PLC's image starts with all
+ * bits off, so a signal that is on counts once at the PLC, whatever happened before. This end counts that tick as follows:
  * <ul>
  *   <li>a signal to the PLC counts once if it is on, or if it rose while there was no PLC, because the driver
  *       keeps a latched pulse for the next exchange, and however many such pulses merge into one;
@@ -28,11 +27,10 @@ import tickbus.simulator.Simulator;
  *       on when the driver saw it last, or by its fail-safe value, it counts once if it is on.
  * </ul>
  *
- * <p><b>When it goes.</b> A killed PLC cannot be asked any more, so it must be killed while the counts that it
- * reported last are {@linkplain #disagreement the same as here}. After that the other end does not count any more. An
- * edge from the PLC that still arrives was made after its last report: the audit fails, because it could not be
- * exact. It also fails if a signal to the PLC rises twice while the link comes up: it would be unknown whether the
- * pulses merged.
+ * <p><b>When the PLC goes.</b> A killed PLC cannot report any more, so it must be killed while its last reported counts are
+ * {@linkplain #disagreement the same as here}. After that the other end does not count any more. If an edge from the PLC
+ * still arrives, it was made after the last report: the audit fails, because it cannot be exact. It also fails if a signal
+ * to the PLC rises twice while the link comes up, because the pulses may have merged.
  */
 final class EdgeAudit {
     private static final int STALE = 2;
@@ -56,10 +54,10 @@ final class EdgeAudit {
     }
 
     private enum State {
-        /** There never was a PLC, or its data are stale. */
+        /** No PLC has been there yet, or its data are stale. */
         AWAY,
         PRESENT,
-        /** It is dead, but its last data are not stale yet. */
+        /** The PLC is dead, but its last data are not stale yet. */
         CUT
     }
 
@@ -169,7 +167,7 @@ final class EdgeAudit {
         return quietTicks;
     }
 
-    /** Whether these counts were reported after the last edge at this end. */
+    /** True if these counts were reported after the last edge at this end. */
     boolean isNewer(Plc.Counts counts) {
         return counts.scans() >= 0 && counts.nanoTime() - lastEdgeNanoTime > 0;
     }
@@ -177,8 +175,8 @@ final class EdgeAudit {
     /**
      * How the PLC's counts differ from this end's.
      *
-     * @return null if nothing
-     * @throws DemoFailure if it has no count for a signal
+     * @return null if they agree
+     * @throws DemoFailure if the PLC has no count for a signal
      */
     String disagreement(Plc.Counts counts) {
         String differing = compare(counts).stream().filter(line -> line.missed() != 0).map(Line::text)
@@ -186,13 +184,13 @@ final class EdgeAudit {
         return differing.isEmpty() ? null : differing;
     }
 
-    /** The PLC was killed: its life ends with the counts that it reported last. */
+    /** The PLC was killed: its life ends with its last reported counts. */
     void cut(Plc.Counts last) {
         close("killed", last);
         state = State.CUT;
     }
 
-    /** The demo has ended: so has the PLC's last life. */
+    /** The demo has ended, and with it the PLC's last life. */
     void end(Plc.Counts last) {
         close("end of the demo", last);
     }

@@ -23,7 +23,7 @@ final class HostedPlc implements Plc {
 
     @Override
     public void start() {
-        // It is the driver's.
+        // The driver switches the PLC.
     }
 
     @Override
@@ -74,11 +74,11 @@ final class HostedPlc implements Plc {
 
     @Override
     public void check() {
-        // If it ends, the link shows that.
+        // The link shows if the PLC ends.
     }
 
     @Override
     public void close() {
-        // The driver closes it.
+        // The driver closes the PLC.
     }
 }

@@ -9,7 +9,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 
-/** The page about the run, made by {@code tickbus report} from the driver's recording once that is complete. */
+/** The page about the run, made by {@code tickbus report} from the driver's complete recording. */
 public final class HtmlPage {
     /** The PLC's output with the number of its step. */
     private static final String STEPS = "Step";
@@ -28,7 +28,7 @@ public final class HtmlPage {
     /**
      * Saves the statistics of a driver for a page.
      *
-     * @param file where
+     * @param file the destination
      * @param statistics as reported by the driver
      * @throws IOException if the file cannot be written
      */
@@ -39,9 +39,9 @@ public final class HtmlPage {
     /**
      * Makes the page.
      *
-     * @param options where everything is
+     * @param options has all paths
      * @param out gets a line with the page's location
-     * @return what went wrong, or null
+     * @return the error, or null
      */
     static String make(DemoOptions options, PrintStream out) {
         Path page = options.report().resolveSibling("report.html");
@@ -58,8 +58,8 @@ public final class HtmlPage {
      * Makes a page.
      *
      * @param tickbus the tickbus command
-     * @param arguments what follows {@code tickbus report}
-     * @return what went wrong, or null
+     * @param arguments the arguments of {@code tickbus report}
+     * @return the error, or null
      */
     public static String make(Path tickbus, List<String> arguments) {
         List<String> command = new ArrayList<>(List.of(tickbus.toString(), "report"));

@@ -55,7 +55,7 @@ public final class Main {
     private static final Map<String, Supplier<Machine>> MACHINES = Map.of("rig", Rig::new, "peeler", Peeler::new,
             "board", TestingBoard::new, "cell", ManufacturingCell::new, "none", NoMachine::new);
 
-    /** A machine may have many variables that a plant does not use; only the first ones are listed. */
+    /** A machine can have many variables that a plant does not use; only the first ones are listed. */
     private static final int MOST_NOTES = 10;
 
     private Main() {
@@ -75,7 +75,7 @@ public final class Main {
      *
      * @param args the command line
      * @param out gets results
-     * @param err gets complaints
+     * @param err gets error messages
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {

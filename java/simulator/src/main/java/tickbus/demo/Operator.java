@@ -14,8 +14,8 @@ import tickbus.simulator.Simulator;
 import tickbus.simulator.text.Durations;
 
 /**
- * The operator at the panel: a script of stages, each with an action, a condition to wait for, and a limit in
- * simulation time. Anything that goes wrong is a {@link DemoFailure} that names the stage.
+ * The operator at the panel: a script of stages, each with an action, an awaited condition, and a limit in simulation time.
+ * Every mistake is a {@link DemoFailure} that names the stage.
  */
 final class Operator {
     private static final long SECOND = 1_000_000_000L;
@@ -23,10 +23,10 @@ final class Operator {
     /** How many ticks must pass without an edge before counts are compared. */
     private static final int QUIET_TICKS = 50;
 
-    /** And how many scans of the PLC. */
+    /** How many scans of the PLC must pass as well. */
     private static final int QUIET_SCANS = 3;
 
-    /** How long the counts of both ends may take to agree; after that they are compared as they are. */
+    /** How long the counts of both ends may take to agree; after that they are compared anyway. */
     private static final long AGREEMENT_NANOS = 2 * SECOND;
 
     /** Statistics are slow, so they are read only now and then. */
@@ -201,8 +201,8 @@ final class Operator {
     }
 
     /**
-     * The most revealing moment: lift 2 is moving with a bottle on its cup. The PLC's newest counts must also include
-     * every edge, which they do after a while without edges, because it cannot be asked afterwards.
+     * The best moment to kill the PLC: lift 2 is moving with a bottle on its cup. The PLC's newest counts must also include
+     * every edge, as they do after a while without edges, because a dead PLC cannot report.
      */
     private boolean momentToKill(int cycle) {
         if (watcher.cycles() >= cycle) {
@@ -220,7 +220,7 @@ final class Operator {
         return disagreement == null ? "" : ": " + disagreement;
     }
 
-    /** Whether the PLC's newest counts include every edge counted at this end. */
+    /** True if the PLC's newest counts include every edge counted at this end. */
     private boolean agreed(Plc.Counts counts) {
         disagreement = audit.isNewer(counts) ? audit.disagreement(counts) : null;
         return audit.isNewer(counts) && disagreement == null;
@@ -261,7 +261,7 @@ final class Operator {
         return restarts;
     }
 
-    /** The time without a PLC, null if there was none. */
+    /** The time without a PLC, null if the PLC was never killed. */
     Outage outage() {
         return outage;
     }

@@ -18,17 +18,17 @@ import tickbus.simulator.text.Columns;
 import tickbus.simulator.text.Durations;
 
 /**
- * The time without a PLC, from the tick of the kill to the first tick with data of the next life: what must hold in
- * it at every tick, and what was measured.
+ * The time without a PLC, from the tick of the kill to the first tick with data of the next life: the checks of every tick,
+ * and the measurements.
  */
 final class Outage {
-    /** Outputs that are on while there are no data: the rig's cups. See the rig's driver.cfg. */
+    /** Outputs that are on while no data arrive: the rig's cups. See the rig's driver.cfg. */
     private static final Set<String> FAIL_SAFE_ON = Set.of("SC1", "SC2");
 
     /** The tolerated delay beyond max_age until the data are stale: some bus cycles and ticks. */
     private static final long SLACK_NANOS = 50_000_000L;
 
-    /** How long a drive may take to brake from full speed. */
+    /** The time in which a drive must brake from full speed. */
     private static final long BRAKING_NANOS = 300_000_000L;
 
     private static final long NEVER = Long.MIN_VALUE;

@@ -6,11 +6,11 @@ import java.util.Map;
 /** The PLC at the other end of the link, as far as the demo can control and observe it. */
 public interface Plc extends AutoCloseable {
     /**
-     * The PLC's counts at one moment of its current life, that is since it was switched on.
+     * The PLC's counts at one moment of its current life, that is since power-on.
      *
-     * @param scans scans of its program; -1 if it does not report them
-     * @param rises rising edges per Boolean signal: those that the program saw of signals to it, and those that it
-     * made of signals from it; its image starts with all bits off
+     * @param scans scans of the PLC's program; -1 if it does not report them
+     * @param rises rising edges per Boolean signal: those that the program saw of signals to it, and those that it made of
+     * signals from it; the image starts with all bits off
      * @param nanoTime when the demo got them, on the clock of {@link System#nanoTime()}
      */
     record Counts(long scans, Map<String, Long> rises, long nanoTime) {
@@ -19,20 +19,20 @@ public interface Plc extends AutoCloseable {
     }
 
     /**
-     * Whether the demo can switch it off and on.
+     * Returns whether the demo can switch the PLC off and on.
      *
-     * @return false if the demo does not control it
+     * @return false if the demo does not control the PLC
      */
     boolean restartable();
 
     /**
-     * Switches it on: a new life begins, without any memory of an earlier one.
+     * Switches the PLC on: a new life begins, without any memory of an earlier one.
      *
-     * @throws DemoFailure if it cannot be started
+     * @throws DemoFailure if the PLC cannot be started
      */
     void start();
 
-    /** Cuts its power without warning; on return it is dead. */
+    /** Cuts the PLC's power without warning; on return the PLC is dead. */
     void kill();
 
     /**
@@ -43,34 +43,34 @@ public interface Plc extends AutoCloseable {
     Counts counts();
 
     /**
-     * Its output for people since the last call.
+     * The PLC's output for people since the last call.
      *
      * @return lines
      */
     List<String> news();
 
     /**
-     * The longest time by which one of its regular reports was late, over all its lives.
+     * The longest delay of a regular report, over all lives.
      *
-     * @return nanoseconds, 0 if it does not report regularly
+     * @return nanoseconds, 0 if the PLC does not report regularly
      */
     long longestSilenceNanos();
 
     /**
-     * Identifies it for people.
+     * Identifies the PLC for people.
      *
      * @return such as {@code process 4711}
      */
     String name();
 
     /**
-     * Fails if it has ended on its own.
+     * Fails if the PLC has ended on its own.
      *
-     * @throws DemoFailure with its last output
+     * @throws DemoFailure with the PLC's last output
      */
     void check();
 
-    /** Ends it for good. */
+    /** Ends the PLC for good. */
     @Override
     void close();
 }

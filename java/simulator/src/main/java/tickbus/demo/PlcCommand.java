@@ -8,17 +8,17 @@ import java.util.concurrent.locks.LockSupport;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.text.Durations;
 
-/** Runs a PLC program as a process: which command, and where it connects to. */
+/** Runs a PLC program as a process: the command, and the address that it connects to. */
 public final class PlcCommand {
     private static final String PROGRAM = "rig";
 
     /** How often the process reports its counts. */
     private static final long STATISTICS_NANOS = 100_000_000L;
 
-    /** After this time the process ends on its own, in case nothing is left to end it. */
+    /** After this time the process ends on its own, in case nothing else ends it. */
     private static final String LONGEST = "30min";
 
-    /** How long it may take until the driver listens. */
+    /** The limit until the driver must listen. */
     private static final long LISTENING_NANOS = 10_000_000_000L;
 
     private PlcCommand() {
@@ -59,13 +59,13 @@ public final class PlcCommand {
         return command;
     }
 
-    /** What every PLC process is told. */
+    /** The arguments of every PLC process. */
     private static List<String> hosting() {
         return List.of("--stats", Durations.text(STATISTICS_NANOS), "--duration", LONGEST);
     }
 
     /**
-     * The address on which a driver listens; its driver.cfg may leave the port to the system.
+     * The address on which a driver listens; driver.cfg can leave the port to the system.
      *
      * @param driver open
      * @return such as {@code 127.0.0.1:20030}
@@ -76,7 +76,7 @@ public final class PlcCommand {
     }
 
     /**
-     * The serial port that a driver makes.
+     * The serial port that a driver creates.
      *
      * @param driver open, of kind {@code ivi-reader}
      * @return the port's name

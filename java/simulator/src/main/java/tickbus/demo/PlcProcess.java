@@ -20,21 +20,20 @@ import java.util.regex.Pattern;
 /**
  * A PLC as a separate process, such as {@code tickbus plc}: started, killed, restarted, and reliably ended.
  *
- * <p>It regularly prints its statistics as lines {@code key=value}, followed by an empty line; a thread reads these,
- * so that the tick never waits for the process. Every other line is output for people. Its standard error goes to a
- * file.
+ * <p>The process regularly prints its statistics as lines {@code key=value}, followed by an empty line; a thread reads
+ * these, so that the tick never waits for the process. Every other line is output for people. Standard error goes to a file.
  *
- * <p>The process ends with {@link #close}; with the JVM, however that is told to end; and, if the JVM itself is
- * killed, after the time given on its own command line.
+ * <p>{@link #close} ends the process; so does the end of the JVM by whatever signal; and if the JVM itself is killed, the
+ * process ends after the time given on its own command line.
  */
 public final class PlcProcess implements Plc {
     private static final long SECONDS_TO_DIE = 5;
     private static final int LAST_WORDS = 5;
 
-    /** A process that a signal ended has an exit code above this. */
+    /** The exit code of a process that a signal ended is above this. */
     private static final int SIGNALS = 128;
 
-    /** How lines for people begin: with the name of the command. */
+    /** The beginning of lines for people: the name of the command. */
     private static final Pattern WORDS = Pattern.compile("[a-z]+: ");
 
     private final String what;
@@ -105,11 +104,11 @@ public final class PlcProcess implements Plc {
     }
 
     /**
-     * The process of a PLC, {@code tickbus plc}, that is not started yet.
+     * A PLC's process, {@code tickbus plc}, that is not started yet.
      *
      * @param command gives the executable and its arguments for the next life
-     * @param intervalNanos how often it prints its statistics
-     * @param log gets its standard error; truncated now, appended to by each life
+     * @param intervalNanos the interval of its statistics
+     * @param log gets the process's standard error; truncated now, appended to by each life
      */
     public PlcProcess(Supplier<List<String>> command, long intervalNanos, Path log) {
         this("the PLC", "build it (make build), or name the tickbus executable by --plc", command, intervalNanos, log);
@@ -118,11 +117,11 @@ public final class PlcProcess implements Plc {
     /**
      * A process that is not started yet.
      *
-     * @param what it is, for messages, such as {@code the PLC}
-     * @param hint what to do if it cannot be started
+     * @param what the name in messages, such as {@code the PLC}
+     * @param hint the remedy if the process cannot be started
      * @param command gives the executable and its arguments for the next life
-     * @param intervalNanos how often it prints its statistics
-     * @param log gets its standard error; truncated now, appended to by each life
+     * @param intervalNanos the interval of its statistics
+     * @param log gets the process's standard error; truncated now, appended to by each life
      */
     public PlcProcess(String what, String hint, Supplier<List<String>> command, long intervalNanos, Path log) {
         this.what = what;
@@ -149,7 +148,7 @@ public final class PlcProcess implements Plc {
         ProcessBuilder builder = new ProcessBuilder(command.get())
                 .redirectInput(ProcessBuilder.Redirect.from(nothing()))
                 .redirectError(ProcessBuilder.Redirect.appendTo(log.toFile()));
-        // Its log is a file, so it may contain more than errors.
+        // The log goes to a file, so it can contain more than errors.
         builder.environment().put("TICKBUS_LOG", "info");
         Process process;
         try {
@@ -168,7 +167,7 @@ public final class PlcProcess implements Plc {
     public void kill() {
         Life now = life;
         now.killed = true;
-        // Process.destroyForcibly would also close its output, of which the last part may not be read yet.
+        // Process.destroyForcibly would also close the process's output, whose last part may not be read yet.
         now.process.toHandle().destroyForcibly();
         now.await("was not dead " + SECONDS_TO_DIE + " s after it was killed");
     }
@@ -180,9 +179,9 @@ public final class PlcProcess implements Plc {
     }
 
     /**
-     * The statistics that it printed last in its current life.
+     * The last statistics that the process printed in its current life.
      *
-     * @return keys and values; empty if it has printed none yet
+     * @return keys and values; empty if the process has printed none yet
      */
     public Map<String, String> statistics() {
         Life now = life;
@@ -223,7 +222,7 @@ public final class PlcProcess implements Plc {
                 + lastWords());
     }
 
-    /** Whether a signal of somebody else has ended its current life: a machine that stands still does not do that. */
+    /** True if a foreign signal has ended the current life, which a stall of the machine does not do. */
     public boolean endedBySignal() {
         Life now = life;
         return now != null && !now.killed && !now.process.isAlive() && now.process.exitValue() > SIGNALS;
@@ -247,7 +246,7 @@ public final class PlcProcess implements Plc {
         Life now = life;
         if (now != null && now.process.isAlive()) {
             now.killed = true;
-            // Terminated first, so that its last lines get into its log. Process.destroy would close its output before.
+            // Terminated first, so that the last lines get into the log. Process.destroy would close the output before.
             now.process.toHandle().destroy();
             try {
                 if (!now.process.waitFor(SECONDS_TO_DIE, TimeUnit.SECONDS)) {

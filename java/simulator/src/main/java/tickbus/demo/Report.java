@@ -20,8 +20,8 @@ final class Report {
      *
      * @param options the options of the demo
      * @param verdict the demo's last line
-     * @param timeline what happened
-     * @param run what ran, null if it did not start
+     * @param timeline the events
+     * @param run the run, null if it did not start
      * @param audit the comparison of edges, null if it did not start
      * @param operator the operator, null if it did not start
      */
@@ -142,7 +142,7 @@ final class Report {
             statistics.forEach(table::row);
             text.append(statistics.isEmpty() ? "  none\n" : table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that has failed or is closed may have none; the rest of the report is still useful.
+            // A driver that has failed or is closed can lack statistics; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

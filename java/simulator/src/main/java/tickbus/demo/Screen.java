@@ -21,7 +21,7 @@ public final class Screen {
     private int drawn;
 
     /**
-     * Nothing is drawn yet.
+     * An empty screen.
      *
      * @param out the terminal
      * @param time the clock
@@ -33,7 +33,7 @@ public final class Screen {
     }
 
     /**
-     * Whether standard output is a terminal that can be redrawn.
+     * Returns whether standard output is a terminal that can be redrawn.
      *
      * @return false for pipes, files and terminals without a cursor
      */
@@ -43,7 +43,7 @@ public final class Screen {
             return false;
         }
         try {
-            // Since JDK 22 there is a console even without a terminal, and this method to find out.
+            // From JDK 22 on, a console exists even without a terminal, and this method tells the difference.
             return (Boolean) java.io.Console.class.getMethod("isTerminal").invoke(System.console());
         } catch (ReflectiveOperationException e) {
             return true;
@@ -51,9 +51,9 @@ public final class Screen {
     }
 
     /**
-     * Something happened.
+     * Adds an event.
      *
-     * @param line about it
+     * @param line the event
      */
     public void event(String line) {
         events.add(line);
@@ -63,7 +63,7 @@ public final class Screen {
     }
 
     /**
-     * Whether to draw again; to be called at every tick.
+     * Returns whether to draw now; call it at every tick.
      *
      * @return true some times a second
      */
@@ -77,7 +77,7 @@ public final class Screen {
     }
 
     /**
-     * Draws.
+     * Draws the state.
      *
      * @param state lines above the events
      */
@@ -108,7 +108,7 @@ public final class Screen {
     /**
      * A bar.
      *
-     * @param part how much of it is full, 0 to 1
+     * @param part the filled part, 0 to 1
      * @return characters
      */
     public static String bar(double part) {

@@ -4,10 +4,10 @@ import tickbus.simulator.TimeSource;
 
 /**
  * Detects that the whole computer has stalled, because it is busy or a virtual machine: a tick or the PLC's regular
- * statistics are then much too late. Data that are stale for that reason say nothing about the link.
+ * statistics then come much too late. Data that are stale for that reason prove nothing about the link.
  */
 public final class Stalls {
-    /** Half of the smallest max_age: a stall of this length may have made the other end's data stale. */
+    /** Half of the smallest max_age: a stall of this length can have made the other end's data stale. */
     private static final long LONG_NANOS = 125_000_000L;
 
     private final TimeSource time;
@@ -17,10 +17,10 @@ public final class Stalls {
     private long longest;
 
     /**
-     * No stall yet.
+     * Begins without a stall.
      *
      * @param time the clock
-     * @param stepNanos how often {@link #look} is called
+     * @param stepNanos the interval of the calls of {@link #look}
      */
     public Stalls(TimeSource time, long stepNanos) {
         this.time = time;
@@ -43,7 +43,7 @@ public final class Stalls {
     }
 
     /**
-     * The other end was silent for longer than it should be.
+     * The other end was silent for longer than expected.
      *
      * @param nanos the excess in nanoseconds
      */
@@ -54,7 +54,7 @@ public final class Stalls {
     /**
      * The longest stall.
      *
-     * @return nanoseconds; 0 if there was none long enough to matter
+     * @return nanoseconds; 0 without a relevant stall
      */
     public long longestNanos() {
         return longest < LONG_NANOS ? 0 : longest;

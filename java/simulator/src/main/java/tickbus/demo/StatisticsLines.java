@@ -6,7 +6,7 @@ import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import java.util.stream.Collectors;
 
-/** Statistics as the command writes them: a line {@code key=value}, in the key a backslash before each {@code =} and backslash. */
+/** Statistics in the command's format: a line {@code key=value}, in the key a backslash before each {@code =} and backslash. */
 final class StatisticsLines {
     private static final Pattern LINE = Pattern.compile("([^=\\\\]++(?:\\\\.[^=\\\\]*+)*+)=(.*)");
 

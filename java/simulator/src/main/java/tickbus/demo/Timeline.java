@@ -6,18 +6,18 @@ import java.util.List;
 import java.util.function.Consumer;
 import tickbus.simulator.text.Durations;
 
-/** What happened, and when in simulation time. */
+/** The events, and when they happened in simulation time. */
 public final class Timeline {
     /**
      * One event.
      *
      * @param nanos simulation time
      * @param who the actor, such as operator, PLC, rig
-     * @param text what happened
+     * @param text the event
      */
     public record Event(long nanos, String who, String text) {
         /**
-         * For people.
+         * The event for people.
          *
          * @return one line
          */
@@ -32,18 +32,18 @@ public final class Timeline {
     /**
      * An empty timeline.
      *
-     * @param listener called with each event at once
+     * @param listener called at once for each event
      */
     public Timeline(Consumer<Event> listener) {
         this.listener = listener;
     }
 
     /**
-     * Something happened.
+     * Adds an event.
      *
      * @param nanos simulation time
      * @param who the actor
-     * @param text what happened
+     * @param text the event
      */
     public void add(long nanos, String who, String text) {
         Event event = new Event(nanos, who, text);

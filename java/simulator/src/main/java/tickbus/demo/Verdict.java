@@ -4,20 +4,20 @@ import java.io.PrintStream;
 import tickbus.simulator.ShutdownGuard;
 
 /**
- * The last line of a demo on standard output, {@code NAME: ok …} or {@code NAME: failed reason=…}, and the exit code that
- * belongs to it.
+ * The last line of a demo on standard output, {@code NAME: ok …} or {@code NAME: failed reason=…}, and the matching exit
+ * code.
  */
 public final class Verdict {
     /** The exit code after a wrong command line. */
     public static final int USAGE = 2;
 
-    /** The exit code after a demo that has done what it should. */
+    /** The exit code after a successful demo. */
     public static final int OK = 0;
 
     private static final int FAILED = 1;
     private static final int INTERRUPTED = 130;
 
-    /** How long it may take until this process learns of a Ctrl-C. */
+    /** The time in which this process learns of a Ctrl-C. */
     private static final long INTERRUPTION_MILLIS = 500;
 
     private final String ok;
@@ -26,7 +26,7 @@ public final class Verdict {
     /**
      * The verdicts of a demo.
      *
-     * @param demo its name
+     * @param demo the demo's name
      */
     public Verdict(String demo) {
         ok = demo + ": ok ";
@@ -34,9 +34,9 @@ public final class Verdict {
     }
 
     /**
-     * It has done what it should.
+     * The verdict on a success.
      *
-     * @param counts what happened, as keys and values
+     * @param counts the results, as keys and values
      * @return the line
      */
     public String ok(String counts) {
@@ -44,9 +44,9 @@ public final class Verdict {
     }
 
     /**
-     * It has not.
+     * The verdict on a failure.
      *
-     * @param reason why, for people
+     * @param reason the reason, for people
      * @return the line
      */
     public String failed(String reason) {
@@ -55,10 +55,10 @@ public final class Verdict {
     }
 
     /**
-     * It has not, because of this.
+     * The verdict on a failure by an exception.
      *
      * @param e a {@link DemoFailure}, or anything unexpected
-     * @param err gets the message of what was unexpected
+     * @param err gets the message of an unexpected exception
      * @return the line
      */
     public String failed(Throwable e, PrintStream err) {
@@ -70,17 +70,17 @@ public final class Verdict {
     }
 
     /**
-     * Whether a line is that of a success.
+     * Returns whether a verdict is a success.
      *
      * @param line the verdict
-     * @return true if so
+     * @return true for a success
      */
     public boolean isOk(String line) {
         return line.startsWith(ok);
     }
 
     /**
-     * The reason in a line that says that it failed.
+     * The reason in the verdict on a failure.
      *
      * @param line the verdict
      * @return the reason without quotation marks
@@ -93,7 +93,7 @@ public final class Verdict {
      * Prints the verdict.
      *
      * @param line the verdict
-     * @param guard knows of a Ctrl-C
+     * @param guard detects Ctrl-C
      * @param out gets the line
      * @return the exit code
      */
@@ -104,10 +104,10 @@ public final class Verdict {
     }
 
     /**
-     * Checks other processes of the demo. Ctrl-C in a terminal reaches all of them, and one may have been faster than
+     * Checks other processes of the demo. Ctrl-C in a terminal reaches all of them, and another one can end earlier than
      * this one: then the demo was interrupted.
      *
-     * @param guard knows of a Ctrl-C
+     * @param guard detects Ctrl-C
      * @param check throws a {@link DemoFailure} if one of them has ended
      */
     public static void unlessInterrupted(ShutdownGuard guard, Runnable check) {

@@ -72,7 +72,7 @@ final class Watcher {
     /** Cycles of the PLC's earlier lives, and of the current one as last reported. */
     private int cyclesBefore;
     private int cyclesTold;
-    /** There has been a PLC. */
+    /** A PLC has been there. */
     private boolean begun;
     /** The PLC is dead: from the kill to the first data of the next life. */
     private boolean away;
@@ -95,7 +95,7 @@ final class Watcher {
         age = simulator.probe(driver.id() + ":bus.age");
     }
 
-    /** Checks everything once, after a tick. Fails if data are stale that must not be. */
+    /** Checks everything once, after a tick. Fails if data are stale without a reason. */
     void look() {
         long now = simulator.simulationNanos();
         lookAtData(now);
@@ -180,12 +180,12 @@ final class Watcher {
         lastStep = 0;
     }
 
-    /** Whether the data of the last tick were stale. */
+    /** True if the data of the last tick were stale. */
     boolean stale() {
         return (int) status.getAsDouble() == STALE;
     }
 
-    /** Whether the PLC is dead, according to the data. */
+    /** True if the PLC is dead, according to the data. */
     boolean away() {
         return away;
     }

@@ -30,7 +30,7 @@ public final class Arguments {
      *
      * @param line the words
      * @param options names of the options that take a value, with their dashes
-     * @param flagNames names of the options that take none
+     * @param flagNames names of the options without a value
      * @throws UsageException if an option is unknown, given twice, or lacks its value
      */
     public Arguments(String[] line, List<String> options, List<String> flagNames) {
@@ -51,7 +51,7 @@ public final class Arguments {
     }
 
     /**
-     * Whether a flag is given.
+     * Returns whether a flag is given.
      *
      * @param name with its dashes
      * @return true if it is given
@@ -64,7 +64,7 @@ public final class Arguments {
      * The words of a value.
      *
      * @param name with its dashes
-     * @return what stands between its blanks
+     * @return the words between its blanks
      */
     public List<String> words(String name) {
         return List.of(values.getOrDefault(name, "").strip().split(" +"));
@@ -74,8 +74,8 @@ public final class Arguments {
      * A path that must be given.
      *
      * @param name with its dashes
-     * @return its value
-     * @throws UsageException if it is missing or not a path
+     * @return the option's value
+     * @throws UsageException if the option is missing or not a path
      */
     public Path path(String name) {
         String value = values.get(name);
@@ -93,9 +93,9 @@ public final class Arguments {
      * A duration.
      *
      * @param name with its dashes
-     * @param otherwise its default
+     * @param otherwise the option's default
      * @return nanoseconds, above 0
-     * @throws UsageException if it is not a duration, or 0
+     * @throws UsageException if the value is not a duration, or 0
      */
     public long duration(String name, String otherwise) {
         try {
@@ -113,9 +113,9 @@ public final class Arguments {
      * A count.
      *
      * @param name with its dashes
-     * @param otherwise its default
+     * @param otherwise the option's default
      * @return 1 to 1,000,000
-     * @throws UsageException if it is anything else
+     * @throws UsageException if the value is anything else
      */
     public int count(String name, int otherwise) {
         String value = values.getOrDefault(name, String.valueOf(otherwise));
@@ -128,11 +128,11 @@ public final class Arguments {
     /**
      * One of several words.
      *
-     * @param <T> what the words stand for
+     * @param <T> the type of the choices
      * @param name with its dashes
-     * @param choices the words and what they stand for
+     * @param choices the words and their meanings
      * @param otherwise the word if the option is not given
-     * @return what the given word stands for
+     * @return the meaning of the given word
      * @throws UsageException if it is another word
      */
     public <T> T choice(String name, Map<String, T> choices, String otherwise) {
@@ -144,7 +144,7 @@ public final class Arguments {
         return choices.get(value);
     }
 
-    /** What {@code --mode} may be. */
+    /** The values of {@code --mode}. */
     public static final Map<String, TickMode> MODES =
             Map.of("real-time", TickMode.REAL_TIME, "best-effort", TickMode.BEST_EFFORT);
 }

@@ -42,10 +42,10 @@ public final class DeviceDriverFolder {
     }
 
     /**
-     * Reads what is in a folder, without opening any driver.
+     * Reads the contents of a folder, without opening any driver.
      *
      * @param folder the folder
-     * @return what was found
+     * @return the contents
      * @throws WrongInput if the folder is missing, has no jar or no {@code .cfg}, if no jar or more than one
      *     names a driver class, or if two files claim one id
      */
@@ -131,7 +131,7 @@ public final class DeviceDriverFolder {
      * Opens a driver for each {@code .cfg} file.
      *
      * @return all of them, open
-     * @throws WrongInput if the driver class is missing or not what it must be
+     * @throws WrongInput if the driver class is missing or unsuitable
      * @throws DriverFailure if a driver fails to open; those opened before it are closed again
      */
     public DriverSet open() {
@@ -139,8 +139,8 @@ public final class DeviceDriverFolder {
     }
 
     /**
-     * Describes the driver of each {@code .cfg} file: by the public static method {@code look} of the driver class,
-     * which takes the file's {@link Path} and opens nothing. A class without one is opened.
+     * Describes the driver of each {@code .cfg} file: by the public static method {@code look} of the driver class, which
+     * takes the file's {@link Path} and opens nothing. A driver whose class has no such method is opened.
      *
      * @return all of them, for {@link DriverSet#list}
      * @throws WrongInput as {@link #open}

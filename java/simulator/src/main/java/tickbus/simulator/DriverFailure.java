@@ -5,10 +5,10 @@ public final class DriverFailure extends RuntimeException {
     private static final long serialVersionUID = 1L;
 
     /**
-     * Wraps what the driver threw.
+     * Wraps an exception of a driver.
      *
-     * @param what what the driver was doing, and which driver it was
-     * @param cause what it threw; its message is shown
+     * @param what the driver, and its action
+     * @param cause the exception; its message is shown
      */
     public DriverFailure(String what, Throwable cause) {
         super(what + ": " + reason(cause), cause);

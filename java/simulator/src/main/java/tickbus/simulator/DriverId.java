@@ -7,7 +7,7 @@ import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 
 /**
- * Reads one thing from a driver's {@code .cfg}: the {@code id} under {@code [driver]}.
+ * Reads one value from a driver's {@code .cfg}: the {@code id} under {@code [driver]}.
  *
  * <p>The driver reads the rest of the file itself; the simulator only needs to make sure, before it opens anything,
  * that no two files have the same id. So this is not a TOML reader. It accepts the plain form, a line {@code id =
@@ -15,7 +15,7 @@ import java.util.regex.Pattern;
  * and above the next table header.
  */
 final class DriverId {
-    /** Some editors begin a file in UTF-8 with it. */
+    /** Some editors begin a file in UTF-8 with this mark. */
     private static final String BYTE_ORDER_MARK = "\uFEFF";
     private static final Pattern TABLE = Pattern.compile("\\s*\\[+\\s*([^\\]]*?)\\s*\\]+\\s*(#.*)?");
     private static final Pattern ID = Pattern.compile("\\s*(?:id|\"id\"|'id')\\s*=\\s*([+-]?\\d[\\d_]*)\\s*(#.*)?");

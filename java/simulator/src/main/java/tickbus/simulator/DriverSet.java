@@ -15,7 +15,7 @@ public final class DriverSet implements AutoCloseable {
     private boolean closed;
 
     /**
-     * Drivers that are open already.
+     * Takes drivers that are already open.
      *
      * @param drivers with different ids
      */
@@ -60,7 +60,7 @@ public final class DriverSet implements AutoCloseable {
     }
 
     /**
-     * Calls every driver's {@code exit()}, even if one before it failed. Further calls do nothing.
+     * Calls every driver's {@code exit()}, even if an earlier one failed. Further calls do nothing.
      *
      * @throws DriverFailure the first failure, with the others attached
      */

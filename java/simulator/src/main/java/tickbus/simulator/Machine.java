@@ -31,7 +31,7 @@ public interface Machine {
     List<String> outputs();
 
     /**
-     * Sets an input. The machine looks at its inputs at the next {@link #step(long)}.
+     * Sets an input. The machine reads its inputs at the next {@link #step(long)}.
      *
      * @param index position in {@link #inputs()}
      * @param value the new value; a Boolean is true from 0.5
@@ -40,7 +40,7 @@ public interface Machine {
     void input(int index, double value);
 
     /**
-     * Reads an output as it was at the end of the last {@link #step(long)}.
+     * Reads an output with its value at the end of the last {@link #step(long)}.
      *
      * @param index position in {@link #outputs()}
      * @return the value; 0 or 1 for a Boolean
@@ -51,7 +51,7 @@ public interface Machine {
     /**
      * Advances the machine. The same inputs at the same steps give the same motion, bit for bit.
      *
-     * @param nanos by how much, in nanoseconds of simulation time; not negative
+     * @param nanos the time step, in nanoseconds of simulation time; not negative
      * @throws IllegalArgumentException if {@code nanos} is negative
      */
     void step(long nanos);

@@ -3,10 +3,10 @@ package tickbus.simulator;
 /**
  * Deadlines of real-time mode: start, start + step, start + 2 steps, and so on.
  *
- * <p>Deadlines are counted from the start and not from the previous tick, so there is no drift. A tick that is late
- * by less than a step is followed by the next one at its own time. After a longer stall the missed deadlines are
- * dropped, and ticks continue on the same grid: there is no catching up in a burst. Since each tick advances the
- * simulation by one step, simulation time then lags behind the clock by what was dropped.
+ * <p>Deadlines are counted from the start and not from the previous tick, so there is no drift. A tick that is late by less
+ * than a step is followed by the next one at its own time. After a longer stall the missed deadlines are dropped, and ticks
+ * continue on the same grid, without a burst. Since each tick advances the simulation by one step, simulation time then lags
+ * behind the clock by the dropped time.
  */
 final class Pacer {
     private final TimeSource time;

@@ -4,11 +4,11 @@ import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 
 /**
- * Ends a run properly when the JVM is told to end, by Ctrl-C or by a signal: tells the run, and keeps the JVM from
- * ending until the run has closed its drivers.
+ * Ends a run properly when Ctrl-C or a signal ends the JVM: informs the run, and keeps the JVM from ending until the run has
+ * closed its drivers.
  *
- * <p>The drivers are closed by the thread that ticks them, never by the JVM's shutdown thread, because a driver must
- * not be closed during an exchange. If a driver hangs, the JVM ends even so after a grace period.
+ * <p>The thread that ticks the drivers closes them, never the JVM's shutdown thread, because a driver must not be closed
+ * during an exchange. If a driver hangs, the JVM ends after a grace period anyway.
  */
 public final class ShutdownGuard implements AutoCloseable {
     private static final long GRACE_SECONDS = 5;
@@ -18,7 +18,7 @@ public final class ShutdownGuard implements AutoCloseable {
     private final Thread hook;
     private volatile boolean triggered;
 
-    /** Guards a run from now on; create it before the drivers are opened. */
+    /** Guards a run from now on; create the guard before opening the drivers. */
     public ShutdownGuard() {
         hook = new Thread(this::end, "shutdown guard");
         Runtime.getRuntime().addShutdownHook(hook);
@@ -37,9 +37,9 @@ public final class ShutdownGuard implements AutoCloseable {
     }
 
     /**
-     * Whether the JVM is ending. The run asks before every tick.
+     * Returns whether the JVM is ending. The run asks before every tick.
      *
-     * @return true once it was told to
+     * @return true once the end has begun
      */
     public boolean triggered() {
         return triggered;
@@ -48,8 +48,8 @@ public final class ShutdownGuard implements AutoCloseable {
     /**
      * Waits for the JVM to begin to end.
      *
-     * @param millis how long to wait for that
-     * @return true as soon as it was told to, false after the time
+     * @param millis how long to wait
+     * @return true as soon as the JVM is ending, false after the time
      */
     public boolean triggers(long millis) {
         try {
@@ -67,7 +67,7 @@ public final class ShutdownGuard implements AutoCloseable {
         try {
             Runtime.getRuntime().removeShutdownHook(hook);
         } catch (IllegalStateException e) {
-            // The JVM is ending already, and the hook is running; it was just released.
+            // The JVM is ending already, and its hook is running; it was just released.
         }
     }
 }

@@ -19,7 +19,7 @@ import tickbus.simulator.text.Durations;
  * machine answers the hardware within the tick. The values of a driver that delivers only after sending, like those
  * of 2003, reach the machine one tick later. A tick allocates nothing.
  *
- * <p>One thread ticks and closes; {@link #stop} may be called from any thread.
+ * <p>One thread ticks and closes; any thread can call {@link #stop}.
  */
 public final class Simulator implements AutoCloseable {
     /** One driver's part of the tick. */
@@ -49,7 +49,7 @@ public final class Simulator implements AutoCloseable {
     private volatile boolean stopped;
 
     /**
-     * Connects drivers and machine. The simulator owns the drivers from now on, and closes them if this fails.
+     * Connects drivers and machine. The simulator owns the drivers from now on, and closes them if this constructor fails.
      *
      * @param drivers open drivers
      * @param machine the machine
@@ -109,7 +109,7 @@ public final class Simulator implements AutoCloseable {
     /**
      * One tick.
      *
-     * @throws DriverFailure if a driver failed; the simulation cannot go on
+     * @throws DriverFailure if a driver failed; the simulation cannot continue
      */
     public void tick() {
         for (Seat seat : seats) {
@@ -168,7 +168,7 @@ public final class Simulator implements AutoCloseable {
     }
 
     /**
-     * Whether {@link #stop} was called.
+     * Returns whether {@link #stop} was called.
      *
      * @return true from then on
      */
@@ -208,7 +208,7 @@ public final class Simulator implements AutoCloseable {
     /**
      * The machine.
      *
-     * @return the one that it was built with
+     * @return as passed to the constructor
      */
     public Machine machine() {
         return machine;
@@ -262,7 +262,7 @@ public final class Simulator implements AutoCloseable {
     /**
      * Closes every driver. Further calls do nothing.
      *
-     * @throws DriverFailure if a driver failed to close; the others are closed even so
+     * @throws DriverFailure if a driver failed to close; the others are closed anyway
      */
     @Override
     public void close() {

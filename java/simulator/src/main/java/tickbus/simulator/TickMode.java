@@ -1,8 +1,8 @@
 package tickbus.simulator;
 
-/** How the simulator's ticks follow one another. */
+/** The timing of the simulator's ticks. */
 public enum TickMode {
-    /** As fast as possible: a tick starts when the one before it is done. */
+    /** As fast as possible: a tick starts when the previous one is done. */
     BEST_EFFORT,
     /** In step with the wall clock: a tick starts when its time has come. */
     REAL_TIME

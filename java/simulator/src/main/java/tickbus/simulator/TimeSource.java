@@ -5,7 +5,7 @@ import java.util.concurrent.locks.LockSupport;
 /** The wall clock, and a way to wait for it; injected so that tests need not wait. */
 public interface TimeSource {
     /**
-     * The present time.
+     * The current time.
      *
      * @return nanoseconds since some fixed point, never decreasing
      */

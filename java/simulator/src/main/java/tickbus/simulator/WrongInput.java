@@ -17,7 +17,7 @@ public final class WrongInput extends RuntimeException {
      * For a mistake reported by an exception.
      *
      * @param message lines for people
-     * @param cause what happened
+     * @param cause the exception
      */
     public WrongInput(String message, Throwable cause) {
         super(message, cause);

@@ -16,12 +16,12 @@ final class Cfg {
     private Cfg() {
     }
 
-    /** Writes it into a folder with the lines of its [fieldbus] table replaced by those of a loopback. */
+    /** Writes the file into a folder, with the lines of its [fieldbus] table replaced by those of a loopback. */
     static Path write(Path folder, String... loopback) throws IOException {
         return writeBus(folder, "loopback", loopback);
     }
 
-    /** Writes it into a folder with the lines of its [fieldbus] table replaced by those of another kind of bus. */
+    /** Writes the file into a folder, with the lines of its [fieldbus] table replaced by those of another kind of bus. */
     static Path writeBus(Path folder, String kind, String... lines) throws IOException {
         List<String> cfg = new ArrayList<>(Files.readAllLines(DRIVER_CFG));
         int table = cfg.indexOf("[fieldbus]") + 1;

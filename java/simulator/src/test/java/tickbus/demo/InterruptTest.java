@@ -25,7 +25,7 @@ class InterruptTest {
             while (line != null && !line.contains("phase home")) {
                 line = out.readLine();
             }
-            // Process.destroy() would close the stream from which the verdict is read.
+            // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertEquals(List.of("driver closed", "demo: failed reason=interrupted"),

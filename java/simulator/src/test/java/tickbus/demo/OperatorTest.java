@@ -17,7 +17,7 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.simulator.DriverSet;
 import tickbus.simulator.TickMode;
 
-/** The demo's script with a PLC in the same class loader: what it does, and all the failures that it must detect. */
+/** The demo's script with a PLC in the same class loader: its actions, and all the failures that it must detect. */
 class OperatorTest {
     private static final Path TABLE = Path.of("rig.table");
 

@@ -15,9 +15,9 @@ import java.util.Map;
 import java.util.Set;
 
 /**
- * A driver whose PLC is this class: it homes, runs, aborts, recovers and parks the rig on simulation time,
- * so that the demo's script is tested without any link. It is a stand-in for the rig's program and breaks on demand;
- * docs/ARCHITECTURE.md tells of the program's versions. Its components are those that the rig's control table names.
+ * A driver whose PLC is this class. The PLC homes, runs, aborts, recovers and parks the rig in simulation time, so that the
+ * demo's script is tested without any link. It stands in for the rig's program and breaks on demand; docs/ARCHITECTURE.md
+ * describes the program's versions. The components are those that the rig's control table names.
  */
 class PlcDriver extends ControlInterfaceDeviceDriver {
     static final int ID = 4711;
@@ -57,7 +57,7 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
     private final Set<String> pulses = new HashSet<>();
     int exits;
 
-    /** What is broken: the simulation time at which the link goes stale, a step that never ends, and so on. */
+    /** Faults to inject: the simulation time at which the link goes stale, a step that never ends, and so on. */
     long staleFrom = Long.MAX_VALUE;
     long throwFrom = Long.MAX_VALUE;
     int deafStep;
@@ -177,7 +177,7 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
         return creeps || FAIL_SAFE_ON.contains(name) && !dropsInOutage ? 1 : 0;
     }
 
-    /** Its power switch. */
+    /** The PLC's power switch. */
     final class Power implements Plc {
         @Override
         public boolean restartable() {
@@ -195,8 +195,8 @@ class PlcDriver extends ControlInterfaceDeviceDriver {
             resume = false;
             stopping = false;
             inAtScan.clear();
-            // A pulse from the time without a PLC arrives late. Its image starts with all bits off, so what is on
-            // counts once.
+            // A pulse from the time without a PLC arrives late. The PLC's image starts with all bits off, so a signal that
+            // is on counts once.
             pulses.forEach(name -> rises.merge(name, in.get(name) == 0 ? 1L : 0L, Long::sum));
             pulses.clear();
             in.replaceAll((name, value) -> 0.0);

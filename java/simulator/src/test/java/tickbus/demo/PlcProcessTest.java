@@ -41,7 +41,7 @@ class PlcProcessTest {
         return ProcessHandle.of(Long.parseLong(name.replace("process ", ""))).map(ProcessHandle::isAlive).orElse(false);
     }
 
-    /** What {@code check} says of a process that ends: the JVM learns of the end a moment after the system does. */
+    /** The message of {@code check} about a process that ends: the JVM learns of the end a moment after the system does. */
     private static String complaintOf(PlcProcess plc) {
         return Eventually.get("its end", () -> {
             try {
@@ -152,7 +152,7 @@ class PlcProcessTest {
             PlcProcess plc = new PlcProcess(() -> List.of("sh", "-c", LIVES_ON), 1, Path.of(args[0]));
             plc.start();
             System.out.println(plc.name());
-            // Until it is killed, or the test is gone.
+            // Waits until it is killed, or the test is gone.
             System.in.read();
         }
     }

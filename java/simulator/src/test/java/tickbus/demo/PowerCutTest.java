@@ -26,15 +26,15 @@ import tickbus.simulator.Simulator;
 import tickbus.simulator.TimeSource;
 
 /**
- * The power of the built-in PLC program is cut at one moment after another of a cycle, and it restarts without
- * memory: the rig must stop safely, drop nothing, and continue. Stepped, in simulation time.
+ * Cuts the power of the built-in PLC program at one moment after another of a cycle, and restarts it without memory: the rig
+ * must stop safely, drop nothing, and continue. Stepped, in simulation time.
  */
 @Tag("native")
 class PowerCutTest {
     private static final long STEP = 2_000_000L;
     private static final long MILLI = 1_000_000L;
 
-    /** A cycle takes about this long. */
+    /** The approximate duration of a cycle. */
     private static final long CYCLE = 4_200 * MILLI;
 
     @TempDir
@@ -80,7 +80,7 @@ class PowerCutTest {
                     () -> assertTrue(!rig.moving(), () -> moment + ": something moves without a PLC"),
                     () -> assertArrayEquals(stood, where(), moment));
         }
-        // With the last word, step 6 may end before the data are stale.
+        // With the last word, step 6 can end before the data are stale.
         endedWithoutPlc += rig.counters().cycles() - cycles;
         plc.on();
     }
@@ -117,7 +117,7 @@ class PowerCutTest {
         }
     }
 
-    /** However the rig was left, and however late the PLC is: the delay need not be a multiple of the 10 ms scan. */
+    /** The rig is left in any state, and the PLC is late by any time: the delay need not be a multiple of the 10 ms scan. */
     @ParameterizedTest
     @ValueSource(strings = {"10ms", "37ms"})
     void homingEndsWellFromAnyPosition(String scan) throws IOException {

@@ -91,7 +91,7 @@ class PyrungTest {
     void aLadderProgramOnASoftPlcHomesTheRigRunsItAndParksIt() throws IOException, InterruptedException {
         assumeTrue(Files.isExecutable(PYTHON), "pyrung is not installed (tools/peers installs it)");
         told = folder.resolve("ladder.log");
-        // It runs in real time beside whatever else this computer has to do.
+        // This test runs in real time, whatever else this computer has to do.
         driver = new FieldbusDriver(Cfg.writeBus(folder.resolve("drivers"), "modbus-server",
                 "address = \"127.0.0.1:0\"", "max_age = \"2s\""));
         try (Simulator all = new Simulator(new DriverSet(List.of(driver)), rig, Path.of("rig.table"), STEP,
@@ -112,7 +112,7 @@ class PyrungTest {
                 assertTrue(plc.waitFor(20, TimeUnit.SECONDS), "the PLC ends when it is told to");
             }
         }
-        // Initialise, home, ready, run, finalise, parked; before the PLC has sent anything there is no phase.
+        // Initialise, home, ready, run, finalise, parked; before the first data from the PLC there is no phase.
         assertEquals(List.of(0, 1, 2, 3, 6, 7), phases, this::ladder);
         assertEquals(0, rig.counters().faults(), () -> rig.faults().toString());
         assertEquals(0, rig.counters().fallen());

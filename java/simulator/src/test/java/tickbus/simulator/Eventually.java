@@ -4,14 +4,14 @@ import java.util.concurrent.locks.LockSupport;
 import java.util.function.BooleanSupplier;
 import java.util.function.Supplier;
 
-/** Polls for what a process or a thread does without an event that a test could wait for. */
+/** Polls for an action of a process or a thread that gives a test no event to wait for. */
 public final class Eventually {
     private static final long PATIENCE = 30_000_000_000L;
 
     private Eventually() {
     }
 
-    /** The value, once there is one; a failure says what it was. */
+    /** The value, once there is one; a failure has {@code what}. */
     public static <T> T get(String what, Supplier<T> value) {
         long begin = System.nanoTime();
         T found = value.get();

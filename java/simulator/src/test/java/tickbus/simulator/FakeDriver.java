@@ -6,7 +6,7 @@ import controlinterface.HardwareComponent;
 import java.util.ArrayList;
 import java.util.List;
 
-/** A driver with chosen components that records what it gets and delivers what it is told. */
+/** A driver with chosen components that records received values and delivers prepared ones. */
 public final class FakeDriver extends ControlInterfaceDeviceDriver {
     private final int id;
     private final List<HardwareComponent> components = new ArrayList<>();
@@ -18,7 +18,7 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
     public long time = -1;
     /** Calls of {@link #exit}. */
     public int exits;
-    /** Whether it delivers before the machine's step, rather than after sending. */
+    /** True if the driver delivers before the machine's step, false if after sending. */
     public boolean deliversFirst;
     /** Thrown by the next tick, if any. */
     public RuntimeException failTick;

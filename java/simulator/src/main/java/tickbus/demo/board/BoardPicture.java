@@ -46,7 +46,7 @@ public final class BoardPicture {
     }
 
     /**
-     * Draws it to a file.
+     * Draws a board to a file.
      *
      * @param board the board, between two steps
      * @param file the file; replaced if it exists

@@ -1,6 +1,6 @@
 package tickbus.demo.board;
 
-/** A tank with a level from 0 to 100 percent. What does not fit overflows; what is not there does not flow. */
+/** A tank with a level from 0 to 100 percent. Liquid beyond that overflows; an empty tank gives nothing. */
 final class Tank {
     private static final double FULL = 100;
 
@@ -17,7 +17,7 @@ final class Tank {
     /**
      * Draws liquid.
      *
-     * @return how much there was of it
+     * @return the amount drawn, at most the contents
      */
     double draw(double percent) {
         double drawn = Math.min(level, percent);

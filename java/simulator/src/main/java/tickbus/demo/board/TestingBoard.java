@@ -7,22 +7,22 @@ import tickbus.simulator.Machine;
 /**
  * A board with four switches, four lamps, a gauge and two tanks.
  *
- * <p>The valve lets liquid into tank 1, the pump lifts it from there to tank 2, and through the tap, which the operator
- * opens, it leaves tank 2. Inputs are the lamps, the valve, the pump and the gauge; outputs are the switches and the levels,
- * in percent. Motion is a pure function of the inputs at each step, and a step allocates nothing. Not thread-safe; call
+ * <p>The valve lets liquid into tank 1, the pump lifts it from there to tank 2, and it leaves tank 2 through the tap, which
+ * the operator opens. Inputs are the lamps, the valve, the pump and the gauge; outputs are the switches and the levels, in
+ * percent. Motion is a pure function of the inputs at each step, and a step allocates nothing. Not thread-safe; call
  * everything between two steps.
  */
 public final class TestingBoard implements Machine {
     /** The number of switches, and of lamps. */
     public static final int SWITCHES = 4;
 
-    /** What flows through the open valve, in percent of a tank per second. */
+    /** The flow through the open valve, in percent of a tank per second. */
     public static final double VALVE_FLOW = 45;
 
-    /** What the running pump lifts, likewise. */
+    /** The flow of the running pump, in percent of a tank per second. */
     public static final double PUMP_FLOW = 30;
 
-    /** What flows through the open tap, likewise. */
+    /** The flow through the open tap, in percent of a tank per second. */
     public static final double TAP_FLOW = 10;
 
     private static final double SECONDS = 1e-9;
@@ -96,7 +96,7 @@ public final class TestingBoard implements Machine {
      * Switches a switch.
      *
      * @param number from 1
-     * @param on whether it is on from now on
+     * @param on true for on
      */
     public void set(int number, boolean on) {
         switches[number - 1] = on;
@@ -105,61 +105,61 @@ public final class TestingBoard implements Machine {
     /**
      * Opens or closes the tap of tank 2.
      *
-     * @param open whether it is open from now on
+     * @param open true for open
      */
     public void tap(boolean open) {
         tap = open;
     }
 
     /**
-     * Whether a switch is on.
+     * Returns whether a switch is on.
      *
      * @param number from 1
-     * @return true if so
+     * @return true for on
      */
     public boolean isOn(int number) {
         return switches[number - 1];
     }
 
     /**
-     * Whether a lamp is lit.
+     * Returns whether a lamp is lit.
      *
      * @param number from 1
-     * @return true if so
+     * @return true for lit
      */
     public boolean isLit(int number) {
         return inputs[number - 1] >= HIGH;
     }
 
     /**
-     * Whether the valve is open.
+     * Returns whether the valve is open.
      *
-     * @return true if so
+     * @return true for open
      */
     public boolean valve() {
         return inputs[VALVE] >= HIGH;
     }
 
     /**
-     * Whether the pump runs.
+     * Returns whether the pump runs.
      *
-     * @return true if so
+     * @return true while it runs
      */
     public boolean pump() {
         return inputs[PUMP] >= HIGH;
     }
 
     /**
-     * Whether the tap is open.
+     * Returns whether the tap is open.
      *
-     * @return true if so
+     * @return true for open
      */
     public boolean tap() {
         return tap;
     }
 
     /**
-     * What the gauge shows.
+     * The gauge's value.
      *
      * @return any number
      */

@@ -26,9 +26,9 @@ import tickbus.simulator.TimeSource;
 import tickbus.simulator.text.Durations;
 
 /**
- * The demo's command line; see {@code --help} for what it takes.
+ * The demo's command line; {@code --help} describes it.
  *
- * <p>Its last line on standard output is the verdict, {@code demo-cell: ok …} or {@code demo-cell: failed reason=…}.
+ * <p>The last line on standard output is the verdict, {@code demo-cell: ok …} or {@code demo-cell: failed reason=…}.
  * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class CellDemo {
@@ -38,10 +38,10 @@ public final class CellDemo {
 
     private static final Verdict VERDICT = new Verdict("demo-cell");
 
-    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
     private static final int ATTEMPTS = 5;
 
-    /** How often the nets' process reports. */
+    /** The interval of the reports of the nets' process. */
     private static final long REPORT_NANOS = 100_000_000L;
     private static final int TICKS_PER_LOOK_AT_NETS = 25;
 
@@ -52,11 +52,11 @@ public final class CellDemo {
     private final CellOperator operator;
     private Simulator simulator;
     private Map<String, String> nets = Map.of();
-    /** When the present round of cylinders began. */
+    /** When the current round of cylinders began. */
     private long roundNanos;
-    /** What the last whole round came to; null in the first one. */
+    /** The result of the last complete round; null in the first one. */
     private String lastRound;
-    /** Whether somebody has killed the nets, which no stall excuses. */
+    /** True if somebody has killed the nets, which no stall excuses. */
     private boolean netsKilled;
 
     private CellDemo(CellOptions options, PrintStream out, List<String> notes) {
@@ -80,8 +80,8 @@ public final class CellDemo {
      * Runs the demo.
      *
      * @param args the command line
-     * @param out gets what happens and, last, the verdict
-     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @param out gets the events and, last, the verdict
+     * @param err gets errors in the command line, and messages of unexpected exceptions
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
@@ -125,7 +125,7 @@ public final class CellDemo {
         }
     }
 
-    /** Everything from opening the driver to writing the report. */
+    /** Runs everything from opening the driver to writing the report. */
     private String play(ShutdownGuard guard, PrintStream err) {
         String verdict;
         try (Simulator opened = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), cell, options.control(),
@@ -159,12 +159,12 @@ public final class CellDemo {
         } catch (IOException e) {
             return VERDICT.failed("the folder of the nets cannot be made, or emptied: " + e);
         } catch (RuntimeException | Error e) {
-            // Ctrl-C, which ends rounds without an end, may have reached the nets' process first.
+            // Ctrl-C, which ends endless rounds, may have reached the nets' process first.
             return lastRound != null && guard.triggered() ? lastRound : VERDICT.failed(e, err);
         }
     }
 
-    /** An earlier attempt may have left its nets. */
+    /** Removes the nets of an earlier attempt. */
     private static void empty(Path folder) throws IOException {
         Files.createDirectories(folder);
         try (Stream<Path> files = Files.list(folder)) {
@@ -189,7 +189,7 @@ public final class CellDemo {
                 // The machine's end records.
                 + "\"\n[record]\nfile = \"none.vcd\"\nwhen = \"never\"\n";
         List<String> command = new ArrayList<>(List.of(java, "--enable-native-access=ALL-UNNAMED", "-cp", options.nets()));
-        // Such as where the native library is.
+        // Such as the path of the native library.
         System.getProperties().stringPropertyNames().stream().filter(name -> name.startsWith("tickbus."))
                 .forEach(name -> command.add("-D" + name + "=" + System.getProperty(name)));
         command.addAll(List.of("tickbus.cell.CellControl", cfg.toString(), client,
@@ -267,7 +267,8 @@ public final class CellDemo {
         equal("loader_freed", counters.loaderJams());
         equal("pallet_freed", counters.palletJams());
         equal("vacuum_lost", counters.vacuumLosses());
-        // On a busy computer a head can see a carrier long after the sensor has seen the pallet; that is read again too.
+        // On a busy computer a head can see a carrier long after the sensor has seen the pallet; then the nets also read
+        // again.
         must(number("unread") >= counters.carriersMissed(), "the nets count unread=" + number("unread") + " instead of "
                 + counters.carriersMissed() + " or more");
         equal("refilled", operator.refills());

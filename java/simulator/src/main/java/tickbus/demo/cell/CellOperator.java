@@ -7,18 +7,18 @@ import java.util.Locale;
 import java.util.Random;
 import tickbus.demo.Timeline;
 
-/** Fills magazines, turns the switch, provokes mishaps, and writes down what happens. */
+/** Fills magazines, turns the switch, provokes mishaps, and logs events. */
 final class CellOperator {
     /** The number of cylinders that are out when each mishap is provoked; at least one more is made after it. */
     private static final int CARRIER_IS_MISSED_AFTER = 1;
     private static final int LOADER_JAMS_AFTER = 2;
     private static final int PALLET_JAMS_AFTER = 4;
     private static final int VACUUM_IS_LOST_AFTER = 6;
-    /** The first filling of station 3's magazine, which does not suffice, and how long the operator lets it wait. */
+    /** The first filling of station 3's magazine, which is too small, and how long the operator then lets it wait. */
     private static final int FIRST_PARTS = 7;
     private static final long WALK_NANOS = 500_000_000;
     private static final long SEED = 12;
-    /** In a later round station 1 has found its magazine empty: when the operator presses the rearm button, and for how long. */
+    /** When, in a later round, the operator presses Rearm after station 1 found its magazine empty, and for how long. */
     private static final long REARM_AFTER_NANOS = 1_000_000_000;
     private static final long PRESS_NANOS = 200_000_000;
 
@@ -42,7 +42,7 @@ final class CellOperator {
         this.cylinders = cylinders;
     }
 
-    /** How many mishaps were provoked, with the empty magazine. */
+    /** The number of provoked mishaps, including the empty magazine. */
     int mishaps() {
         return mishaps;
     }
@@ -55,19 +55,19 @@ final class CellOperator {
         return cell.delivered().size() >= ordered();
     }
 
-    /** How many cylinders there are to be when it is {@link #done}. */
+    /** The number of cylinders at which the operator is {@link #done}. */
     int ordered() {
         return (rounds + 1) * cylinders;
     }
 
-    /** As many cylinders again, with the same mishaps. */
+    /** Orders the same number of cylinders again, with the same mishaps. */
     void again() {
         rounds++;
         refillsBefore = refills;
         begun = false;
     }
 
-    /** Before each tick. */
+    /** Acts before each tick. */
     void act(long nanos) {
         if (!begun) {
             begun = true;
@@ -99,7 +99,7 @@ final class CellOperator {
         Collections.shuffle(sleeves, new Random(SEED));
         cell.fillSleeves(sleeves);
         if (rounds == 0) {
-            // Later rounds begin with what the refill has left.
+            // Later rounds begin with the rest of the refill.
             cell.fillParts(FIRST_PARTS);
         } else {
             rearmAt = nanos + REARM_AFTER_NANOS;

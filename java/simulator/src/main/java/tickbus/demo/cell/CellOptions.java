@@ -10,15 +10,15 @@ import tickbus.simulator.Arguments;
  *
  * @param drivers the DeviceDriver folder with the driver.cfg of the cell, and that of its reader
  * @param control the control table
- * @param report where the report goes
+ * @param report the report's file
  * @param nets the class path of the nets
- * @param identification the driver.cfg by which the nets reach the reader
+ * @param identification the driver.cfg of the nets' line to the reader
  * @param plc the tickbus executable, which makes the page; null for no page
- * @param recording what the driver records; null for no page
+ * @param recording the driver's recording; null for no page
  * @param stepNanos simulation step size
  * @param cylinders cylinders to make
  * @param timeLimitNanos longest simulation time
- * @param page where the nets are shown live, as host and port; null for nowhere
+ * @param page where the nets are shown live, as host and port; null for no live page
  */
 record CellOptions(Path drivers, Path control, Path report, String nets, Path identification, Path plc, Path recording,
         long stepNanos, int cylinders, long timeLimitNanos, String page) {
@@ -60,7 +60,7 @@ record CellOptions(Path drivers, Path control, Path report, String nets, Path id
                 arguments.duration("--time-limit", "1min"), arguments.has("--page") ? String.join(" ", arguments.words("--page")) : null);
     }
 
-    /** Behind {@code --page} nothing need stand. */
+    /** {@code --page} needs no value. */
     private static String[] withPort(String[] args) {
         List<String> words = new ArrayList<>(List.of(args));
         int page = words.indexOf("--page");

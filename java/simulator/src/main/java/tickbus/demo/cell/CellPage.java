@@ -13,7 +13,7 @@ final class CellPage {
     private CellPage() {
     }
 
-    /** Makes the page; returns what went wrong, or null. */
+    /** Makes the page; returns the error, or null. */
     static String make(CellOptions options, Path page, Path statistics) {
         String trouble = HtmlPage.make(options.plc(), List.of(options.recording().toString(), "--out", page.toString(),
                 "--stats", statistics.toString(), "--text", options.report().toString()));
@@ -33,7 +33,7 @@ final class CellPage {
         }
     }
 
-    /** The folder in which the nets' process leaves them. */
+    /** The folder in which the nets' process writes them. */
     static Path nets(CellOptions options) {
         return options.report().toAbsolutePath().resolveSibling("nets");
     }

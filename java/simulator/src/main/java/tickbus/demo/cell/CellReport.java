@@ -30,7 +30,7 @@ final class CellReport {
      *
      * @param nets the last counts of the nets' process
      * @param markings a line {@code net=firings, marking} for each net
-     * @param simulator what ran; null if it did not start
+     * @param simulator the simulator; null if it did not start
      */
     static String write(CellOptions options, String verdict, Timeline timeline, ManufacturingCell cell,
             Map<String, String> nets, String markings, Simulator simulator) {
@@ -100,7 +100,7 @@ final class CellReport {
         try {
             table("Statistics of driver " + driver.id(), driver.statistics());
         } catch (RuntimeException e) {
-            // A driver that has failed or is closed may have none; the rest of the report is still useful.
+            // A driver that has failed or is closed can lack statistics; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

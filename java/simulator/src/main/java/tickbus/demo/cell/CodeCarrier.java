@@ -2,10 +2,10 @@ package tickbus.demo.cell;
 
 /** The memory at the bottom of a pallet: bytes, read and written in blocks by the head below it. */
 public final class CodeCarrier {
-    /** How many bytes it has. */
+    /** The size in bytes. */
     public static final int BYTES = 32;
 
-    /** How many words of four bytes. */
+    /** The size in words of four bytes. */
     static final int WORDS = BYTES / 4;
 
     private final byte[] memory = new byte[BYTES];
@@ -13,8 +13,8 @@ public final class CodeCarrier {
     /**
      * Reads a block.
      *
-     * @param address its first byte, from 0
-     * @param count how many bytes
+     * @param address the block's first byte, from 0
+     * @param count the number of bytes
      * @return a copy
      * @throws IndexOutOfBoundsException if the block reaches beyond the memory
      */
@@ -28,7 +28,7 @@ public final class CodeCarrier {
     /**
      * Writes a block.
      *
-     * @param address its first byte, from 0
+     * @param address the block's first byte, from 0
      * @param block the bytes
      * @throws IndexOutOfBoundsException if the block reaches beyond the memory; nothing is written then
      */

@@ -1,11 +1,11 @@
 package tickbus.demo.cell;
 
-/** What a sleeve is made of, which the sensors of station 1 tell apart. */
+/** The material of a sleeve, which the sensors of station 1 distinguish. */
 public enum Colour {
-    /** Seen by the capacitive sensor alone. */
+    /** Detected by the capacitive sensor alone. */
     BLACK,
-    /** Seen by the optical sensor, too. */
+    /** Also detected by the optical sensor. */
     RED,
-    /** Seen by all three sensors. */
+    /** Detected by all three sensors. */
     METALLIC
 }

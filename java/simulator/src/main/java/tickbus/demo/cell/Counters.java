@@ -1,6 +1,6 @@
 package tickbus.demo.cell;
 
-/** What has happened in the cell. */
+/** The counted events of the cell. */
 public final class Counters {
     int begun;
     int fallen;
@@ -19,12 +19,12 @@ public final class Counters {
         return begun;
     }
 
-    /** Pieces that fell where nothing holds them. */
+    /** Pieces that fell without support. */
     public int fallen() {
         return fallen;
     }
 
-    /** Parts that were pressed into nothing. */
+    /** Parts that were pressed into an empty place. */
     public int wasted() {
         return wasted;
     }

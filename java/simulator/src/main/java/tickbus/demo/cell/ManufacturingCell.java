@@ -8,14 +8,14 @@ import java.util.function.DoubleSupplier;
 import tickbus.simulator.Machine;
 
 /**
- * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg and plc/cell/reader.cfg;
- * those of station 1 are those of the cell at Zaragoza, in English.
+ * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg and plc/cell/reader.cfg. The
+ * names of station 1 are those of the cell at Zaragoza, in English.
  *
- * <p>The switches of the panel, what is in the magazines, and mishaps are the operator's: methods, not variables.
+ * <p>The operator works the switches of the panel, fills the magazines and provokes mishaps: by methods, not variables.
  */
 public final class ManufacturingCell implements Machine {
     private static final double ON = 0.5;
-    /** From the button Rearm until air and motors are back: the control's outputs are there before that. */
+    /** The time from the button Rearm until air and motors are back; the control's outputs are back earlier. */
     private static final long CONTACTOR_NANOS = 50_000_000;
 
     /** Takes a Boolean variable. */
@@ -37,13 +37,13 @@ public final class ManufacturingCell implements Machine {
     private boolean integrated = true;
     private boolean rearm;
     private boolean emergency;
-    /** How long air and motors have been wanted again since the emergency stop; as long as the contactor takes if never cut. */
+    /** How long air and motors have been requested since the emergency stop; the contactor's time if they were never cut. */
     private long contactorNanos = CONTACTOR_NANOS;
     private boolean partsLamp;
     private boolean capsLamp;
     private boolean runningLamp;
 
-    /** A cell with three pallets, and nothing in its magazines. */
+    /** A cell with three pallets and empty magazines. */
     public ManufacturingCell() {
         stationOne();
         stationThree();
@@ -192,7 +192,9 @@ public final class ManufacturingCell implements Machine {
         counters.palletJams += palletJam && !transport.isJammed() ? 1 : 0;
     }
 
-    /** The emergency stop cuts air and motors, whatever the control wants; letting it go brings them back only after Rearm. */
+    /**
+     * The emergency stop cuts air and motors, whatever the control commands; releasing it brings them back only after Rearm.
+     */
     private boolean hasPower(long nanos) {
         if (emergency) {
             contactorNanos = -1;
@@ -204,7 +206,7 @@ public final class ManufacturingCell implements Machine {
         return contactorNanos >= CONTACTOR_NANOS;
     }
 
-    /** Puts sleeves into the magazine of station 1, which come out in this order. */
+    /** Puts sleeves into the magazine of station 1; they come out in this order. */
     public void fillSleeves(List<Colour> sleeves) {
         sleeves.forEach(one::fill);
     }
@@ -245,59 +247,59 @@ public final class ManufacturingCell implements Machine {
     }
 
     /**
-     * Presses the button Rearm, or lets it go: after an emergency stop it brings air and motors back; otherwise it tells
+     * Presses or releases the button Rearm: after an emergency stop it brings air and motors back; otherwise it informs
      * station 1 that its magazine is filled.
      */
     public void rearm(boolean on) {
         rearm = on;
     }
 
-    /** Presses the emergency stop, or lets it go, after which the cell waits for {@link #rearm}. */
+    /** Presses or releases the emergency stop; after a release the cell waits for {@link #rearm}. */
     public void emergency(boolean on) {
         emergency = on;
     }
 
-    /** The loader's next stroke stops half-way, until it has been back. */
+    /** Stops the loader's next stroke half-way, until the loader has been back. */
     public void jamLoader() {
         one.loader.jam();
     }
 
-    /** The next pallet that passes the middle between two stops gets stuck, until the belt has run back for 0.1 s. */
+    /** Makes the next pallet that passes the middle between two stops stick, until the belt has run back for 0.1 s. */
     public void jamPallet() {
         transport.jam();
     }
 
-    /** Head 1 misses the carrier the next time that it comes forward, until it has been back. */
+    /** Makes head 1 miss the carrier the next time that it comes forward, until it has been back. */
     public void missCarrier() {
         one.missCarrier();
     }
 
-    /** The next piece that station 4 lifts falls. */
+    /** Makes the next piece that station 4 lifts fall. */
     public void loseVacuum() {
         four.loseVacuum();
     }
 
-    /** Whether station 3 shows that a magazine is empty. */
+    /** True if station 3 shows that a magazine is empty. */
     public boolean showsEmptyParts() {
         return partsLamp;
     }
 
-    /** Whether station 4 shows that its magazine is empty. */
+    /** True if station 4 shows that its magazine is empty. */
     public boolean showsEmptyCaps() {
         return capsLamp;
     }
 
-    /** Whether the cell shows that it works. */
+    /** True if the cell shows that it works. */
     public boolean showsRunning() {
         return runningLamp;
     }
 
-    /** Whether something is stuck at this moment. */
+    /** True if something is stuck at this moment. */
     public boolean isJammed() {
         return one.loader.isJammed() || transport.isJammed();
     }
 
-    /** What has happened. */
+    /** The counted events. */
     public Counters counters() {
         return counters;
     }

@@ -4,7 +4,7 @@ package tickbus.demo.cell;
 public final class Pallet {
     private final int number;
     private final CodeCarrier carrier = new CodeCarrier();
-    /** Where it is on the loop, in micrometres from stop 1. */
+    /** The position on the loop, in micrometres from stop 1. */
     long micrometres;
     Workpiece piece;
 
@@ -13,12 +13,12 @@ public final class Pallet {
         this.micrometres = micrometres;
     }
 
-    /** Its number, from 1. */
+    /** The pallet's number, from 1. */
     public int number() {
         return number;
     }
 
-    /** Its code carrier. */
+    /** The pallet's code carrier. */
     public CodeCarrier carrier() {
         return carrier;
     }

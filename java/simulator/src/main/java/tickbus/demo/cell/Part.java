@@ -1,6 +1,6 @@
 package tickbus.demo.cell;
 
-/** What a pallet's record says of its contents, in its order. */
+/** The contents in a pallet's record, in the record's order. */
 public enum Part {
     /** The tube of the cylinder. */
     SLEEVE,
@@ -12,10 +12,10 @@ public enum Part {
     HEAD,
     /** The coloured cap. */
     CAP,
-    /** Whether there is a piece at all. */
+    /** The piece itself: on if the pallet carries one. */
     PIECE;
 
-    /** Its bit in {@code Head n contents}. */
+    /** The part's bit in {@code Head n contents}. */
     public int bit() {
         return 1 << ordinal();
     }

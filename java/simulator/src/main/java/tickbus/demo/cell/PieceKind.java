@@ -27,17 +27,17 @@ public enum PieceKind {
         this.capped = capped;
     }
 
-    /** Its code in the record, 0x00 to 0x60. */
+    /** The kind's code in the record, 0x00 to 0x60. */
     public int code() {
         return code;
     }
 
-    /** What its sleeve is made of; null for {@link #UNDEFINED}. */
+    /** The material of the kind's sleeve; null for {@link #UNDEFINED}. */
     public Colour colour() {
         return colour;
     }
 
-    /** Whether it has a cap. */
+    /** True if the kind has a cap. */
     public boolean isCapped() {
         return capped;
     }
@@ -52,7 +52,7 @@ public enum PieceKind {
         return UNDEFINED;
     }
 
-    /** The kind of a piece as it is. */
+    /** The current kind of a piece. */
     public static PieceKind of(Workpiece piece) {
         return values()[1 + 2 * piece.colour().ordinal() + (piece.has(Part.CAP) ? 1 : 0)];
     }

@@ -7,17 +7,17 @@ final class PneumaticCylinder {
     private boolean willJam;
     private boolean jammed;
 
-    /** A cylinder that is back, and takes {@code strokeNanos} from one end to the other. */
+    /** A retracted cylinder that takes {@code strokeNanos} from one end to the other. */
     PneumaticCylinder(long strokeNanos) {
         this.strokeNanos = strokeNanos;
     }
 
-    /** With a valve that a spring puts back: forward while it is on, otherwise back. */
+    /** With one valve and a spring: forward while the valve is on, otherwise back. */
     void step(boolean valve, long nanos) {
         step(valve, !valve, nanos);
     }
 
-    /** With a valve for each direction: with neither, or with both, it stays where it is. */
+    /** With a valve for each direction: with neither or both on, the cylinder stays. */
     void step(boolean forward, boolean backward, long nanos) {
         if (forward && !backward) {
             boolean halts = willJam && at <= strokeNanos / 2;
@@ -41,7 +41,10 @@ final class PneumaticCylinder {
         return at == 0;
     }
 
-    /** Its next stroke stops half-way, until it has been back; one that is past the middle is finished before. */
+    /**
+     * Stops the next stroke half-way, until the cylinder has been back; a cylinder past the middle finishes its stroke
+     * first.
+     */
     void jam() {
         willJam = true;
     }

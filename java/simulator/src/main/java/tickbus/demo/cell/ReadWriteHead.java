@@ -3,23 +3,23 @@ package tickbus.demo.cell;
 import java.util.Optional;
 
 /**
- * A read/write head for code carriers: lends the carrier in front of it to the reader, and takes over what the reader says
- * that it holds.
+ * A read/write head for code carriers: lends the carrier in front of it to the reader, and takes over the data that the
+ * reader reports for it.
  *
- * <p>The reader has a carrier from when it says so until it says that it has none; what was written in between belongs to
- * that carrier, even if its pallet has left meanwhile. The next one is shown only then.
+ * <p>The reader has a carrier from when it reports it until it reports none; data written in between belong to that carrier,
+ * even if its pallet has left meanwhile. The next carrier is shown only then.
  */
 public final class ReadWriteHead {
     private CodeCarrier inFront;
     private CodeCarrier lent;
-    /** The reader's: it has a carrier, and what that holds. */
+    /** Set by the reader: it has a carrier, and these are its data. */
     boolean taken;
     final long[] holds = new long[CodeCarrier.WORDS];
 
     ReadWriteHead() {
     }
 
-    /** The carrier in front of it; empty without one. */
+    /** The carrier in front of the head; empty without one. */
     public Optional<CodeCarrier> carrier() {
         return Optional.ofNullable(inFront);
     }
@@ -36,7 +36,7 @@ public final class ReadWriteHead {
         }
     }
 
-    /** Whether a carrier is there for the reader. */
+    /** True if a carrier is there for the reader. */
     boolean showsCarrier() {
         return lent != null && lent == inFront;
     }

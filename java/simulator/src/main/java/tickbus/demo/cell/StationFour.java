@@ -4,8 +4,8 @@ import java.util.ArrayList;
 import java.util.List;
 
 /**
- * Station 4: presses a cap on the piece at stop 4, and takes the piece to the exit with a vacuum gripper. If the vacuum is
- * lost while the arm lifts the piece, it falls back on its pallet.
+ * Station 4: presses a cap on the piece at stop 4, and takes the piece to the exit with a vacuum gripper. If the vacuum
+ * fails while the arm lifts the piece, the piece falls back on its pallet.
  */
 final class StationFour {
     private static final long VACUUM_NANOS = 40_000_000;

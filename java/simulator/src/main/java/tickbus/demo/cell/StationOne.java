@@ -4,8 +4,8 @@ import java.util.ArrayDeque;
 import java.util.Queue;
 
 /**
- * Station 1: a loader pushes a sleeve out of a magazine on a belt, sensors at the belt's back end tell what it is made of,
- * and at its front end an arm takes the sleeve and puts it on the pallet at stop 1, where a cylinder holds head 1.
+ * Station 1: a loader pushes a sleeve out of a magazine on a belt, and sensors at the belt's back end detect its material.
+ * At the front end an arm takes the sleeve and puts it on the pallet at stop 1, where a cylinder holds head 1.
  */
 final class StationOne {
     private static final long BELT_NANOS = 250_000_000;
@@ -94,12 +94,12 @@ final class StationOne {
         return onBelt != null && beltNanos == BELT_NANOS;
     }
 
-    /** Whether a sleeve at the belt's back end is one of those that a sensor sees. */
+    /** True if the sleeve at the belt's back end has at least this colour, so that the sensor for it responds. */
     boolean sees(Colour least) {
         return isAtBack() && onBelt.colour().compareTo(least) >= 0;
     }
 
-    /** The next time that its cylinder comes forward, the head misses the carrier, until it has been back. */
+    /** Makes the head miss the carrier the next time that its cylinder comes forward, until it has been back. */
     void missCarrier() {
         willMiss = true;
     }

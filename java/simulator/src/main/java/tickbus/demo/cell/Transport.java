@@ -4,13 +4,13 @@ import java.util.ArrayList;
 import java.util.List;
 
 /**
- * A belt in a loop that carries pallets past four stops; at stop 2 no station is on the bus, and pallets only wait.
- * Going back, it moves the pallets between stops: those at a stop are clamped.
+ * A belt in a loop that carries pallets past four stops; at stop 2 no station is on the bus, and pallets only wait. Running
+ * back, the belt moves the pallets between stops; pallets at a stop are clamped.
  */
 public final class Transport {
     static final int STOPS = 4;
 
-    /** Lengths in micrometres, so that a pallet stands exactly at its stop. */
+    /** Lengths in micrometres, so that a pallet can be exactly at its stop. */
     private static final long LOOP = 2_000_000;
     private static final long SECTION = LOOP / STOPS;
     /** 1.25 m/s. */
@@ -51,7 +51,10 @@ public final class Transport {
         return null;
     }
 
-    /** The next pallet that passes the middle between two stops gets stuck, until the belt has run back a little; only one at a time. */
+    /**
+     * Makes the next pallet that passes the middle between two stops stick, until the belt has run back a little; one at a
+     * time.
+     */
     void jam() {
         willJam = true;
     }

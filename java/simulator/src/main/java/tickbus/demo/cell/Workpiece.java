@@ -3,7 +3,7 @@ package tickbus.demo.cell;
 import java.util.EnumSet;
 import java.util.Set;
 
-/** A cylinder in the making. */
+/** A cylinder in production. */
 public final class Workpiece {
     private final int number;
     private final Colour colour;
@@ -14,22 +14,22 @@ public final class Workpiece {
         this.colour = colour;
     }
 
-    /** Its number, from 1. */
+    /** The piece's number, from 1. */
     public int number() {
         return number;
     }
 
-    /** What its sleeve is made of. */
+    /** The material of the piece's sleeve. */
     public Colour colour() {
         return colour;
     }
 
-    /** Whether it has this part. */
+    /** True if the piece has this part. */
     public boolean has(Part part) {
         return parts.contains(part);
     }
 
-    /** Whether it has all but perhaps the cap. */
+    /** True if the piece has all parts, not counting the cap. */
     public boolean isComplete() {
         return has(Part.PISTON) && has(Part.SPRING) && has(Part.HEAD);
     }

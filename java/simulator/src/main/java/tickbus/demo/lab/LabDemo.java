@@ -21,21 +21,21 @@ import tickbus.simulator.TickMode;
 import tickbus.simulator.TimeSource;
 
 /**
- * The demo's command line; see {@code --help} for what it takes.
+ * The demo's command line; {@code --help} describes it.
  *
- * <p>Its last line on standard output is the verdict, {@code demo-lab: ok …} or {@code demo-lab: failed reason=…}. Exit
+ * <p>The last line on standard output is the verdict, {@code demo-lab: ok …} or {@code demo-lab: failed reason=…}. Exit
  * codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class LabDemo {
     private static final Verdict VERDICT = new Verdict("demo-lab");
 
-    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
     private static final int ATTEMPTS = 5;
 
-    /** How the driver says that the dispatcher has taken it: it is not running yet, because nothing is connected. */
+    /** The driver's text when the dispatcher has accepted it: it is not running yet, because nothing is connected. */
     private static final String JOINED = "joined the dispatcher";
 
-    /** How often the processes are heard and checked. */
+    /** The interval of looking at the processes' output and state. */
     private static final int TICKS_PER_LOOK = 5;
 
     private final LabOptions options;
@@ -64,8 +64,8 @@ public final class LabDemo {
      * Runs the demo.
      *
      * @param args the command line
-     * @param out gets what happens and, last, the verdict
-     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @param out gets the events and, last, the verdict
+     * @param err gets errors in the command line, and messages of unexpected exceptions
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
@@ -102,7 +102,7 @@ public final class LabDemo {
         }
     }
 
-    /** Everything from starting the dispatcher to writing the report. */
+    /** Runs everything from starting the dispatcher to writing the report. */
     private String play(ShutdownGuard guard, PrintStream err) {
         String run = "";
         String verdict;
@@ -146,7 +146,7 @@ public final class LabDemo {
             long begun = System.nanoTime();
             over[0] = operator.look(now, simulator.stepNanos());
             if (System.nanoTime() - begun > simulator.stepNanos()) {
-                // It has started or killed a process.
+                // The operator has started or killed a process.
                 stalls.pause();
             }
             return !over[0];
@@ -179,7 +179,7 @@ public final class LabDemo {
         return options.report().resolveSibling(name);
     }
 
-    /** An HTML page about the driver's recording; returns what went wrong, or null. */
+    /** Makes an HTML page about the driver's recording; returns the error, or null. */
     private String page(PrintStream out) {
         if (options.recording() == null) {
             return null;

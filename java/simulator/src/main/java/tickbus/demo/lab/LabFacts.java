@@ -2,9 +2,9 @@ package tickbus.demo.lab;
 
 import java.util.Locale;
 
-/** What was measured; a value out of bounds has already ended the demo. */
+/** The measurements; a value out of bounds has already ended the demo. */
 final class LabFacts {
-    /** How far a level may leave the band between the thresholds of plc/lab/tanks.toml, in percent. */
+    /** The tolerance of a level around the thresholds of plc/lab/tanks.toml, in percent. */
     static final double MARGIN = 8;
 
     private static final double[] LOWEST = {40, 30};
@@ -24,9 +24,9 @@ final class LabFacts {
     }
 
     /**
-     * Notes the levels of one tick in which they should be held.
+     * Records the levels of one tick in which the controller should hold them.
      *
-     * @return what is wrong, or null
+     * @return the error, or null
      */
     String level(int tank, double level, long stepNanos) {
         int i = tank - 1;
@@ -56,14 +56,14 @@ final class LabFacts {
         wokeNanos = nanos;
     }
 
-    /** The part of the last line that states them. */
+    /** The part of the last line with the measurements. */
     String line(int overtaken) {
         return text("levels=%.1f..%.1f,%.1f..%.1f held_s=%.1f lamps=%d lamp_ms=%d edges=%d/%d woke_ms=%d overtaken=%d",
                 min[0], max[0], min[1], max[1], heldNanos / 1e9, lamps, slowestLampNanos / 1_000_000, counted,
                 pulses, wokeNanos / 1_000_000, overtaken);
     }
 
-    /** Rows of a table: what, here, as it should be. */
+    /** Rows of a table: the quantity, the measurement, the expectation. */
     Object[][] rows() {
         return new Object[][] {
             {"level of tank 1", text("%.1f to %.1f %%", min[0], max[0]), text("40 to 60 %%, or up to %.0f beyond", MARGIN)},

@@ -8,7 +8,7 @@ import tickbus.demo.DemoFailure;
 import tickbus.demo.Timeline;
 import tickbus.demo.board.TestingBoard;
 
-/** Works the switches of the board step by step, and waits for what must follow. */
+/** Works the switches of the board step by step, and waits for the reactions. */
 final class LabOperator {
     private static final int TOGGLES = 5;
     private static final int PULSES = 20;
@@ -20,17 +20,17 @@ final class LabOperator {
     private static final long SETTLING = 200 * MS;
     private static final long HOLD = 2_000 * MS;
 
-    /** To which level, in percent, tank 2 falls while TANKS is dead. */
+    /** The level, in percent, to which tank 2 falls while TANKS is dead. */
     private static final double FALLEN = 22;
 
     /**
      * A step of the script.
      *
-     * @param expected what must follow, for the message if it does not
-     * @param begin what the operator does
-     * @param until whether it has followed
-     * @param limitNanos how long that may take
-     * @param done gets how long it took
+     * @param expected the reaction, for the message if it does not come
+     * @param begin the operator's action
+     * @param until true when the reaction has come
+     * @param limitNanos the limit for the reaction
+     * @param done gets the duration
      */
     private record Step(String expected, Runnable begin, BooleanSupplier until, long limitNanos, LongConsumer done) {
     }
@@ -49,7 +49,7 @@ final class LabOperator {
     /**
      * An operator.
      *
-     * @param joined whether the dispatcher has taken the board
+     * @param joined true if the dispatcher has accepted the board
      */
     LabOperator(TestingBoard board, Laboratory lab, LabFacts facts, Timeline timeline, BooleanSupplier joined) {
         this.board = board;
@@ -131,7 +131,7 @@ final class LabOperator {
         }
         then("the gauge shows " + PULSES + " pulses, and lamp 4 is lit", () -> { },
                 () -> board.gauge() == PULSES && board.isLit(4), SOON);
-        // An edge that is counted twice may come after the others.
+        // An edge that is counted twice can come later than the others.
         then("", () -> { }, () -> now - begun >= SETTLING, Long.MAX_VALUE, nanos -> {
             facts.counted(board.gauge());
             if (board.gauge() != PULSES) {
@@ -170,10 +170,10 @@ final class LabOperator {
     }
 
     /**
-     * Goes on; once per tick.
+     * Continues the script; once per tick.
      *
-     * @return whether the script is over
-     * @throws DemoFailure if something did not follow
+     * @return true if the script is over
+     * @throws DemoFailure if a reaction did not come
      */
     boolean look(long nanos, long stepNanos) {
         now = nanos;

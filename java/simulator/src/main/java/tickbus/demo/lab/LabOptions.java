@@ -10,9 +10,9 @@ import tickbus.simulator.Arguments;
  * @param drivers the DeviceDriver folder with board.cfg; the dispatcher's address is written into it
  * @param control the control table
  * @param programs the folder with the programs and connections of the controllers
- * @param report where the report goes
+ * @param report the report's file
  * @param tickbus the tickbus executable
- * @param recording where the driver records to, null if it does not
+ * @param recording the driver's recording, null for none
  * @param stepNanos simulation step size
  */
 record LabOptions(Path drivers, Path control, Path programs, Path report, Path tickbus, Path recording, long stepNanos) {

@@ -17,8 +17,8 @@ final class LabReport {
      * Writes a report.
      *
      * @param verdict the demo's last line
-     * @param facts what was measured
-     * @param timeline what happened
+     * @param facts the measurements
+     * @param timeline the events
      * @param run {@link #run}, empty if the simulator did not start
      */
     static String write(String verdict, LabFacts facts, Timeline timeline, String run) {
@@ -36,10 +36,10 @@ final class LabReport {
     }
 
     /**
-     * The part about the simulator, which must still run.
+     * The part about the simulator, which must still be running.
      *
      * @param options the options of the demo
-     * @param simulator what runs
+     * @param simulator the running simulator
      */
     static String run(LabOptions options, Simulator simulator) {
         LabReport report = new LabReport();
@@ -72,7 +72,7 @@ final class LabReport {
             driver.statistics().forEach(table::row);
             text.append(table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that has failed may have none; the rest of the report is still useful.
+            // A driver that has failed can lack statistics; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

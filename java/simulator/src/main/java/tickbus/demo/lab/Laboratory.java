@@ -14,7 +14,7 @@ import tickbus.demo.Timeline;
 
 /** The processes of the laboratory: the dispatcher and the two controllers. */
 final class Laboratory implements AutoCloseable {
-    /** After this time a process ends on its own, in case nothing is left to end it. */
+    /** After this time a process ends on its own, in case nothing else ends it. */
     private static final String LONGEST = "30min";
 
     private static final long LISTENING_NANOS = 10_000_000_000L;
@@ -84,8 +84,8 @@ final class Laboratory implements AutoCloseable {
     /**
      * Starts a controller.
      *
-     * @param member which one
-     * @param patched whether it asks for its connections; if not, it has those that the dispatcher remembers
+     * @param member the controller
+     * @param patched true if it requests its connections; otherwise it has those that the dispatcher remembers
      */
     void start(Member member, boolean patched) {
         String file = member.name().toLowerCase(Locale.ROOT);
@@ -98,7 +98,7 @@ final class Laboratory implements AutoCloseable {
         member.start(command);
     }
 
-    /** Tells the timeline what all of them have said since the last call. */
+    /** Adds to the timeline the output of all processes since the last call. */
     void listen(long now) {
         for (Member member : members()) {
             member.listen().forEach(line -> timeline.add(now, member.name(), line.substring(line.indexOf(": ") + 2)));
@@ -110,10 +110,10 @@ final class Laboratory implements AutoCloseable {
     }
 
     /**
-     * Ends all of them, the dispatcher last.
+     * Ends all processes, the dispatcher last.
      *
-     * @return how many values were replaced by newer ones because their client did not read
-     * @throws DemoFailure if one did not end as it should
+     * @return the number of values replaced by newer ones because their client did not read
+     * @throws DemoFailure if a process did not end properly
      */
     int end() {
         close();

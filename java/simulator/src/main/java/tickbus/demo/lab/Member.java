@@ -5,9 +5,9 @@ import java.util.ArrayList;
 import java.util.List;
 import tickbus.demo.PlcProcess;
 
-/** A process of the laboratory, and all that it has said in its current life. */
+/** A process of the laboratory, and its output in its current life. */
 final class Member implements AutoCloseable {
-    /** None of them reports statistics. */
+    /** The processes report no statistics. */
     private static final long NEVER = Long.MAX_VALUE;
 
     private final String name;
@@ -15,7 +15,7 @@ final class Member implements AutoCloseable {
     private final List<String> said = new ArrayList<>();
     private List<String> command = List.of();
 
-    /** One that is not started yet; {@code what} it is stands in messages. */
+    /** A process that is not started yet; {@code what} is its name in messages. */
     Member(String name, String what, Path log) {
         this.name = name;
         process = new PlcProcess(what, "build it (make build), or name the tickbus executable by --tickbus", () -> command, NEVER, log);
@@ -35,29 +35,29 @@ final class Member implements AutoCloseable {
         process.kill();
     }
 
-    /** What it has said since the last call. */
+    /** The output since the last call. */
     List<String> listen() {
         List<String> news = process.news();
         said.addAll(news);
         return news;
     }
 
-    /** What stands behind these words in a line that it has said; null if it has not. */
+    /** The text behind these words in an output line; null without such a line. */
     String said(String words) {
         return said.stream().filter(line -> line.startsWith(words)).map(line -> line.substring(words.length()))
                 .findFirst().orElse(null);
     }
 
     /**
-     * Fails if it has ended.
+     * Fails if the process has ended.
      *
-     * @throws tickbus.demo.DemoFailure with its name and last output
+     * @throws tickbus.demo.DemoFailure with the process's name and last output
      */
     void check() {
         process.check();
     }
 
-    /** Ends it, and hears its last words. */
+    /** Ends the process, and takes its last output. */
     @Override
     public void close() {
         process.close();

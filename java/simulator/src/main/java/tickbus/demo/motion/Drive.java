@@ -7,8 +7,8 @@ package tickbus.demo.motion;
  * <p>From rest, a distance d with speed v, acceleration a and deceleration b takes v/a + (d − v²/2a − v²/2b)/v + v/b
  * if d is at least v²/2a + v²/2b, else w/a + w/b with the peak w = √(2dab/(a+b)).
  *
- * <p>With a jerk above 0 each change of speed is an S-curve: the acceleration rises and falls at that rate, so that
- * it takes longer, by acceleration / jerk if the acceleration is reached.
+ * <p>With a jerk above 0 each change of speed is an S-curve: the acceleration rises and falls at that rate. The change takes
+ * longer, by acceleration / jerk if the acceleration is reached.
  */
 public final class Drive {
     /** Bisection steps in the search for the peak of a short S-curve; more would change nothing. */
@@ -21,7 +21,7 @@ public final class Drive {
     /**
      * A drive at rest.
      *
-     * @param position its position
+     * @param position the drive's position
      */
     public Drive(double position) {
         this.legs = new Legs(position);
@@ -30,7 +30,7 @@ public final class Drive {
     /**
      * The position of the drive.
      *
-     * @return in its unit
+     * @return in the drive's unit
      */
     public double position() {
         return legs.position();
@@ -46,7 +46,7 @@ public final class Drive {
     }
 
     /**
-     * Whether it is moving.
+     * Returns whether the drive is moving.
      *
      * @return false at rest
      */
@@ -57,7 +57,7 @@ public final class Drive {
     /**
      * The planned duration of the current motion, from beginning to end.
      *
-     * @return seconds; for an endless motion, the time until it has its speed
+     * @return seconds; for an endless motion, the time until it reaches its speed
      */
     public double plannedSeconds() {
         return legs.plannedTime();
@@ -66,15 +66,15 @@ public final class Drive {
     /**
      * Sets the rate of change of the acceleration for the motions that start from now on.
      *
-     * @param rate units per second cubed; 0 or less lets it jump
+     * @param rate units per second cubed; with 0 or less the acceleration jumps
      */
     public void jerk(double rate) {
         jerk = Math.max(0, rate);
     }
 
     /**
-     * Moves to a target and stops there. A drive in motion continues from its current speed if it can, otherwise it
-     * brakes first.
+     * Moves to a target and stops there. A moving drive continues from its current speed if it can, otherwise it brakes
+     * first.
      *
      * @param target the position
      * @param speed the greatest speed, above 0

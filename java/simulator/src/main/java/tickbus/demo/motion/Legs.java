@@ -3,8 +3,8 @@ package tickbus.demo.motion;
 /**
  * Motion of one drive in legs: in each, the speed is constant, or changes linearly or along an S-curve.
  *
- * <p>The position is computed from the time since the motion began, never accumulated from step to step: the result
- * does not depend on the step size, and the drive ends exactly where it should.
+ * <p>The position is computed from the time since the motion began, never accumulated from step to step: the result does not
+ * depend on the step size, and the drive ends exactly at its target.
  *
  * <p>Lengths are in any unit, speeds in that unit per second.
  */
@@ -15,7 +15,7 @@ public final class Legs {
 
     private final double[] duration = new double[MOST];
     private final double[] change = new double[MOST];
-    /** How long the acceleration of a leg takes to rise, and to fall; 0 if it jumps. */
+    /** How long the acceleration of a leg rises, and falls; 0 if it jumps. */
     private final double[] rise = new double[MOST];
     private int legs;
     private double startPosition;
@@ -32,7 +32,7 @@ public final class Legs {
     /**
      * A drive at rest.
      *
-     * @param position its position
+     * @param position the drive's position
      */
     public Legs(double position) {
         this.position = position;
@@ -57,7 +57,7 @@ public final class Legs {
     }
 
     /**
-     * Whether it is moving.
+     * Returns whether the drive is moving.
      *
      * @return false at rest
      */
@@ -95,7 +95,7 @@ public final class Legs {
     /**
      * Shifts the scale of positions; rotating drives use it to stay within one turn.
      *
-     * @param by what is added to every position
+     * @param by the amount added to every position
      */
     public void shift(double by) {
         position += by;
@@ -103,7 +103,7 @@ public final class Legs {
         plannedPosition += by;
     }
 
-    /** Starts a new motion at the current position and speed; legs have to follow, and then one of the two ends. */
+    /** Starts a new motion at the current position and speed; legs must follow, and then one of the two ends. */
     public void begin() {
         startPosition = position;
         startVelocity = velocity;
@@ -115,9 +115,9 @@ public final class Legs {
     }
 
     /**
-     * Adds a leg with a linear change of speed, or none.
+     * Adds a leg with a linear change of speed, or without a change.
      *
-     * @param time its duration in seconds, at least 0
+     * @param time the duration in seconds, at least 0
      * @param by the change of speed, in units per second
      */
     public void leg(double time, double by) {
@@ -125,12 +125,11 @@ public final class Legs {
     }
 
     /**
-     * Adds a leg in which the speed changes along an S-curve: the acceleration rises linearly, stays, and falls
-     * linearly.
+     * Adds a leg in which the speed changes along an S-curve: the acceleration rises linearly, stays, and falls linearly.
      *
-     * @param time its duration in seconds, at least 0
+     * @param time the duration in seconds, at least 0
      * @param by the change of speed, in units per second
-     * @param ramp how long the acceleration takes to rise, and likewise to fall, in seconds, at most half the time
+     * @param ramp how long the acceleration rises, and likewise falls, in seconds, at most half the time
      */
     public void leg(double time, double by, double ramp) {
         duration[legs] = time;
@@ -171,7 +170,7 @@ public final class Legs {
     }
 
     /**
-     * Stops instantly at a given position, where something is in the way.
+     * Stops instantly at a given position, where there is an obstacle.
      *
      * @param place the position
      */

@@ -4,7 +4,7 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
 
-/** All axes of the line, and the variables through which their PLCs command them and see them. */
+/** All axes of the line, and the variables by which their PLCs command and observe them. */
 final class Axes {
     /** The names of an axis's outputs, after its name and a dot. */
     private static final List<String> SHOWN =

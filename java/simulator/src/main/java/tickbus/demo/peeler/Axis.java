@@ -5,18 +5,18 @@ import tickbus.demo.motion.Drive;
 /**
  * One axis: carries out the commands of its PLC, and gives feedback.
  *
- * <p>A command starts with the rising edge of Execute while Enable is on, with the bits and values at that time; the
- * next one can only start after Execute has fallen. It clears InPosition. Without Enable nothing moves, and the
- * current command is discarded.
+ * <p>A command starts with the rising edge of Execute while Enable is on, with the bits and values at that time, and clears
+ * InPosition. The next one can only start after Execute has fallen. Without Enable nothing moves, and the current command is
+ * discarded.
  *
  * <ul>
- *   <li><b>Position</b>, no other bit: to the target, in a trapezoid or triangle of speed. A target beyond an end
- *       position leads to that.
+ * <li><b>Position</b>, no other bit: to the target, in a trapezoid or triangle of speed. A target beyond an end position
+ * leads to that position.
  *   <li><b>Speed</b>, SpeedControl: towards the target for as long as the bit is on; brakes when it falls, and before an
  *       end position. A new command meanwhile changes the speed without a stop.
- *   <li><b>Torque</b>, for axes of that kind: Tracking closes, TorqueControl opens, with nominal speed, until something
- *       is in the way; neither is a loss of power, and stops.
- *   <li><b>Tracking</b>: follows other axes as the machine tells, for as long as the bit is on.
+ * <li><b>Torque</b>, for axes of that kind: Tracking closes, TorqueControl opens, with nominal speed, until an obstacle
+ * stops the axis; neither bit means no power, and stops the axis.
+ * <li><b>Tracking</b>: follows other axes as the machine requires, for as long as the bit is on.
  * </ul>
  */
 final class Axis {
@@ -51,7 +51,7 @@ final class Axis {
     /** The position of an obstacle below; the lower end if the way is clear. */
     private double obstacle;
     private boolean met;
-    /** The speed of a motion that is not the drive's own. */
+    /** The speed of a motion that the drive does not make itself. */
     private double pushed;
 
     Axis(AxisName name) {
@@ -95,12 +95,12 @@ final class Axis {
         return mode == Mode.TORQUE && direction != 0 && torque > 0;
     }
 
-    /** The error word: what is wrong with the axis or with its last command. */
+    /** The error word: the error of the axis or of its last command. */
     int error() {
         return (healthy ? error : AxisError.FAILED).ordinal();
     }
 
-    /** An error in what the axis does; cleared by its next command. */
+    /** Sets an error of the axis, which its next command clears. */
     void blame(AxisError what) {
         error = what;
     }
@@ -110,12 +110,12 @@ final class Axis {
         return commands;
     }
 
-    /** Whether it presses against an obstacle. */
+    /** True if the axis presses against an obstacle. */
     boolean presses() {
         return met && (name.kind() != AxisKind.TORQUE || mode == Mode.TORQUE && direction < 0 && torque > 0);
     }
 
-    /** The pressure in percent, while it presses. */
+    /** The pressure in percent, while the axis presses. */
     double pressure() {
         return presses() ? torque : 0;
     }
@@ -143,7 +143,7 @@ final class Axis {
         healthy = !failed;
     }
 
-    /** Sets the position below which it cannot go, until further notice; the lower end for none. */
+    /** Sets the position below which the axis cannot go, until the next call; the lower end for none. */
     void meets(double place) {
         obstacle = Math.max(place, name.low());
         if (position() > obstacle + TOLERANCE) {
@@ -236,7 +236,7 @@ final class Axis {
         stop();
     }
 
-    /** Commands that last as long as their bit is on. */
+    /** Continues commands that last as long as their bit is on. */
     private void holdOn() {
         if (mode == Mode.SPEED && !command.speedControl()) {
             drive.runAt(0, deceleration, deceleration);

@@ -4,12 +4,12 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * The command of one axis as the PLC currently sends it: five bits and six values.
+ * The command of one axis as currently sent by the PLC: five bits and six values.
  *
  * <p>Nothing happens before Execute rises. Values are in the axis's unit, per second and per second squared.
  */
 final class AxisCommand {
-    /** The names of its variables, after the axis's name and a dot, in order. */
+    /** The names of the variables, after the axis's name and a dot, in order. */
     static final List<String> NAMES = List.of("Execute", "Tracking", "TorqueControl", "SpeedControl", "Enable",
             "TargetPosition", "Speed", "Acceleration", "Deceleration", "Torque", "Jerk");
 
@@ -72,12 +72,12 @@ final class AxisCommand {
         return values[9];
     }
 
-    /** For an S-curve: the rate of change of the acceleration; 0 lets it jump. */
+    /** For an S-curve: the rate of change of the acceleration; with 0 the acceleration jumps. */
     double jerk() {
         return values[10];
     }
 
-    /** Whether speed, acceleration and deceleration permit a motion; NaN does not. */
+    /** True if speed, acceleration and deceleration permit a motion; NaN does not. */
     boolean movable() {
         return speed() > 0 && acceleration() > 0 && deceleration() > 0 && Double.isFinite(target());
     }

@@ -4,7 +4,7 @@ package tickbus.demo.peeler;
 enum AxisError {
     /** No error. */
     NONE,
-    /** The target lies beyond an end position: the axis stopped there. */
+    /** The target is beyond an end position: the axis stopped there. */
     BEYOND_END,
     /** Speed, acceleration or deceleration is not above 0: the command was not carried out. */
     NO_SPEED,

@@ -1,6 +1,6 @@
 package tickbus.demo.peeler;
 
-/** Which commands an axis accepts. */
+/** The commands that an axis accepts. */
 public enum AxisKind {
     /** To a position; by joystick. */
     POSITION,

@@ -8,7 +8,7 @@ import java.util.List;
  * <p>Positions count outwards from the lathe's centre line, from the middle of the block, or from the ground.
  */
 public enum AxisName {
-    /** One stroke up and down takes every block one step on. */
+    /** One stroke up and down moves every block one step on. */
     STEP_FEEDER("step feeder", AxisKind.POSITION, 0, 400, 0),
     /** 650: beside the step feeder; 0: under the centring spindles. */
     LINEAR_FEEDER("linear feeder", AxisKind.POSITION, 0, 650, 650),
@@ -40,21 +40,21 @@ public enum AxisName {
     /** In revolutions. */
     SPINDLE_ROTATION("spindle rotation", AxisKind.SPEED, Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, 0),
     /**
-     * Edge to the axis of the block; tracking, it advances per revolution by one thickness of veneer, which is its
+     * Edge to the axis of the block. Tracking, the knife advances per revolution by one thickness of veneer, which is its
      * torque.
      */
     KNIFE_CARRIAGE("knife carriage", AxisKind.TRACKING, 0, 400, 300),
     /** In degrees; tracking, a function of the knife's distance, plus an offset. */
     PITCH_ANGLE("pitch angle", AxisKind.TRACKING, -5, 10, 0),
-    /** Its gap to the knife. */
+    /** Gap to the knife. */
     NOSEBAR("nosebar", AxisKind.POSITION, 0, 20, 20),
-    /** Tracking, it keeps the knife's distance, plus an offset. */
+    /** Tracking, the roll keeps the knife's distance, plus an offset. */
     TOP_ROLL("top roll", AxisKind.TRACKING, 0, 400, 300),
     /** As for the top roll. */
     BOTTOM_ROLL_LEFT("bottom roll left", AxisKind.TRACKING, 0, 400, 300),
     /** As for the top roll. */
     BOTTOM_ROLL_RIGHT("bottom roll right", AxisKind.TRACKING, 0, 400, 300),
-    /** In revolutions; tracking, the speed of the block's surface, increased by its torque in percent. */
+    /** In revolutions; tracking, the speed of the block's surface, increased by the torque in percent. */
     ROLL_ROTATION("roll rotation", AxisKind.TRACKING, Double.NEGATIVE_INFINITY, Double.POSITIVE_INFINITY, 0),
     /** When open, veneer falls onto the veneer belt. */
     VENEER_GATE("veneer gate", AxisKind.TORQUE, 0, 100, 0),
@@ -90,34 +90,34 @@ public enum AxisName {
     }
 
     /**
-     * Which commands it accepts.
+     * The commands that the axis accepts.
      *
-     * @return its kind
+     * @return the axis's kind
      */
     public AxisKind kind() {
         return kind;
     }
 
     /**
-     * Its lower end position.
+     * The axis's lower end position.
      *
-     * @return in the axis's unit, negative infinity if it turns without end
+     * @return in the axis's unit, negative infinity if the axis turns without end
      */
     public double low() {
         return low;
     }
 
     /**
-     * Its upper end position.
+     * The axis's upper end position.
      *
-     * @return in the axis's unit, infinity if it turns without end
+     * @return in the axis's unit, infinity if the axis turns without end
      */
     public double high() {
         return high;
     }
 
     /**
-     * Its position when the simulation starts.
+     * The axis's position when the simulation starts.
      *
      * @return in the axis's unit
      */
@@ -126,9 +126,9 @@ public enum AxisName {
     }
 
     /**
-     * Whether the charger's PLC moves it.
+     * Returns whether the charger's PLC moves the axis.
      *
-     * @return false if the lathe's does
+     * @return false if the lathe's PLC does
      */
     public boolean ofCharger() {
         return compareTo(SPINDLE_LEFT) < 0;

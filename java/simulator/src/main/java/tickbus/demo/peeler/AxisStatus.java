@@ -4,7 +4,7 @@ package tickbus.demo.peeler;
 enum AxisStatus {
     /** Enabled, and not failed. */
     READY,
-    /** Its speed is not 0. */
+    /** The speed is not 0. */
     MOVING,
     /** The same as the bit of that name. */
     IN_POSITION,
@@ -18,7 +18,7 @@ enum AxisStatus {
     TRACKING,
     /** There is pressure for closing or opening. */
     PRESSURE,
-    /** There is an obstacle in its way. */
+    /** There is an obstacle in the axis's way. */
     MET,
     /** The last command was not carried out, or not completely: the error word says why. */
     REFUSED;

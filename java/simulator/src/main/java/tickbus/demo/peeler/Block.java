@@ -22,7 +22,7 @@ final class Block {
     private final String shape;
     private final Profile left;
     private final Profile right;
-    /** Where the spindles hold it, relative to its own axis at each end; all 0 before it was ever held. */
+    /** Where the spindles hold the block, relative to its own axis at each end; all 0 before it was ever held. */
     private double leftX;
     private double leftY;
     private double rightX;
@@ -35,12 +35,12 @@ final class Block {
         this.right = right;
     }
 
-    /** Its number, from 1. */
+    /** The block's number, from 1. */
     int number() {
         return number;
     }
 
-    /** Its shape, for people. */
+    /** The block's shape, for people. */
     String shape() {
         return shape;
     }
@@ -54,7 +54,7 @@ final class Block {
         return (end(ofLeft).reach(DOWN_RIGHT) + end(ofLeft).reach(DOWN_LEFT)) / ROOT;
     }
 
-    /** How far an end's axis then is to the right of the middle of the V. */
+    /** How far an end's axis is then to the right of the middle of the V. */
     double lyingAside(boolean ofLeft) {
         return (end(ofLeft).reach(DOWN_LEFT) - end(ofLeft).reach(DOWN_RIGHT)) / ROOT;
     }
@@ -64,7 +64,7 @@ final class Block {
         return lyingHeight(ofLeft) + end(ofLeft).reach(UP);
     }
 
-    /** Sets where the tips hold it, relative to each end's axis, in millimetres to the right and upwards. */
+    /** Sets where the tips hold the block, relative to each end's axis, in millimetres to the right and upwards. */
     void holdAt(boolean ofLeft, double x, double y) {
         if (ofLeft) {
             leftX = x;
@@ -75,17 +75,17 @@ final class Block {
         }
     }
 
-    /** Shifts the place where it is held. */
+    /** Shifts the place where the tips hold the block. */
     void shift(boolean ofLeft, double x, double y) {
         holdAt(ofLeft, (ofLeft ? leftX : rightX) + x, (ofLeft ? leftY : rightY) + y);
     }
 
-    /** How far off its axis an end is held, in millimetres. */
+    /** The distance between an end's axis and the point where it is held, in millimetres. */
     double eccentricity(boolean ofLeft) {
         return ofLeft ? Math.hypot(leftX, leftY) : Math.hypot(rightX, rightY);
     }
 
-    /** Whether a tip at this place, relative to an end's axis, meets wood. */
+    /** True if a tip at this place, relative to an end's axis, meets wood. */
     boolean isHitAt(boolean ofLeft, double x, double y) {
         double half = Math.hypot(x, y);
         int sector = (int) Math.floorMod(Math.round(Math.toDegrees(Math.atan2(y, x)) * Profile.SECTORS / 360),
@@ -93,7 +93,7 @@ final class Block {
         return half < end(ofLeft).radius(sector) / 2;
     }
 
-    /** Its slices from left to right, around the line between the tips. */
+    /** The block's slices from left to right, around the line between the tips. */
     List<Profile> slices(int count) {
         return IntStream.range(0, count).mapToObj(i -> {
             double part = (i + 0.5) / count;
@@ -102,7 +102,7 @@ final class Block {
         }).toList();
     }
 
-    /** Its volume in cubic millimetres, computed with this many slices around its own axis. */
+    /** The volume in cubic millimetres, computed with this many slices around the block's own axis. */
     double volume(int count) {
         double sum = 0;
         for (int i = 0; i < count; i++) {

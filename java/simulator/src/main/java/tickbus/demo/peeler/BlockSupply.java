@@ -1,6 +1,6 @@
 package tickbus.demo.peeler;
 
-/** Blocks as they come from the cross-cut saw: four shapes in rotation. */
+/** Blocks from the cross-cut saw: four shapes in rotation. */
 final class BlockSupply {
     private int made;
     private final int most;

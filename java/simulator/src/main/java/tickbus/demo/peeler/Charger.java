@@ -4,13 +4,13 @@ package tickbus.demo.peeler;
  * The charger: a step feeder with four steps, a linear feeder with a V, centring spindles that move sideways and up,
  * and the transfer arm with its clamps.
  *
- * <p>It follows its axes, which the PLC controls. Letting a block fall is a mishap.
+ * <p>The charger follows its axes, which the PLC controls. Letting a block fall is a mishap.
  */
 final class Charger {
     /** Steps of the step feeder. */
     static final int STEPS = 4;
 
-    /** Sensors: the steps, the linear feeder, the centring spindles, the clamps, the gate; the others are spare. */
+    /** Sensors: the steps, the linear feeder, the centring spindles, the clamps, the gate; the remaining ones are spare. */
     static final int SENSORS = 16;
 
     /** Height of the pre-centring sensors above the bottom of the V, in millimetres. */
@@ -30,7 +30,7 @@ final class Charger {
     /** How far tips and jaws bite into the wood. */
     private static final double BITE = 5;
 
-    /** How long a block takes from the gate to the first step. */
+    /** The time that a block takes from the gate to the first step. */
     private static final long ROLL_NANOS = 300_000_000L;
 
     private final Axes axes;
@@ -67,7 +67,7 @@ final class Charger {
         return clamped;
     }
 
-    /** The block in the clamps while the arm stands between the lathe's spindles, else null. */
+    /** The block in the clamps while the arm is between the lathe's spindles, else null. */
     Block presented() {
         return axis(AxisName.TRANSFER_ARM).standsAt(0) ? clamped : null;
     }
@@ -87,7 +87,7 @@ final class Charger {
         return steps[step];
     }
 
-    /** Whether a sensor, counted from 0, detects a block. */
+    /** True if a sensor, counted from 0, detects a block. */
     boolean sensor(int index) {
         return switch (index) {
             case 0, 1, 2, 3 -> steps[index] != null;
@@ -105,7 +105,7 @@ final class Charger {
         return SENSOR_HEIGHT - (below ? fed.lyingTop(left) : 0);
     }
 
-    /** Sets obstacles for the axes; before they move. */
+    /** Sets obstacles for the axes; call it before they move. */
     void obstruct() {
         boolean offered = fed != null && axis(AxisName.LINEAR_FEEDER).standsAt(0);
         axis(AxisName.CENTRING_SPINDLE_LEFT).meets(centred != null || offered && tipHits(true) ? Block.HALF : 0);
@@ -115,7 +115,7 @@ final class Charger {
         axis(AxisName.TRANSFER_CLAMP_RIGHT).meets(jaw);
     }
 
-    /** Moves the blocks; after the axes have moved. */
+    /** Moves the blocks; call it after the axes have moved. */
     void step(long nanos, Block onLathe) {
         gate(nanos);
         stroke();
@@ -162,7 +162,7 @@ final class Charger {
         return x.position() - OVER_FEEDER - fed.lyingAside(left);
     }
 
-    /** The vertical position of a tip, likewise. */
+    /** The vertical position of a tip, relative to the same axis. */
     private double tipY(boolean left) {
         Axis y = axis(left ? AxisName.CENTRING_Y_LEFT : AxisName.CENTRING_Y_RIGHT);
         return y.position() - fed.lyingHeight(left);
@@ -188,7 +188,7 @@ final class Charger {
         }
     }
 
-    /** Whether at least one of a pair has released. */
+    /** True if at least one of a pair has released. */
     static boolean away(Axis left, Axis right) {
         return Math.max(left.position(), right.position()) > Block.HALF + BITE;
     }

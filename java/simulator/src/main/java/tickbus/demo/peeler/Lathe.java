@@ -25,7 +25,7 @@ final class Lathe {
     /** Diameter of the rolls, in millimetres. */
     private static final double ROLL_DIAMETER = 120;
 
-    /** The knife's pitch angle in degrees at the axis; it rises with the distance, per millimetre. */
+    /** The knife's pitch angle in degrees at the axis, and its increase per millimetre of distance. */
     private static final double PITCH_AT_AXIS = -1;
 
     private static final double PITCH_SLOPE = 0.02;
@@ -68,7 +68,7 @@ final class Lathe {
         return surfaceSpeed;
     }
 
-    /** Sets obstacles for the axes; before they move. */
+    /** Sets obstacles for the axes; call it before they move. */
     void obstruct(Block presented) {
         double tip = held != null || presented != null ? Block.HALF : 0;
         axis(AxisName.SPINDLE_LEFT).meets(tip);
@@ -77,7 +77,7 @@ final class Lathe {
         knifeBefore = axis(AxisName.KNIFE_CARRIAGE).position();
     }
 
-    /** Turns and cuts; after the axes have moved. */
+    /** Turns and cuts; call it after the axes have moved. */
     void step(long nanos, Block presented, Block clamped) {
         double revolutions = axis(AxisName.SPINDLE_ROTATION).position() - rotationBefore;
         track(revolutions, nanos);
@@ -176,7 +176,7 @@ final class Lathe {
         }
     }
 
-    /** One mishap per block is reported; the others follow from it. */
+    /** Reports one mishap per block; later ones are its consequences. */
     private void scold(String what) {
         if (!scolded) {
             scolded = true;

@@ -10,8 +10,9 @@ import tickbus.simulator.text.Svg;
  * Draws the current state of the lathe as a self-contained SVG, seen from its right end: the cross-section of the
  * block at its middle, the knife and the veneer, the rolls, and a caption.
  *
- * <p>What signals tell is bound to them, so that the same picture lives on the live page: {@code java/simulator/lathe.svg} is
- * it before the first block. There the block is round, since no signal tells its shape.
+ * <p>Values that signals carry are bound to them, so that the same picture moves on the live page: {@code
+ * java/simulator/lathe.svg} is the picture before the first block. There the block is round, since no signal carries its
+ * shape.
  */
 public final class LathePicture {
     private static final int WIDTH = 960;
@@ -58,7 +59,7 @@ public final class LathePicture {
     }
 
     /**
-     * Draws it to a file.
+     * Draws the lathe to a file.
      *
      * @param line the line, between two steps
      * @param file the file; replaced if it exists
@@ -80,7 +81,7 @@ public final class LathePicture {
         }
         StringBuilder path = new StringBuilder();
         for (int i = 0; i < Profile.SECTORS; i++) {
-            // The knife is at the right; what it cuts next is above it.
+            // The knife is at the right; the part that it cuts next is above it.
             double angle = i * SECTOR;
             double radius = held.radius(i) * SCALE;
             path.append(String.format(Locale.ROOT, "%s%.1f %.1f", i == 0 ? "M" : "L", X + radius * Math.cos(angle),
@@ -99,7 +100,7 @@ public final class LathePicture {
         svg.stroke(X - 8, Y, X + 8, Y, "stroke=\"#22313f\"").stroke(X, Y - 8, X, Y + 8, "stroke=\"#22313f\"");
     }
 
-    /** The block as the signals tell it: it turns with the spindles, and is as thick as the knife lets it be. */
+    /** The block by its signals: it turns with the spindles, and reaches to the knife. */
     private static void liveBlock(Svg svg) {
         String turn = Svg.bound("turn", "spindle rotation.ActualPosition: 360") + Svg.bound("pivot", "%.0f %.0f", X, Y);
         String size = Svg.bound("scale", "knife carriage.ActualPosition: 0..%.0f -> 0..1", UNCUT);

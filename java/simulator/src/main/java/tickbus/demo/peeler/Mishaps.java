@@ -4,9 +4,9 @@ import java.util.ArrayList;
 import java.util.Collections;
 import java.util.List;
 
-/** Things that happened on the line and must not, each with its time. */
+/** Events on the line that must not happen, each with its time. */
 final class Mishaps {
-    /** Further ones say nothing new. */
+    /** Further mishaps add no information. */
     private static final int MOST = 100;
 
     private final List<String> texts = new ArrayList<>();

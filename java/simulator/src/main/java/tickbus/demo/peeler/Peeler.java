@@ -33,8 +33,8 @@ public final class Peeler implements Machine {
     /**
      * A line.
      *
-     * @param blocks how many blocks there are; after the last one the charger runs empty
-     * @param onSteps how many of them are on the step feeder at the beginning, at most 4
+     * @param blocks the number of blocks; after the last one the charger runs empty
+     * @param onSteps the number of them on the step feeder at the beginning, at most 4
      */
     public Peeler(int blocks, int onSteps) {
         axes = new Axes();
@@ -103,19 +103,19 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Sets or clears a fault of an axis: with a fault it is not healthy, and does not move.
+     * Sets or clears a fault of an axis: with a fault the axis is not healthy, and does not move.
      *
-     * @param name which one
-     * @param failed whether it has a fault
+     * @param name the axis
+     * @param failed true for a fault
      */
     public void fail(AxisName name, boolean failed) {
         axes.get(name).fail(failed);
     }
 
     /**
-     * Things that happened and must not.
+     * Events that must not happen.
      *
-     * @return texts in the order in which it happened; empty in a good run
+     * @return texts in the order of the events; empty in a good run
      */
     public List<String> mishaps() {
         return mishaps.texts();
@@ -124,7 +124,7 @@ public final class Peeler implements Machine {
     /**
      * The position of an axis.
      *
-     * @param name which one
+     * @param name the axis
      * @return in the axis's unit
      */
     public double position(AxisName name) {
@@ -134,7 +134,7 @@ public final class Peeler implements Machine {
     /**
      * The speed of an axis, with its direction as sign.
      *
-     * @param name which one
+     * @param name the axis
      * @return in the axis's unit per second
      */
     public double speed(AxisName name) {
@@ -144,7 +144,7 @@ public final class Peeler implements Machine {
     /**
      * The torque of an axis's last command.
      *
-     * @param name which one
+     * @param name the axis
      * @return percent; of the knife carriage, the thickness of the veneer in millimetres
      */
     public double torque(AxisName name) {
@@ -154,7 +154,7 @@ public final class Peeler implements Machine {
     /**
      * The number of commands that an axis has started.
      *
-     * @param name which one
+     * @param name the axis
      * @return counts from 0
      */
     public int commands(AxisName name) {
@@ -165,7 +165,7 @@ public final class Peeler implements Machine {
      * The block in a place.
      *
      * @param place the place
-     * @return its number from 1 on; 0 if the place is empty
+     * @return the block's number from 1 on; 0 if the place is empty
      */
     public int blockAt(Place place) {
         Block block = block(place);
@@ -194,9 +194,9 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * How far off its axis the block in the lathe is held.
+     * How far off its axis the lathe holds the block.
      *
-     * @return millimetres, at the end where it is more; 0 if there is no block
+     * @return millimetres, at the worse end; 0 without a block
      */
     public double eccentricity() {
         Block block = lathe.block();
@@ -204,9 +204,9 @@ public final class Peeler implements Machine {
     }
 
     /**
-     * Whether the veneer from the block in the lathe is a continuous ribbon.
+     * Returns whether the veneer from the block in the lathe is a continuous ribbon.
      *
-     * @return false if there is no block
+     * @return true for a continuous ribbon; false without a block
      */
     public boolean round() {
         return lathe.held() != null && lathe.held().round();

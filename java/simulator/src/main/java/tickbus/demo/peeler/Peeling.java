@@ -3,11 +3,11 @@ package tickbus.demo.peeler;
 import java.util.List;
 
 /**
- * A block between the lathe's spindles, and what the knife cuts off it as it turns.
+ * A block between the lathe's spindles, and the veneer that the knife cuts off as it turns.
  *
- * <p>It consists of slices along its length and sectors around it: as a sector passes the knife, all wood beyond the
- * knife's edge is cut off. The veneer is a continuous ribbon only after the knife has been in the wood over the full
- * length for a full turn; before that it is torn, or comes in short pieces.
+ * <p>The block consists of slices along its length and sectors around it: as a sector passes the knife, all wood beyond the
+ * knife's edge is cut off. The veneer is a continuous ribbon only after the knife has been in the wood over the full length
+ * for a full turn; before that it is torn, or comes in short pieces.
  */
 final class Peeling {
     /** Slices along the block. */
@@ -84,7 +84,7 @@ final class Peeling {
         return most;
     }
 
-    /** Whether the veneer is a continuous ribbon. */
+    /** True if the veneer is a continuous ribbon. */
     boolean round() {
         return contact >= Profile.SECTORS;
     }
@@ -102,11 +102,11 @@ final class Peeling {
     /**
      * Turns the block.
      *
-     * @param revolutions how far, towards the knife; the other way nothing is cut
+     * @param revolutions the angle, towards the knife; in the other direction nothing is cut
      * @param before the knife's distance from the axis at the beginning, in millimetres
      * @param after the distance at the end
      * @param thickness the nominal thickness of the veneer
-     * @param belt whether the veneer falls onto the veneer belt, rather than into the chipper
+     * @param belt true if the veneer falls onto the veneer belt, false if into the chipper
      */
     void turn(double revolutions, double before, double after, double thickness, boolean belt) {
         thickest = 0;

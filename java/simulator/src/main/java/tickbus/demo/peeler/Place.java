@@ -1,6 +1,6 @@
 package tickbus.demo.peeler;
 
-/** Where a block can be, in the order in which it gets there. */
+/** The places of a block, in the order in which it reaches them. */
 public enum Place {
     /** The first step of the step feeder. */
     STEP_1,

@@ -74,7 +74,8 @@ final class Profile {
     }
 
     /**
-     * The extent of the profile in a direction, in degrees: where a straight edge perpendicular to it would touch.
+     * The extent of the profile in a direction, in degrees: where a straight edge perpendicular to that direction would
+     * touch.
      */
     double reach(double direction) {
         double towards = Math.toRadians(direction);
@@ -89,7 +90,7 @@ final class Profile {
      * The same cross-section around another axis, which must be inside it.
      *
      * @param x of the new axis relative to the current one, in millimetres
-     * @param y likewise, upwards
+     * @param y of the new axis, upwards
      */
     Profile around(double x, double y) {
         double[] angle = new double[SECTORS + 1];

@@ -85,7 +85,7 @@ public final class Wood {
     }
 
     /**
-     * Everything that was ever between the lathe's spindles.
+     * All wood that was ever between the lathe's spindles.
      *
      * @return cubic metres
      */
@@ -94,7 +94,7 @@ public final class Wood {
     }
 
     /**
-     * The part of it that is continuous ribbon on the veneer belt.
+     * The part of that wood that is continuous ribbon on the veneer belt.
      *
      * @return cubic metres
      */
@@ -103,7 +103,7 @@ public final class Wood {
     }
 
     /**
-     * The part of it that is torn or short pieces on the veneer belt.
+     * The part of that wood that is torn or short pieces on the veneer belt.
      *
      * @return cubic metres
      */
@@ -112,7 +112,7 @@ public final class Wood {
     }
 
     /**
-     * The part of it that went into the chipper.
+     * The part of that wood that went into the chipper.
      *
      * @return cubic metres
      */
@@ -121,7 +121,7 @@ public final class Wood {
     }
 
     /**
-     * The part of it that is cores.
+     * The part of that wood that is cores.
      *
      * @return cubic metres
      */
@@ -130,7 +130,7 @@ public final class Wood {
     }
 
     /**
-     * The part of it that is blocks that fell before they were peeled.
+     * The part of that wood that fell in blocks before they were peeled.
      *
      * @return cubic metres
      */

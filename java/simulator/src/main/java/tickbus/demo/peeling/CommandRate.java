@@ -52,7 +52,7 @@ final class CommandRate {
         return Arrays.stream(seen).sum();
     }
 
-    /** Commands per second of an axis, from the first command to any axis on. */
+    /** Commands per second of an axis, counted from the first command to any axis. */
     double mean(AxisName axis) {
         return seconds() == 0 ? 0 : seen[axis.ordinal()] / seconds();
     }

@@ -8,7 +8,7 @@ import tickbus.demo.DemoFailure;
  * The times between records at their destination, in one direction of one link.
  *
  * @param count the number of intervals
- * @param mean in milliseconds, like the others
+ * @param mean in milliseconds, like {@code max} and {@code min}
  * @param max the longest
  * @param min the shortest
  * @param variance in square milliseconds
@@ -48,7 +48,7 @@ record Intervals(long count, double mean, double max, double min, double varianc
     }
 
     /**
-     * Reads them from the statistics of the receiving end.
+     * Reads the intervals from the statistics of the receiving end.
      *
      * @throws DemoFailure if nothing was measured
      */

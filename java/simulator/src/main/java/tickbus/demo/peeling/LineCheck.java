@@ -5,7 +5,7 @@ import tickbus.demo.DemoFailure;
 import tickbus.demo.peeler.Peeler;
 import tickbus.demo.peeler.Wood;
 
-/** What must hold at the end of a good run. */
+/** The conditions at the end of a good run. */
 final class LineCheck {
     /** The rounding error permitted in the balance of wood, in cubic metres. */
     private static final double CRUMB = 1e-9;
@@ -22,7 +22,7 @@ final class LineCheck {
     /**
      * Checks a run.
      *
-     * @throws DemoFailure with what does not hold
+     * @throws DemoFailure with the violated condition
      */
     static void check(LineWatcher watcher, int logs) {
         Peeler line = watcher.line();

@@ -68,7 +68,7 @@ final class LineWatcher {
         return silentNanos;
     }
 
-    /** Checks everything once, after a tick. Fails if something happened on the line that must not happen. */
+    /** Checks everything once, after a tick. Fails if an event on the line must not happen. */
     void look() {
         long now = simulator.simulationNanos();
         if (simulator.ticks() % TICKS_PER_LOOK_AT_LINKS == 1) {

@@ -29,21 +29,21 @@ import tickbus.simulator.TimeSource;
 import tickbus.simulator.text.Durations;
 
 /**
- * The demo's command line; see {@code --help} for what it takes.
+ * The demo's command line; {@code --help} describes it.
  *
- * <p>Its last line on standard output is the verdict, {@code demo-peeler: ok …} or {@code demo-peeler: failed reason=…}.
+ * <p>The last line on standard output is the verdict, {@code demo-peeler: ok …} or {@code demo-peeler: failed reason=…}.
  * Exit codes: 0 ok, 1 failed, 2 the command line was wrong, 130 interrupted.
  */
 public final class PeelingDemo {
     private static final Verdict VERDICT = new Verdict("demo-peeler");
 
-    /** If the demo failed while the machine was stalled, that proves nothing, and it is started again. */
+    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
     private static final int ATTEMPTS = 5;
 
-    /** The position of the knife at which the picture of a block that is not round shows most. */
+    /** The position of the knife at which the picture of a block that is not round is most instructive. */
     private static final double PICTURE_MM = 138;
 
-    /** Need not be written: the driver acknowledges by itself, and without a jerk there are no S-curves. */
+    /** Need not be written: the driver acknowledges automatically, and without a jerk there are no S-curves. */
     private static final List<String> LEFT_OUT = List.of(".Acknowledge", ".Jerk");
 
     /** How often the PLCs are checked. */
@@ -82,8 +82,8 @@ public final class PeelingDemo {
      * Runs the demo.
      *
      * @param args the command line
-     * @param out gets what happens and, last, the verdict
-     * @param err gets complaints about the command line, and what unexpected exceptions say
+     * @param out gets the events and, last, the verdict
+     * @param err gets errors in the command line, and messages of unexpected exceptions
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
@@ -125,7 +125,7 @@ public final class PeelingDemo {
         }
     }
 
-    /** Everything from opening the drivers to writing the report. */
+    /** Runs everything from opening the drivers to writing the report. */
     private String play(ShutdownGuard guard, PrintStream err) {
         String verdict;
         try (Simulator simulator = new Simulator(DeviceDriverFolder.scan(options.drivers()).open(), line,
@@ -177,7 +177,7 @@ public final class PeelingDemo {
                 rate.look(simulator.simulationNanos());
                 watcher.look();
                 lookAtLinks(plcs, guard);
-                // With enough peeled, Ctrl-C ends it, which may reach the PLCs first.
+                // After enough blocks, Ctrl-C ends the demo, and may reach the PLCs first.
                 if (!peeled && simulator.ticks() % TICKS_PER_LOOK_AT_PLCS == 0) {
                     plcs.listen(simulator.simulationNanos(), timeline);
                     Verdict.unlessInterrupted(guard, plcs::check);
@@ -198,8 +198,7 @@ public final class PeelingDemo {
     }
 
     /**
-     * If a link breaks because its PLC has died, that is reported; if because the computer stalled, it does not
-     * count.
+     * Reports a link that broke because its PLC has died; ignores one that broke because the computer stalled.
      */
     private void lookAtLinks(Plcs plcs, ShutdownGuard guard) {
         if (watcher.broken() == null) {
@@ -212,7 +211,7 @@ public final class PeelingDemo {
         });
     }
 
-    /** A picture of a block that is being rounded, once. */
+    /** Draws a block that is being rounded, once. */
     private void picture() {
         boolean tells = line.blockAt(Place.LATHE) > 1 && !line.round()
                 && line.position(AxisName.KNIFE_CARRIAGE) < PICTURE_MM;
@@ -261,7 +260,7 @@ public final class PeelingDemo {
         return options.report().resolveSibling(name);
     }
 
-    /** An HTML page for each driver's recording; returns what went wrong, or null. */
+    /** Makes an HTML page for each driver's recording; returns the error, or null. */
     private String pages() {
         if (options.recordings() == null) {
             return null;

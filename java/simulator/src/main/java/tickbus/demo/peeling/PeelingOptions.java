@@ -9,13 +9,13 @@ import tickbus.simulator.Arguments;
  *
  * @param drivers the DeviceDriver folder with charger.cfg and lathe.cfg
  * @param control the control table
- * @param report where the report goes
+ * @param report the report's file
  * @param plc the tickbus executable
- * @param recordings the folder in which each driver records into {@code <name of its .cfg>.vcd}, null if they do not
+ * @param recordings the folder in which each driver records into {@code <name of its .cfg>.vcd}, null for no recordings
  * @param stepNanos simulation step size
  * @param logs blocks to peel
  * @param timeLimitNanos longest simulation time
- * @param page whether it peels on until Ctrl-C, for the live page
+ * @param page true if the demo peels until Ctrl-C, for the live page
  */
 record PeelingOptions(Path drivers, Path control, Path report, Path plc, Path recordings, long stepNanos, int logs,
         long timeLimitNanos, boolean page) {

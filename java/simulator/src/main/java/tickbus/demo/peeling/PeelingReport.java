@@ -29,9 +29,9 @@ final class PeelingReport {
      *
      * @param options the options of the demo
      * @param verdict the demo's last line
-     * @param timeline what happened
-     * @param watcher what ran, null if it did not start
-     * @param tables {@link #tables}, empty if it did not start
+     * @param timeline the events
+     * @param watcher the run, null if it did not start
+     * @param tables {@link #tables}, empty if the run did not start
      * @param rate commands of the axes
      */
     static String write(PeelingOptions options, String verdict, Timeline timeline, LineWatcher watcher, String tables,
@@ -144,7 +144,7 @@ final class PeelingReport {
             driver.statistics().forEach(table::row);
             text.append(table.text("  "));
         } catch (RuntimeException e) {
-            // A driver that has failed or is closed may have none; the rest of the report is still useful.
+            // A driver that has failed or is closed can lack statistics; the rest of the report is still useful.
             text.append("  none: ").append(e.getMessage()).append('\n');
         }
     }

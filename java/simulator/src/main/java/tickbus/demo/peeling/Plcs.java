@@ -19,7 +19,7 @@ final class Plcs implements AutoCloseable {
 
     private final Map<String, PlcProcess> processes = new LinkedHashMap<>();
 
-    /** Starts them. */
+    /** Starts the PLCs. */
     Plcs(PeelingOptions options, List<ControlInterfaceDeviceDriver> drivers) {
         Map<Integer, Path> files = DeviceDriverFolder.scan(options.drivers()).configurations();
         try {
@@ -38,16 +38,16 @@ final class Plcs implements AutoCloseable {
         }
     }
 
-    /** Collects their output for people. */
+    /** Collects the PLCs' output for people. */
     void listen(long now, Timeline timeline) {
         processes.forEach((program, process) ->
                 process.news().forEach(line -> timeline.add(now, program, line.replaceFirst("^plc: ", ""))));
     }
 
     /**
-     * Fails if one has ended.
+     * Fails if a PLC has ended.
      *
-     * @throws DemoFailure with its name and last output
+     * @throws DemoFailure with the PLC's name and last output
      */
     void check() {
         processes.forEach((program, process) -> {
@@ -59,7 +59,7 @@ final class Plcs implements AutoCloseable {
         });
     }
 
-    /** The statistics that a program printed last. */
+    /** The last statistics that a program printed. */
     Map<String, String> statistics(String program) {
         return processes.get(program).statistics();
     }

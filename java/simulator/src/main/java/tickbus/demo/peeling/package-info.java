@@ -1,5 +1,5 @@
 /**
- * The demo of the peeling line: two PLCs peel some blocks over two links; at the end the times between records are
- * compared with those measured in 2018.
+ * The demo of the peeling line: two PLCs peel some blocks over two links. At the end the times between records are compared
+ * with those measured in 2018.
  */
 package tickbus.demo.peeling;

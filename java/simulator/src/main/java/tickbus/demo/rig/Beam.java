@@ -3,8 +3,8 @@ package tickbus.demo.rig;
 /**
  * A package sensor: a light beam across a lift's path, which a passing bottle blocks.
  *
- * <p>It also measures how long it has been blocked while the lift is commanded to run; a passing bottle takes a small
- * part of the time that means a jam.
+ * <p>The sensor also measures how long it has been blocked while the lift is commanded to run; a passing bottle blocks it
+ * for a small part of the time that means a jam.
  */
 final class Beam {
     /** Blocked for longer than this while the lift runs is a jam. */
@@ -32,7 +32,7 @@ final class Beam {
     }
 
     /**
-     * Checks for a bottle on the path.
+     * Checks whether the bottle is in the beam.
      *
      * @param bottle the bottle, or null
      * @param running the lift is commanded to run

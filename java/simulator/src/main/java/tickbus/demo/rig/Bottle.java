@@ -3,13 +3,13 @@ package tickbus.demo.rig;
 /**
  * A bottle in the rig.
  *
- * <p>The rig reuses a fixed set of these, so that motion allocates nothing: read a bottle between two steps and do
- * not keep it.
+ * <p>The rig reuses a fixed set of bottles, so that motion allocates nothing: read a bottle between two steps and do not
+ * keep it.
  */
 public final class Bottle {
-    /** What carries a bottle. */
+    /** The carriers of a bottle. */
     public enum Place {
-        /** Nothing: the bottle is not in the rig. */
+        /** No carrier: the bottle is not in the rig. */
         AWAY,
         /** A pocket of index wheel 1. */
         POCKET,
@@ -35,7 +35,7 @@ public final class Bottle {
     Bottle() {}
 
     /**
-     * Its number.
+     * The bottle's number.
      *
      * @return 1 for the first bottle ever fed
      */
@@ -44,7 +44,7 @@ public final class Bottle {
     }
 
     /**
-     * What carries it.
+     * The bottle's carrier.
      *
      * @return the place
      */
@@ -53,7 +53,7 @@ public final class Bottle {
     }
 
     /**
-     * Which pocket (0 to 3) or sleeve (0 or 1) carries it.
+     * The number of the pocket (0 to 3) or sleeve (0 or 1) that carries the bottle.
      *
      * @return the number; 0 in other places
      */
@@ -62,7 +62,7 @@ public final class Bottle {
     }
 
     /**
-     * Height of its base above the pockets' floor.
+     * Height of the bottle's base above the pockets' floor.
      *
      * @return millimetres
      */
@@ -71,9 +71,9 @@ public final class Bottle {
     }
 
     /**
-     * Whether it has been at the lamp.
+     * Returns whether the bottle has been at the lamp.
      *
-     * @return true once it has
+     * @return true once it has been there
      */
     public boolean treated() {
         return treated;
@@ -100,7 +100,7 @@ public final class Bottle {
         treated = true;
     }
 
-    /** It is in a pocket again; returns whether it was treated, the first time only. */
+    /** The bottle is in a pocket again; returns whether it was treated, the first time only. */
     boolean comesBack() {
         boolean first = treated && !back;
         back |= first;

@@ -4,7 +4,7 @@ package tickbus.demo.rig;
 public enum Button {
     /** Starts production, and homes a parked rig. */
     START,
-    /** Ends production after the present cycle. */
+    /** Ends production after the current cycle. */
     STOP,
     /** Lets the control recover from a fault. */
     RESET

@@ -85,7 +85,7 @@ final class Cell {
         return wheel1.moving() || wheel2.moving() || path1.drive().moving() || path2.drive().moving();
     }
 
-    /** Whether a run bit is on that has no effect, because a fault came after it rose. */
+    /** True if a run bit is on without effect, because a fault came after it rose. */
     boolean ignores(Inputs in) {
         return in.high(Inputs.LA1_RUN) && !run1 || in.high(Inputs.LA2_RUN) && !run2;
     }

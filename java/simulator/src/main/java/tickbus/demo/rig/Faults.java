@@ -3,7 +3,7 @@ package tickbus.demo.rig;
 import java.util.ArrayList;
 import java.util.List;
 
-/** Why Not OK is on, latched until acknowledged. */
+/** The causes of Not OK, latched until acknowledged. */
 final class Faults {
     /** The kinds of fault that the counters distinguish. */
     enum Kind {

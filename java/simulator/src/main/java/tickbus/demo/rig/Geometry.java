@@ -13,7 +13,7 @@ public final class Geometry {
     /** Height of a bottle. */
     public static final double BOTTLE_HEIGHT = 60.0;
 
-    /** Base of a bottle that stands in a pocket. */
+    /** Base of a bottle in a pocket. */
     public static final double POCKET_FLOOR = 0.0;
 
     /** The big move of either lift. */
@@ -22,7 +22,7 @@ public final class Geometry {
     /** The small move of lift 1, which brings its cup clear of the chamber wheel. */
     public static final double SMALL = 20.0;
 
-    /** Base of a bottle that hangs in a sleeve: lift 1 after a big move, lift 2 at its bottom. */
+    /** Base of a bottle in a sleeve: lift 1 after a big move, lift 2 at its bottom. */
     public static final double SLEEVE_FLOOR = POCKET_FLOOR + BIG;
 
     /** Base of a bottle at the lamp: lift 2 after a big move. */

@@ -58,7 +58,7 @@ final class LiftDrive {
         return referenced;
     }
 
-    /** A move or its final ramp is in progress, or a wedged bottle blocks it. */
+    /** True while a move or its final ramp is in progress, or a wedged bottle blocks the lift. */
     boolean moving() {
         return underWay;
     }
@@ -85,8 +85,8 @@ final class LiftDrive {
     }
 
     /**
-     * The run command fell: brakes where it is. A lift already at the bottom switch sinks the last half millimetre
-     * onto its stop, because a control drops the run command as soon as it sees the switch.
+     * The run command fell: the lift brakes at once. A lift already at the bottom switch sinks the last half millimetre onto
+     * its stop, because a control drops the run command as soon as it sees the switch.
      */
     void stop() {
         if (target == 0 && atBottom()) {

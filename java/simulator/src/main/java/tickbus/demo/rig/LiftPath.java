@@ -3,10 +3,11 @@ package tickbus.demo.rig;
 import java.util.Locale;
 
 /**
- * A lift with its cup, its beam, and the wheels that its path passes: what it grips, carries, hits and drops.
+ * A lift with its cup, its beam, and the wheels that its path passes: the bottles and parts that it grips, carries, hits and
+ * drops.
  *
- * <p>Everything that can go wrong between a lift and a bottle is detected by comparing the cup's previous and current
- * position, so that it is not missed however long the step is.
+ * <p>Faults between a lift and a bottle are detected by comparing the cup's previous and current position, so that none is
+ * missed however long the step is.
  */
 final class LiftPath {
     private final Lift lift;
@@ -99,7 +100,7 @@ final class LiftPath {
         return bottle;
     }
 
-    /** Moves, and handles everything on the way. */
+    /** Moves the lift, and handles everything on the way. */
     void advance(long nanos) {
         double from = cupHeight();
         drive.advance(nanos);
@@ -126,12 +127,12 @@ final class LiftPath {
         }
     }
 
-    /** No part of this lift obstructs the wheel at the bottom of its path. */
+    /** True if no part of this lift obstructs the wheel at the bottom of its path. */
     boolean clearOfLower() {
         return drive.position() <= Geometry.REACH && cup.held() == null;
     }
 
-    /** No part of this lift obstructs the wheel at the top of its path. */
+    /** True if no part of this lift obstructs the wheel at the top of its path. */
     boolean clearOfUpper() {
         return upper == null || top(cupHeight()) <= Geometry.CHAMBER_UNDERSIDE;
     }
@@ -193,7 +194,7 @@ final class LiftPath {
         }
     }
 
-    /** The empty cup reaches a bottle from below: with vacuum it grips it, without it pushes it. */
+    /** The empty cup reaches a bottle from below: with vacuum it grips the bottle, without vacuum it pushes it. */
     private void meetBase(Seat seat, double from, double to) {
         Bottle bottle = seat.bottle();
         if (bottle == null || cup.held() != null) {

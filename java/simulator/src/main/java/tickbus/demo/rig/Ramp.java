@@ -22,19 +22,18 @@ final class Ramp {
         return legs.moving();
     }
 
-    /** Shifts the scale of a resting or endlessly turning drive; a wheel uses it to stay within one turn. */
+    /** Shifts the scale of a resting or endlessly turning drive; a wheel uses this to stay within one turn. */
     void shift(double by) {
         legs.shift(by);
     }
 
     /**
      * Moves to a target and stops there. A moving drive first brakes to rest.
-     * Goes to a target and stops there. A drive under way first brakes to rest.
      *
      * @param target where to stop
      * @param speed greatest speed, above 0
      * @param steepness acceleration and deceleration, above 0
-     * @param brake deceleration from the present speed, above 0
+     * @param brake deceleration from the current speed, above 0
      */
     void moveTo(double target, double speed, double steepness, double brake) {
         legs.begin();
@@ -71,7 +70,7 @@ final class Ramp {
         legs.halt();
     }
 
-    /** Stops instantly at a given position, where something is in the way. */
+    /** Stops instantly at a given position, where there is an obstacle. */
     void haltAt(double place) {
         legs.haltAt(place);
     }

@@ -84,9 +84,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Presses a button of the operator panel; it is held for 200 ms of simulation time.
+     * Presses a button of the operator panel, and holds it for 200 ms of simulation time.
      *
-     * @param button which one
+     * @param button the button
      */
     public void press(Button button) {
         panel.press(button);
@@ -96,7 +96,7 @@ public final class Rig implements Machine {
      * Makes the next bottle that a lift carries through its beam stick there: the lift stops, the bottle blocks the
      * beam, and Not OK rises when that has lasted 1.0 s while the lift is commanded to run.
      *
-     * @param lift which lift
+     * @param lift the lift
      */
     public void jamNext(Lift lift) {
         cell.path(lift).jamNext();
@@ -111,7 +111,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a bottle is stuck in a lift's path.
+     * Returns whether a bottle is stuck in a lift's path.
      *
      * @return true until {@link #clearJam()}
      */
@@ -129,7 +129,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Why Not OK is on.
+     * The causes of Not OK.
      *
      * @return one sentence per cause; empty without a fault
      */
@@ -138,9 +138,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * What has been counted since power-up.
+     * The counts since power-up.
      *
-     * @return the numbers as they are now
+     * @return the current numbers
      */
     public Counters counters() {
         return new Counters(
@@ -187,7 +187,7 @@ public final class Rig implements Machine {
     /**
      * How far a lift is above its bottom.
      *
-     * @param lift which lift
+     * @param lift the lift
      * @return millimetres
      */
     public double position(Lift lift) {
@@ -197,7 +197,7 @@ public final class Rig implements Machine {
     /**
      * The height of a lift's suction cup above the floor of index wheel 1's pockets.
      *
-     * @param lift which lift
+     * @param lift the lift
      * @return millimetres
      */
     public double cupHeight(Lift lift) {
@@ -205,9 +205,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a lift's suction cup has vacuum.
+     * Returns whether a lift's suction cup has vacuum.
      *
-     * @param lift which lift
+     * @param lift the lift
      * @return true while the control commands it
      */
     public boolean vacuum(Lift lift) {
@@ -215,9 +215,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a lift has a valid position.
+     * Returns whether a lift has a valid position.
      *
-     * @param lift which lift
+     * @param lift the lift
      * @return false until a reference run, unless it was at the bottom
      */
     public boolean referenced(Lift lift) {
@@ -225,9 +225,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a bottle blocks a lift's package sensor.
+     * Returns whether a bottle blocks a lift's package sensor.
      *
-     * @param lift which lift
+     * @param lift the lift
      * @return true while the beam is interrupted
      */
     public boolean beamBlocked(Lift lift) {
@@ -235,7 +235,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a wheel's homing sensor is on.
+     * Returns whether a wheel's homing sensor is on.
      *
      * @param wheel 1 or 2
      * @return true near every index position
@@ -245,7 +245,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether the lamp is lit.
+     * Returns whether the lamp is lit.
      *
      * @return the commanded state
      */
@@ -254,7 +254,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether any drive is moving.
+     * Returns whether any drive is moving.
      *
      * @return true also while a wedged bottle blocks a lift
      */
@@ -263,7 +263,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether the rig reports Not OK.
+     * Returns whether the rig reports Not OK.
      *
      * @return true from a fault to its acknowledgement
      */
@@ -272,9 +272,9 @@ public final class Rig implements Machine {
     }
 
     /**
-     * The step of the cycle that the current command word belongs to.
+     * The step of the cycle that has the current command word.
      *
-     * @return 1 to 6, or 0 if it belongs to none
+     * @return 1 to 6, or 0 if no step has it
      */
     public int step() {
         return monitor.step();
@@ -299,7 +299,7 @@ public final class Rig implements Machine {
     }
 
     /**
-     * Whether a lamp of the operator panel is lit.
+     * Returns whether a lamp of the operator panel is lit.
      *
      * @param number 0 Ready, 1 Running, 2 Fault, 3 Parked
      * @return the commanded state
@@ -311,7 +311,7 @@ public final class Rig implements Machine {
     /**
      * The cycles that the control shows on its panel.
      *
-     * @return cycles since its program started
+     * @return cycles since the control's program started
      */
     public long panelCycles() {
         return (long) in.value(Inputs.CYCLES);

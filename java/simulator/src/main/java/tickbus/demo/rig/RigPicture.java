@@ -10,8 +10,8 @@ import tickbus.simulator.text.Svg;
  * Draws the current state of a rig as a self-contained SVG: both wheels seen from a little above, both lifts with
  * their cups, every bottle with its number, the lamp, the sensors, and a caption with phase, step and cycle.
  *
- * <p>What signals tell is bound to them, so that the same picture lives on the live page: {@code java/simulator/rig.svg} is
- * it in the rig's start position.
+ * <p>Values that signals carry are bound to them, so that the same picture moves on the live page: {@code
+ * java/simulator/rig.svg} is the picture of the rig's start position.
  */
 public final class RigPicture {
     private static final int WIDTH = 960;
@@ -134,7 +134,7 @@ public final class RigPicture {
         });
     }
 
-    /** What the phases of the PLC program are called. */
+    /** The names of the PLC program's phases. */
     private static String phases() {
         StringBuilder cases = new StringBuilder("Phase: ");
         for (int phase = 0; phase < PHASES; phase++) {

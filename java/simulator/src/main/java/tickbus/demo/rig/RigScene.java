@@ -26,7 +26,7 @@ final class RigScene {
     private static final double LIFT1 = RADIUS1;
     private static final double LIFT2 = MIDDLE2 + RADIUS2;
     private static final double GROUND = -112;
-    /** Above all that a lift carries. */
+    /** Above everything that a lift carries. */
     private static final double TOP = Geometry.LAMP_FLOOR + Geometry.BOTTLE_HEIGHT + 20;
     private static final double LAMP = Geometry.LAMP_FLOOR + Geometry.BOTTLE_HEIGHT + 26;
 
@@ -42,7 +42,7 @@ final class RigScene {
     private final Svg svg;
     private final List<Bottle> bottles;
 
-    /** Something that hides what is behind it. */
+    /** An object that hides the objects behind it. */
     private record Thing(double near, Runnable paint) {}
 
     RigScene(Rig rig, Svg svg) {
@@ -155,19 +155,19 @@ final class RigScene {
         }));
     }
 
-    /** What is seen of something between two heights: the wheel that it passes hides the rest. */
+    /** Draws the visible part of something between two heights: the wheel that it passes hides the rest. */
     private void within(String id, double across, double from, double to, Runnable inside) {
         svg.line("<clipPath id=\"%s\"><rect x=\"%.1f\" y=\"%.1f\" width=\"120\" height=\"%.1f\"/></clipPath>",
                 id, x(across) - 60, y(0, to), (to - from) * UP);
         svg.group("clip-path=\"url(#" + id + ")\"", inside);
     }
 
-    /** What goes up and down with a lift. */
+    /** Draws something that goes up and down with a lift. */
     private void moved(Lift lift, Runnable inside) {
         svg.group(Svg.bound("y", "%s position: %.2f + %.4f", lift, -UP, rig.position(lift) * UP), inside);
     }
 
-    /** What turns with a wheel, in the wheel's own plane; each command turns it by so many degrees. */
+    /** Draws something that turns with a wheel, in the wheel's own plane; each command turns it by {@code degrees}. */
     private void wheel(double across, double height, String command, int degrees, double angle, Runnable inside) {
         svg.line("<g transform=\"translate(%.1f %.1f) scale(%.2f %.2f)\">", x(across), y(0, height), ACROSS, NEAR);
         svg.group(turn(command, degrees) + String.format(Locale.ROOT, " transform=\"rotate(%.1f)\"", -angle), inside);
@@ -204,7 +204,7 @@ final class RigScene {
         svg.ellipse(px, py, 15, 15 * NEAR / ACROSS, look);
     }
 
-    /** The rod of a lift, from its cup down into the ground; what of it is seen, others say. */
+    /** The rod of a lift, from its cup down into the ground; the caller decides which part is visible. */
     private void rod(Lift lift, double across) {
         double top = rig.cupHeight(lift) - 5;
         svg.rect(x(across) - 4.5, y(0, top), 9, (top - GROUND + Geometry.STROKE) * UP, 0, STEEL);
@@ -232,7 +232,7 @@ final class RigScene {
         svg.rect(px - 8, base - tall - 1, 16, 6, 2, "fill=\"#f4f6f8\" stroke=\"#52636f\"");
     }
 
-    /** A sleeve at an angle of its wheel: it goes round with it, and stays upright. */
+    /** A sleeve at an angle of its wheel: it turns with the wheel, and stays upright. */
     private void sleeve(int angle) {
         double around = Math.toRadians(angle);
         double upright = rig.wheel2Angle();

@@ -3,8 +3,7 @@ package tickbus.demo.rig;
 /**
  * Reports completed steps to the control: complete(n) rises when all motion of command word n has ended.
  *
- * <p>It stays on until the command pattern changes or Acknowledge rises. A fault cancels the step: its bit never
- * comes.
+ * <p>The bit stays on until the command pattern changes or Acknowledge rises. A fault cancels the step: its bit never comes.
  */
 final class StepMonitor {
     static final int STEPS = 6;
@@ -22,7 +21,7 @@ final class StepMonitor {
     private int pattern;
     private int step;
 
-    /** The last completed step; 0 outside a cycle: after a fault, or after a word that is not a step's. */
+    /** The last completed step; 0 outside a cycle: after a fault, or after a word of no step. */
     private int previous;
 
     private long cycles;
@@ -35,7 +34,7 @@ final class StepMonitor {
      * @param newPattern motion and suction bits of the command word
      * @param acknowledge Acknowledge rose
      * @param fault Not OK is on
-     * @param busy some drive is moving, or ignores a run bit
+     * @param busy a drive is moving, or ignores a run bit
      */
     void look(int newPattern, boolean acknowledge, boolean fault, boolean busy) {
         if (newPattern != pattern) {
@@ -61,8 +60,8 @@ final class StepMonitor {
     }
 
     /**
-     * Whether the current step belongs to a cycle. The word of a homing with both cups on equals that of step 6, so a
-     * step only counts after its predecessor.
+     * True if the current step belongs to a cycle. The word of a homing with both cups on equals that of step 6, so a step
+     * only counts after its predecessor.
      */
     private boolean inTurn() {
         return step > 0 && (step == previous || step == previous % STEPS + 1);

@@ -1,6 +1,6 @@
 package tickbus.demo.rig;
 
-/** A suction cup on a lift: it grips a bottle by its base, and holds it as long as there is vacuum. */
+/** A suction cup on a lift: grips a bottle by its base, and holds it while there is vacuum. */
 final class SuctionCup {
     private final String name;
     private final Bottle.Place place;

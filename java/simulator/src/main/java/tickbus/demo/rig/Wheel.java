@@ -3,7 +3,7 @@ package tickbus.demo.rig;
 /**
  * The drive of an index wheel.
  *
- * <p>A rising index command turns it to the next index position. While it jogs, it turns slowly. At rest inside the
+ * <p>A rising index command turns the wheel to the next index position. While it jogs, it turns slowly. At rest inside the
  * homing window but off the index position, it creeps onto the drive's index pulse, so that jogging ends exactly.
  */
 final class Wheel {
@@ -36,7 +36,7 @@ final class Wheel {
      * @param pitch degrees between index positions
      * @param speed degrees per second while indexing
      * @param steepness degrees per second squared while indexing
-     * @param angle its position
+     * @param angle the wheel's position
      */
     Wheel(double pitch, double speed, double steepness, double angle) {
         this.pitch = pitch;
@@ -97,7 +97,7 @@ final class Wheel {
      * Turns for a time.
      *
      * @param nanos the time
-     * @param free nothing obstructs the wheel, so that it may creep to the index position
+     * @param free true if nothing obstructs the wheel, so that it can creep to the index position
      */
     void advance(long nanos, boolean free) {
         ramp.advance(nanos);

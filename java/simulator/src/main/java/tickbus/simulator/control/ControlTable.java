@@ -65,7 +65,7 @@ public final class ControlTable {
      * Reads a control table from a file.
      *
      * @param file the file
-     * @param endpoints what its rows may name
+     * @param endpoints the names that rows can use
      * @param stepNanos the simulation's step size in nanoseconds, above 0; the unit of delays
      * @return the table, all values 0
      * @throws ControlTableException with all mistakes, or if the file cannot be read
@@ -91,7 +91,7 @@ public final class ControlTable {
      *
      * @param file the file's name in messages
      * @param text its content
-     * @param endpoints what its rows may name
+     * @param endpoints the names that rows can use
      * @param stepNanos the simulation's step size in nanoseconds, above 0; the unit of delays
      * @return the table, all values 0
      * @throws ControlTableException with all mistakes
@@ -120,8 +120,8 @@ public final class ControlTable {
     /**
      * Sets one source.
      *
-     * @param index its number in {@link Endpoints#sources}
-     * @param value its value
+     * @param index the source's number in {@link Endpoints#sources}
+     * @param value the source's value
      */
     public void setSource(int index, double value) {
         values[index] = value;
@@ -140,8 +140,8 @@ public final class ControlTable {
     /**
      * A destination's value.
      *
-     * @param index its number in {@link Endpoints#destinations}
-     * @return the value that the last computation gave it
+     * @param index the destination's number in {@link Endpoints#destinations}
+     * @return the value of the last computation
      */
     public double destination(int index) {
         return destinations[index];
@@ -161,7 +161,7 @@ public final class ControlTable {
      * A window on one value, for displays.
      *
      * @param name of a source, a destination or a variable
-     * @return gives the value as it is at each call; allocates nothing
+     * @return gives the current value at each call; allocates nothing
      * @throws IllegalArgumentException if nothing has this name; the message has the nearest one
      */
     public DoubleSupplier probe(String name) {

@@ -3,7 +3,7 @@ package tickbus.simulator.control;
 import java.util.List;
 import java.util.stream.Collectors;
 
-/** A control table that cannot be used, with every mistake in it. */
+/** A control table that cannot be used, with all its mistakes. */
 public final class ControlTableException extends RuntimeException {
     private static final long serialVersionUID = 1L;
 

@@ -10,7 +10,7 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * Everything that a control table may name: {@code <driver id>:<component>} and {@code machine:<variable>}.
+ * Everything that a control table can name: {@code <driver id>:<component>} and {@code machine:<variable>}.
  *
  * <p>Sources are numbered driver by driver in component order, followed by the machine's outputs; destinations
  * likewise, followed by the machine's inputs.
@@ -28,8 +28,8 @@ public final class Endpoints {
      * The endpoints of some drivers and a machine.
      *
      * @param drivers with different ids
-     * @param machineInputs variables that the table may write
-     * @param machineOutputs variables that the table may read
+     * @param machineInputs variables that the table can write
+     * @param machineOutputs variables that the table can read
      * @throws IllegalArgumentException if two of them have the same name
      */
     public Endpoints(List<? extends ControlInterfaceDeviceDriver> drivers, List<String> machineInputs,
@@ -73,20 +73,20 @@ public final class Endpoints {
     }
 
     /**
-     * Where a driver's sources begin.
+     * The number of a driver's first source.
      *
-     * @param driver position among the drivers; their count stands for the machine
-     * @return number of its first source
+     * @param driver position among the drivers; their count means the machine
+     * @return in {@link #sources}
      */
     public int sourceStart(int driver) {
         return sourceStarts.get(driver);
     }
 
     /**
-     * Where a driver's destinations begin.
+     * The number of a driver's first destination.
      *
-     * @param driver position among the drivers; their count stands for the machine
-     * @return number of its first destination
+     * @param driver position among the drivers; their count means the machine
+     * @return in {@link #destinations}
      */
     public int destinationStart(int driver) {
         return destinationStarts.get(driver);

@@ -5,11 +5,11 @@ import java.util.List;
 /**
  * One row as written, with quotes resolved and blanks removed.
  *
- * @param line its line number
- * @param sources names in the source column, may be empty
- * @param variable name for the result, empty if it has none
+ * @param line the row's line number
+ * @param sources names in the source column, can be empty
+ * @param variable name for the result, can be empty
  * @param transfer text of the transfer column, empty for copy
- * @param destination where the result goes, empty if nowhere
+ * @param destination destination of the result, can be empty
  */
 record Row(int line, List<String> sources, String variable, String transfer, String destination) {
     /** The row's result in messages. */

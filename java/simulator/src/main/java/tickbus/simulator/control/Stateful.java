@@ -5,7 +5,7 @@ final class Stateful {
     private Stateful() {
     }
 
-    /** Follows its source only when that has moved by more than the deadband. */
+    /** Follows its source only when the source has moved by more than the deadband. */
     static final class Deadband implements TransferFunction {
         private final double width;
         private double held;

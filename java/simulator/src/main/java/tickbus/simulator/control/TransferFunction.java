@@ -1,8 +1,8 @@
 package tickbus.simulator.control;
 
 /**
- * What happens to a value between its source and its destination. May remember earlier ticks; is applied
- * exactly once per tick; allocates nothing.
+ * Computes a value on its way from its source to its destination. Can remember earlier ticks; is applied exactly once per
+ * tick; allocates nothing.
  */
 @FunctionalInterface
 interface TransferFunction {

@@ -13,11 +13,11 @@ import tickbus.simulator.text.NearestName;
 /**
  * The fixed set of transfer functions.
  *
- * <p>Values are doubles; 0 is false, everything else is true, and Boolean results are 0 or 1. Before its first tick
- * every function is assumed to have seen 0, so that a value that starts at 1 rises at once.
+ * <p>Values are doubles; 0 is false, every other value is true, and Boolean results are 0 or 1. Every function is assumed to
+ * have seen 0 before its first tick, so that a value that starts at 1 rises at once.
  */
 public final class TransferFunctions {
-    /** A delay of more ticks than this is taken for a mistake. */
+    /** A longer delay, in ticks, counts as a mistake. */
     private static final long LONGEST_DELAY_TICKS = 1_000_000;
 
     private static final Pattern CALL = Pattern.compile("([A-Za-z-]+)\\s*(?:\\((.*)\\))?");
@@ -90,11 +90,10 @@ public final class TransferFunctions {
      * Makes a function from the text of a transfer column.
      *
      * @param text such as {@code scale(2, 0)}; empty for copy
-     * @param sources how many sources the row has
+     * @param sources the number of the row's sources
      * @param stepNanos the simulation's step size
      * @return the function
      * @throws IllegalArgumentException with a text for people, if there is no such function or it does not fit
-     *     fit
      */
     static TransferFunction read(String text, int sources, long stepNanos) {
         Matcher call = CALL.matcher(text.isEmpty() ? "copy" : text);

@@ -1,5 +1,5 @@
 /**
- * The control table: which value goes where, and what happens to it on its way.
+ * The control table: the source and destination of every value, and its transfer function.
  *
  * <p>See {@link tickbus.simulator.control.ControlTable} for the file format and
  * {@link tickbus.simulator.control.TransferFunctions} for the functions.

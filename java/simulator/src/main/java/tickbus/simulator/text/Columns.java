@@ -29,7 +29,7 @@ public final class Columns {
      * Adds a row.
      *
      * @param cells one per column
-     * @throws IllegalArgumentException if there are more or fewer
+     * @throws IllegalArgumentException if their number differs from the columns
      */
     public void row(Object... cells) {
         if (cells.length != right.length) {

@@ -5,7 +5,7 @@ import java.util.Locale;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 
-/** Durations as people write them, {@code "2ms"}, and as the simulator keeps them, whole nanoseconds. */
+/** Durations as people write them, {@code "2ms"}, and in the simulator's unit, whole nanoseconds. */
 public final class Durations {
     private static final Pattern FORM = Pattern.compile("(\\d+(?:\\.\\d+)?)\\s*(ns|us|ms|s|min)");
 

@@ -13,7 +13,7 @@ public final class NearestName {
      *
      * @param wrong the unknown name
      * @param known the names that exist
-     * @return {@code "; did you mean \"…\"?"}, or an empty text when nothing is near enough
+     * @return {@code "; did you mean \"…\"?"}, or an empty text if no name is similar enough
      */
     public static String hint(String wrong, Collection<String> known) {
         String best = null;

@@ -5,10 +5,10 @@ import java.util.Locale;
 /**
  * Writes SVG elements, with numbers short enough to read and the same on every locale.
  *
- * <p>What is drawn may be bound to signals: the live page moves it then (docs/live-page.md).
+ * <p>Drawn elements can be bound to signals: the live page then moves them (docs/live-page.md).
  */
 public final class Svg {
-    /** An attribute: drawn when the picture stands still, and left out of the live page, since no signal tells it. */
+    /** An attribute for parts of the still picture, left out of the live page, since no signal carries them. */
     public static final String STILL = " data-tb-still=\"\"";
 
     private final StringBuilder text = new StringBuilder(16_384);
@@ -18,7 +18,7 @@ public final class Svg {
      *
      * @param width in pixels
      * @param height in pixels
-     * @param title what it shows
+     * @param title of the picture
      */
     public Svg(int width, int height, String title) {
         line("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 %d %d\" width=\"%d\" height=\"%d\""
@@ -30,9 +30,9 @@ public final class Svg {
     /**
      * The attribute that binds an element to a signal.
      *
-     * @param what moves or changes of it: "y", "fill", "show", "text", …
-     * @param how the signal's name, and behind a colon what its values become
-     * @param values of a format in it
+     * @param what the bound property: "y", "fill", "show", "text", …
+     * @param how the signal's name, and behind a colon the conversion of its values
+     * @param values of the format's placeholders
      * @return an attribute, with a blank in front of it
      */
     public static String bound(String what, String how, Object... values) {
@@ -40,10 +40,10 @@ public final class Svg {
     }
 
     /**
-     * Adds what is inside of a clipping rectangle, or moves together.
+     * Adds a group that is clipped by a rectangle, or moves together.
      *
      * @param look attributes of the group
-     * @param inside draws it
+     * @param inside draws the contents
      * @return this
      */
     public Svg group(String look, Runnable inside) {
@@ -70,9 +70,9 @@ public final class Svg {
      *
      * @param x left
      * @param y top
-     * @param width of it
-     * @param height of it
-     * @param round radius of its corners
+     * @param width in pixels
+     * @param height in pixels
+     * @param round radius of the corners
      * @param look attributes
      * @return this
      */
@@ -84,8 +84,8 @@ public final class Svg {
     /**
      * Adds an ellipse.
      *
-     * @param x its middle
-     * @param y its middle
+     * @param x the middle
+     * @param y the middle
      * @param rx half width
      * @param ry half height
      * @param look attributes
@@ -112,7 +112,7 @@ public final class Svg {
     /**
      * Adds a path.
      *
-     * @param data as SVG writes it
+     * @param data in SVG's syntax
      * @param look attributes
      * @return this
      */
@@ -134,15 +134,15 @@ public final class Svg {
     }
 
     /**
-     * Adds an upright cylinder: its round top and its side.
+     * Adds an upright cylinder: a round top and a side.
      *
-     * @param x its middle
+     * @param x the middle
      * @param top of its side
      * @param bottom of its side
      * @param rx half width
-     * @param ry half height of its top
+     * @param ry half height of the top
      * @param side attributes
-     * @param lid attributes of its top
+     * @param lid attributes of the top
      * @return this
      */
     public Svg cylinder(double x, double top, double bottom, double rx, double ry, String side, String lid) {

@@ -87,7 +87,7 @@ class CellMishapTest {
         Transport transport = new Transport();
         transport.forward = true;
         for (int stop = 0; stop < Transport.STOPS; stop++) {
-            // Until all three stand one behind the other before stop 2.
+            // Until all three are one behind the other before stop 2.
             transport.open[stop] = stop != 1;
         }
         for (int i = 0; i < 2000; i++) {

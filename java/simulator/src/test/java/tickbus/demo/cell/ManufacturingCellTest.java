@@ -17,7 +17,7 @@ import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import org.junit.jupiter.api.Test;
 
-/** The cell's mechanics, with a hand at its valves. */
+/** The cell's mechanics, with the test at its valves. */
 class ManufacturingCellTest {
     private static final long STEP = 5_000_000;
     private static final int PATIENCE = 1000;

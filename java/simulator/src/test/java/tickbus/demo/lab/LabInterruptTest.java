@@ -36,7 +36,7 @@ class LabInterruptTest {
             }
             List<ProcessHandle> members = demo.toHandle().descendants().toList();
             assertEquals(3, members.size());
-            // Process.destroy() would close the stream from which the verdict is read.
+            // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertEquals("demo-lab: failed reason=interrupted", rest.get(rest.size() - 1));

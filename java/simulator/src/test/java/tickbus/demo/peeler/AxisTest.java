@@ -8,7 +8,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 
-/** What an axis does with commands. */
+/** The reactions of an axis to commands. */
 class AxisTest {
     private static final long TICK = 2_000_000L;
 

@@ -31,7 +31,7 @@ class LathePictureTest {
         assertEquals(svg, Files.readString(folder.resolve("lathe.svg")));
     }
 
-    /** {@code TICKBUS_UPDATE=1} draws it anew. */
+    /** {@code TICKBUS_UPDATE=1} redraws the picture. */
     @Test
     void thePictureOfTheLivePageIsTheSameDrawing() throws Exception {
         Path file = Path.of("lathe.svg");

@@ -8,7 +8,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 
-/** What the knife cuts off a block; no wood may be lost. */
+/** The wood that the knife cuts off a block; none may be lost. */
 class PeelingTest {
     private static final double MM3 = 1e9;
 

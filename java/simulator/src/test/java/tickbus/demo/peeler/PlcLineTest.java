@@ -70,7 +70,7 @@ class PlcLineTest {
     }
 
     /**
-     * Its PLC stops all axes, and starts over with the state that the sensors show; a half-peeled block is discarded.
+     * The PLC stops all axes, and restarts with the state that the sensors show; a half-peeled block is discarded.
      */
     @ParameterizedTest
     @CsvSource({"TRANSFER_CLAMP_RIGHT, 37.47, 0", "CENTRING_X_LEFT, 18.2, 0", "LINEAR_FEEDER, 43.22, 0",

@@ -36,7 +36,7 @@ class PeelingInterruptTest {
             }
             List<ProcessHandle> plcs = demo.toHandle().descendants().toList();
             assertEquals(2, plcs.size());
-            // Process.destroy() would close the stream from which the verdict is read.
+            // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();
             assertEquals("demo-peeler: failed reason=interrupted", rest.get(rest.size() - 1));

@@ -30,7 +30,7 @@ class RigRunsTest {
         plc.await(on("Homing sensor 2")).within("10s");
         plc.expect(off("Ready lamp"));
 
-        // Lift 1 brings down whatever may be in the sleeve above it since before the power cut.
+        // Lift 1 brings down a bottle that may be in the sleeve above it since before the power cut.
         plc.await(on("LA1 run").and(on("SC1"))).within("3s");
         plc.await(on("Step 2 complete")).within("1s");
         plc.await(on("LA1 bottom")).within("2s");

@@ -16,8 +16,8 @@ import tickbus.simulator.TimeSource;
 /**
  * The rig behind its control table, as the simulator runs it, stepped by a {@link Plc} of the test kit.
  *
- * <p>For a machine of your own, just implement {@link Machine} and set its sensors there. This model exists already
- * with its own simulator, so the whole simulator is stepped, with the {@link Plc} in place of its driver.
+ * <p>For your own machine, just implement {@link Machine} and set its sensors there. This model already has its own
+ * simulator, so the whole simulator is stepped, with the {@link Plc} in place of its driver.
  */
 public final class SimulatedRig implements Machine {
     private static final Path CONTROL_TABLE = Path.of("rig.table");
@@ -35,7 +35,7 @@ public final class SimulatedRig implements Machine {
         this.rig = rig;
     }
 
-    /** The model, for what signals do not show: bottles, jams. */
+    /** The model, for states without a signal: bottles, jams. */
     Rig rig() {
         return rig;
     }

@@ -213,7 +213,7 @@ class RigCycleTest {
             }
             grown += threads.getThreadAllocatedBytes(id) - before;
         }
-        // The measurement itself may allocate a little, once; a step that allocates would show 6,000 times.
+        // The measurement itself can allocate a little, once; a step that allocates would show 6,000 times.
         assertTrue(grown < 6_000, grown + " bytes in 6,000 steps");
         player.assertWell();
     }

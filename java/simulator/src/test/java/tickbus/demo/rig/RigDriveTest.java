@@ -9,7 +9,7 @@ import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 import org.junit.jupiter.params.provider.ValueSource;
 
-/** What starts, changes and ends a motion: lifts, reference runs, index commands, jogging and homing. */
+/** Everything that starts, changes and ends a motion: lifts, reference runs, index commands, jogging and homing. */
 class RigDriveTest {
     @ParameterizedTest
     @ValueSource(longs = {100_000, 1_000_000, 50_000_000})

@@ -39,7 +39,7 @@ class RigPictureTest {
         assertEquals(svg, RigPicture.draw(player.rig), "drawing changes nothing");
     }
 
-    /** {@code TICKBUS_UPDATE=1} draws it anew. */
+    /** {@code TICKBUS_UPDATE=1} redraws the picture. */
     @Test
     void thePictureOfTheLivePageIsTheSameDrawing() throws Exception {
         Rig rig = new Rig(0, 0, 0, 0);
@@ -51,7 +51,7 @@ class RigPictureTest {
         assertEquals(Files.readString(file), RigPicture.draw(rig));
     }
 
-    /** What is bound stays where it was drawn while its signal has the value of that moment. */
+    /** A bound element stays where it was drawn while its signal has the value of that moment. */
     @Test
     void whatMovesIsBoundRelativeToWhereItWasDrawn() {
         player.play(WordPlayer.LA1_BIG_UP, 1000);

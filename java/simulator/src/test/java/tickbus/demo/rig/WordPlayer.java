@@ -132,7 +132,7 @@ final class WordPlayer {
         return value(output) != 0;
     }
 
-    /** All bottles are somewhere, and none is counted twice. */
+    /** Checks that every bottle is somewhere, and none is counted twice. */
     WordPlayer assertAccounted() {
         Counters c = rig.counters();
         assertEquals(c.fed(), c.delivered() + c.removed() + c.fallen() + rig.bottles().size(), c::toString);

@@ -107,7 +107,7 @@ class AnalysisTest {
         Reachability grown = Reachability.explore(all, 100_000);
         assertEquals(Verdict.UNKNOWN, grown.isBounded());
         for (int tokens : new int[] {0, 1, 2, 15, 16, 255, 256, 65_535, 65_536, 99_999}) {
-            assertEquals(tokens, grown.find(all.marking(tokens)), "packed anew with wider places");
+            assertEquals(tokens, grown.find(all.marking(tokens)), "repacked with wider places");
             assertEquals(tokens, grown.marking(tokens).get(0));
         }
     }

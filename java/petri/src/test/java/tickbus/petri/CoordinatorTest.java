@@ -218,7 +218,7 @@ class CoordinatorTest {
         assertEquals(0, coordinator.scan(1099) - 1, "only on fires");
         assertEquals(Long.MAX_VALUE, coordinator.nextDue());
         pressed[0] = false;
-        assertEquals(1, coordinator.scan(1150), "only off fires: the delay begins anew");
+        assertEquals(1, coordinator.scan(1150), "only off fires: the delay restarts");
         assertEquals(1250, coordinator.nextDue());
         assertEquals(0, coordinator.scan(1249));
         assertEquals(1, coordinator.scan(1250));

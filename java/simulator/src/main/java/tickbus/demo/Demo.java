@@ -224,7 +224,7 @@ public final class Demo {
                 audit.end(plc.counts());
                 verdict = check(simulator);
                 timeline.add(simulator.simulationNanos(), "demo", options.page()
-                        ? "is over; the live page goes on until Ctrl-C" : "is over");
+                        ? "is over; the live page stays until Ctrl-C" : "is over");
             }
             return verdict == null || options.page();
         });

@@ -44,7 +44,7 @@ record DemoOptions(Path drivers, Path control, Path report, Path recording, Path
               --cycles N         cycles to complete (default 3)
               --time-limit TIME  longest simulation time (default 2min)
               --page             after the last cycle the rig stays as it is until Ctrl-C: the live page
-                                 ([page] in driver.cfg) goes on, and its buttons can be forced
+                                 ([page] in driver.cfg) stays, and its buttons can be forced
 
             The last line is "demo: ok …" with exit code 0, or "demo: failed reason=…" with exit code 1;
             2 if the command line was wrong, 130 after Ctrl-C.

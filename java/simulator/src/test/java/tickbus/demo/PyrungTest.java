@@ -109,7 +109,7 @@ class PyrungTest {
         } finally {
             if (plc != null) {
                 plc.destroy();
-                assertTrue(plc.waitFor(20, TimeUnit.SECONDS), "the PLC ends when it is told to");
+                assertTrue(plc.waitFor(20, TimeUnit.SECONDS), "the PLC ends on request");
             }
         }
         // Initialise, home, ready, run, finalise, parked; before the first data from the PLC there is no phase.

@@ -195,7 +195,7 @@ public final class IdentificationHead {
         mustBeDone();
         if (at < 0 || at > 0xFFFF) {
             throw new IllegalArgumentException(
-                "the address " + at + " is none of a carrier; write one from 0 to 65535");
+                at + " is no address on a carrier; write one from 0 to 65535");
         }
         address.setLong(at);
         length.setLong(count);

@@ -224,7 +224,7 @@ class NetControllerTest {
         assertFalse(out("Gripper"));
         assertTrue(out("Brake"), "its fail-safe value");
         assertTrue(nets.stopped());
-        assertEquals(3, machine.signal("Pieces").get(), "the other net goes on");
+        assertEquals(3, machine.signal("Pieces").get(), "the other net continues");
         assertEquals(1, nets.stops().size());
     }
 

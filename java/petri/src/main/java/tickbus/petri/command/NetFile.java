@@ -38,7 +38,7 @@ final class NetFile {
         }
         String format = format(file);
         if (unit != null && !format.equals("hpx")) {
-            throw new UsageException("--unit is for .hpx files; " + file + " is none");
+            throw new UsageException("--unit is for .hpx files; " + file + " is not one");
         }
         if (!delays.isEmpty() && !format.equals("text")) {
             throw new UsageException("--delay is for HPSim's text; " + file + " has its delays itself");

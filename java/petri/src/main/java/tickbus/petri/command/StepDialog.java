@@ -246,7 +246,7 @@ final class StepDialog {
     private void pass(String text) {
         synchronized (stepper) {
             if (text.isEmpty() && stepper.nextDue() == Long.MAX_VALUE) {
-                throw new Refusal("nothing waits for the time; 'wait 2s' lets it pass all the same");
+                throw new Refusal("nothing waits for the time; 'wait 2s' lets it pass anyway");
             }
             stepper.advance(text.isEmpty() ? stepper.nextDue() - stepper.time() : Times.nanos(text));
         }

@@ -42,7 +42,7 @@ record CellOptions(Path drivers, Path control, Path report, String nets, Path id
               --step TIME        simulation step size (default 2ms)
               --cylinders N      cylinders to make, of all kinds in turn (default 12)
               --time-limit TIME  longest simulation time (default 1min)
-              --page [HOST:PORT] shows the nets live in a browser, and goes on with as many cylinders again and again,
+              --page [HOST:PORT] shows the nets live in a browser, and makes as many cylinders again and again,
                                  each time with its mishaps, until Ctrl-C (default 127.0.0.1, any port)
 
             The last line is "demo-cell: ok …" with exit code 0, or "demo-cell: failed reason=…" with exit

@@ -1,4 +1,4 @@
-"""What the tests share."""
+"""Fixtures and helpers shared by the tests."""
 
 import os
 import re
@@ -88,7 +88,7 @@ def root(*parts: str) -> Path:
 
 @pytest.fixture
 def line_cfg(tmp_path: Path) -> Path:
-    """A driver.cfg whose PLC brings every %I back on the %Q of the same address."""
+    """A driver.cfg whose PLC copies every %I to the %Q of the same address."""
     file = tmp_path / "line.cfg"
     file.write_text(MIRROR + SIGNALS)
     return file
@@ -96,14 +96,14 @@ def line_cfg(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def line(line_cfg: Path) -> Iterator[tickbus.Driver]:
-    """The same, open."""
+    """The same driver, open."""
     with tickbus.open(line_cfg) as driver:
         yield driver
 
 
 @pytest.fixture(autouse=True)
 def no_unexpected_warning(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
-    """As tools/test has it for Java: states of a line and injected faults are expected, other warnings in the log are not."""
+    """As tools/test does for Java: states of a line and injected faults are expected, other warnings in the log are not."""
     yield
     told = capfd.readouterr()
     sys.stdout.write(told.out)
@@ -115,7 +115,7 @@ def no_unexpected_warning(capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
 
 @pytest.fixture
 def python(tmp_path: Path) -> Callable[..., Any]:
-    """Runs a program in a Python process of its own, which must not go down."""
+    """Runs a program in a separate Python process, which must not crash."""
     import subprocess
 
     def run(program: str, *arguments: Any) -> subprocess.CompletedProcess[str]:

@@ -1,4 +1,4 @@
-"""The slots as a buffer, by NumPy itself."""
+"""The slots as a buffer, in NumPy."""
 
 import gc
 import threading

@@ -14,7 +14,7 @@ from conftest import root
 DOORS = Path(__file__).with_name("doors")
 TICKS = 5000
 
-# Beside the rig's signals, one of each other kind.
+# In addition to the rig's signals, one of each other kind.
 MORE = """
 [[signal]]
 name    = "scaled"
@@ -97,7 +97,7 @@ def by_python(rig: Rig) -> bytes:
             else:
                 plc.exchange(tick * 0.002)
     recording = rig.recording("python")
-    # Enough to show that something has happened.
+    # Enough to prove that the machine has moved.
     assert len(recording) > 100_000
     return recording
 
@@ -156,7 +156,7 @@ def test_the_example_in_c_sharp_runs_a_tank(tmp_path):
     assert result.returncode == 0, result.stderr
     lines = result.stdout.splitlines()
     assert len(lines) == 10
-    # The mirror opens the valve below 150 mm, a scan later: it stays there.
+    # The mirror opens the valve below 150 mm, a scan later, so the level stays there.
     assert all(145 < float(line[3:].split()[0]) < 155 for line in lines[2:]), result.stdout
     result = subprocess.run([*command, "nothing.cfg"], cwd=tmp_path, capture_output=True, text=True, env=environment)
     assert result.returncode == 1

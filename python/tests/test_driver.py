@@ -1,4 +1,4 @@
-"""A driver by its signals."""
+"""A driver, tested through its signals."""
 
 import math
 from pathlib import Path
@@ -301,7 +301,7 @@ def test_events_are_told_one_by_one(tmp_path):
         ]
         assert events[0].signal is server["Run"]
         assert events == sorted(events, key=lambda event: event.time_ns)
-        # Two rising edges came; what is shown is the level.
+        # Two rising edges came; the value is the level.
         assert server["Run"].value is True
 
 
@@ -314,7 +314,7 @@ def test_the_tank_of_the_manual_runs(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     found = {}
     exec(program, found)
-    # The mirror opens the valve below 150 mm, a scan later: it stays there.
+    # The mirror opens the valve below 150 mm, a scan later, so the level stays there.
     assert 145 < found["mm"] < 155
 
 

@@ -1,4 +1,4 @@
-"""What a controller leaves behind at a device that is none of ours, however its process ends."""
+"""The outputs that a controller leaves at a third-party device, however its process ends."""
 
 import signal
 import socket

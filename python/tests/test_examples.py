@@ -1,4 +1,4 @@
-"""The worked examples, by the programs that they are for: MuJoCo, SimPy, and a soft PLC that others wrote."""
+"""The worked examples, run with their programs: MuJoCo, SimPy, and a third-party soft PLC."""
 
 import os
 import re
@@ -18,7 +18,7 @@ PYRUNG = root("target", "peers", "pyrung", "bin", "python")
 
 @dataclass
 class Run:
-    """A run of the conveyor."""
+    """Runs the conveyor."""
 
     told: str
     picture: Path | None
@@ -26,7 +26,7 @@ class Run:
 
 
 def backend() -> tuple[str | None, str]:
-    """How MuJoCo can draw without a display, or why it cannot."""
+    """Whether and how MuJoCo can draw without a display."""
     why = ""
     for name in ("egl", "osmesa"):
         probe = [sys.executable, "-c", "import mujoco; mujoco.GLContext(64, 64).make_current()"]

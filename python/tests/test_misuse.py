@@ -1,4 +1,4 @@
-"""Whatever is done to a driver, the interpreter stays up."""
+"""The interpreter survives every misuse of a driver."""
 
 import gc
 import threading
@@ -78,7 +78,7 @@ def test_all_places_are_taken_and_come_back(line_cfg):
 
 
 def test_two_threads_never_are_in_one_driver_at_once(line_cfg):
-    """Each call is done or refused; nothing is done twice or in between."""
+    """Each call is done completely or refused; none is done twice or in part."""
     done = [0, 0, 0]
     with tickbus.open(line_cfg) as line:
         start = threading.Barrier(3)
@@ -127,7 +127,7 @@ def test_a_thread_may_close_while_another_one_ticks(line_cfg):
 
 
 def test_the_lock_is_released_while_a_stepped_bus_waits(line_cfg, tmp_path):
-    """In lock-step over virtual time, a tick waits for the other participant: which is a thread of this interpreter."""
+    """In lock-step over virtual time, a tick waits for the other participant, which is a thread of this interpreter."""
     import subprocess
 
     from conftest import SIGNALS, root

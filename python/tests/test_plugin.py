@@ -1,4 +1,4 @@
-"""The plug-in for pytest, by pytest itself: tests that pass, and tests that fail, with what they say."""
+"""The plug-in for pytest, tested by pytest itself: tests that pass, and tests that fail, with their messages."""
 
 from pathlib import Path
 
@@ -141,7 +141,7 @@ class TestSocket:
         plc.expect(on("Run"))
 """
 
-# What a test says, by its body.
+# The failure message of a test, by the test's body.
 RED = [
     (
         'plc.set("Height", 2).tick(3); plc.set("Height", 3).tick(2); plc.await_(above("Speed", 3)).within("40ms")',
@@ -186,7 +186,7 @@ RED = [
     ('near("Speed", 1, -1)', "a tolerance of -1; expected 0 or more"),
 ]
 
-# Marks that are wrong.
+# Marks with mistakes.
 WRONG = [
     ('step="0s"', 'step = "0s": a tick takes more than no time'),
     ('config="lien.cfg"', "there is none of the files *lien.cfg"),

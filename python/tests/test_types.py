@@ -1,4 +1,4 @@
-"""The types, by mypy."""
+"""The types, checked by mypy."""
 
 import sys
 from pathlib import Path

@@ -26,13 +26,14 @@ def open(path: str | os.PathLike[str], overlay: _toml.Tables | None = None) -> "
 
     Returns at once, whether or not the PLC is there: until it is, ticks return ``Status.STALE``.
 
-    ``overlay`` takes the place of tables of the file, for example to put the plant's own signals on another bus::
+    ``overlay`` replaces tables of the file, for example to put the plant's own signals on another bus::
 
         tickbus.open("plant.cfg", {"fieldbus": {"kind": "loopback", "program": "mirror", "mode": "stepped"},
                                    "record": {"file": "run.vcd"}})
 
-    It is a mapping of such tables, or the same as a text in TOML. Raises ``FieldbusError`` with ``Status.BAD_CONFIG`` and every
-    mistake at its line and column, or with the reason why the bus cannot be opened; ``MissingFileError`` if there is no such file.
+    The overlay is a mapping of such tables, or the same as a text in TOML. Raises ``FieldbusError`` with
+    ``Status.BAD_CONFIG`` and every mistake at its line and column, or with the reason why the bus cannot be opened;
+    ``MissingFileError`` if there is no such file.
     """
     try:
         return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "")
@@ -46,11 +47,11 @@ class Turn(NamedTuple):
     """One turn of a loop over ``Driver.every``."""
 
     time: float
-    """When it was due, in seconds since the loop began: the simulation's time, if it keeps pace with the clock."""
+    """When the turn was due, in seconds since the loop began: the simulation's time, if it keeps pace with the clock."""
     lag: float
-    """By how many seconds it begins late."""
+    """How late the turn begins, in seconds."""
     missed: int
-    """How many turns before it were left out, since they could not begin before the next one was due."""
+    """How many turns before this one were skipped, since they could not begin before the next one was due."""
 
 
 def _turns(period: int, now: Callable[[], int], sleep: Callable[[float], None]) -> Iterator[Turn]:
@@ -72,10 +73,10 @@ class Driver(_native.Driver):
 
     A tick is either ``receive()``, the model, ``send()``, or one ``exchange()``. The first way answers within the tick;
     ``exchange()`` sends first and then receives, so that an answer goes out with the next tick. Neither waits for the bus,
-    unless it is a stepped one; there the interpreter's lock is released meanwhile.
+    except on a stepped one; while it waits there, the interpreter's lock is released.
 
-    One thread at a time uses a driver. A call that meets a tick of another thread waits for it, at most 2 s; then it
-    raises ``FieldbusError`` with ``Status.BUSY``.
+    One thread at a time uses a driver. A call that meets a tick of another thread waits for it, at most 2 s; then it raises
+    ``FieldbusError`` with ``Status.BUSY``.
     """
 
     __slots__ = ("__weakref__",)
@@ -85,15 +86,15 @@ class Driver(_native.Driver):
         _close_when_terminated()
 
     def every(self, period: str) -> Iterator[Turn]:
-        """Pace a loop by the computer's clock: a turn in each period, such as ``"10ms"``, until the driver is closed::
+        """Pace a loop by the computer's clock: one turn per period, such as ``"10ms"``, until the driver is closed::
 
             for turn in plc.every("10ms"):
                 plc.receive(turn.time)
                 ...
                 plc.send()
 
-        A late turn does not delay the next one. Turns that were missed, as on a busy computer, are left out: a burst would
-        only carry outdated values. ``turn.lag`` and ``turn.missed`` report both.
+        A late turn does not delay the next one. Missed turns, as on a busy computer, are skipped: a burst would only carry
+        outdated values. ``turn.lag`` and ``turn.missed`` report both.
         """
         nanos = _durations.parse(period)
         if nanos == 0:
@@ -102,7 +103,7 @@ class Driver(_native.Driver):
         return itertools.takewhile(lambda turn: not self.closed, turns)
 
     def statistics(self) -> dict[str, str]:
-        """The state of the line and all counters, by key: docs/statistics.md has their meanings."""
+        """The state of the line and all counters, by key: docs/statistics.md explains them."""
         entries = filter(None, map(_ENTRY.fullmatch, self._statistics().splitlines()))
         return {re.sub(r"\\(.)", r"\1", entry[1]): entry[2] for entry in entries}
 
@@ -114,7 +115,7 @@ class Driver(_native.Driver):
             plc.inject(kind="stuck", signal="LA1 bottom", value=True, at="2s")
             plc.inject(kind="link-down", for_="500ms")
 
-        A key that is a word of Python's takes an underscore: ``for_``, ``while_``. A text in TOML will do, too.
+        For a key that is a Python keyword, append an underscore: ``for_``, ``while_``. A text in TOML is also accepted.
         """
         keys = {name.removesuffix("_"): value for name, value in keys.items()}
         if not isinstance(fault, str):
@@ -123,7 +124,7 @@ class Driver(_native.Driver):
         return next(fault for fault in self.faults() if fault.id == number)
 
     def faults(self) -> list["Fault"]:
-        """The faults in driver.cfg and those that were injected; of those long over some may be missing."""
+        """The faults in driver.cfg and the injected ones; some that ended long ago may be missing."""
         return [Fault(self, *line.split("\t")) for line in self._faults().split("\n") if line]
 
     def __enter__(self) -> Self:
@@ -141,18 +142,18 @@ class Driver(_native.Driver):
 
 
 class Fault:
-    """A fault that was injected: ``Driver.inject`` makes it. In a ``with`` statement it ends with the block."""
+    """An injected fault, made by ``Driver.inject``. In a ``with`` statement it ends with the block."""
 
     def __init__(self, driver: Driver, id: str, state: str, begun: str, kind: str, name: str, what: str) -> None:
         self._driver = driver
         self.id = int(id)
-        """Its number, from 1."""
+        """The fault's number, from 1."""
         self.kind = kind
-        """Its kind, such as ``link-down``."""
+        """The fault's kind, such as ``link-down``."""
         self.name = name
-        """Its name, its own or made from what it does."""
+        """The fault's given name, or one derived from its effect."""
         self.what = what
-        """What it does, for people."""
+        """The fault's effect, for people."""
         self._last = (state, begun)
 
     def _now(self) -> tuple[str, str]:
@@ -161,27 +162,27 @@ class Fault:
             if int(number) == self.id:
                 self._last = (state, begun)
                 return self._last
-        # It is over for so long that the driver has forgotten it.
+        # The fault ended so long ago that the driver has forgotten it.
         self._last = ("over", self._last[1])
         return self._last
 
     @property
     def state(self) -> Literal["waiting", "active", "over"]:
-        """``waiting``: it has not begun, or may begin again; ``active``; ``over``: for good. As of the last tick."""
+        """``waiting``: not begun, or can begin again; ``active``; ``over``: for good. As of the last tick."""
         return self._now()[0]  # type: ignore[return-value]
 
     @property
     def is_active(self) -> bool:
-        """Whether it has its effect, as of the last tick."""
+        """True if the fault has its effect, as of the last tick."""
         return self.state == "active"
 
     @property
     def begun(self) -> int:
-        """How often it has begun."""
+        """How often the fault has begun."""
         return int(self._now()[1])
 
     def end(self) -> None:
-        """End it at the next tick, which has the true values again."""
+        """End the fault at the next tick, which has the true values again."""
         self._driver._end_fault(self.id)
 
     def __enter__(self) -> Self:
@@ -205,8 +206,8 @@ def report(
 ) -> Path:
     """Make an HTML page from a recording: a chart of all signals, faults, states of the line.
 
-    ``recording`` is the VCD or CSV file that a ``[record]`` table named; its driver must be closed. The page is written beside it,
-    and its path returned. ``statistics`` are those of the driver, ``texts`` are shown under their headings. Raises
+    ``recording`` is the VCD or CSV file that a ``[record]`` table named; its driver must be closed. The page is written
+    beside it; returns its path. ``statistics`` are those of the driver, ``texts`` are shown under their headings. Raises
     ``FieldbusError`` with ``Status.BAD_ARGUMENT`` if the recording cannot be read.
     """
     escaped = ((re.sub(r"([=\\])", r"\\\1", key), value) for key, value in (statistics or {}).items())
@@ -219,7 +220,7 @@ _open: weakref.WeakSet[Driver] = weakref.WeakSet()
 
 @atexit.register
 def _close_all() -> None:
-    """Closes the drivers that are open, so that their recordings are whole."""
+    """Closes all open drivers, so that their recordings are complete."""
     for driver in list(_open):
         try:
             driver.close()
@@ -230,7 +231,7 @@ def _close_all() -> None:
 
 
 def _terminated(number: int, _frame: FrameType | None) -> None:
-    """Closes the drivers that are open, and then ends the process as the signal does where nobody handles it."""
+    """Closes all open drivers, and then ends the process as an unhandled signal would."""
     signal.signal(number, signal.SIG_DFL)
     try:
         _close_all()
@@ -239,12 +240,12 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
 
 
 def _close_when_terminated() -> None:
-    """Lets a termination signal that the program does not handle close the drivers before it ends the process."""
+    """Closes the drivers on a termination signal that the program does not handle, before the signal ends the process."""
     if os.name != "posix":
         return
     for number in (signal.SIGTERM, signal.SIGHUP):
         if signal.getsignal(number) is signal.SIG_DFL:
-            # Only the main thread may; a program that opens its drivers elsewhere handles signals itself.
+            # Only the main thread can set handlers; a program that opens its drivers elsewhere handles signals itself.
             with contextlib.suppress(ValueError):
                 signal.signal(number, _terminated)
 

@@ -8,7 +8,7 @@ _UNITS = {"ns": 1, "us": 10**3, "ms": 10**6, "s": 10**9, "min": 60 * 10**9, "h":
 
 
 def parse(text: str) -> int:
-    """Nanoseconds, 0 or more; ``ValueError`` if the text is no duration."""
+    """Nanoseconds, 0 or more; ``ValueError`` if the text is not a duration."""
     match = _FORM.fullmatch(text.strip())
     if match is None:
         raise ValueError(
@@ -21,7 +21,7 @@ def parse(text: str) -> int:
 
 
 def text(nanos: int) -> str:
-    """With a suitable unit: ``2ms``, ``1.5s``."""
+    """The duration with a suitable unit: ``2ms``, ``1.5s``."""
     for unit in ("s", "ms", "us"):
         if nanos >= _UNITS[unit]:
             return f"{(Decimal(nanos) / _UNITS[unit]).normalize():f}{unit}"
@@ -29,12 +29,12 @@ def text(nanos: int) -> str:
 
 
 class Unit:
-    """What a number of ``within`` or ``during`` counts: ``ticks``, or a unit of simulation time."""
+    """The unit of ``within`` or ``during``: ``ticks``, or a unit of simulation time."""
 
     def __init__(self, name: str, nanos: int | None) -> None:
         self.name = name
         self.nanos = nanos
-        """None: ticks."""
+        """None for ticks."""
 
     def __repr__(self) -> str:
         return self.name

@@ -4,7 +4,7 @@ from ._status import Status
 
 
 class FieldbusError(Exception):
-    """Something that the driver refused or could not do; the message says what happened and what to do."""
+    """The driver refused or could not do something; the message says what happened and what to do."""
 
     def __init__(self, code: int, message: str) -> None:
         super().__init__(code, message)
@@ -21,8 +21,8 @@ class FieldbusError(Exception):
 
 
 class MissingFileError(FieldbusError, FileNotFoundError):
-    """There is no driver.cfg of this name. It is a ``FileNotFoundError``, too."""
+    """There is no driver.cfg with this name. Also a ``FileNotFoundError``."""
 
 
 class UnknownSignalError(FieldbusError, KeyError):
-    """No signal of the driver has this name; the message has the nearest one. It is a ``KeyError``, too."""
+    """No signal of the driver has this name; the message has the nearest one. Also a ``KeyError``."""

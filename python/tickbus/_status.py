@@ -8,7 +8,7 @@ _TABLE = {code: (text, remedy) for code, _name, text, remedy in _native.STATUS_T
 
 
 class Status(IntEnum):
-    """The result of a tick, or the reason of a ``FieldbusError``. Below zero: it was not done."""
+    """The result of a tick, or the reason of a ``FieldbusError``. Below zero: the call failed."""
 
     FRESH = 0
     """A new bus cycle has arrived since the last exchange, even if nothing changed in it."""
@@ -31,18 +31,18 @@ class Status(IntEnum):
     TOO_MANY_DRIVERS = -7
     """All places for drivers in this process are taken."""
     INTERNAL = -8
-    """A defect in the driver itself; it stays in this state until it is closed."""
+    """The driver has a defect, and stays in this state until closed."""
     LIBRARY = -9
-    """The native library cannot be loaded. (Python says so itself, by an ``ImportError``.)"""
+    """The native library cannot be loaded. (In Python an ``ImportError`` reports this.)"""
     BAD_ARGUMENT = -10
-    """A call had an argument that makes no sense."""
+    """An argument is invalid."""
 
     @property
     def text(self) -> str:
-        """What it means, as one clause."""
+        """The meaning, as one clause."""
         return _TABLE[self.value][0]
 
     @property
     def remedy(self) -> str:
-        """What to do about it, as one clause."""
+        """The remedy, as one clause."""
         return _TABLE[self.value][1]

@@ -1,4 +1,4 @@
-"""Text in TOML, the language of driver.cfg, from what Python has."""
+"""Writes Python values as TOML, the language of driver.cfg."""
 
 import operator
 import os
@@ -11,7 +11,7 @@ _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 
 
 def document(tables: Tables) -> str:
-    """Tables as in a driver.cfg. A text is taken as it is."""
+    """Tables as in a driver.cfg. A text is returned unchanged."""
     if isinstance(tables, str):
         return tables
     if not isinstance(tables, Mapping):
@@ -31,7 +31,7 @@ def document(tables: Tables) -> str:
 
 
 def section(keys: Mapping[str, Any]) -> str:
-    """The keys of one table, a line each."""
+    """The keys of one table, one per line."""
     return "".join(f"{_key(name)} = {_value(value)}\n" for name, value in keys.items())
 
 

@@ -1,6 +1,6 @@
 """The plug-in for pytest: the fixtures ``plc`` and ``machine``, and the mark ``plc``.
 
-What is expensive is imported by the fixtures, so that the plug-in costs nothing where no test uses it.
+The fixtures import the expensive modules, so that the plug-in costs nothing where no test uses it.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ _MARK = (
 _KEYS = ("config", "program", "options", "scan", "step", "machine", "recording")
 _RECORDING = ("on failure", "always", "never")
 _LONGEST = 200
-"""The most bytes of a recording's name without its end; file systems have room for 255."""
+"""The greatest length of a recording's name without its suffix, in bytes; file systems allow 255."""
 _ATTEMPTS = 100
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The folder of what is kept."""
+    """Adds the option for the folder of recordings."""
     group = parser.getgroup("tickbus")
     text = "folder for the recordings and pages of failed tests of PLC programs (default: tickbus-reports)"
     group.addoption("--tickbus-reports", metavar="DIR", help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """The mark."""
+    """Registers the mark."""
     config.addinivalue_line("markers", _MARK)
 
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[Any]) -> Iterator[None]:
-    """A failure tells where the test stood, and what is kept of it."""
+    """Adds to a failure the tick at which it happened, and the files that are kept."""
     bench = getattr(item, "funcargs", {}).get("_plc_bench")
     if bench is not None and call.when == "call" and call.excinfo and not call.excinfo.errisinstance(pytest.skip.Exception):
         bench.failure = call.excinfo.value
@@ -65,13 +65,13 @@ class _Bench:
 
 @pytest.fixture
 def plc(_plc_bench: _Bench) -> Plc:
-    """The PLC under test, at tick 0, as the test's mark ``plc`` says."""
+    """The PLC under test, at tick 0, as specified by the test's mark ``plc``."""
     return _plc_bench.plc
 
 
 @pytest.fixture
 def machine(_plc_bench: _Bench) -> Any:
-    """The machine in front of it."""
+    """The machine that the PLC controls."""
     if _plc_bench.machine is None:
         raise pytest.UsageError("the test's mark plc names no machine; write machine=… there")
     return _plc_bench.machine
@@ -106,7 +106,7 @@ def _plc_bench(request: pytest.FixtureRequest) -> Iterator[_Bench]:
 
 
 def _setup(request: pytest.FixtureRequest) -> dict[str, Any]:
-    """The marks of the test, of its class and of its module together: the nearest one that states a key wins."""
+    """The marks of the test, of its class and of its module together: the nearest one that has a key wins."""
     setup: dict[str, Any] = {"step": "1ms", "recording": "on failure"} | dict.fromkeys(("program", "options", "scan", "machine"))
     found: dict[str, Any] = {}
     for mark in request.node.iter_markers("plc"):
@@ -131,7 +131,7 @@ def _setup(request: pytest.FixtureRequest) -> dict[str, Any]:
 
 
 def _config(name: str | Path, request: pytest.FixtureRequest) -> Path:
-    """The driver.cfg beside the test, or else as seen from where pytest was started, or from its root folder."""
+    """The driver.cfg beside the test, or else relative to where pytest was started, or to its root folder."""
     folders = (request.path.parent, request.config.invocation_params.dir, request.config.rootpath)
     for folder in folders:
         if (folder / name).is_file():
@@ -141,7 +141,7 @@ def _config(name: str | Path, request: pytest.FixtureRequest) -> Path:
 
 
 def _fieldbus(setup: dict[str, Any]) -> dict[str, Any]:
-    """What puts the program at the other end, whatever bus driver.cfg names."""
+    """The table that puts the program at the other end, whatever bus driver.cfg names."""
     program, options, scan = setup["program"], setup["options"], setup["scan"]
     if program is None:
         if options or scan:
@@ -149,7 +149,7 @@ def _fieldbus(setup: dict[str, Any]) -> dict[str, Any]:
         return {"fieldbus": {"mode": "stepped"}}
     table = {"kind": "loopback", "role": "device", "mode": "stepped", "program": str(program)}
     if re.search(r"[/\\]|\.(so|dll|dylib)$", str(program)):
-        # driver.cfg may be elsewhere.
+        # driver.cfg can be elsewhere.
         table["program"] = str(Path(program).resolve())
     if scan is not None:
         table["scan"] = scan
@@ -159,7 +159,7 @@ def _fieldbus(setup: dict[str, Any]) -> dict[str, Any]:
 
 
 class _Keep:
-    """What is kept of a test."""
+    """Keeps the recording of a test."""
 
     def __init__(self, when: str, request: pytest.FixtureRequest) -> None:
         self._when = when
@@ -171,14 +171,14 @@ class _Keep:
         self._recording = Path(folder).resolve() / f"{name}.vcd"
 
     def table(self) -> dict[str, Any]:
-        """Takes the place of driver.cfg's own: tests must not write to the plant's recording."""
+        """Replaces driver.cfg's own table: tests must not write to the plant's recording."""
         if self._when == "never":
             return {"record": {"file": "none.vcd", "when": "never"}}
         self._reserve()
         return {"record": {"file": self._recording}}
 
     def _reserve(self) -> None:
-        """Makes the file. Its folder may be removed meanwhile, by another process of the same run that kept nothing."""
+        """Creates the file. Another process of the same run that keeps nothing can remove its folder meanwhile."""
         for _ in range(_ATTEMPTS):
             with suppress(FileNotFoundError, FileExistsError):
                 self._recording.parent.mkdir(parents=True, exist_ok=True)
@@ -187,25 +187,25 @@ class _Keep:
         self._recording.parent.mkdir(parents=True, exist_ok=True)
 
     def abandon(self) -> None:
-        """The driver was not opened. What an earlier run has left stays."""
+        """The driver was not opened. Files of an earlier run stay."""
         with suppress(OSError):
             if self._recording.stat().st_size == 0:
                 self._drop()
 
     def _drop(self) -> None:
         self._recording.unlink(missing_ok=True)
-        # It stays if there is something else in it.
+        # The folder stays if it is not empty.
         with suppress(OSError):
             self._recording.parent.rmdir()
 
     def told(self) -> str:
-        """Where it is, if the test has failed."""
+        """The recording's path, if the test has failed."""
         if self._when == "never":
             return ""
         return f"; recording: {self._recording}; report: {self._recording.with_suffix('.html')}"
 
     def finish(self, failure: BaseException | None, statistics: dict[str, str]) -> None:
-        """Keeps what is to be kept, after the driver is closed."""
+        """Keeps or deletes the recording, after the driver is closed."""
         import tickbus
 
         if self._when == "never":
@@ -217,5 +217,5 @@ class _Keep:
         try:
             tickbus.report(self._recording, self._title, statistics, texts)
         except tickbus.FieldbusError as error:
-            # The test's own failure is what matters.
+            # The test's own failure matters more.
             warnings.warn(f"there is no page of the recording: {error}", stacklevel=1)

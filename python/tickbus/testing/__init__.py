@@ -1,6 +1,6 @@
 """Tests of PLC programs: the program and a model of the machine, tick by tick, on simulation time.
 
-The plug-in for pytest, which is there as soon as tickbus is installed, hands a ``Plc`` to tests as the fixture ``plc``::
+The plug-in for pytest comes with tickbus, and passes a ``Plc`` to tests as the fixture ``plc``::
 
     import pytest
     from tickbus.testing import off, on

@@ -1,4 +1,4 @@
-"""What a test expects or waits for."""
+"""Conditions that a test expects or waits for."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ class Condition(ABC):
 
     @abstractmethod
     def bind(self, plc: Plc) -> Bound:
-        """Finds the signals; ``UnknownSignalError`` with the nearest name if there is none."""
+        """Finds the signals; ``UnknownSignalError`` with the nearest name if one does not exist."""
 
     def and_(self, other: Condition) -> Condition:
         """Both hold in the same tick."""
         return _Both(self, other, True)
 
     def or_(self, other: Condition) -> Condition:
-        """One of them holds, or both do."""
+        """At least one of them holds."""
         return _Both(self, other, False)
 
     def negated(self) -> Condition:
-        """The contrary."""
+        """The opposite."""
         return _Negated(self)
 
     __and__ = and_
@@ -96,7 +96,7 @@ def falls(signal: str) -> Condition:
 
 
 def when(what: str, holds: Callable[[], object]) -> Condition:
-    """Something else, such as the state of the machine's model. A failure calls it by ``what``."""
+    """Any other condition, such as the state of the machine's model. A failure names it by ``what``."""
     return _When(what, holds)
 
 
@@ -199,7 +199,7 @@ class _BoundBoth(Bound):
         return all(held) if self._every else any(held)
 
     def _told(self, tell: Callable[[Bound], str]) -> str:
-        # Of two conditions that must hold together, only those that do not are told.
+        # Of two conditions that must both hold, only those that fail are reported.
         everything = self.holds() or not self._every
         wrong = [part for part in self._parts if everything or not part.holds()]
         return (" and " if self._every else " or ").join(map(tell, wrong))

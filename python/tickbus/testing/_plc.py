@@ -19,17 +19,17 @@ Duration: TypeAlias = float | str
 
 
 class Machine(Protocol):
-    """A model of the machine, as detailed as the tests need. ``connect(plc)``, if it has that, is called once before the first tick."""
+    """A model of the machine, as detailed as the tests need. ``connect(plc)`` is optional, and is called once before the first tick."""
 
     def step(self, plc: Plc, time: float) -> object:
-        """One tick: reads what the PLC has commanded, moves on, sets the sensors. ``time`` in seconds is that of its end."""
+        """One tick: reads the PLC's commands, moves on, sets the sensors. ``time`` is the time at its end, in seconds."""
 
 
 class Plc:
     """The PLC under test: set its inputs, read its outputs, let time pass.
 
-    In each tick the machine takes a step with the PLC's commands, its sensors and all forced values are sent to the PLC, the PLC is
-    scanned if a scan is due, and its outputs come back. Between two calls time stands still.
+    In each tick the machine takes a step with the PLC's commands, the PLC gets the sensors and all forced values, is scanned
+    if a scan is due, and returns its outputs. Between two calls time stands still.
     """
 
     def __init__(self, driver: Driver, step: str = "1ms") -> None:
@@ -49,7 +49,7 @@ class Plc:
         self._in_step = False
 
     def connect(self, machine: Machine | Callable[[Plc, float], object]) -> Plc:
-        """Connect a machine, beside those that are there: an object with ``step(plc, time)``, or a function."""
+        """Connect another machine: an object with ``step(plc, time)``, or a function."""
         step = getattr(machine, "step", machine)
         if not callable(step):
             raise TypeError(f"{machine!r} is no machine: it has no method step(plc, time)")
@@ -62,7 +62,7 @@ class Plc:
     # Signals
 
     def signal(self, name: str) -> Signal:
-        """A signal, which is faster than its name in a machine that uses it at every tick."""
+        """A signal's handle, which is faster than the name in a machine that uses the signal at every tick."""
         return self._watch(name).signal
 
     @property
@@ -71,7 +71,7 @@ class Plc:
         return self._driver.signals
 
     def set(self, signal: str, value: float) -> Plc:
-        """Set an input of the PLC (``%I``), to be sent with the next tick. A machine that sets it, too, overwrites it: see ``force``."""
+        """Set an input of the PLC (``%I``), to be sent with the next tick. A machine that also sets it overwrites it: see ``force``."""
         self.signal(signal).value = value
         return self
 
@@ -88,7 +88,7 @@ class Plc:
         return self
 
     def press(self, button: str) -> Plc:
-        """Press a push button: force the signal on, let 200 ms pass, let it go off again."""
+        """Press a push button: force the signal on, let 200 ms pass, and release it."""
         return self.force(button, True).run(_PRESS).release(button).set(button, False)
 
     def get(self, signal: str) -> float:
@@ -96,7 +96,7 @@ class Plc:
         return self.signal(signal).value
 
     def is_on(self, signal: str) -> bool:
-        """Whether the signal is on."""
+        """True if the signal is on."""
         return self.get(signal) != 0
 
     def rises(self, signal: str) -> int:
@@ -118,7 +118,7 @@ class Plc:
         return self._driver.inject(fault, **keys)
 
     def faults(self) -> list[Fault]:
-        """The faults in driver.cfg and those that were injected."""
+        """The faults of driver.cfg and the injected ones."""
         return self._driver.faults()
 
     # Time
@@ -137,7 +137,7 @@ class Plc:
 
     @property
     def ticks(self) -> int:
-        """How many ticks there were."""
+        """The number of ticks so far."""
         return self._ticks
 
     @property
@@ -203,7 +203,7 @@ class Plc:
 
     def _watch(self, name: str) -> Watch:
         watch = self._watches.get(name)
-        # Asked for a signal that it does not have, the driver tells the nearest one.
+        # For an unknown name, the driver's error has the nearest one.
         return watch if watch is not None else self._watches[self._driver.signal(name).name]
 
     def _where(self) -> str:
@@ -245,7 +245,7 @@ class Await:
         self._plc, self._bound = plc, bound
 
     def within(self, limit: Duration, unit: Unit | None = None) -> int:
-        """Let ticks pass until the condition holds, none if it does already; returns how many it took.
+        """Let ticks pass until the condition holds, none if it already does; returns the number of ticks.
 
         The limit is a number of ticks, ``within(40)`` or ``within(40, ticks)``, or simulation time, ``within("3s")`` or ``within(3, s)``.
         """
@@ -276,13 +276,13 @@ class Await:
 
 
 class Expectation:
-    """A condition that holds now, and may have to go on: ``plc.expect(off("Not OK")).during("5s")``."""
+    """A condition that holds now, and can be required to keep holding: ``plc.expect(off("Not OK")).during("5s")``."""
 
     def __init__(self, plc: Plc, bound: Bound) -> None:
         self._plc, self._bound = plc, bound
 
     def during(self, span: Duration, unit: Unit | None = None) -> Plc:
-        """Let ticks or simulation time pass, and fail at the first tick at whose end the condition does not hold."""
+        """Let ticks or simulation time pass, and fail at the end of the first tick in which the condition does not hold."""
         plc = self._plc
         if not isinstance(span, str) and (unit is None or unit.nanos is None):
             count = int(span)

@@ -1,4 +1,4 @@
-"""The recent history of a signal, for the messages of failures."""
+"""The recent history of a signal, for failure messages."""
 
 import math
 from collections import deque
@@ -11,7 +11,7 @@ _KEPT = 8
 
 
 def number(value: float) -> str:
-    """For people: no exponent if it is short, no fraction if it is whole."""
+    """A number for people: no exponent if it is short, no fraction if it is whole."""
     if isinstance(value, int):
         return str(int(value))
     plain = math.isfinite(value) and abs(value) < 1e15 and (value == 0 or abs(value) >= 1e-6)
@@ -42,7 +42,7 @@ class Watch:
         self._value = now
 
     def text(self, value: float | None = None) -> str:
-        """The current value, or this one, for people."""
+        """The current or given value, for people."""
         if value is None:
             value = self.signal.value
         if self.signal.type == "BOOL":

@@ -1,4 +1,4 @@
-# The commands of this project. What they do stands in tools/; this file gives them their names.
+# The commands of this project. tools/ has the scripts; this file gives them their names.
 
 .PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak worlds storm lint dist build setup clean
 .DEFAULT_GOAL := help

@@ -16,7 +16,7 @@ have() {
     command -v "$1" >/dev/null 2>&1
 }
 
-# Whether system packages can be installed: on Debian or Ubuntu, as root or with a sudo that asks for no password.
+# True if system packages can be installed: on Debian or Ubuntu, as root or with a sudo that asks for no password.
 can_install() {
     have apt-get && { [ "$(id -u)" = 0 ] || sudo -n true 2>/dev/null; }
 }
@@ -25,17 +25,17 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
-# at_least 1.88 1.95.0: whether the second version is at least the first.
+# at_least 1.88 1.95.0: true if the second version is at least the first.
 at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
-# What the zip has beyond a plain build; with the rest it would be larger than 15.5 MB.
+# The zip's features beyond a plain build; with all others it would be larger than 15.5 MB.
 # shellcheck disable=SC2034 # for the scripts that source this
 PRODUCT_FEATURES=opcua,page
 
-# Has the linker keep one copy of functions that are identical, of which OPC UA has thousands, where it can (Rust's own does on
-# Linux): library and command are smaller by a twentieth. For all that builds the product, so that none builds it anew.
+# Has the linker keep one copy of identical functions, of which OPC UA has thousands, where it can (Rust's own does on
+# Linux): library and command become smaller by a twentieth. Used in every build of the product, so that none is rebuilt.
 link_small() {
     local option=-Wl,--icf=all probe
     probe=$(mktemp -d)
@@ -84,11 +84,11 @@ tickbus_command() {
     esac
 }
 
-# Where tools/build puts the tickbus command without its debug tables, and the tables.
+# The folder of tools/build for the tickbus command without its debug tables, and for the tables.
 STRIPPED=target/stripped
 DEBUG_TABLES=target/debug-tables
 
-# without_debug_tables FILE COPY: a copy without debug tables, which take up more than half of it. If the tools are
+# without_debug_tables FILE COPY: copies FILE without debug tables, which take up more than half of it. If the tools are
 # installed, the tables go to a separate file, named after the copy with .debug, where debuggers find them.
 without_debug_tables() {
     mkdir -p "$(dirname "$2")" "$DEBUG_TABLES"
@@ -104,13 +104,13 @@ without_debug_tables() {
     fi
 }
 
-# One pip for all environments under target/: to install one into each takes longer than what they are to have.
+# One pip for all environments under target/: installing pip into each takes longer than installing their packages.
 PIP=target/peers/pip
 
 has_pip() {
     [ -x "$PIP/bin/pip" ] && return
     rm -rf "$PIP"
-    # Since 22.3 it installs into other environments.
+    # Since version 22.3, pip can install into other environments.
     python3 -m venv "$PIP" && "$PIP/bin/pip" install --quiet --disable-pip-version-check 'pip>=22.3'
 }
 
@@ -119,7 +119,7 @@ pip_into() {
     "$PIP/bin/pip" --quiet --disable-pip-version-check --python "$1/bin/python" "${@:2}"
 }
 
-# Whether there is an iec2c: named by IEC2C, on the PATH, or in shared/peers beside the checkout. Sets IEC2C to it.
+# True if there is an iec2c: named by IEC2C, on the PATH, or in shared/peers beside the checkout. Sets IEC2C to it.
 has_iec2c() {
     if [ -z "${IEC2C:-}" ] && ! have iec2c && [ -x "$ROOT/../shared/peers/iec2c/iec2c" ]; then
         IEC2C=$ROOT/../shared/peers/iec2c/iec2c
@@ -128,7 +128,7 @@ has_iec2c() {
     have "$IEC2C"
 }
 
-# For what ends before a thorough compiler would pay.
+# For programs that end before a thorough compiler would pay.
 SHORT_JVM="-XX:TieredStopAtLevel=1 -XX:+UseSerialGC"
 
 # Runs Maven on the Java reactor, quietly and without colours.
@@ -137,9 +137,8 @@ maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 
-# Lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
-# command) and simulator/ (the simulator, the control tables, and in peeler/ the driver.cfg of the
-# peeling line). Needs what tools/build makes.
+# Lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus command) and simulator/
+# (the simulator, the control tables, and in peeler/ the driver.cfg of the peeling line). Needs the output of tools/build.
 assemble() {
     local folder=$1 release
     release=$(version)

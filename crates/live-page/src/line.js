@@ -18,7 +18,7 @@ const line = (() => {
     if (element.textContent !== text) element.textContent = text;
   }
 
-  /** How a state is coloured. */
+  /** The colour of a state. */
   const colour = { running: "good", stale: "stale", failed: "bad", opening: "stale", closed: "gap" };
 
   function card(driver) {
@@ -41,7 +41,7 @@ const line = (() => {
     return { it, state, name, reason, since, faults, facts, stations, more, times, texts, counters };
   }
 
-  /** Makes the rows of a table equal to these lists of cells, and touches only what is another. */
+  /** Fills a table with rows of cells, and touches only cells that differ. */
   function fill(table, head, rows) {
     const shape = `${rows.length}/${rows[0]?.length ?? 0}`;
     if (table.dataset.shape !== shape) {
@@ -105,10 +105,10 @@ const line = (() => {
     }
   }
 
-  /** Whether the simulation stands still. */
+  /** True if the simulation stands still. */
   const isSilent = (line) => line.silence_ms > 1000;
 
-  /** The time that has passed since what was heard, for what counts on by itself. */
+  /** Milliseconds since the line was last heard of, for figures that count on between messages. */
   const since = (line) => line.since_ms + (performance.now() - line.heard);
 
   function show() {
@@ -120,7 +120,7 @@ const line = (() => {
       const { line } = driver;
       const own = cards.get(driver.id);
       if (!line) continue;
-      // A line may run whose data are stale, while the PLC is in STOP.
+      // A line can run with stale data while the PLC is in STOP.
       const isStale = line.status === "stale" && line.state === "running";
       const state = isStale ? "stale" : line.state;
       say(own.name, driver.name);
@@ -129,7 +129,7 @@ const line = (() => {
       own.it.classList.toggle("trouble", state !== "running");
       say(own.reason, line.reason || "no reason known");
       say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
-      // What was forced and is released is no news.
+      // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
       facts(own, line);
       const isRun = driver.kind === "sync";

@@ -1,13 +1,13 @@
 "use strict";
 
-// The list of signals. Only the rows that can be seen exist; each shows another signal when the list is scrolled.
+// The list of signals. Only the visible rows exist; scrolling gives each another signal.
 
 const list = (() => {
   const TREND = 132;
   const frame = document.getElementById("list");
   const view = document.getElementById("window");
   const narrow = matchMedia("(max-width: 640px)");
-  /** What is listed: `{ kind: "station" | "signal" | "trend", … }`, and where each begins, in pixels. */
+  /** The rows, `{ kind: "station" | "signal" | "trend", … }`, and the top of each, in pixels. */
   let rows = [];
   let tops = [0];
   let chosen = null;
@@ -15,10 +15,10 @@ const list = (() => {
   let kind = "all";
   let wanted = [];
   let isDue = false;
-  /** The elements of rows by what they show, and those that show nothing. */
+  /** The row elements by their contents, and the empty ones. */
   let shown = new Map();
   const spare = { station: [], signal: [], trend: [] };
-  /** For measurements: how many pictures there were, and the longest time that one took, in milliseconds. */
+  /** For measurements: the number of redraws, and the longest one, in milliseconds. */
   const drawn = { count: 0, longest: 0 };
   let act = {};
 
@@ -33,7 +33,7 @@ const list = (() => {
     return wanted.every((word) => signal.words.includes(word));
   }
 
-  /** Makes the rows anew. */
+  /** Rebuilds the rows. */
   function choose() {
     rows = [];
     let found = 0;
@@ -77,7 +77,7 @@ const list = (() => {
     });
   }
 
-  /** From where to where the rows can be seen, whoever scrolls. */
+  /** The visible range of the rows, whichever element scrolls. */
   function seen() {
     const box = view.getBoundingClientRect();
     const own = frame.getBoundingClientRect();
@@ -115,7 +115,7 @@ const list = (() => {
     drawn.longest = Math.max(drawn.longest, performance.now() - begun);
   }
 
-  /** Changes an element only where it is another: most of it stays as it is from one picture to the next. */
+  /** Changes an element only if the value differs: most of it stays the same from one redraw to the next. */
   function set(element, name, value, change) {
     const known = element.known ??= {};
     if (known[name] === value) return;
@@ -222,7 +222,7 @@ const list = (() => {
     },
   };
 
-  /** Whether something of what can be seen moves by itself: trends, and what was new a moment ago. */
+  /** True if something visible moves without events: trends, and values that are shown as new. */
   const isMoving = () => {
     for (const element of shown.values()) {
       if (element.dataset.kind === "trend" || element.known?.new) return true;
@@ -246,7 +246,7 @@ const list = (() => {
     redraw();
   }
 
-  /** To the next signal in a direction, over so many. */
+  /** Moves the choice by this many signals. */
   function move(by) {
     const step = Math.sign(by);
     let at = chosenRow;
@@ -323,9 +323,9 @@ const list = (() => {
       kind = which;
       choose();
     },
-    /** Who is told: `chosen(signal)`, `force(signal)`, `release(signal)`. */
+    /** Sets the listeners: `chosen(signal)`, `force(signal)`, `release(signal)`. */
     begin(actions) { act = actions; },
-    /** After the signals were made anew: the chosen one by its name. */
+    /** After the signals were replaced: finds the chosen one by its name. */
     renew() {
       const key = chosen && plant.keyOf(chosen);
       chosen = (key && plant.signals.find((signal) => plant.keyOf(signal) === key)) ?? null;

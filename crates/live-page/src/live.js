@@ -1,6 +1,6 @@
 "use strict";
 
-// The work of the page: it hears what happens, shows it, and asks for forced values.
+// The page's controller: receives events, shows them, and requests forced values.
 
 (() => {
   const get = (id) => document.getElementById(id);
@@ -8,7 +8,7 @@
   let mayForce = false;
   let isOld = true;
   let counts = { forced: 0, failSafe: 0 };
-  /** For measurements: when the first signals were painted, in milliseconds since the page was asked for. */
+  /** For measurements: when the first signals were painted, in milliseconds since the request for the page. */
   let painted = 0;
 
   function say(text, isBad = false) {
@@ -43,7 +43,7 @@
     change("DELETE", pathOf(signal), undefined, `${signal.name} is released.`);
   }
 
-  /** To the tools that force the chosen signal. */
+  /** Opens the tools that force the chosen signal. */
   function edit(signal) {
     if (!signal) {
       say("Choose a signal first.", true);
@@ -76,7 +76,7 @@
     show(get("force-unit"), signal.unit);
     show(get("trend"), signal.isOpen ? "Close trend" : "Trend");
     if (isNew) {
-      // To the last digit: whoever confirms it holds what is there.
+      // To the last digit: confirming it unchanged holds the current value.
       forceValue.value = signal.value === null || signal.isBool ? "" : String(signal.value);
       if (!/^Read-only/.test(get("status").textContent)) say("");
     }
@@ -158,7 +158,7 @@
 
   // What happens.
 
-  /** What nobody may overlook. */
+  /** Alarms that nobody may overlook. */
   function alarm() {
     const now = { forced: 0, failSafe: 0 };
     const names = [];
@@ -190,7 +190,7 @@
     show(get("title"), names.join(" · ") || "tickbus");
     document.title = `${names.join(" · ") || "No driver"} – tickbus`;
     show(get("counts"), plant.drivers.length > 1 ? `${plant.drivers.length} drivers` : "");
-    // The variables of a run have no address and no direction, and none is forced.
+    // The variables of a run have no address and no direction, and cannot be forced.
     document.body.classList.toggle("only-runs", plant.drivers.length > 0 && plant.drivers.every(({ kind }) => kind === "sync"));
     list.renew();
     pictures.load();
@@ -198,7 +198,7 @@
   }
 
   let isDue = false;
-  /** After an event, and as long as something moves by itself. */
+  /** Redraws after an event, and continuously while something moves. */
   function redraw() {
     if (isDue) return;
     isDue = true;

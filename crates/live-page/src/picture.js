@@ -1,14 +1,14 @@
 "use strict";
 
-// The machines' pictures. The server has made each harmless and read its bindings, which stand in `data-tb` as a list of
-// `{ do, signal, edges, map }`; what a map is stands at `valueOf` below.
+// The machines' pictures. The server has sanitised each one and parsed its bindings into `data-tb`, a list of `{ do, signal,
+// edges, map }`; see `mapped` below for maps.
 
 const pictures = (() => {
   const box = document.getElementById("pictures");
   const NAMESPACE = "http://www.w3.org/2000/svg";
   let all = [];
   let generation = 0;
-  /** A page that is left in the background for long turns nothing by more than this, in milliseconds. */
+  /** The longest step of an animation, in milliseconds, so that a page that was in the background does not jump. */
   const LONGEST = 200;
   let last = 0;
 
@@ -42,7 +42,8 @@ const pictures = (() => {
         frame.append(text);
         return { driver, element, movers: [], root: null };
       }
-      // What is parsed is held to the policy of the page, which has no styles but its own: these come in by another way below.
+      // The page's policy allows the parsed picture no styles but the page's own: rename them, and add them in another way
+      // below.
       const text = (await drawing.text()).replace(/<(\/?)style\b/g, "<$1styles");
       const root = new DOMParser().parseFromString(text, "image/svg+xml").documentElement;
       if (root.namespaceURI !== NAMESPACE) return null;
@@ -52,7 +53,7 @@ const pictures = (() => {
       }
       root.setAttribute("role", "img");
       root.setAttribute("aria-label", title || `The machine of ${driver.name}`);
-      // A picture's names of gradients and its styles are its own, and whatever they do to its host stays within the frame.
+      // A picture's gradient names and styles must not affect the page, so it lives in a shadow root within its frame.
       const host = document.createElement("div");
       frame.append(host);
       const shadow = host.attachShadow({ mode: "open" });
@@ -90,20 +91,20 @@ const pictures = (() => {
     element.append(details);
   }
 
-  /** Finds what moves, and where each was drawn, before anything is hidden. */
+  /** Finds the moving elements, and their original positions, before anything is hidden. */
   function prepare(picture) {
     if (!picture.root) return;
     for (const element of picture.root.querySelectorAll("[data-tb]")) {
       const bindings = JSON.parse(element.dataset.tb);
       const signals = bindings.map(({ signal }) => picture.driver.byName.get(signal) ?? null);
       if (element === picture.root) continue;
-      // A copy: the element's own changes with what is done to it.
+      // A copy, because the element's own matrix changes with its transforms.
       const base = picture.root.createSVGMatrix().multiply(element.transform?.baseVal.consolidate()?.matrix ?? picture.root.createSVGMatrix());
       let area = { x: 0, y: 0, width: 0, height: 0 };
       try {
         area = element.getBBox();
       } catch {
-        // What is within a definition has no place of its own.
+        // An element within a definition has no position.
       }
       picture.movers.push({
         element, bindings, signals, base, area,
@@ -115,9 +116,9 @@ const pictures = (() => {
   }
 
   /**
-   * What a value becomes: without a map itself; by `{ factor, offset }`; or by the first of `{ cases: [[from, to, out], …] }`
-   * whose range has it, where `from` is null for "else" and an `out` of two lies between them. Beyond all ranges the nearest
-   * end counts, for numbers. `undefined`: as it was drawn.
+   * The result of a value: the value itself without a map; by `{ factor, offset }`; or by the first of `{ cases: [[from, to,
+   * out], …] }` whose range contains it, where a null `from` means "else" and an `out` of two values interpolates. For
+   * numbers beyond all ranges the nearest end counts. `undefined`: as drawn.
    */
   function mapped(map, value) {
     if (!map) return value;
@@ -141,14 +142,14 @@ const pictures = (() => {
     return `rgb(${parts[0].map((part, i) => Math.round(part + (parts[1][i] - part) * share)).join(", ")})`;
   }
 
-  /** A text with the value in place of `{}` (as in the list), or `{0.00}` with so many decimals. */
+  /** A text with the value in place of `{}` (formatted as in the list), or of `{0.00}` with that number of decimals. */
   const filled = (pattern, signal, value) => pattern.replace(/\{(0(?:\.0*)?)?\}/g, (_, digits) => {
     if (digits === undefined && !signal) return String(value);
     if (digits === undefined) return signal.unit ? `${words.value(signal)} ${signal.unit}` : words.value(signal);
     return value.toFixed((digits.split(".")[1] ?? "").length).replace("-", "−");
   });
 
-  /** Where something is on its way: it gets to a new place evenly within the time that the drawing says. */
+  /** The current value of a moving property: it reaches a new target at constant speed within the drawing's time. */
   function eased(mover, what, target, now) {
     if (!mover.smooth || !Number.isFinite(target)) return target;
     const way = mover.moving[what] ??= { from: target, to: target, begin: now - mover.smooth };
@@ -160,7 +161,7 @@ const pictures = (() => {
 
   let isBusy = false;
 
-  /** Brings the pictures to what the signals have now. Whether something still moves. */
+  /** Updates the pictures from the signals. Returns whether something still moves. */
   function move() {
     const now = performance.now();
     const passed = Math.min(LONGEST, now - last);
@@ -181,7 +182,7 @@ const pictures = (() => {
     let isPlaced = false;
     mover.bindings.forEach((binding, i) => {
       const signal = mover.signals[i];
-      // Without a latch no edges are counted.
+      // Edges are only counted with a latch.
       const value = signal === null ? ofBus(driver, binding.signal) : binding.edges ? signal.edges ?? NaN : plant.number(signal);
       if (Number.isNaN(value)) return;
       const out = mapped(binding.map, value);
@@ -222,13 +223,13 @@ const pictures = (() => {
     mover.element.setAttribute("transform", transform);
   }
 
-  /** Where an element is: moved, and turned and scaled about its middle or the point that the drawing says. */
+  /** An element's matrix: moved, and turned and scaled about its middle or the drawing's pivot. */
   function matrix({ base, area, pivot }, { x, y, turn, scale, width, height }, root) {
     const point = root.createSVGPoint();
     [point.x, point.y] = pivot.length === 2 ? pivot : [area.x + area.width / 2, area.y + area.height / 2];
     const centre = point.matrixTransform(base);
     let to = root.createSVGMatrix().translate(centre.x + x, centre.y + y).rotate(turn).scale(scale).translate(-centre.x, -centre.y).multiply(base);
-    // A level rises from the bottom, and a bar grows from the left, of what was drawn.
+    // A level rises from the bottom of the drawn shape, and a bar grows from its left.
     if (width !== 1 || height !== 1) {
       const [left, bottom] = [area.x, area.y + area.height];
       to = to.translate(left, bottom).scaleNonUniform(Math.max(0, width), Math.max(0, height)).translate(-left, -bottom);
@@ -243,7 +244,7 @@ const pictures = (() => {
     return { fresh: 0, unchanged: 1, stale: 2 }[line.status] ?? NaN;
   }
 
-  /** A property, which counts before what the drawing and its style sheet say; null: as they say. */
+  /** Sets a property, which overrides the drawing and its style sheet; null removes it. */
   function style(mover, name, value) {
     if (mover.was[name] === value) return;
     mover.was[name] = value;
@@ -254,7 +255,7 @@ const pictures = (() => {
   function say(mover, text) {
     if (mover.was.text === text) return;
     mover.was.text = text;
-    // Inkscape writes each line of a text as a span that has its place.
+    // Inkscape writes each line of a text as a span with its own position.
     const line = mover.element.querySelector("tspan") ?? mover.element;
     line.textContent = text;
   }

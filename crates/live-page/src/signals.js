@@ -1,14 +1,14 @@
 "use strict";
 
-// The drivers and their signals, as they are known from the events.
+// The drivers and their signals, as received in the events.
 
-/** For what draws: units are milliseconds, and the present is 0 s. */
+/** For drawing: the unit is milliseconds, and now is 0 s. */
 const run = { begin: 0, end: 0, unit: 1e6 };
 
 const plant = (() => {
-  /** How long a value that has changed is shown as new. */
+  /** How long a changed value is shown as new, in milliseconds. */
   const NEW = 350;
-  /** A connection that comes back within this time has missed nothing that a trend would show, in milliseconds. */
+  /** A connection that returns within this time has missed nothing visible in a trend, in milliseconds. */
   const MISSED = 250;
   const FAIL_SAFE = 1;
   const FORCED = 2;
@@ -16,7 +16,7 @@ const plant = (() => {
   let layout = null;
   let drivers = [];
   let signals = [];
-  /** The server's clock when it was heard last, in milliseconds, and this page's then. */
+  /** The server's clock at its last message, in milliseconds, and this page's clock then. */
   let time = 0;
   let heard = 0;
 
@@ -51,7 +51,7 @@ const plant = (() => {
     signal.isStale = (flags & STALE) !== 0;
   }
 
-  /** The signals as such: the same ones after a restart keep what was opened of them. */
+  /** Replaces the signals: signals that exist after a restart, too, keep their open trends. */
   function takeAll(given, before) {
     const known = new Map(signals.map((signal) => [keyOf(signal), signal]));
     drivers = given.drivers.map((driver) => ({ ...driver, line: null }));
@@ -62,7 +62,7 @@ const plant = (() => {
       for (const signal of driver.signals) {
         const old = known.get(keyOf(signal));
         signal.isOpen = old?.isOpen ?? false;
-        // What was missed meanwhile the server has, coarsely.
+        // The server has the missed values, coarsely.
         if (old?.trend && old.index === signal.index && time - before < MISSED) {
           signal.trend = old.trend;
           trend.add(signal, time);
@@ -81,10 +81,10 @@ const plant = (() => {
     }
   }
 
-  /** Takes an event over. Whether there are other signals now, and whether the line was told. */
+  /** Applies an event. Returns whether the signals were replaced, and whether the line has changed. */
   function hear(text) {
     const event = JSON.parse(text);
-    // Another server has another clock: what was collected on the old one is not comparable.
+    // Another server has another clock: values collected by the old clock are not comparable.
     if (event.full && event.time_ms < time) for (const signal of signals) signal.trend = null;
     const before = time;
     time = event.time_ms;
@@ -113,13 +113,13 @@ const plant = (() => {
   /** The server's time, in milliseconds. */
   const now = () => time + (performance.now() - heard);
 
-  /** A value as a number; NaN if there is none. */
+  /** A value as a number; NaN without a value. */
   const number = (signal) => (signal.value === null ? NaN : Number(signal.value));
 
-  /** A value as something that was measured: NaN while it is stale. */
+  /** A value as a measurement: NaN while it is stale. */
   const live = (signal) => (signal.isStale ? NaN : number(signal));
 
-  /** How old the data of a signal's station are, in milliseconds; null if that is not known. */
+  /** The age of the data of a signal's station, in milliseconds; null if unknown. */
   function age(signal) {
     const line = signal.driver.line;
     const age = line?.stations?.[signal.station]?.age_ms;
@@ -136,7 +136,7 @@ const plant = (() => {
 
 /** Texts for people. */
 const words = {
-  /** A value without its unit, with so many decimals that it stands still while it changes. */
+  /** A value without its unit, with enough decimals that its width is constant while it changes. */
   value(signal) {
     if (signal.value === null) return "–";
     if (signal.isBool) return plant.number(signal) > 0.5 ? "TRUE" : "FALSE";

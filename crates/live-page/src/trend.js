@@ -1,18 +1,18 @@
 "use strict";
 
-// The trend of a signal: what the server has kept, and what has come since, drawn as the report draws it.
+// The trend of a signal: the server's history and the values received since, drawn by the report's code.
 
 const trend = (() => {
-  /** What is shown, in milliseconds. */
+  /** The selectable lengths, in milliseconds. */
   const LENGTHS = [15000, 60000, 300000];
-  /** Values that are kept by the page, for each signal. */
+  /** The most values that the page keeps per signal. */
   const MOST = 60000;
   let length = LENGTHS[1];
   let colours = null;
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { colours = null; });
 
-  /** Begins to collect a signal, with what the server has of it. */
+  /** Begins to collect a signal, starting with the server's history. */
   async function open(signal) {
     signal.isOpen = true;
     if (signal.trend) return;
@@ -33,7 +33,7 @@ const trend = (() => {
       mine.values = values.filter(isChange);
       mine.sampled = { until: begin, often: kept.samples_per_s };
     } catch {
-      // The trend begins now, then.
+      // Without the history, the trend begins now.
     }
   }
 
@@ -42,7 +42,7 @@ const trend = (() => {
     signal.trend = null;
   }
 
-  /** A signal has another value. */
+  /** Adds a signal's new value. */
   function add(signal, time) {
     const data = signal.trend;
     const value = plant.live(signal);
@@ -61,7 +61,7 @@ const trend = (() => {
     const axis = 20;
     const gutter = 58;
     const painted = { ctx, colours, left: gutter, width: Math.max(10, width - gutter - MARGIN), isNarrow: true, from: 0, to: length };
-    // The run of the report ends with the present here, which is 0 s on the axis.
+    // The report's run ends now, which is 0 s on the axis.
     run.begin = -length * run.unit;
     run.end = length;
     const begin = plant.now() - length;
@@ -102,7 +102,7 @@ const trend = (() => {
     paintAxis(painted, axis);
   }
 
-  /** Time of which only samples are known, and how many of them. */
+  /** Paints the time of which only samples are known, and their number. */
   function paintSampled({ ctx, colours, left, width, to }, sampled, begin, height) {
     const end = sampled ? (sampled.until - begin) / to * width : 0;
     if (end <= 0) return;
@@ -119,7 +119,7 @@ const trend = (() => {
     if (text.length > 3) ctx.fillText(text, left + end - 4, height / 2 - 5);
   }
 
-  /** Time without a value that counts. */
+  /** Paints the time without a valid value. */
   function paintUnknown(painted, { times, values }, height) {
     const { ctx, colours, left, width, to } = painted;
     values.forEach((value, i) => {
@@ -133,7 +133,7 @@ const trend = (() => {
     });
   }
 
-  /** The next length of time, for all trends. */
+  /** Selects the next length, for all trends. */
   function next() {
     length = LENGTHS[(LENGTHS.indexOf(length) + 1) % LENGTHS.length];
     return length;

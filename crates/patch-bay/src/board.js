@@ -1,7 +1,6 @@
 'use strict';
 
-// Draws the board: boxes of clients, their pins, and the cables between them. What happens when one is touched is
-// page.js's work.
+// Draws the board: boxes of clients, their pins, and the cables between them. page.js handles clicks and drags.
 const board = (() => {
   const clients = document.getElementById('clients');
   const cables = document.getElementById('cables');
@@ -58,7 +57,7 @@ const board = (() => {
     return { element: box, shape };
   }
 
-  /** All clients: those that are here, and those that only cables remember. */
+  /** All clients: connected ones, and those that only cables remember. */
   function everyone(state) {
     const all = state.clients.map((client) => ({ ...client, isHere: true }));
     const here = new Map(all.map((client) => [client.name, new Set(client.channels.map(({ channel }) => channel))]));
@@ -74,7 +73,7 @@ const board = (() => {
         else missing.push([name, channel]);
       }
     }
-    // A cable may remember a channel that its client no longer has.
+    // A cable can remember a channel that its client no longer has.
     const byName = new Map(all.map((client) => [client.name, client]));
     for (const [name, channel] of missing) byName.get(name).channels.push({ channel, value: null, forced: null });
     for (const [name, channels] of away) {
@@ -84,7 +83,7 @@ const board = (() => {
     return all;
   }
 
-  /** What the inputs of a pin get: volts above 8 are on, below 5 off, and between them it stays. */
+  /** The level that inputs derive from a pin: on above 8 V, off below 5 V, unchanged in between. */
   function isOn(pin, value) {
     if (value === null) return false;
     const number = Number(value);
@@ -147,7 +146,7 @@ const board = (() => {
       }
     }
     showCables(state.connections, isMoved);
-    // What had the focus may have been moved or made anew; where a cable was, its input has it.
+    // The focused element may have been moved or rebuilt; if its cable is gone, focus the input.
     const next = pins.get(focusedPin)?.element ?? wires.get(focusedCable)?.group ?? pins.get(focusedCable)?.element;
     if (next && document.activeElement !== next) next.focus({ preventScroll: true });
   }
@@ -216,20 +215,20 @@ const board = (() => {
     return [jack.left + jack.width / 2 - origin.left, jack.top + jack.height / 2 - origin.top];
   }
 
-  /** A cable that hangs from an output, on its right, to an input, on its left; `low` is where it has to pass. */
+  /** A cable that hangs from an output's right to an input's left; `low` is a height that it must pass. */
   function curve([x1, y1], [x2, y2], low) {
     const width = cables.clientWidth;
     const reach = Math.max(28, Math.min(120, Math.abs(x2 - x1) / 2));
-    // What goes back to the left, to another row of boxes, would hook around its end.
+    // A cable back to the left, to another row of boxes, would hook around its end.
     const sag = x2 > x1 ? Math.min(70, Math.hypot(x2 - x1, y2 - y1) / 7) : 0;
     const out = Math.min(x1 + reach, width + 14);
     const back = Math.max(x2 - reach, -14);
-    // The middle of a cubic curve is where its ends have an eighth of the weight each.
+    // At the middle of a cubic curve, each end has an eighth of the weight.
     const [down, up] = low === undefined ? [y1 + sag, y2 + sag] : [0, 0].fill((8 * low - y1 - y2) / 6);
     return `M${x1},${y1} C${out},${down} ${back},${up} ${x2},${y2}`;
   }
 
-  /** Below the boxes of two pins, if the cable goes back to the left in the same row: else it would run through them. */
+  /** The height below the boxes of two pins if the cable goes back to the left in one row: otherwise it would cross them. */
   function below(source, sink) {
     const [from, to] = [source, sink].map((pin) => pin.element.closest('.client').getBoundingClientRect());
     const isBack = to.left <= from.left && to.top < from.bottom && from.top < to.bottom;
@@ -237,7 +236,7 @@ const board = (() => {
   }
 
   function draw() {
-    // All of the layout is read before anything is written, which would have it made anew.
+    // Read the whole layout before writing anything, which would force a new layout.
     const lines = [...wires.values()].map(({ paths, input, output }) => {
       const [source, sink] = [pins.get(output), pins.get(input)];
       return [paths, curve(place(source), place(sink), below(source, sink))];

@@ -1,13 +1,13 @@
 'use strict';
 
-// The work of the page: it hears the state, and asks for changes.
+// The page's controller: receives the state, and requests changes.
 (() => {
   const get = (id) => document.getElementById(id);
   const tray = get('chosen');
   const value = get('force-value');
   let mayChange = false;
   let chosen = null;
-  /** The next channel that is chosen gets a cable to the chosen one; not after that was forced, released or cut. */
+  /** True if choosing another channel connects it to the chosen one; false after forcing, releasing or cutting. */
   let isEnd = false;
   let state = null;
 
@@ -38,7 +38,7 @@
     change('DELETE', `/patch/${name}`, undefined, text);
   }
 
-  // Choosing: the first pin is held, the second one is its other end.
+  // Choosing: the first pin is kept, the second one is its other end.
 
   function fits(pin, other) {
     return pin.isInput !== other.isInput && pin.isAnalog === other.isAnalog;
@@ -93,14 +93,14 @@
     enable(get('cut'), state.connections.some(({ input, output }) => input === pin.name || output === pin.name), pin);
   }
 
-  /** A button that cannot be pressed any more gives the focus back to its channel. */
+  /** Disabling a focused button returns the focus to its channel. */
   function enable(button, isEnabled, pin) {
     const isLost = !isEnabled && document.activeElement === button;
     button.disabled = !isEnabled;
     if (isLost) pin.element.focus({ preventScroll: true });
   }
 
-  /** After this, the chosen channel is no longer the first end of a cable. */
+  /** After this call, the chosen channel is no longer the first end of a cable. */
   function endChoice() {
     isEnd = false;
     showChosen();
@@ -138,7 +138,7 @@
   board.clients.addEventListener('pointerdown', (event) => {
     const pin = pinAt(event.target);
     wasDragged = false;
-    // By touch, only the jack is dragged: the rest of the box scrolls the page.
+    // By touch, only the jack can be dragged: the rest of the box scrolls the page.
     const mayDrag = event.pointerType !== 'touch' || event.target.closest('.jack');
     if (!pin || !mayChange || !mayDrag || event.button !== 0) return;
     held = { name: pin.name, pointer: event.pointerId, x: event.clientX, y: event.clientY };
@@ -152,7 +152,7 @@
   window.addEventListener('pointermove', (event) => {
     if (held?.pointer !== event.pointerId) return;
     const pin = board.pins.get(held.name);
-    // The button was let go outside of the window, or the client has gone.
+    // The button was released outside of the window, or the client has gone.
     if (event.buttons === 0 || !pin) {
       endDrag();
       return;
@@ -175,7 +175,7 @@
   });
   window.addEventListener('blur', endDrag);
   board.clients.addEventListener('click', (event) => {
-    // The click that ends a drag on its own pin does not count.
+    // Ignore the click that ends a drag on its own pin.
     if (wasDragged && event.detail > 0) return;
     const pin = pinAt(event.target);
     if (pin) choose(pin);
@@ -229,7 +229,7 @@
     }
   });
 
-  // The state, as it comes.
+  // Incoming states.
 
   function count(number, one, many) {
     return `${number} ${number === 1 ? one : many}`;

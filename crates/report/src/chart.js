@@ -1,24 +1,24 @@
-// The chart on the screen: what is seen, and how it is moved.
+// The chart on the screen: the visible range, and how the user moves it.
 
 const element = (id) => document.getElementById(id);
 const lanes = element("lanes");
 const canvas = element("canvas");
 const overview = element("overview");
 
-/** From the first to the last moment; never nothing. */
+/** From the first to the last moment; never empty. */
 const whole = { from: 0, to: Math.max(run.end, 1) };
-/** No closer than this many units: a tenth of a change, and what a double can still tell apart. */
+/** The shortest visible range, in units: a tenth of a change, and within a double's resolution. */
 const CLOSEST = Math.max(0.1, run.end * 1e-12);
 
 const view = { ...whole };
 let rows = [];
 let tops = [];
 let chosen = -1;
-/** Where values are read, and where the distance is measured from: times, or null. */
+/** The time at which values are read, and the time from which the distance is measured; or null. */
 let cursor = null;
 let mark = null;
 let colours = null;
-/** For measurements: when the first picture was there, and how long the longest took, in milliseconds. */
+/** For measurements: when the first redraw was done, and the longest one, in milliseconds. */
 let drawn = { count: 0, first: 0, longest: 0 };
 
 const isNarrow = () => lanes.clientWidth < 640;
@@ -30,7 +30,7 @@ function painting(ctx) {
   return { ctx, colours, left, width: Math.max(10, lanes.clientWidth - left - MARGIN), isNarrow: isNarrow(), ...view };
 }
 
-/** Which rows there are, by the filter. */
+/** Selects the rows by the filter. */
 function choose() {
   const words = element("filter").value.toLowerCase().split(/\s+/).filter(Boolean);
   const onlyActive = element("active").checked;
@@ -69,7 +69,7 @@ function redraw() {
 /** The row at a height within all rows. */
 const rowAt = (y) => Math.min(rows.length - 1, Math.max(0, indexAt(tops, y)));
 
-/** What the bands keep of the top while the signals scroll below: signals are read against them. */
+/** The height of the bands, which stay at the top while the signals scroll below: signals are read against them. */
 function pinned() {
   const height = tops[run.bands.length] ?? 0;
   return !isNarrow() && height <= lanes.clientHeight * 0.4 ? height : 0;
@@ -134,7 +134,7 @@ function paintLine({ ctx, left, width, ...rest }, time, colour, height, dashes) 
   ctx.setLineDash([]);
 }
 
-/** What a row has at a time, as text. */
+/** The value of a row at a time, as text. */
 function readAt(row, time) {
   if (row.spans) {
     const there = row.spans.filter(([from, to]) => from <= time && time < to).map(([, , , text]) => text);
@@ -180,7 +180,7 @@ function paintOverview() {
   ctx.strokeRect(from, 1, Math.max(2, to - from), height - 2);
 }
 
-/** The line of text above the chart. */
+/** Writes the line of text above the chart. */
 function tell() {
   const step = (view.to - view.from) * run.unit / 1e9 / 1000;
   const fine = Math.max(step, run.unit / 1e9);
@@ -191,7 +191,7 @@ function tell() {
 }
 
 let saying = 0;
-/** Tells those who do not see the chart, once the keys rest. */
+/** Updates the text for screen readers, once the keys rest. */
 function say() {
   clearTimeout(saying);
   saying = setTimeout(() => {
@@ -202,7 +202,7 @@ function say() {
   }, 400);
 }
 
-/** Shows a range, moved back into the run. */
+/** Shows a range, shifted to lie within the run. */
 function show(from, to) {
   const most = whole.to - whole.from;
   const size = Math.min(most, Math.max(CLOSEST, to - from));
@@ -225,7 +225,7 @@ const pan = (share) => {
   show(view.from + by, view.to + by);
 };
 
-/** Where a key zooms: at the cursor, if it can be seen. */
+/** The centre of a zoom by key: the cursor, if it is visible. */
 const focus = () => (cursor !== null && cursor >= view.from && cursor <= view.to ? cursor : undefined);
 
 function chooseRow(row) {
@@ -238,7 +238,7 @@ function chooseRow(row) {
   redraw();
 }
 
-/** To the next (1) or previous (-1) change of the chosen row. */
+/** Moves to the next (1) or previous (-1) change of the chosen row. */
 function step(direction) {
   const row = rows[chosen];
   if (!row) return;
@@ -313,7 +313,7 @@ lanes.addEventListener("wheel", (event) => {
   }
 }, { passive: false });
 
-// Pointers that are down: where each began, and the view then.
+// The pressed pointers: where each began, and the view at that time.
 const pointers = new Map();
 let grip = null;
 const CLICK = 5;

@@ -1,4 +1,4 @@
-// The run, and its signals' changes, unpacked one signal at a time. How they are packed stands in code.rs.
+// The run, and its signals' changes, unpacked one signal at a time. code.rs has the format.
 
 const run = JSON.parse(document.getElementById("run").textContent);
 run.signals.forEach((signal, number) => { signal.number = number; });
@@ -49,7 +49,7 @@ function unpack(signal, bytes) {
     }
     return { times, values };
   }
-  // Planes of bytes, each exclusive-or with the one before.
+  // Planes of bytes, each exclusive-or with the previous one.
   const width = signal.coding === "single" ? 4 : 8;
   const raw = new Uint8Array(count * width);
   for (let plane = 0; plane < width; plane++) {
@@ -67,7 +67,7 @@ function unpack(signal, bytes) {
   return { times, values };
 }
 
-/** Unpacks a signal, once; its `data` is there from then on. */
+/** Unpacks a signal, once; sets its `data`. */
 function load(number) {
   const signal = run.signals[number];
   signal.loading ??= bytesOf(number).then(

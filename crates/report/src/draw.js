@@ -1,5 +1,5 @@
-// Painting: rows of a chart on a canvas. A painting has a context, colours, a view (from, to, in units), and where
-// the traces lie (left, width).
+// Painting: rows of a chart on a canvas. A painting has a context, colours, a view (from, to, in units), and the horizontal
+// range of the traces (left, width).
 
 const FONT = "12px system-ui, sans-serif";
 const SMALL = "10.5px system-ui, sans-serif";
@@ -7,7 +7,7 @@ const SMALL = "10.5px system-ui, sans-serif";
 const MARGIN = 10;
 const NUMBERS = "12px ui-monospace, 'DejaVu Sans Mono', monospace";
 
-/** Colours as the style sheet has them at an element. */
+/** The style sheet's colours at an element. */
 function coloursAt(element) {
   const style = getComputedStyle(element);
   const colour = (name) => style.getPropertyValue("--" + name).trim();
@@ -16,7 +16,7 @@ function coloursAt(element) {
   return Object.fromEntries(names.map((name) => [name, colour(name)]));
 }
 
-/** Sizes a canvas for the screen it is on, and gives its context in CSS pixels. */
+/** Sizes a canvas for its screen, and returns its context in CSS pixels. */
 function context(canvas, width, height, ratio = window.devicePixelRatio || 1) {
   const [wide, high] = [Math.max(1, Math.round(width * ratio)), Math.max(1, Math.round(height * ratio))];
   if (canvas.width !== wide || canvas.height !== high) {
@@ -31,7 +31,7 @@ function context(canvas, width, height, ratio = window.devicePixelRatio || 1) {
   return ctx;
 }
 
-/** A text in so much room, its end cut off if it must. */
+/** A text fitted to a width, its end cut off if necessary. */
 function fitted(ctx, text, room) {
   if (ctx.measureText(text).width <= room) return text;
   // No text of more characters than pixels fits.
@@ -70,7 +70,7 @@ function paintBool(painting, data, top, bottom) {
   const busy = new Path2D();
   const lines = new Path2D();
   const level = (value) => (value > 0.5 ? top : bottom);
-  // Beside a time without a value nothing is known to have changed.
+  // Next to a time without a value, a change is unknown.
   const isEdge = (i) => i >= 0 && !Number.isNaN(valueOf(data, i)) && !Number.isNaN(valueOf(data, i + 1));
   function segment(value, x, end) {
     if (Number.isNaN(value)) return;
@@ -92,7 +92,7 @@ function paintBool(painting, data, top, bottom) {
       x = end;
     }
   } else {
-    // Each pixel: one level, or changes that are too close to be told apart.
+    // Per pixel: one level, or changes too close to distinguish.
     const step = (to - from) / width;
     let index = first;
     let [begin, was] = [left, valueOf(data, first)];
@@ -130,7 +130,7 @@ function paintReal(painting, signal, data, top, bottom) {
   const last = indexAt(times, to);
   const [low, high] = [signal.low ?? 0, signal.high ?? 0];
   const size = high - low;
-  // Infinite values lie on the edge.
+  // Infinite values are drawn at the edge.
   const y = (value) => {
     const share = size > 0 ? Math.min(1, Math.max(0, (value - low) / size)) : 0.5;
     return bottom - share * (bottom - top);
@@ -159,7 +159,7 @@ function paintReal(painting, signal, data, top, bottom) {
     for (let x = 0; x < width; x++) {
       const next = indexAt(times, from + (x + 1) * step, Math.max(index, 0), last + 1);
       let [least, most] = extremes(data, index + 1, next + 1);
-      // What held when the pixel began joins it to the one before.
+      // The value at the pixel's begin connects it to the previous pixel.
       const held = valueOf(data, index);
       if (!Number.isNaN(held)) {
         least = Math.min(least, held);
@@ -178,14 +178,14 @@ function paintReal(painting, signal, data, top, bottom) {
   ctx.stroke(lines);
 }
 
-/** What lasted: boxes with their text, told apart also by their pattern. */
+/** Paints durations: boxes with their text, also distinguished by their pattern. */
 function paintSpans(painting, spans, top, bottom) {
   const { ctx, colours, left, width, from, to } = painting;
   ctx.font = FONT;
   ctx.textAlign = "left";
   ctx.textBaseline = "middle";
   let drawnTo = -Infinity;
-  // Spans begin in order; the first that can be seen may begin long before.
+  // Spans are sorted by their begin; the first visible one can begin long before.
   for (const [begin, end, kind, text] of spans) {
     if (end < from || begin > to) continue;
     const x = Math.max(left, place(painting, begin));
@@ -204,7 +204,7 @@ function paintSpans(painting, spans, top, bottom) {
     }
     if (wide > 8) {
       const words = fitted(ctx, text, wide - 3);
-      // Two letters of a word tell nothing.
+      // Two letters of a word are useless.
       if (words === text || words.length > 3) {
         const room = ctx.measureText(words).width;
         const begins = x + Math.min(5, (wide - room) / 2);
@@ -243,26 +243,26 @@ function niceStep(least) {
 /** Seconds since the epoch of the simulation, of a time in units. */
 const secondsOf = (time) => (Number(run.begin) + time * run.unit) / 1e9;
 
-/** A time of the run for people, told to a step in seconds. */
+/** A time of the run for people, to the precision of a step in seconds. */
 function timeText(time, step = run.unit / 1e9) {
   const decimals = Math.min(9, Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)));
   return secondsOf(time).toFixed(decimals).replace("-", "−") + " s";
 }
 
-/** A length of time in the unit that suits it. */
+/** A duration in a suitable unit. */
 function spanText(units) {
   const seconds = Math.abs(units) * run.unit / 1e9;
   const [size, name] = [[1, "s"], [1e-3, "ms"], [1e-6, "µs"], [1e-9, "ns"]].find(([size]) => seconds >= size) ?? [1e-9, "ns"];
   return Number((seconds / size).toPrecision(6)) + " " + name;
 }
 
-/** Where the axis has its lines: times in units, with the step in seconds. */
+/** The lines of the axis: times in units, with the step in seconds. */
 function ticksOf(painting) {
   const seconds = (painting.to - painting.from) * run.unit / 1e9;
   const step = niceStep(Math.max(seconds / painting.width * (painting.isNarrow ? 72 : 100), 1e-9));
   const ticks = [];
   const end = secondsOf(painting.to);
-  // Counted, not summed up: a step may be too small to change a large number.
+  // Counted, not summed: a step can be too small to change a large number.
   for (let n = Math.ceil(secondsOf(painting.from) / step), last = n + 100; n * step <= end && n < last; n++) {
     ticks.push((n * step * 1e9 - Number(run.begin)) / run.unit);
   }
@@ -299,11 +299,11 @@ function paintGrid(painting, height) {
   ctx.globalAlpha = 1;
 }
 
-/** What the height of a trace stands for, and what it does not show. */
+/** The range that a trace's height represents, and the values beyond it. */
 function rangeText(row) {
   const parts = [];
   if (row.kind === "real" && row.low !== undefined && row.low < row.high) {
-    // What is next to nothing beside the whole is nothing to the eye.
+    // A value close to 0 compared with the whole range looks like 0.
     const round = (value) => (Math.abs(value) < (row.high - row.low) * 1e-6 ? 0 : value);
     parts.push(`${short(round(row.low), 4)} to ${valueText(row, round(row.high), 4)}`);
   }

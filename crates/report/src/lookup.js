@@ -3,10 +3,10 @@
 // Changes of signals by their time. The report and the live page share this and draw.js: each has a `run` with `begin` (of
 // the simulation, in nanoseconds), `end` (in units), and `unit` (in nanoseconds).
 
-/** Changes below each other in one block of the pyramid of least and greatest values. */
+/** The number of changes per block of the pyramid of least and greatest values. */
 const BLOCK = 128;
 
-/** Least and greatest value of every BLOCK changes, so that a pixel looks at few of a million. */
+/** Least and greatest value of every BLOCK changes, so that a pixel reads few of a million. */
 function pyramid(values) {
   const blocks = Math.floor(values.length / BLOCK);
   const low = new values.constructor(blocks).fill(Infinity);

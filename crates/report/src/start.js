@@ -1,16 +1,16 @@
-// Unpacking in the background, printing, and the beginning of it all.
+// Unpacking in the background, printing, and the start of the page.
 
 const BETWEEN = 40;
 let wanted = [];
 let isUnpacking = false;
 
-/** Asks for signals that are to be seen: they come before all others. */
+/** Requests signals for display: they come before all others. */
 function want(numbers) {
   wanted = numbers.concat(wanted.filter((number) => !numbers.includes(number)));
   unpackAll();
 }
 
-/** Unpacks one signal after another, and leaves the browser time in between. */
+/** Unpacks one signal after another, with pauses for the browser. */
 async function unpackAll() {
   if (isUnpacking) return;
   isUnpacking = true;
@@ -26,7 +26,7 @@ async function unpackAll() {
   isUnpacking = false;
 }
 
-// Paper has no scrolling: all rows, cut into pieces that fit on a page, over the range that is seen.
+// Paper does not scroll: print all rows, cut into pieces that fit on a page, over the visible range.
 const ROWS_ON_PAPER = 160;
 const PIECE = 230;
 
@@ -64,7 +64,7 @@ function paper() {
   }
 }
 
-// Steps that are folded away on the screen are on paper.
+// Steps that are folded on the screen are printed.
 const folded = () => document.querySelectorAll("#steps details");
 
 window.addEventListener("beforeprint", () => {

@@ -1,19 +1,19 @@
 "use strict";
 
-// What the scripts of every page of the room share: the token, asking, and listening to the newest state.
+// Shared by the scripts of every page of the room: the token, requests, and listening to the newest state.
 
 const room = (() => {
-  /** Without a word for this long, what is shown counts as old. The room says something every second. */
+  /** Without a message for this long, the displayed state counts as old. The room sends one every second. */
   const PATIENCE = 2500;
-  /** Without an answer for this long, nobody waits any more. */
+  /** The time-out of a request. */
   const LONGEST = 10000;
   let tell = {};
-  /** What this tab listens to, with its token. */
+  /** The event source of this tab, and its token. */
   let mine = null;
   let isOpen = false;
   let heard = 0;
 
-  /** The token comes behind "#", which is sent to nobody, and leaves the address at once. */
+  /** Takes the token from behind "#", which browsers never send, and removes it from the address at once. */
   function takeToken() {
     const given = /^#token=([0-9a-f]+)$/.exec(location.hash);
     if (!given) return;
@@ -34,11 +34,11 @@ const room = (() => {
       const access = await answer.json();
       tell.access(access.may_change === true, answer.ok ? "" : access.text);
     } catch {
-      // Whoever does not answer is missed elsewhere.
+      // Other requests report a server that does not answer.
     }
   }
 
-  /** Asks for a change: `{ ok, code, text }`, or null if nobody answers. */
+  /** Requests a change: returns `{ ok, code, text }`, or null without an answer. */
   async function change(method, path, body) {
     try {
       const answer = await ask(path, { method, body });
@@ -53,7 +53,7 @@ const room = (() => {
     tell.age(now - heard > PATIENCE || !isOpen, Math.round((now - heard) / 1000));
   }
 
-  /** One server-sent event. */
+  /** Handles one server-sent event. */
   function hear(event) {
     heard = performance.now();
     const data = /^data: ?([^\n]*)$/m.exec(event);
@@ -73,12 +73,12 @@ const room = (() => {
     setAge();
   }
 
-  /** What reads for this tab with this token: a worker for all tabs, or the tab itself. */
+  /** The reader for this tab and token: a worker for all tabs, or the tab itself. */
   function source(token) {
     const takeOwn = (message) => { if (token === mine?.token) take(message); };
     if (!window.SharedWorker) {
       const own = stream(token, takeOwn);
-      // A hidden tab leaves its connection to others, unless it has forced something.
+      // A hidden tab frees its connection for other tabs, unless it has a token and may have forced something.
       return { look: own.connect, rest: () => { if (!token) own.stop(); }, leave: own.stop };
     }
     const { port } = new SharedWorker("/stream.js", { name: token });
@@ -98,13 +98,13 @@ const room = (() => {
   }
 
   /**
-   * Listens for good. `news` gets each event as text; `access` whether changes are allowed and, if a token was refused, why;
-   * `age` twice a second whether what is shown is old, and by how many seconds.
+   * Listens forever. `news` gets each event as text; `access` whether changes are allowed and, if a token was refused, why;
+   * `age` twice a second whether the displayed state is old, and by how many seconds.
    */
   function listen(listener) {
     tell = listener;
     takeToken();
-    // Another token that is put into the address of this tab loads nothing.
+    // A new token in the address of this tab does not reload the page.
     window.addEventListener("hashchange", () => {
       takeToken();
       connect();

@@ -6,14 +6,15 @@ import tickbus.Signal;
 import tickbus.Tickbus;
 
 /**
- * A simulation engine that jumps from event to event, each on whatever thread is free: the two things that differ from a
- * simulation with a fixed tick.
+ * A simulation engine that jumps from event to event, each on any free thread: the two differences from a simulation with a
+ * fixed tick.
  *
- * <p>Time: the engine hands in its own, and the PLC program, hosted on simulation time, runs up to it. Behind a PLC in real
- * time such an engine has to wait for the clock between events; free-running at full speed it would see no more than a
- * few scans of the PLC.
+ * <p>Time: the engine passes its own, and the PLC program, hosted on simulation time, runs up to it. With a PLC in real time
+ * such an engine must wait for the clock between events; free-running at full speed it would meet only a few scans of the
+ * PLC.
  *
- * <p>Threads: one thread ticks a driver. An event that is over lets go of it, so that the next one may be on another.
+ * <p>Threads: one thread ticks a driver. An event releases it when it is over, so that the next one can run on another
+ * thread.
  *
  * <p>Run it with {@code java -cp java/tickbus/target/tickbus-0.1.0.jar examples/event-engine/EventEngine.java} in a
  * checkout; the zip's README names its jar.
@@ -38,7 +39,7 @@ class EventEngine {
         low = plc.signal("Level low");
     }
 
-    /** What happens at one moment: the PLC's outputs, the model, the PLC's inputs. */
+    /** An event: reads the PLC's outputs, runs the model, sets the PLC's inputs. */
     private void fill() {
         try {
             plc.receive(now);
@@ -50,13 +51,13 @@ class EventEngine {
             // The next event may run on another thread.
             plc.releaseThread();
         }
-        // Events need no fixed distance.
+        // Events need no fixed interval.
         long next = now + (level < 100 ? 10 : 25) * MILLISECOND;
         events.add(new Event(next, this::fill));
     }
 
     private void run() throws Exception {
-        // Three threads in turn, as an engine with a pool of its own might have it.
+        // Three threads in turn, like an engine with its own pool.
         ExecutorService[] threads = {
             Executors.newSingleThreadExecutor(), Executors.newSingleThreadExecutor(), Executors.newSingleThreadExecutor()
         };

@@ -90,7 +90,7 @@ static int set_bool(Tank *tank, uint32_t reference, bool value) {
     return OK;
 }
 
-/* What this model is without; many tools look for the functions all the same. */
+/* Functions that this model does not need; many tools look for them anyway. */
 #define NONE(name)                                                                                                                  \
     EXPORT int name(void *tank) { return (void)tank, FAILED; }
 

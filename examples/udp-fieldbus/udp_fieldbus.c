@@ -48,7 +48,7 @@ struct tickbus_bus {
     uint32_t session;
     /* The newest request: sent by the controller, or received by the device. 0 before the first. */
     uint32_t sequence;
-    /* Controller: the newest answer that came. Device: the request that first got the present image. */
+    /* Controller: the newest answer that came. Device: the request that first got the current image. */
     uint32_t settled;
     struct sockaddr_in peer; /* the controller last heard, for a device */
     uint8_t *sending;   /* header and image */
@@ -56,7 +56,7 @@ struct tickbus_bus {
     char error[300];
 };
 
-/* For a tickbus_open that failed there is no tickbus_bus; a text per thread, as each driver has its own. */
+/* A failed tickbus_open has no tickbus_bus, so the text is per thread, as each driver has its own thread. */
 static __thread char open_error[300];
 
 static int32_t fail(char error[300], int32_t code, const char *format, ...) {
@@ -84,14 +84,14 @@ static uint32_t word(const uint8_t *datagram, int index) {
     return ntohl(value);
 }
 
-/* Whether sequence a is newer than b; they wrap. */
+/* True if sequence a is newer than b; sequences wrap. */
 static int newer(uint32_t a, uint32_t b) {
     return (int32_t)(a - b) > 0;
 }
 
 /* ---- Opening ---------------------------------------------------------------------------------- */
 
-/* Splits "ADDRESS:PORT" and looks it up; NULL after having said why not. */
+/* Splits "ADDRESS:PORT" and looks it up; NULL after having set the error. */
 static struct addrinfo *resolve(const char *key, const char *text, int32_t *code) {
     char host[256];
     const char *colon = strrchr(text, ':');
@@ -195,16 +195,16 @@ int32_t tickbus_open(const tickbus_config *config, const tickbus_layout *layout,
 
 /* ---- Exchanging ------------------------------------------------------------------------------- */
 
-/* What receive says beside the TICKBUS_E_ codes. */
+/* Results of receive besides the TICKBUS_E_ codes. */
 enum { NOTHING = 0, DATAGRAM = 1 };
 
-/* Takes the next datagram of the right kind, or the good-bye of the peer. `from` is who sent it. */
+/* Takes the next datagram of the right kind, or the peer's good-bye. `from` gets the sender. */
 static int32_t receive(tickbus_bus *bus, uint32_t kind, struct sockaddr_in *from) {
     for (;;) {
         socklen_t length = sizeof *from;
         ssize_t got = recvfrom(bus->socket, bus->receiving, MOST, 0, (struct sockaddr *)from, &length);
         if (got < 0) {
-            /* Refused: nobody listens there yet, which shows when a datagram has come back. */
+            /* Refused: nobody listens there yet, as a returned datagram shows. */
             if (errno == EINTR || errno == ECONNREFUSED)
                 continue;
             if (errno == EAGAIN || errno == EWOULDBLOCK)
@@ -229,7 +229,7 @@ static int32_t receive(tickbus_bus *bus, uint32_t kind, struct sockaddr_in *from
     }
 }
 
-/* Waits until a datagram is there or `deadline` has come; 0 at the deadline. */
+/* Waits until a datagram is there or until `deadline`; returns 0 at the deadline. */
 static int wait_readable(tickbus_bus *bus, uint64_t deadline) {
     uint64_t now = now_ns();
     struct pollfd wanted = {bus->socket, POLLIN, 0};
@@ -240,7 +240,7 @@ static int wait_readable(tickbus_bus *bus, uint64_t deadline) {
 }
 
 static void send_datagram(tickbus_bus *bus, size_t image) {
-    /* A datagram that cannot go out is a lost datagram: the next cycle sends again. */
+    /* A datagram that cannot be sent counts as lost: the next cycle sends again. */
     if (bus->connected)
         (void)!send(bus->socket, bus->sending, HEADER + image, 0);
     else
@@ -248,8 +248,8 @@ static void send_datagram(tickbus_bus *bus, size_t image) {
                       sizeof bus->peer);
 }
 
-/* Asks, and waits for the answer. Answers to earlier requests are delivered as well, each replaced by a
- * newer one, since the newest image counts. */
+/* Asks, and waits for the answer. Also delivers answers to earlier requests, each replaced by a newer
+ * one, since the newest image counts. */
 static int32_t ask(tickbus_bus *bus, const uint8_t *in, uint8_t *out, uint64_t deadline) {
     struct sockaddr_in from;
     int32_t flags = 0;
@@ -280,7 +280,7 @@ static int32_t ask(tickbus_bus *bus, const uint8_t *in, uint8_t *out, uint64_t d
     return flags;
 }
 
-/* Waits for a request and answers it; of several that wait, the newest. */
+/* Waits for a request and answers it; if several wait, the newest. */
 static int32_t answer(tickbus_bus *bus, const uint8_t *in, uint8_t *out, uint64_t deadline) {
     struct sockaddr_in from;
     int32_t flags = 0;

@@ -4,19 +4,19 @@
  *
  *     cc -shared -fPIC -I . -I <the C folder of iec2c's library> config.c resource1.c tickbus_plc.c -o program.so
  *
- * It uses none of iec2c's headers: the few types that matter here are spelt out below, as iec2c has them.
+ * It includes none of iec2c's headers: the few types that matter are repeated below, as iec2c has them.
  *
  * SPDX-License-Identifier: MIT OR Apache-2.0
  */
 #include "tickbus_plc.h"
 
-/* What iec2c exports. */
+/* Exported by iec2c. */
 void config_init__(void);
 void config_run__(unsigned long tick);
 extern unsigned long long common_ticktime__;
 extern unsigned long greatest_tick_count__;
 
-/* What it expects of its host: the time, which is all that its timers ever read, and a switch. */
+/* Expected by iec2c from its host: the time, which is all that its timers ever read, and a switch. */
 typedef struct {
     long int tv_sec;
     long int tv_nsec;
@@ -41,7 +41,7 @@ typedef uint32_t tickbus_DWORD;
 typedef uint64_t tickbus_LWORD;
 typedef float tickbus_REAL;
 typedef double tickbus_LREAL;
-/* These have no place in a process image. They compile, so that tickbus can say so by name. */
+/* These types have no place in a process image. They compile, so that tickbus can report them by name. */
 typedef tickbus_time tickbus_TIME;
 typedef tickbus_time tickbus_DATE;
 typedef tickbus_time tickbus_TOD;
@@ -51,8 +51,8 @@ typedef struct {
     uint8_t body[126];
 } tickbus_STRING;
 
-/* Two programs of one project may name the same address, and then it stands in the list twice. Definitions
- * without a value may be repeated; so each variable is defined that way, and its pointer is set later. */
+/* Two programs of one project can name the same address, which is then in the list twice. Definitions
+ * without a value may be repeated, so each variable is defined that way, and its pointer is set later. */
 #define __LOCATED_VAR(type, name, ...) \
     static tickbus_##type value##name; \
     tickbus_##type *name;
@@ -65,7 +65,7 @@ typedef struct {
      sizeof(tickbus_##type)},
 static const struct tickbus_located located[] = {
 #include "LOCATED_VARIABLES.h"
-    {0} /* no array of C may be empty */
+    {0} /* an array in C cannot be empty */
 };
 #undef __LOCATED_VAR
 

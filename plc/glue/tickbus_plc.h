@@ -10,7 +10,7 @@
 
 #include <stdint.h>
 
-/* Changes whenever this file changes in a way that an older reader would misread. */
+/* Changes whenever an older reader would misread this file. */
 #define TICKBUS_PLC_VERSION 1u
 
 #if defined(_WIN32)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Exchanges through the door of Python, beside a call of an empty function in C by ctypes; and MuJoCo's steps with an exchange in each.
+"""Measures exchanges from Python, beside calls of an empty C function by ctypes; and MuJoCo's steps with an exchange in each.
 
     exchange.py FILE EMPTY-LIBRARY CONVEYOR-XML
 
@@ -21,14 +21,14 @@ STEPS = 1500
 
 
 def rate(work, count):
-    """How often a second."""
+    """Calls per second."""
     begin = time.perf_counter()
     work(count)
     return count / (time.perf_counter() - begin)
 
 
 def compared(count, **work):
-    """The medians of their rates, in turns, so that the machine's load is in all of them."""
+    """The medians of their rates, measured by turns, so that the machine's load affects all of them."""
     rates = {name: [] for name in work}
     for _ in range(ROUNDS):
         for name, one in work.items():

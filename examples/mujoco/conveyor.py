@@ -3,7 +3,8 @@
 
     conveyor.py [--config conveyor.cfg] [--picture conveyor.png] [--seconds 30]
 
-It listens for the PLC, such as conveyor_plc.py, and ends when all boxes are in the bin. Its clock is the computer's, as a PLC's is.
+It listens for the PLC, such as conveyor_plc.py, and ends when all boxes are in the bin. Like a PLC it runs by the computer's
+clock.
 """
 
 import argparse
@@ -18,7 +19,7 @@ import tickbus
 HERE = Path(__file__).parent
 BELT_SPEED = 0.4  # m/s
 STROKE = 0.5  # m
-WIDTH = 0.44  # m, of the belt with its fences; what the light barrier sees beyond does not interrupt it
+WIDTH = 0.44  # m, of the belt with its fences; objects beyond it do not interrupt the light barrier
 PITCH = 0.2  # m: the pattern of the belt repeats
 
 
@@ -43,13 +44,13 @@ def simulate(plc, model, data, seconds, watch):
         inside = sum(box.xpos[2] < -0.3 for box in boxes)
         if inside == len(boxes):
             break
-        # A PLC's clock does not wait for a simulation, nor run ahead of it.
+        # A PLC's clock neither waits for a simulation nor runs ahead of it.
         time.sleep(max(0.0, began + data.time - time.monotonic()))
     return inside
 
 
 class Camera:
-    """Takes the picture in the middle of the second push, when one box lies in the bin already."""
+    """Takes the picture in the middle of the second push, when one box is already in the bin."""
 
     def __init__(self, model, data, file):
         self.model, self.data, self.file = model, data, file
@@ -66,7 +67,7 @@ class Camera:
 
 
 def write_png(file, pixels):
-    """A picture of rows, columns and three colours, as PNG."""
+    """Encodes a picture of rows, columns and three colours as PNG."""
     import struct
     import zlib
 
@@ -103,7 +104,7 @@ def main():
 
 
 def address(plc):
-    """Where the driver listens, as soon as it does."""
+    """The driver's address, as soon as it listens."""
     while "address" not in (statistics := plc.statistics()):
         time.sleep(0.01)
     return statistics["address"]

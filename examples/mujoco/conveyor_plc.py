@@ -3,8 +3,8 @@
 
     conveyor_plc.py --address 127.0.0.1:1502
 
-Where a box interrupts the light barrier, the belt stops, and the pusher pushes the box into the bin.
-The machine's %I are input register 0, its %Q holding register 0. Runs until it is told to end.
+When a box interrupts the light barrier, the belt stops, and the pusher pushes the box into the bin.
+The machine's %I are input register 0, its %Q holding register 0. Runs until a signal ends it.
 """
 
 import argparse

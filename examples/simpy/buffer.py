@@ -3,8 +3,8 @@
 
     buffer.py [--hours 8] [--limit 5] [--seed 1] [--config buffer.cfg] [--without-plc]
 
-The PLC's program is scanned by the simulation's time, every 10 ms of it, so that hours take seconds, and the same seed gives the same
-run. The feeder hears of a full buffer at the PLC's next scan, as it would in the plant.
+The PLC's program is scanned every 10 ms of the simulation's time, so that hours take seconds, and the same seed gives the
+same run. The feeder learns of a full buffer at the PLC's next scan, as in the plant.
 """
 
 import argparse
@@ -56,7 +56,7 @@ class Cell:
 
 
 def fieldbus(env, cell, plc):
-    """The PLC, as one more process of the simulation."""
+    """The PLC, as a further process of the simulation."""
     stop, full = plc["Feeder stop"], plc["Buffer full"]
     while True:
         plc.receive(env.now)
@@ -67,7 +67,7 @@ def fieldbus(env, cell, plc):
 
 
 def run(hours, limit, seed, plc):
-    """Returns the cell after so many hours."""
+    """Runs the cell for this many hours and returns it."""
     env = simpy.Environment()
     cell = Cell(env, limit, seed)
     if plc is not None:

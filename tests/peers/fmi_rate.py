@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""How many steps a second FMPy does with an FMU of tickbus, beside another FMU, which does next to nothing in a step.
+"""Measures FMPy's steps per second with an FMU of tickbus, beside another FMU whose steps do next to nothing.
 
     fmi_rate.py VERSION OURS.fmu OTHER.fmu
 
-In turns, so that both have the same machine. Prints "rust fmi.NAME RATE", in the form of the other benches.
+Measured by turns, so that both have the same machine. Prints "rust fmi.NAME RATE", in the form of the other benches.
 """
 
 import statistics

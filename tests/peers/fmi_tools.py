@@ -1,9 +1,9 @@
 """Imports FMUs of tickbus with tools that others wrote: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
-
+Imports FMUs of tickbus with third-party tools: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
     fmi_tools.py TOOL FMU...
 
 The FMU is that of tests/fmi/types.cfg: a PLC that brings every input back on the output of the same type. Prints one line,
-"fmi_tools: ok ...", or raises.
+The FMU is that of tests/fmi/types.cfg: a PLC that copies every input to the output of the same type. Prints one line,
 """
 
 import ctypes
@@ -11,7 +11,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-# What is sent in three steps, by the names in types.cfg.
+# The values to send in three steps, by the names in types.cfg.
 VALUES = {
     "bool": [True, False, True],
     "byte": [255, 0, 7],
@@ -34,7 +34,7 @@ STEP = 0.01
 
 
 def close(a, b, name):
-    """Equal; a REAL and a scaled INT have fewer digits than a double."""
+    """True if equal; a REAL and a scaled INT have fewer digits than a double."""
     if name == "scaled":
         return abs(a - b) <= 250.0 / 27648
     if name == "real":
@@ -95,14 +95,14 @@ def fmpy(path):
     send = groups({name: named[f"{name} <in>"] for name in VALUES})
     come = groups({name: named[f"{name} <out>"] for name in VALUES})
     get = lambda kind, references: getattr(slave, f"get{kind}")(references)
-    # Their start values, which are the fail-safe ones.
+    # The start values, which are the fail-safe ones.
     assert get(*next((kind, [named["lreal <out>"][1]]) for kind in [named["lreal <out>"][0]])) == [-1.5]
     time = 0.0
     for turn in range(3):
         for kind, some in send.items():
             values = [VALUES[name][turn] for name, _ in some]
             getattr(slave, f"set{kind}")([reference for _, reference in some], values)
-        # One step is a scan: what is sent in it comes back in the next.
+        # One step is a scan: values sent in a step come back in the next.
         for _ in range(2):
             slave.doStep(time, STEP)
             time += STEP
@@ -116,7 +116,7 @@ def fmpy(path):
     status = named["bus.status"]
     assert get(status[0], [status[1]]) == [0]
     assert any("is running" in text for _, category, text in lines if category == "logEvents"), lines
-    # Time cannot go back: an error, and a sentence in the tool's log.
+    # Time cannot go back: expect an error, and a sentence in the tool's log.
     lines.clear()
     try:
         slave.doStep(0.0, STEP)
@@ -136,14 +136,14 @@ def fmpy(path):
     slave.doStep(5.0, STEP)
     slave.terminate()
     slave.freeInstance()
-    # As a user calls it.
+    # Calls it as a user does.
     result = fmpy.simulate_fmu(folder, stop_time=0.5, output_interval=STEP, output=["bus.status"], model_description=description)
     assert result["bus.status"][-1] in (0, 1), result[-1]
     return f"version={description.fmiVersion} variables={len(named)}"
 
 
 def tank(path):
-    """The FMU of examples/fmu-tank, which this project's import is tested with, is one for others, too."""
+    """The FMU of examples/fmu-tank, which tests this project's import, must also work in other tools."""
     import fmpy
     from fmpy.validation import validate_fmu
 
@@ -189,7 +189,7 @@ def cosim(path):
 
 
 def pathsim(path):
-    """By hand alone: pip install pathsim-fmi==0.1.1, which brings more than a test is worth."""
+    """Only run by hand: pip install pathsim-fmi==0.1.1, which brings more packages than a test is worth."""
     from fmpy import read_model_description
     from pathsim import Connection, Simulation
     from pathsim.blocks import Constant, Scope
@@ -209,7 +209,7 @@ def pathsim(path):
 
 
 def misuse(path):
-    """The functions called as no tool should: every call has an answer, and the process lives."""
+    """Calls the functions as no tool should: every call returns, and the process survives."""
     from fmpy import extract, read_model_description
 
     description = read_model_description(path)
@@ -232,7 +232,7 @@ def misuse(path):
         assert right(None, None) is None
         get, step = library.fmi3GetFloat64, library.fmi3DoStep
     assert right(b"{another}", uri) is None
-    # Every form in which a folder may come; without any, the library finds its own.
+    # Every form in which a folder can be given; without any, the library finds its own.
     plain = str(folder / "resources")
     for where in [uri, uri + b"/", uri.replace(b"file:///", b"file:/"), plain.encode(), plain.encode() + b"/", b"file:///nowhere", None]:
         handle = right(description.guid.encode(), where)
@@ -289,7 +289,7 @@ def rig(path, record):
 
 
 def rig_in_c(library, config, record):
-    """The same by the functions of include/tickbus.h."""
+    """The same with the functions of include/tickbus.h."""
     native = ctypes.CDLL(library)
     native.tb_buffer_of.restype = ctypes.POINTER(ctypes.c_uint64)
     native.tb_last_error.restype = ctypes.c_char_p

@@ -1,4 +1,4 @@
-"""The IVI protocol a second time, written from the reader's manual alone: our own cross-check, no program of others.
+"""The IVI protocol implemented a second time, from the reader's manual alone: our own cross-check, not third-party.
 
 ivi.py client DEVICE      asks the reader there for everything, and says so when all answers were right
 ivi.py reader DEVICE      is a reader with an IDC-1K before head 1, until its standard input ends
@@ -27,7 +27,7 @@ class Client:
         self.port.write(telegram(text))
 
     def take(self, text):
-        """Takes the answer that this is, with its checksum."""
+        """Reads the expected answer, with its checksum."""
         expected = telegram(text)
         found = self.port.read(len(expected))
         if found != expected:
@@ -42,7 +42,7 @@ class Client:
         self.ask(b"d4", b"d")
         self.ask(b"c", b"c00")
         self.ask(b"b", b"b")
-        # The carrier is put there by a simulation, which is slower than a serial port.
+        # A simulation puts the carrier there, which is slower than a serial port.
         limit = time.monotonic() + 20
         while True:
             self.tell(b"w10001")
@@ -76,7 +76,7 @@ class Client:
         for _ in range(3):
             self.take(b"W00\x03")
         self.tell(b"q")
-        # More of them may be on their way.
+        # More octets can be on their way.
         found = self.port.read(3)
         while found == b"W00":
             self.port.read(3)
@@ -109,7 +109,7 @@ class Reader:
         return b"k00"
 
     def command(self):
-        """One command without its end; None if it was damaged."""
+        """Reads one command without its end; None if it was damaged."""
         text = self.port.read(1)
         text += self.port.read({"w": 5, "k": 5, "d": 1}.get(text.decode("latin-1"), 0))
         if text[:1] == b"k":

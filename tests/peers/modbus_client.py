@@ -1,4 +1,4 @@
-"""Drives a Modbus server with pymodbus: every function, and what the server has to refuse.
+"""Drives a Modbus server with pymodbus: every function, and requests that the server must refuse.
 
 modbus_client.py tcp HOST PORT | modbus_client.py rtu-over-tcp HOST PORT | modbus_client.py rtu DEVICE
 
@@ -27,7 +27,7 @@ def refused(what, response, exception):
 
 
 def wait(what, read, expected):
-    """What the PLC writes comes back through the machine's tick."""
+    """Values that the PLC writes come back through the machine's tick."""
     limit = time.monotonic() + 10
     while (given := read()) != expected and time.monotonic() < limit:
         pass
@@ -35,7 +35,7 @@ def wait(what, read, expected):
 
 
 def functions(client):
-    """Every function, with what it reads and writes."""
+    """Every function, with the values that it reads and writes."""
     check("write registers", client.write_registers(0, [0x1234, 0xABCD, 7]).isError(), False)
     check("read holding", client.read_holding_registers(0, count=4).registers, [0x1234, 0xABCD, 7, 0])
     wait("read input", lambda: client.read_input_registers(0, count=3).registers, [0x1234, 0xABCD, 7])
@@ -61,7 +61,7 @@ def functions(client):
 
 
 def refusals(client):
-    """What the standard refuses, and with which exception."""
+    """Requests that the standard refuses, and their exceptions."""
     refused("holding beyond", client.read_holding_registers(31, count=2), 2)
     refused("input beyond", client.read_input_registers(32, count=1), 2)
     refused("coils beyond", client.read_coils(505, count=8), 2)

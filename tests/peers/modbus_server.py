@@ -32,7 +32,7 @@ async def main():
             context, identity=identity, framer=FramerType.RTU, port=sys.argv[2], baudrate=115200, parity="N")
     await server.serve_forever(background=True)
     print("modbus_server: ready", flush=True)
-    # Until the parent process closes stdin.
+    # Runs until the parent process closes stdin.
     await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
     await server.shutdown()
 

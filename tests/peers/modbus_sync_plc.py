@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A PLC that knows nothing of virtual time but two variables and a clock, with pymodbus.
+"""A PLC that takes part in virtual time by two variables and a clock alone, with pymodbus.
 
 modbus_sync_plc.py HOST PORT STEPS SEED
 
@@ -39,9 +39,9 @@ def main():
         if delays.random() < 0.2:
             time.sleep(delays.random() / 300)
         client.write_register(2, (position + count) % 1000)
-        # The answer, when the outputs are there.
+        # Answer when the outputs are written.
         client.write_registers(0, [go >> 16, go & 0xFFFF])
-    # Until the run has ended: a PLC does not leave.
+    # Runs until the run has ended: a PLC does not leave.
     print(f"modbus_sync_plc: ok steps={count}", flush=True)
     sys.stdin.read()
 

@@ -1,7 +1,7 @@
 """An OPC UA client of asyncua, for tests of tickbus as its server.
 
-Its one argument is JSON: {"url", "security": "Policy,Mode,own.der,own.pem,server.der" or null, "uri", "user",
-"password", "certificate"}; with "certificate" it only makes a certificate in that folder. It says "ready" when it
+The only argument is JSON: {"url", "security": "Policy,Mode,own.der,own.pem,server.der" or null, "uri", "user",
+"password", "certificate"}; with "certificate" it only makes a certificate in that folder. It prints "ready" when it
 has a session, or "refused WHY", then obeys a line of JSON from stdin at a time, and answers each with one:
     {"browse": true}                 {"tree": {folder: [names]}}
     {"read": node}                   {"value", "type", "status", "source"}

@@ -1,11 +1,11 @@
 """An OPC UA server of asyncua, for tests of tickbus as its client.
 
-Its one argument is JSON: {"url", "security": ["None", …], "folder", "user", "password", "nodes": {name: [type, value]}}.
-It says "ready" on stdout, then obeys a line of JSON from stdin at a time, and answers each with one:
+The only argument is JSON: {"url", "security": ["None", …], "folder", "user", "password", "nodes": {name: [type, value]}}.
+It prints "ready" on stdout, then obeys a line of JSON from stdin at a time, and answers each with one:
     {"set": {name: value}}           writes good values
     {"status": {name: "Bad…"}}       writes the last value again, with that status
     {"get": name}                    {"value": …}
-    {"state": number}                the state that the server says it is in
+    {"state": number}                the server's reported state
     {"stop": true}                   and at the end of stdin
 """
 
@@ -53,7 +53,7 @@ async def lines():
 
 
 async def main():
-    # The standard's thousands of nodes are nothing to collect, and without looking for that are there in half the time.
+    # The standard's thousands of nodes are never garbage, and without a search for it they are created in half the time.
     gc.disable()
     asked = json.loads(sys.argv[1])
     manager = OneUser(asked["user"], asked["password"]) if asked.get("user") else None

@@ -27,7 +27,7 @@ async def main():
             # sync.go, sync.time and the position in one request: they belong together.
             values = [value.Value for value in await client.uaclient.read_attributes(
                 [node.nodeid for node in inputs], ua.AttributeIds.Value)]
-            # They are bad until the first step.
+            # The values are bad until the first step.
             if any(value is None or value.Value is None for value in values):
                 continue
             go, millis, position = (value.Value for value in values)
@@ -40,9 +40,9 @@ async def main():
             if delays.random() < 0.2:
                 await asyncio.sleep(delays.random() / 300)
             await write(speed, (position + count) % 1000, ua.VariantType.Int16)
-            # The answer, when the outputs are there.
+            # Answer when the outputs are written.
             await write(done, go, ua.VariantType.UInt32)
-        # Until the run has ended: a PLC does not leave.
+        # Runs until the run has ended: a PLC does not leave.
         print(f"opcua_sync_plc: ok steps={count}", flush=True)
         await asyncio.get_running_loop().run_in_executor(None, sys.stdin.read)
 

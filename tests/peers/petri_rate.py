@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""How many transitions SNAKES fires in a second, in the net of 100 places of java/bench's PetriBench.
+"""Measures the transitions that SNAKES fires per second, in the net of 100 places of java/bench's PetriBench.
 
 Prints "rust petri.snakes RATE", in the form of the other benches.
 """

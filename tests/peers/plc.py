@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""A PLC that somebody else wrote: the controller's end of a socket bus, with the standard library alone.
+"""A stand-in for a third-party PLC: the controller's end of a socket bus, with the standard library alone.
 
     plc.py HOST PORT RECORDS
 
-It sends RECORDS records, each with another speed, and wants an answer to each one. The machine copies the
-speed to `copy` and doubles it in `position`, sooner or later: the program goes on to the next speed when
-the answer has it. The last line tells how it went.
+It sends RECORDS records, each with another speed, and waits for the answer to each. The machine copies the speed to `copy`
+and doubles it in `position`, sooner or later: the program continues with the next speed when the answer has both. The last
+line has the result.
 """
 
 import socket
@@ -19,7 +19,7 @@ INPUTS = struct.Struct(">Bxhh")
 
 
 def receive(connection, size):
-    """Exactly `size` bytes, however TCP cuts them."""
+    """Reads exactly `size` bytes, however TCP splits them."""
     data = b""
     while len(data) < size:
         piece = connection.recv(size - len(data))

@@ -1,4 +1,4 @@
-"""What pyprofibus makes of a GSD file and the modules in its slots.
+"""Prints pyprofibus's reading of a GSD file and the modules in its slots.
 
 profibus_gsd.py GSD MODULE...
 """

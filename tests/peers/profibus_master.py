@@ -2,9 +2,9 @@
 
 profibus_master.py DEVICE BAUD ADDRESS GSD MODULE [SECONDS]
 
-The station has 4 bytes each way and brings the outputs back on the inputs. The last line has the number of exchanges, and
-the diagnoses that it has sent while data were exchanged, each as it differs from the one before. With SECONDS it only counts
-the exchanges in so many seconds, whatever comes back.
+The station has 4 bytes each way and copies the outputs to the inputs. The last line has the number of exchanges, and the
+diagnoses that the station sent while data were exchanged, without repetitions. With SECONDS it only counts the exchanges in
+that time, whatever comes back.
 """
 
 import os
@@ -60,7 +60,7 @@ def open_master(arguments):
 
 
 def note_diagnoses():
-    """pyprofibus keeps the standard's part alone, so the telegrams are looked at where they arrive."""
+    """Records the diagnoses where the telegrams arrive, because pyprofibus keeps only the standard part."""
     seen = []
     read = DpTelegram_SlaveDiag_Con.fromFdlTelegram.__func__
 
@@ -96,7 +96,7 @@ def main():
         sent = bytearray([number, 255 - number, 0x10, number ^ 0x55])
         limit = time.monotonic() + 20
         while True:
-            # It sends them once.
+            # pyprofibus sends them once.
             slave.setMasterOutData(sent)
             master.run()
             came = slave.getMasterInData()

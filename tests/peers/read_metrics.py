@@ -1,4 +1,4 @@
-"""Reads OpenMetrics from stdin by the parser of prometheus_client, and prints a line for each sample."""
+"""Reads OpenMetrics from stdin with prometheus_client's parser, and prints a line per sample."""
 
 import sys
 

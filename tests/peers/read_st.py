@@ -3,7 +3,7 @@
 
     read_st.py FILE...
 
-A CONFIGURATION is left out: that dialect has none.
+Leaves out a CONFIGURATION, which that dialect does not have.
 """
 
 import gc
@@ -14,7 +14,7 @@ from blark.parse import parse_source_code
 
 
 def main():
-    # Trees of some thousand nodes, and nothing to collect: a fifth of the time.
+    # Trees of some thousand nodes, and no garbage: this saves a fifth of the time.
     gc.disable()
     wrong = 0
     read = set()

@@ -1,5 +1,4 @@
-"""Reads a recording with readers that others wrote: VCD with the packages vcdvcd and pyvcd, CSV with Python's own
-module.
+"""Reads a recording with third-party readers: VCD with the packages vcdvcd and pyvcd, CSV with Python's own module.
 
 usage: read_vcd.py RUN.vcd RUN.csv
 
@@ -34,14 +33,14 @@ def number(text, kind, size):
 
 
 def same(one, two):
-    """Whether two numbers are the same to the last bit."""
+    """True if two numbers are the same to the last bit."""
     if isinstance(one, int):
         return one == int(two)
     return struct.pack("d", one) == struct.pack("d", float(two)) or (one != one and two.lower() == "nan")
 
 
 def strict(path):
-    """Reads with pyvcd, which keeps to the letter of the standard; gives the number of value changes."""
+    """Reads with pyvcd, which follows the standard strictly; returns the number of value changes."""
     with open(path, "rb") as file:
         return sum(token.kind.name.startswith("CHANGE_") for token in tokenize(file))
 

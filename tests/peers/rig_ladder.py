@@ -3,9 +3,9 @@
 
     rig_ladder.py --address 127.0.0.1:1502
 
-crates/programs/src/rig/mod.rs says what the program does, and docs/ARCHITECTURE.md why it exists in ladder, too. The PLC reads the
-machine's %I as input registers 0 to 3 and writes its %Q as holding registers 0 to 3: with kind = "modbus-server" in
-driver.cfg nothing else is to be set. It runs until it is told to end. Standard output tells each change of its phase.
+crates/programs/src/rig/mod.rs describes the program, and docs/ARCHITECTURE.md why it also exists in ladder. The PLC reads
+the machine's %I as input registers 0 to 3 and writes its %Q as holding registers 0 to 3: with kind = "modbus-server",
+driver.cfg needs no other change. It runs until a signal ends it, and prints each change of its phase to standard output.
 """
 
 import argparse
@@ -52,10 +52,10 @@ IDLE, ACKNOWLEDGE, CLEAR, LIFTS, LET_GO, WHEELS, FETCH, BRING, DONE, FAILED = ra
 # The command word of each step of the cycle.
 WORDS = [0x0001, 0x0024, 0x000C, 0x0080, 0x3C34, 0x343C]
 
-# Of the phases with a lamp: the lamp's bit in the high byte of the register, the phase in its low byte.
+# For the phases with a lamp: the lamp's bit in the high byte of the register, the phase in its low byte.
 LAMPS = {READY: 0x0100, RUN: 0x0200, ABORT: 0x0400, PARKED: 0x0800}
 
-# Registers of the machine: what it tells, and what it is told.
+# Registers of the machine: its feedback, and its commands.
 Told = Block("Told", TagType.WORD, 1, 4)
 Say = Block("Say", TagType.WORD, 1, 4)
 # Bit n of a register is number n + 1 of its block.
@@ -159,7 +159,7 @@ def homing():
     ]:
         with rung(condition):
             on_delay(timer, milliseconds)
-    # A wheel that was jogged creeps onto its index position: longer, where lift 1 goes through the wheels next.
+    # A wheel that was jogged creeps onto its index position: longer if lift 1 goes through the wheels next.
     with rung(Centred.Done, Or(~Jogged, ~Fetches, Crept.Done)):
         out(Settled)
 
@@ -172,8 +172,8 @@ def homing():
     goes(CLEAR, LIFTS, ~NotOk)
     goes(CLEAR, FAILED, ClearTime.Done)
     goes(LIFTS, FAILED, NotOk, Unreferenced)
-    # A drive that stands referenced in mid-path refuses to go further than its bottom stop. Acknowledging takes its
-    # reference, and then it makes a reference run.
+    # A referenced drive at rest in mid-path refuses to go further than its bottom stop. Acknowledging clears its reference,
+    # and then it makes a reference run.
     goes(LIFTS, ACKNOWLEDGE, NotOk)
     with rung(HomingWas == LIFTS, Homing == ACKNOWLEDGE):
         latch(Unreferenced)
@@ -191,7 +191,7 @@ def homing():
     goes(BRING, FAILED, NotOk)
     goes(BRING, DONE, Brought.Done)
     goes(BRING, FAILED, BringTime.Done)
-    # A lift that is at its bottom already is left alone. One that is not keeps running after its switch, to the stop.
+    # A lift that is already at its bottom is left alone. Any other keeps running after its switch, to the stop.
     with rung(Homing == LIFTS, Or(Lower1, ~Bottom1)):
         out(Lower1)
     with rung(Homing == LIFTS, Or(Lower2, ~Bottom2)):
@@ -270,8 +270,8 @@ def to_machine(machine):
         out(Homes)
     with rung(Phase == RUN):
         out(Running)
-    # What a suction cup holds it goes on holding through abort and initialise, until the lifts are down. A program that
-    # was just switched on takes it that both hold something.
+    # A suction cup that holds something keeps holding it through abort and initialise, until the lifts are down. A program
+    # that was just switched on assumes that both hold something.
     with rung(system.sys.first_scan):
         latch(Held1)
         latch(Held2)
@@ -314,7 +314,7 @@ def to_machine(machine):
             copy(LAMPS.get(phase, 0) + phase, Say[2])
     with rung(Running):
         copy(Step, Say[3])
-    # Only what a machine was heard to need: a program that knows nothing of it says nothing.
+    # Command the machine only while its data are alive: without them the program sends nothing.
     with rung(Alive):
         send(target=machine, remote_start=ModbusAddress(0), source=Say.select(1, 4),
              sending=Writing, success=Written, error=WriteFailed, exception_response=WriteCode)

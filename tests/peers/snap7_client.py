@@ -1,4 +1,4 @@
-"""python-snap7's client against a server of ours: tests/foreign_s7.rs has what the image holds."""
+"""python-snap7's client against a tickbus server: tests/foreign_s7.rs describes the image."""
 
 import datetime
 import struct
@@ -28,14 +28,14 @@ client = snap7.client.Client()
 client.connect("127.0.0.1", 0, 1, int(sys.argv[1]))
 equal("pdu", client.get_pdu_length(), 480)
 
-# What is read: the inputs, and a data block over a part of them.
+# Reads the inputs, and a data block over a part of them.
 equal("inputs", bytes(client.eb_read(0, 8)), bytes([1, 0, 0xFF, 0xFE]) + struct.pack(">f", 1.5))
 equal("DB2", bytes(client.db_read(2, 0, 6)), b"\xff\xfe" + struct.pack(">f", 1.5))
 equal("a bit", list(client.read_area(Area.PE, 0, 0, 1, WordLen.Bit)), [1])
 equal("an INT", client.db_read_int(2, 0), -2)
 equal("a REAL", list(client.read_area(Area.PE, 0, 4, 1, WordLen.Real)), list(struct.pack(">f", 1.5)))
 
-# What is written: data block 1 is the outputs.
+# Writes data block 1, which is the outputs.
 equal("fail-safe", bytes(client.ab_read(2, 2)), b"\xff\xff")
 client.db_write(1, 2, bytearray(struct.pack(">h", 1234)))
 client.db_write_bool(1, 0, 0, True)
@@ -54,7 +54,7 @@ code, read = client.read_multi_vars(items)
 equal("code", code, 0)
 equal("items", [bytes(one) for one in read], [struct.pack(">h", 1234), b"\x01\0\xff", b"\x01"])
 
-# What cannot be done has the protocol's own codes.
+# Impossible requests return the protocol's own codes.
 refused("DB 9", lambda: client.db_read(9, 0, 1), "0x0a")
 refused("DB 1 beyond its end", lambda: client.db_read(1, 7, 2), "0x05")
 refused("writing an input", lambda: client.eb_write(0, 1, bytearray(b"x")), "")
@@ -65,7 +65,7 @@ refused("upload", lambda: client.upload(1), "not implemented")
 refused("setting the clock", client.set_plc_system_datetime, "not implemented")
 refused("an unknown list", lambda: client.read_szl(0x00A0), "unavailable")
 
-# Who it is.
+# The identity of the CPU.
 equal("state", client.get_cpu_state(), "S7CpuStatusRun")
 order = client.get_order_code()
 equal("order code", order.OrderCode, b"tickbus")

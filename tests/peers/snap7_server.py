@@ -1,4 +1,4 @@
-"""python-snap7's server as a CPU: data block 1 answers what data block 2 holds, plus 1, until stdin ends."""
+"""python-snap7's server as a CPU: data block 1 has the value of data block 2 plus 1, until stdin ends."""
 
 import logging
 import struct

@@ -1,6 +1,6 @@
-"""Snap7 in C as a CPU: data block 1 answers what the second word of data block 2 holds, plus 1.
+"""Snap7 in C as a CPU: data block 1 has the second word of data block 2 plus 1.
 
-Lines of stdin are "run" and "stop"; at its end the bytes of data block 2 that were changed are printed.
+Lines of stdin are "run" and "stop"; when stdin ends, it prints the changed bytes of data block 2.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""An end of a line of the storm, in Python. See README.md in this folder for its arguments and for what it writes."""
+"""An end of a line of the storm, in Python. README.md in this folder describes its arguments and its output."""
 
 import os
 import sys
@@ -17,7 +17,7 @@ def signed(number):
     return (number & 0xFFFF ^ 0x8000) - 0x8000
 
 
-# SIGTERM ends it, and closes the driver: that is for the package to do.
+# SIGTERM ends the process; the package must close the driver.
 with tickbus.open(path) as plc:
     written = [[plc[f"{name}{area}{station}"] for name in NAMES] for station in range(stations)]
     read = [[plc[f"{name}{'Q' if is_input else 'I'}{station}"] for name in NAMES] for station in range(stations)]

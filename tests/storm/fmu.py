@@ -1,5 +1,5 @@
-"""An end of a line of the storm: the product's own FMU in FMPy. See README.md in this folder for its arguments and for what it
-writes. Its driver.cfg is in the FMU, beside which it lies: PATH.cfg and PATH.fmu."""
+"""An end of a line of the storm: the product's own FMU in FMPy. README.md in this folder describes its arguments and its
+output. The FMU, PATH.fmu, contains its driver.cfg, which also lies beside it as PATH.cfg."""
 
 import os
 import shutil
@@ -45,7 +45,7 @@ def signed(number):
 is_over = False
 signal.signal(signal.SIGTERM, leave)
 slave.instantiate(logMessage=told)
-# It keeps to the clock itself.
+# The program paces itself by the clock.
 slave.setFloat64([references["pace"]], [0.0])
 slave.enterInitializationMode()
 slave.exitInitializationMode()

@@ -1,4 +1,4 @@
-"""Who judges a line of the storm: by the stamps that each end wrote and saw, and by what befell them."""
+"""Judges a line of the storm: by the stamps that each end wrote and saw, and by the line's misfortunes."""
 
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
@@ -17,14 +17,14 @@ class Life:
     ticks: list = field(default_factory=list)
     # When it is killed, or asked to end; None while it lives.
     ended: int | None = None
-    # Whether it was asked, and closed.
+    # True if it was asked to end, and has closed.
     closed: bool = False
-    # While it was suspended, or cut off.
+    # The times in which it was suspended, or cut off.
     downs: list = field(default_factory=list)
     is_second: bool = False
     # When its process was started.
     born: int = 0
-    # By how many misfortunes at once.
+    # The number of misfortunes that suspend it now.
     suspended: int = 0
 
 
@@ -41,7 +41,7 @@ class Tick:
 
 
 def read(path, stations):
-    """The ticks of a life. The last line of one that was killed may be incomplete."""
+    """The ticks of a life. A killed process can leave an incomplete last line."""
     ticks = []
     try:
         lines = path.read_text().splitlines()
@@ -58,15 +58,15 @@ def read(path, stations):
 
 
 def beside(stamp):
-    """The values beside a stamp, which follow from it."""
+    """The values beside a stamp, which are derived from it."""
     mixed = stamp * 0x9E3779B97F4A7C15 & 0xFFFFFFFFFFFFFFFF
     signed = [(mixed >> shift & 0xFFFF ^ 0x8000) - 0x8000 for shift in (32, 16)]
     return mixed >> 63, float(signed[0]), signed[1] / 2
 
 
 def recording(path, life_of, plan, end):
-    """What a recording in CSV says otherwise than the end that made it: its rows are the ticks, none is missing and not counted, and none
-    is cut; only a process that was killed may leave the last one incomplete."""
+    """Compares a recording in CSV with the end that made it: the rows must be the ticks, every missing one must be counted, and
+    none may be cut; only a killed process may leave the last one incomplete."""
     lines = path.read_text().splitlines(keepends=True)
     if len(lines) < 2:
         return []
@@ -115,19 +115,19 @@ class Judge:
         self.findings.append(f"{promise}: {ROLES[reader.end]} life {reader.number} tick {tick.number} at {tick.began}: {what}")
 
     def writers(self, reader):
-        """Those whose values a reader may see, and the area in their stamps. What the command reads it brings back, so that its peer
-        sees its own again."""
+        """The lives whose values a reader can see, and the area in their stamps. The command sends back the values that it
+        reads, so its peer sees its own again."""
         other = 1 - reader.end
         of = reader.end if self.plan.ends[other].program == "command" else other
         return [life for life in self.lives if life.end == of], int(of == DEVICE)
 
     def slack(self, since, until):
-        """What the line and the threads of both ends add to an age."""
+        """The time that the line and the threads of both ends add to an age."""
         periods = sum(end.period for end in self.plan.ends)
         return 60 * MS + 6 * self.plan.cycle + 2 * periods + 2 * self.stalls.longest(since - SECOND, until)
 
     def allowed(self):
-        """By how much an age may be too small, as docs/ARCHITECTURE.md has it."""
+        """The greatest error of an age that is too small, as docs/ARCHITECTURE.md states it."""
         return max(self.plan.max_age // 2, 2 * MS)
 
     def judge(self):
@@ -184,7 +184,7 @@ class Judge:
         number, life = stamp & 0xFF_FFFF_FFFF, by_number.get(stamp >> 48)
         has_written = False
         if life is not None and stamp >> 44 & 15 == area and stamp >> 40 & 15 == station:
-            # A process that is killed may have sent one more tick than it has noted.
+            # A killed process can have sent one more tick than it has logged.
             last = life.ticks[-1] if life.ticks else None
             known = life.ticks[number - 1] if last and 0 < number <= last.number else None
             noted = known.began if known else last.ended if last else 0
@@ -197,15 +197,15 @@ class Judge:
         return life.number, number
 
     def are_two_that_bring_back(self, end, at):
-        """Whether two processes of the command bring back the same values: then one may be behind the other. What one has sent may
-        arrive after a cut."""
+        """True if two processes of the command send back the same values: then one can be behind the other. Values sent before
+        a cut can arrive after it."""
         if self.plan.ends[end].program != "command":
             return False
         second = [life for life in self.lives if life.end == end and life.is_second]
         return any(life.born <= at and (life.ended is None or at <= life.ended + 5 * SECOND) for life in second)
 
     def down_since(self, lives, at):
-        """Since when all lives of an end are dead, suspended or cut off; None if one is not, or has come back a moment ago."""
+        """Since when all lives of an end have been dead, suspended or cut off; None if one is not, or has just come back."""
         since = None
         for life in lives:
             spans = life.downs + ([(life.ended, None)] if life.ended else [])
@@ -218,7 +218,7 @@ class Judge:
         return since
 
     def age(self, reader, tick, writers):
-        """A peer that cannot say anything is as old as that, and after `max_age` nothing of it counts."""
+        """A peer that cannot send is at least that old, and after `max_age` its values no longer count."""
         peers = [life for life in self.lives if life.end == 1 - reader.end]
         since = self.down_since(peers, tick.began)
         if since is None:
@@ -227,7 +227,7 @@ class Judge:
         truth = tick.began - since
         allowed = self.allowed() + self.slack(since, tick.began)
         if self.plan.bus == "dispatcher":
-            # The dispatcher lives, and tells of a source that is lost after the time that this has promised.
+            # The dispatcher lives, and reports a lost source after the time that its `max_age` promises.
             allowed += self.plan.max_age
             if truth <= self.plan.max_age + allowed or all(station[0] == FAIL_SAFE for station in tick.stations):
                 return
@@ -235,7 +235,7 @@ class Judge:
             self.finding("age", reader, tick, f"told {tick.age} ns, and its peer has been down for {truth} ns")
 
     def old_as_young(self, reader, tick, by_number, first):
-        """What counts is not older than its age, and what passes on the way."""
+        """Valid values are not older than their age, and the time on the way."""
         life = by_number[first[0]]
         is_back = self.plan.ends[1 - reader.end].program == "command"
         heard = tick.began - tick.age - self.allowed() - self.slack(tick.began - tick.age - 2 * SECOND, tick.began)
@@ -273,7 +273,7 @@ class Judge:
 
     @staticmethod
     def arrived(life, tick):
-        """When all that a life had sent has come: TCP sends again what went into a cut network, after up to as long as that was cut."""
+        """When all data of a life have arrived: TCP resends data from a cut network, after up to the duration of the cut."""
         cuts = [(begin, end or tick.began) for begin, end in life.downs]
         return max([life.ended, *(2 * end - begin for begin, end in cuts if begin <= life.ended < end)])
 
@@ -286,13 +286,13 @@ class Judge:
         for life in writers:
             every = self.plan.ends[life.end].pulse_every
             known = [tick for tick in life.ticks if tick.number % every == 0 and since <= tick.ended and tick.began <= until]
-            # One that a killed process has not noted.
+            # One pulse that a killed process has not logged.
             pulses += len(known) + 1
         if seen > pulses * self.plan.stations:
             self.finding("edges", reader, reader.ticks[-1], f"{seen} seen, and {pulses} pulses written to each of {self.plan.stations} stations")
 
     def pulses(self, end):
-        """Where both ends are well, each pulse of `end` is seen once by its reader."""
+        """While both ends are well, the reader sees each pulse of `end` once."""
         for writer in self.lives:
             if writer.end != end or writer.is_second:
                 continue
@@ -309,7 +309,7 @@ class Judge:
                     self.pulse(readers[0], writer, tick)
 
     def is_well(self, since, until):
-        """Whether nothing befell either end around a span, and the machine had time."""
+        """True if neither end had a misfortune around a span, and the machine had time."""
         for life in self.lives:
             begins = life.ticks[0].began if life.ticks else life.born
             spans = [*life.downs, (life.born, begins)] + ([(life.ended, life.ended)] if life.ended else [])
@@ -320,7 +320,7 @@ class Judge:
         return self.stalls.longest(since, until) == 0
 
     def is_steady(self, reader, writer, since, until):
-        """Whether the reader had young data all the time, and both ticked."""
+        """True if the reader had fresh data all the time, and both ticked."""
         for life in (reader, writer):
             times = [since, *(tick.began for tick in life.ticks if since <= tick.began <= until), until]
             if any(after - before > 150 * MS for before, after in zip(times, times[1:])):

@@ -1,4 +1,4 @@
-"""Runs one line of the storm: its two ends as processes of the built artefacts, what befalls them, and the judge."""
+"""Runs one line of the storm: its two ends as processes of the built artefacts, their misfortunes, and the judge."""
 
 import os
 import shutil
@@ -13,14 +13,14 @@ from machine import Disk, Network, Process, Stalls
 from plan import CONTROLLER, DEVICE, FAIL_SAFE, MS, ROLES, SECOND, driver_cfg, patch
 
 HERE = Path(__file__).parent
-# Faults that are over have to be forgotten within this time: pauses between attempts to connect, and a JVM that starts.
+# The ends must recover from faults within this time, which includes pauses between attempts to connect, and a JVM's start.
 LIVELY = 16.0
-# What a process may have more of at the end: what its language keeps is none of tickbus's.
+# The permitted growth of a process's memory until the end, in kilobytes: languages keep memory that is not tickbus's.
 MEMORY = {"java": 64_000, "python": 6_000, "fmu": 12_000, "c": 3_000, "command": 3_000}
 
 
 class Artefacts:
-    """What the ends are made of: what tools/dist makes for users, and the environments of tools/python and tools/peers."""
+    """The programs of the ends: the output of tools/dist, and the environments of tools/python and tools/peers."""
 
     def __init__(self, product, folder):
         self.folder = folder
@@ -60,7 +60,7 @@ class Artefacts:
             if program in self.programs:
                 done = subprocess.run(list(map(str, command)), capture_output=True, text=True, cwd=self.folder)
                 if "is not in this build" in done.stderr:
-                    # An FMU has the library that C has.
+                    # An FMU has the same library as C.
                     without |= {"c", "fmu"} if program == "c" else {program}
         return without
 
@@ -91,7 +91,7 @@ class Artefacts:
 
 
 class Line:
-    """A line that runs."""
+    """A running line."""
 
     def __init__(self, plan, artefacts, folder, has_namespaces):
         self.plan, self.artefacts, self.folder = plan, artefacts, folder
@@ -126,7 +126,7 @@ class Line:
             self.findings.append(f"export: {done.stderr}")
 
     def start_dispatcher(self):
-        """The server between both ends; it stands where the device is."""
+        """The server between both ends; it runs on the device's side."""
         command = [self.artefacts.command, "dispatch", "--listen", self.address, "--patch", self.folder / "patch.toml"]
         command = [*self.network.prefix(DEVICE), *map(str, command)]
         log = self.folder / f"dispatcher-{len(self.story)}.log"
@@ -136,7 +136,7 @@ class Line:
         self.story.append((time.monotonic_ns(), what))
 
     def start(self, end, is_second=False):
-        """Starts a process of an end, another life."""
+        """Starts a process of an end, which is another life."""
         number = len(self.lives) + 1
         life = judge.Life(end, number, is_second=is_second)
         life.program = self.plan.ends[end].program
@@ -175,13 +175,13 @@ class Line:
             life.process.kill()
             return
         code = life.process.child.returncode
-        # A second one may have been refused, and have ended with an error; what it logs is judged.
+        # A second process may have been refused, and have ended with an error; its log is judged.
         is_refused = life.is_second and code in (1, 3)
         if not is_refused and (was is not None or code not in (0, -15, 143)):
             self.findings.append(f"died: {ROLES[life.end]} life {life.number}, with {code}")
 
     def suspend(self, life):
-        """Misfortunes may overlap: a process goes on when the last of them is over."""
+        """Misfortunes can overlap: a process continues when the last one is over."""
         life.process.signal(signal.SIGSTOP)
         if not life.suspended:
             life.downs.append((time.monotonic_ns(), None))
@@ -223,7 +223,7 @@ class Line:
         if event.what == "stopped" and life:
             self.resume(life)
         elif event.what in ("killed", "terminated") and not life:
-            # A second one may have taken its port and its recording meanwhile.
+            # A second process can have taken its port and its recording meanwhile.
             self.over(event.end, True, self.second)
             self.start(event.end)
         elif event.what == "cut":
@@ -237,7 +237,7 @@ class Line:
         self.tell(f"over: {event}")
 
     def is_lively(self):
-        """Whether both ends have values of each other that count."""
+        """True if both ends have valid values of each other."""
         for end in (DEVICE, CONTROLLER):
             life = self.processes.get(end)
             if self.plan.ends[end].program == "command":
@@ -271,7 +271,7 @@ class Line:
                 self.dispatcher.kill()
             self.network.close()
             for recording in self.recordings:
-                # Off the small disk, which is gone in a moment.
+                # Move it off the small disk, which is removed in a moment.
                 if recording and recording.exists():
                     shutil.copy(recording, self.folder / f"kept-{recording.name}")
             if self.disk:
@@ -312,7 +312,7 @@ class Line:
             if (descriptors, threads) == before[:2] or time.monotonic() > until:
                 break
             time.sleep(0.2)
-        # Of a peer that ended while the network was cut nobody tells this end: its connection is there until it times out.
+        # This end does not learn that a peer ended while the network was cut: its connection stays until it times out.
         lost = sum(
             any(begin <= (other.ended or 0) and (end is None or other.ended <= end) for begin, end in self.cuts)
             for other in self.lives
@@ -333,7 +333,7 @@ class Line:
                     life.downs.append((begin, end))
         for life in self.lives:
             life.ticks = judge.read(life.path, self.plan.stations)
-        # A dataclass with lists has no hash: lives are told apart by themselves.
+        # A dataclass with lists has no hash: lives are distinguished by identity.
         one = judge.Judge(self.plan, self.lives, self.stalls)
         self.findings += one.judge()
         for end, recording in enumerate(self.recordings):

@@ -1,15 +1,15 @@
-"""The lines that the ends may log, and what causes each. Any other line is a finding."""
+"""The lines that the ends may log, and the cause of each. Any other line is a finding."""
 
 import re
 
-# What makes an end silent for its peer.
+# Misfortunes that silence an end for its peer.
 SILENT = {"stopped", "killed", "terminated", "cut", "second", "paused", "stalled", "dispatcher killed", "dispatcher stopped"}
 DISPATCHER = {"dispatcher killed", "dispatcher stopped"}
-# Lines end in disorder when one of them ends, which happens in every line of the storm.
+# Lines end in disorder when an end ends, which happens in every line of the storm.
 ALWAYS = set()
 DEATHS = {"killed", "terminated", "second", "cut", "stopped"}
 
-# The states of a line, in the words of the driver and of the command; what has to have befallen the line for it.
+# The states of a line, in the words of the driver and of the command, and the misfortunes that cause them.
 STATE = r'^(?:driver "\w+" is|mirror:|plc:|\[[^]]* WARN +tickbus_fieldbus::link\] driver "\w+" is) '
 KNOWN = [
     (STATE + r"(opening|running): (opening the line|beginning to listen on|listening on|connecting to|connected with|polling|waiting|joined|the PLC) ?", ALWAYS),
@@ -35,28 +35,28 @@ KNOWN = [
     # OPC UA, and the dispatcher.
     (STATE + r"(opening: asking|opening: opening a session with|running: in session with) ", ALWAYS),
     (STATE + r"(failed|opening): the peer left: the (server|last client) closed (the|its) session", ALWAYS),
-    # Its server ends in the middle of a greeting.
+    # The server ends in the middle of a greeting.
     (STATE + r"failed: the protocol was broken: \S+ does not answer as an OPC UA server \(BadConnectionClosed", DEATHS),
     (STATE + r"opening: the peer left: no input has a source any more", ALWAYS),
     (STATE + r"failed: the link failed: the connection with the dispatcher at \S+ broke \(Connection reset", DISPATCHER | {"cut"}),
     (STATE + r"failed: refused: the dispatcher has another client ", DEATHS | DISPATCHER),
-    # A second writer, which was refused, cannot leave its fail-safe values behind; nor can one that is cut off.
+    # A second writer, which was refused, cannot leave its fail-safe values behind; neither can one that is cut off.
     (r"closes, and the peer has not confirmed the fail-safe values within ", DEATHS | DISPATCHER),
     # Recordings.
     (r"the recording ended with tick \d+ of the file: No space left on device", {"small disk"}),
     (r": (process \d+|another process) records to this file, or replays it; name another file", {"second"}),
-    # What Python and FMPy print of it.
+    # The output of Python and FMPy about it.
     (r"^(Traceback \(most recent call last\):|  File .*|    .*)$", {"second"}),
     (r"the server does not take the value of \"\w+\" \(BadUserAccessDenied", DEATHS),
     (r"^  correct the lines named in the message; `tickbus check FILE`", {"second"}),
     (r"^\tat (tickbus\.Tickbus|End\.main)", {"second"}),
-    # What the command prints in the end.
+    # The last output of the command.
     (r"^(mirror|plc): ok ", ALWAYS),
 ]
 
 
 def unexplained(text, befallen):
-    """The lines of a log that nothing explains."""
+    """The unexplained lines of a log."""
     found = []
     for line in text.splitlines():
         causes = [causes for pattern, causes in KNOWN if re.search(pattern, line)]

@@ -1,4 +1,4 @@
-"""What the storm needs of the machine: processes and what they hold, networks that can be cut off, small disks, a look at stalls."""
+"""Access to the machine: processes and their resources, networks that can be cut off, small disks, detection of stalls."""
 
 import os
 import re
@@ -11,12 +11,12 @@ from pathlib import Path
 
 
 def run(*command):
-    """Whether a command succeeds."""
+    """True if a command succeeds."""
     return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).returncode == 0
 
 
 class Network:
-    """Both ends of a line in network namespaces of their own, with a cable between them; or this computer alone."""
+    """Both ends of a line in separate network namespaces, with a cable between them; or this computer alone."""
 
     def __init__(self, name, has_namespaces):
         self.names = [f"{name}-{side}" for side in "dc"] if has_namespaces else None
@@ -37,7 +37,7 @@ class Network:
         subprocess.run(["ip", "netns", "exec", own, *command], check=True)
 
     def prefix(self, end):
-        """What a command begins with that is to run at an end."""
+        """The prefix of a command that runs at an end."""
         return ["ip", "netns", "exec", self.names[end]] if self.names else []
 
     def cut(self, is_cut):
@@ -45,7 +45,7 @@ class Network:
         self._in(self.names[0], "ip", "link", "set", self.cable[0], "down" if is_cut else "up")
 
     def port(self):
-        """One that nobody has; in a namespace of its own any will do."""
+        """A free port; in a separate namespace any will do."""
         if self.names:
             return 20030
         with socket.socket() as free:
@@ -58,7 +58,7 @@ class Network:
 
 
 def has_namespaces():
-    """Whether this user may cut networks off here."""
+    """True if this user may cut networks off here."""
     try:
         Network(f"storm-{os.getpid()}-try", True).close()
     except (OSError, subprocess.CalledProcessError):
@@ -67,7 +67,7 @@ def has_namespaces():
 
 
 class Disk:
-    """A folder with little room."""
+    """A folder with little space."""
 
     def __init__(self, folder):
         folder.mkdir()
@@ -102,7 +102,7 @@ class Process:
         self.ended = self.ended or time.monotonic_ns()
 
     def terminate(self, seconds):
-        """Whether it ends by itself within a time."""
+        """Asks the process to end; true if it ends within the time."""
         self.asked = time.monotonic_ns()
         self.signal(signal.SIGTERM)
         try:
@@ -113,7 +113,7 @@ class Process:
         return True
 
     def holds(self):
-        """What it has of the system's: descriptors by kind, threads by name, kilobytes. Those of a JVM's own are left out."""
+        """The process's system resources: descriptors by kind, threads by name, kilobytes. A JVM's own ones are left out."""
         folder = Path(f"/proc/{self.child.pid}")
         descriptors = {}
         for one in (folder / "fd").iterdir():
@@ -135,7 +135,7 @@ class Process:
 
 
 class Stalls(threading.Thread):
-    """When this whole machine stood still, or had no processor for its threads."""
+    """Detects when this whole machine stood still, or had no processor for its threads."""
 
     LEAST = 25_000_000
 

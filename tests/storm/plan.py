@@ -1,17 +1,17 @@
-"""What a line of the storm consists of, drawn from its seed: bus, ends, driver.cfg, and the misfortunes with their times."""
+"""The plan of a line of the storm, drawn from its seed: bus, ends, driver.cfg, and the misfortunes with their times."""
 
 import random
 from dataclasses import dataclass, field
 
 DEVICE, CONTROLLER = 0, 1
 ROLES = ("device", "controller")
-# Stamps of no life, and the values beside them.
+# Stamps of no life, and their other values.
 FAIL_SAFE, FAIL_SAFE_WHOLE, FAIL_SAFE_REAL = 2989, -7, 2.5
 SECOND = 1_000_000_000
 MS = 1_000_000
 
 BUSES = ("socket", "on change", "modbus", "modbus rtu", "s7", "opcua", "dispatcher")
-# The command brings back what it reads: "mirror" as device, "plc mirror" as controller.
+# The command sends back the values that it reads: "mirror" as device, "plc mirror" as controller.
 PROGRAMS = ("c", "python", "java", "fmu", "command")
 
 
@@ -54,7 +54,7 @@ class Plan:
 
     @property
     def asks(self):
-        """Whether one end asks and the other answers."""
+        """True if one end asks and the other answers."""
         return self.bus in ("modbus", "modbus rtu", "s7", "opcua")
 
     def server(self):
@@ -62,11 +62,11 @@ class Plan:
         return None if self.bus == "dispatcher" else int(self.controller_serves)
 
     def watchdog(self, end):
-        """After how long without a tick an end's peer gets fail-safe values; None for never. That of a device has to be asked for."""
+        """The time without a tick after which an end's peer gets fail-safe values; None for never. A device's must be configured."""
         return max(self.max_age, 10 * self.cycle, 250 * MS) if end == CONTROLLER else None
 
     def names(self):
-        """For the table of what has met."""
+        """The labels for the table of combinations."""
         names = [f"{self.ends[0].program}-{self.ends[1].program}", self.bus]
         return names + sorted({event.what for event in self.events})
 
@@ -86,7 +86,7 @@ class Plan:
 
 
 def draw(seed, programs, buses, without_opcua, has_network):
-    """The line of a seed, of what this machine has."""
+    """The line of a seed, using what this machine has."""
     of = random.Random(seed)
     bus = of.choice([bus for bus in BUSES if bus in buses])
     cycle = of.choice([5, 10, 20]) * MS
@@ -117,7 +117,7 @@ def draw(seed, programs, buses, without_opcua, has_network):
         small_disk=of.random() < 0.5,
         span=of.choice([8.0, 12.0, 16.0]),
     )
-    # Each line draws which misfortunes exist at all.
+    # Each line draws the kinds of misfortunes that can happen.
     kinds = ["stopped", "killed", "terminated", "cut", "second", "paused"]
     kinds += ["dispatcher killed", "dispatcher stopped"] if bus == "dispatcher" else []
     exist = [kind for kind in kinds if of.random() < 0.5]
@@ -161,7 +161,7 @@ def fieldbus(plan, end, address):
         if not serves:
             lines += [f'write_to = "tickbus {ROLES[1 - end]}"']
     elif plan.bus == "opcua" and serves:
-        # Clients write what has changed: of two of them each would leave the other one's values beside its own.
+        # Clients write changed values only: of two clients, each would leave the other one's values beside its own.
         lines += ['kind = "opcua-server"', 'security = "None"', "anonymous = true", "writers = 1"]
     elif plan.bus == "opcua":
         lines = [f'kind = "opcua-client"\nurl = "opc.tcp://{address}"\nsecurity = "None"']
@@ -172,8 +172,8 @@ def fieldbus(plan, end, address):
 
 
 def patch():
-    """The dispatcher's patch: all that an end reads, from what the other one writes. It stands there from the start, since connections that
-    a client asks for are made one after another. Digital and analog channels are counted apart."""
+    """The dispatcher's patch: everything that an end reads, from what the other one writes. It is there from the start, since
+    the dispatcher makes requested connections one after another. Digital and analog channels are counted separately."""
     channels = [("I1", "Q1"), ("I2", "Q2"), ("AI1", "AQ1"), ("AI2", "AQ2"), ("AI3", "AQ3")]
     pairs = [(role.upper(), other.upper()) for role, other in (ROLES, ROLES[::-1])]
     lines = [f'"{end}:{own}" = "{other}:{its}"' for end, other in pairs for own, its in channels]

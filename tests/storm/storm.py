@@ -1,7 +1,7 @@
-"""The storm: the built artefacts as ends of lines, from outside, under misfortunes that a seed draws. README.md tells more.
+"""The storm: the built artefacts as ends of lines, from outside, under misfortunes that a seed draws. See README.md.
 
     storm.py [--minutes N] [--seed S] [--jobs N] [--product FOLDER] [--buses A,B] [--programs A,B]
-    storm.py --line SEED ...      one line again, with its story
+    storm.py --line SEED ...      repeats one line, with its story
 """
 
 import argparse
@@ -52,7 +52,7 @@ def one_line(given, seed, artefacts, namespaces):
 
 
 def command(given, seed):
-    """The command that runs a line, in a process of its own: so it is measured by itself, and repeated alone."""
+    """The command that runs a line in a separate process: so it is measured separately, and can be repeated alone."""
     return [
         sys.executable, __file__, "--line", seed, "--product", str(given.product), "--out", str(given.out),
         "--buses", given.buses, "--programs", given.programs, "--without-opcua", given.without_opcua,
@@ -64,7 +64,7 @@ def storm(given):
     try:
         return storm_on(given, running)
     finally:
-        # Each line takes its network, its disk and its processes with it.
+        # Ending a line also removes its network, its disk and its processes.
         for process in running.values():
             process.terminate()
         for process in running.values():
@@ -114,7 +114,7 @@ def storm_on(given, running):
 
 
 def table(met):
-    """Which ends have met which buses and misfortunes, in lines."""
+    """The combinations of ends with buses and misfortunes, in lines."""
     columns = sorted({column for _, column in met})
     rows = sorted({row for row, _ in met})
     print("".ljust(18) + " ".join(columns))
@@ -123,7 +123,7 @@ def table(met):
 
 
 def end(number, _):
-    """Ends the storm; what it has begun is taken back, and a second signal does not disturb that."""
+    """Ends the storm: undoes its changes to the machine, undisturbed by a second signal."""
     for ending in ENDINGS:
         signal.signal(ending, signal.SIG_IGN)
     sys.exit(128 + number)

@@ -1,4 +1,4 @@
-"""The judge of the storm is judged: a line in which all is well breaks no promise, and each way to break one is found."""
+"""Judges the storm's judge: a line in which all is well breaks no promise, and each way to break one is found."""
 
 import copy
 import unittest
@@ -76,7 +76,7 @@ class TheJudge(unittest.TestCase):
         for tick in self.device.ticks[700:]:
             tick.stations = [stamped(2, 0, 700, 0)]
         self.assertIn("left on", self.found())
-        # Its last words may have waited in a network that was cut when it closed, and no longer.
+        # Its last data can have waited in a network that was cut when it closed, but no longer.
         ended = self.controller.ended
         for after, is_found in ((6 * SECOND, False), (SECOND, True)):
             self.controller.downs = [(ended - SECOND, ended + after)]

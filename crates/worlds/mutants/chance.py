@@ -1,4 +1,4 @@
-"""Changes of single lines, drawn by chance: always the same ones from the same seed, as long as the code is the same."""
+"""Random changes of single lines: the same seed gives the same changes, as long as the code is the same."""
 
 import random
 import re
@@ -21,7 +21,7 @@ def switched(old, new, switch):
 
 
 def ways(line, switch):
-    """All changes of a line, in its place, each in force only while `switch` is true."""
+    """All changes of a line, at its place; each has effect only while `switch` is true."""
     for pattern in (COMPARES, SUMS):
         for found in pattern.finditer(line):
             before, left, operator, right = found.groups()
@@ -48,7 +48,7 @@ def ways(line, switch):
 
 
 def code_lines(text):
-    """The numbers of the lines that are code of the product: no tests, comments, attributes, constants."""
+    """The numbers of the lines with product code: no tests, comments, attributes, constants."""
     for number, line in enumerate(text.split("\n")):
         if line.startswith(("#[cfg(test)]", "#[cfg(all(test")):
             return
@@ -59,7 +59,7 @@ def code_lines(text):
 
 
 def drawn(files, count, switch_of):
-    """`count` changes of these files (name to text): where, what it says instead, and the line with its switch."""
+    """Draws `count` changes of these files (name to text): the place, the new text, and the line with its switch."""
     source = random.Random("tickbus")
     sites = []
     for name, text in sorted(files.items()):

@@ -1,7 +1,7 @@
 """Builds tickbus with every mutation of mutants.toml as a switch, and runs simulated worlds until they find each of them.
 
-With --random COUNT it changes that many lines of image, fieldbus, driver and the buses by chance (always the same ones), and
-lets the unit tests of the crate judge each of them before the worlds do.
+With --random COUNT it changes that many random lines of image, fieldbus, driver and the buses (always the same ones), and
+runs the unit tests of the crate on each change before the worlds.
 """
 
 import argparse
@@ -33,16 +33,16 @@ pub fn mutant(number: u32) -> bool {
     *CHOSEN == number
 }
 """
-# Crates whose lines are changed by chance.
+# Crates whose lines are changed at random.
 CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7"]
 
 
 def write_tree(texts):
-    """The files that git knows, with these changes; those that are as they were keep their times, and are not compiled anew."""
+    """Copies the files that git knows, with these changes; unchanged files keep their times, and are not recompiled."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
     names = set(filter(None, listed.decode().split("\0")))
     for path in TREE.rglob("*.rs"):
-        # A module that has moved would be there twice.
+        # A module that has moved would exist twice.
         if str(path.relative_to(TREE)) not in names:
             path.unlink()
     for name in sorted(names):
@@ -90,7 +90,7 @@ def fresh(number, seconds):
     process = subprocess.Popen(
         [binary, "100000", str(seconds)], env=chosen(number), stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
     )
-    # A mutation may let a thread go on for ever, in which no world ends.
+    # A mutation can make a thread run forever, so that no world ends.
     patience = threading.Timer(seconds + 60, process.kill)
     patience.start()
     promise, took, last = None, 0.0, ""
@@ -98,7 +98,7 @@ def fresh(number, seconds):
         last = line
         if line.startswith("  seed"):
             seed = line.split(";")[0].split()[1]
-            # What tickbus does without the mutation, too, the mutation has not done.
+            # A failure that also happens without the mutation does not count.
             if is_whole(binary, seed):
                 patience.cancel()
                 process.kill()

@@ -240,7 +240,7 @@ def test_ctrl_c_ends_a_simulation_and_closes_its_driver(python, line_cfg):
         """
 import os, signal, sys, threading
 import tickbus
-# Whoever starts the tests in the background may have had it ignored.
+# A shell that runs the tests in the background ignores SIGINT.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:

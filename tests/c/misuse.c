@@ -106,7 +106,7 @@ int main(int count, char **arguments) {
     EXPECT(lag >= 1500000 && due >= second + 500000 && (due - second) % 1000000 == 500000, 1, NULL);
     EXPECT(strcmp(tb_version(), "0.1.0"), 0, NULL);
 
-    /* A text that does not fit is cut, ends with 0, and its length is told. */
+    /* A text that does not fit is cut and ends with 0; the call returns its whole length. */
     int length = tb_statistics(driver, NULL, 0);
     EXPECT(length > 64, 1, NULL);
     memset(text, 'x', sizeof text);
@@ -126,7 +126,7 @@ int main(int count, char **arguments) {
     EXPECT(tb_end_fault(driver, 4711), 0, NULL);
     EXPECT(tb_events(driver, NULL, 1), TB_BAD_ARGUMENT, "events is NULL");
 
-    /* Two threads: one of them is told that the driver is busy, now and then. */
+    /* Two threads: now and then, one of them gets TB_BUSY. */
     shared = driver;
     int counts[2][2] = {{0, 0}, {0, 0}};
     pthread_t thread;

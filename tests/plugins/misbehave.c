@@ -1,6 +1,6 @@
 /* misbehave.c: a plug-in that does what its options say, for the tests.
  *
- * It is an echo: `out` is `in`, as far as both reach. The rest is misbehaviour:
+ * The plug-in is an echo: `out` is `in`, as far as both reach. The rest is misbehaviour:
  *
  *   open, exchange, close = WHAT    what that function does instead; see misbehave()
  *   good    = N       the first N exchanges are good

@@ -1,6 +1,6 @@
 /* standin_cifx.c: stands in for the cifX driver's library, for the tests.
  *
- * It has two boards, cifX0 and cifX1, whose process images are joined: what one writes the other one reads. Each bus
+ * The stand-in has two boards, cifX0 and cifX1, whose process images are joined: each reads the other one's output. Each bus
  * communicates while both are on. An image that the other end has not read yet is EXCHANGE_FAILED for its writer, one
  * that it has read already for its reader.
  */

@@ -156,7 +156,7 @@
     });
   }
 
-  // What happens.
+  // Events.
 
   /** Alarms that nobody may overlook. */
   function alarm() {

@@ -248,7 +248,7 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="tools/mutants", description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*", help="some of the mutations; all by default")
     parser.add_argument("--seconds", type=int, default=300, help="how long worlds look for each")
-    parser.add_argument("--random", type=int, metavar="COUNT", help="so many changes by chance in place of them")
+    parser.add_argument("--random", type=int, metavar="COUNT", help="this many random changes instead")
     arguments = parser.parse_args()
     if arguments.random:
         sys.exit(by_chance(arguments.random, arguments.seconds))

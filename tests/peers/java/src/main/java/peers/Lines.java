@@ -7,7 +7,7 @@ import java.nio.charset.StandardCharsets;
 
 /** Obeys lines from the standard input, and answers each with one line. */
 final class Lines {
-    /** What a line asks for: its words are apart by tabs. */
+    /** Handles a request line, given as its words, which tabs separate. */
     interface Command {
         String obey(String[] words) throws Exception;
     }

@@ -1,4 +1,4 @@
-/* A tank in C on a PLC's fieldbus: README.md's tank.cfg and machine. docs/c-api.md tells how to build it. */
+/* A tank in C on a PLC's fieldbus: README.md's tank.cfg and machine. docs/c-api.md explains how to build it. */
 #include <stdio.h>
 #include <tickbus.h>
 
@@ -18,7 +18,7 @@ int main(int count, char **arguments) {
     tb_buffer *values = tb_buffer_of(plc);
     double mm = 100;
     for (int tick = 0; tick < 500; tick++) {
-        values->simulation_time = tick * INT64_C(10000000); /* 10 ms a tick; needed on a stepped bus alone */
+        values->simulation_time = tick * INT64_C(10000000); /* 10 ms per tick; only needed on a stepped bus */
         int status = check(tb_receive(plc));
         if (status < 0) return 1;
         mm += tb_get_bool(values, &valve) ? 2 : -1; /* your machine model */

@@ -1,4 +1,4 @@
-// A tank in C# on a PLC's fieldbus: README.md's tank.cfg and machine. docs/c-api.md tells how to build it.
+// A tank in C# on a PLC's fieldbus: README.md's tank.cfg and machine. docs/c-api.md explains how to build it.
 using System;
 using System.Runtime.InteropServices;
 

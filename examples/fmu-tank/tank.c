@@ -1,7 +1,7 @@
 /* A tank as an FMU, for co-simulation: one C file for FMI 2.0 and, with -DFMI3, for FMI 3.0.
  *
- * A valve fills it, a drain empties it, a float switch tells that it is low. The functions are those that a master needs for such a
- * model; the types are the standards', written down here so that the file compiles by itself.
+ * A valve fills the tank, a drain empties it, a float switch is on while it is low. The file has the functions that a master needs
+ * for such a model, and repeats the standards' types so that it compiles without their headers.
  *
  * Value references: 0 valve (input), 1 level in metres, 2 low (outputs), 3 area in square metres (parameter), 4 counter.
  */
@@ -21,7 +21,7 @@ enum { OK = 0, WARNING = 1, DISCARD = 2, FAILED = 3, FATAL = 4 };
 enum { VALVE = 0, LEVEL = 1, LOW = 2, AREA = 3, STEPS = 4 };
 
 static const double INFLOW = 0.02;  /* cubic metres per second, with the valve open */
-static const double OUTFLOW = 0.01; /* always */
+static const double OUTFLOW = 0.01; /* at all times */
 
 typedef struct {
     bool valve;

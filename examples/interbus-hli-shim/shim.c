@@ -1,12 +1,12 @@
 /* shim.c: an INTERBUS controller board for tickbus, by the vendor's high-level language interface (HLI).
  *
- * The HLI's header is not public, so tickbus cannot call it by itself: you compile this file with your copy, and the
- * result is a plug-in. It has never been run with the vendor's library or a board; it is compiled and run with a header
- * made up for the tests.
+ * The HLI's header is not public, so tickbus cannot call the HLI directly: compile this file with your copy of the header
+ * to get a plug-in. The shim has never run with the vendor's library or a board; the tests compile and run it with an
+ * invented header.
  *
  * CMD, the vendor's configurator, exports your bus as C: the process data objects as global variables, and three
- * functions, which start the bus, end it, and run one cycle. What they do inside is, by the publication of a cell that
- * was controlled so (Piedrafita and Garcia, Universidad de Zaragoza, sections 2.1 and 3.2):
+ * functions, which start the bus, end it, and run one cycle. According to the publication about a cell that was
+ * controlled in this way (Piedrafita and Garcia, Universidad de Zaragoza, sections 2.1 and 3.2), they call:
  *
  *     start    IBS_HLI_Init_CFG with the list of devices, in the mode IBS_STANDARD
  *              IBS_HLI_RegisterPDOObject for each object, with the address of its variable
@@ -16,17 +16,17 @@
  *     end      IBS_HLI_ResetAllOutputs
  *              IBS_HLI_Exit
  *
- * Write a header of your own that includes what CMD has exported, and that defines, in the names of your export:
+ * Write your own header that includes the files exported by CMD, and that defines, with the names of your export:
  *
- *     HLI_INIT()         starts the bus, and is HLI_OKAY when that worked
+ *     HLI_INIT()         starts the bus; its value is HLI_OKAY on success
  *     HLI_CYCLE()        runs a cycle, likewise
  *     HLI_EXIT()         ends it, outputs reset
- *     HLI_RUNS()         whether the bus runs, such as (PCI1.BusState == HLI_IBS_RUN)
+ *     HLI_RUNS()         true while the bus runs, such as (PCI1.BusState == HLI_IBS_RUN)
  *     HLI_OUTPUT_BITS(X) what tickbus sends: X(byte, bit, variable) for each object of one bit, X(0, 3, Valve)
  *     HLI_OUTPUT_WORDS(X)                    X(byte, variable) for each object of 16 bits
  *     HLI_INPUT_BITS(X), HLI_INPUT_WORDS(X)  what tickbus receives, likewise
  *
- * byte and bit are those of the signal's address in driver.cfg. A list without objects is defined as nothing.
+ * byte and bit are those of the signal's address in driver.cfg. Define a list without objects as empty.
  *
  * Build: cc -std=c99 -O2 -Wall -Wextra -fPIC -shared -I ../../include -DHLI_CELL='"cell.h"' -o libhlishim.so shim.c
  *        cl /O2 /LD /I ..\..\include /DHLI_CELL="\"cell.h\"" shim.c and the vendor's import library

@@ -1,4 +1,4 @@
-/* hli_cell.h: stands in for a user's cell.h, for the tests: what is received is what was sent. */
+/* hli_cell.h: stands in for a user's cell.h, for the tests: it returns the sent data as received. */
 #define HLI_OKAY 0
 
 #ifndef INIT

@@ -1,9 +1,9 @@
-/* standin.h: what the stand-ins for vendors' libraries have in common.
+/* standin.h: the common part of the stand-ins for vendors' libraries.
  *
- * Beside the library two files: `calls`, to which each call is added as a line (the same one again is left out), and
- * `script`, which a test writes: lines "FUNCTION CODE" or "FUNCTION hang". A function named there returns that code
- * instead of doing its work, or does not return while the line is there; "FUNCTION(ARGUMENT" stands for those of its
- * calls that have this first argument.
+ * Two files lie beside the library: `calls`, to which each call is added as a line (without repetitions), and `script`,
+ * which a test writes: lines "FUNCTION CODE" or "FUNCTION hang". A function named there returns that code instead of
+ * doing its work, or does not return while the line is there; "FUNCTION(ARGUMENT" restricts this to calls with this
+ * first argument.
  */
 #define _GNU_SOURCE
 

@@ -2,7 +2,7 @@ package tickbus.petri;
 
 import java.util.Arrays;
 
-/** The strongly connected components of a graph whose edges stand side by side (Tarjan, without recursion). */
+/** The strongly connected components of a graph whose edges are in one array (Tarjan, without recursion). */
 final class Components {
     /** The component of each node. */
     final int[] of;

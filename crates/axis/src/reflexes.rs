@@ -146,7 +146,7 @@ impl Reflex {
         }
         for switch in &mut self.switches {
             let position = slots[switch.position].real();
-            // The distance beyond the trip point: the switch goes on at 0, and off below minus the hysteresis.
+            // The distance beyond the trip point: the switch turns on at 0, and off below minus the hysteresis.
             let beyond = if switch.above {
                 position - switch.at
             } else {

@@ -350,6 +350,27 @@ fn who_only_looks_does_not_keep_the_values_of_another_one_young() {
 }
 
 #[test]
+fn a_client_that_returns_and_reads_before_it_writes_does_not_bring_its_old_values_back() {
+    const READ: [u8; 5] = [4, 0, 1, 0, 1];
+    let (mut device, mut stream) = device("");
+    is_served(&mut device, &mut stream, 7);
+    device.clock.advance(MAX_AGE + Nanos::from_millis(10));
+    for transaction in 1..4 {
+        ask(&mut stream, transaction, &READ);
+        assert_eq!(device.end.tick().code, Code::Stale, "{transaction}");
+        assert_eq!(device.end.get("speed"), -1.0);
+    }
+    // A client that writes only changes has nothing to write.
+    device.clock.advance(MAX_AGE);
+    ask(&mut stream, 4, &READ);
+    device.until_speed(7);
+    device.clock.advance(MAX_AGE + Nanos::from_millis(10));
+    ask(&mut stream, 5, &READ);
+    assert_eq!(device.end.tick().code, Code::Stale);
+    is_served(&mut device, &mut stream, 8);
+}
+
+#[test]
 fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
     let (mut device, mut stream) = device("");
     // A refused request is not a sign of life: it may have been meant for another server.

@@ -51,6 +51,7 @@ impl Port {
         status: LinkStatus,
     ) -> Self {
         Self {
+            faults: FaultLayer::new(Arc::default(), image.stations()),
             looks: Looks::new(status.max_age()),
             image: ImagePort {
                 validity: Validity::new(image.stations()),
@@ -63,7 +64,6 @@ impl Port {
                 blind: None,
                 ending: None,
             },
-            faults: FaultLayer::default(),
             clock,
             role,
         }
@@ -72,7 +72,7 @@ impl Port {
     /// The same with the faults on `board` on its line.
     #[must_use]
     pub fn with_faults(mut self, board: Arc<FaultBoard>) -> Self {
-        self.faults = FaultLayer::of(board);
+        self.faults = FaultLayer::new(board, self.image.stations());
         self
     }
 

@@ -1,45 +1,53 @@
-//! Which requests keep values young that their client wrote before.
+//! The requests that keep the values young that their client wrote before.
 
 use tickbus_base::time::Nanos;
 
-/// Whether requests of one client that write nothing keep the values of a station young: once it has written, and after a
-/// silence in which its values became stale either when it writes again, or when it has gone on asking for `max_age`. A client that
-/// was held up may read before it writes, and what it wrote then is old; one that writes only changes has nothing to write.
+/// Decides if requests of one client that write nothing keep the values of a station young. They do once the client has written.
+/// After a silence of more than `max_age` they do when the client has written again, or has asked for `max_age`. A client that was
+/// held up may read before it writes, and its values from before are old; a client that writes only changes has nothing to write.
 #[derive(Clone, Copy, Debug)]
 pub struct Renewal {
-    has_written: bool,
     /// When it asked last.
     asked: Nanos,
-    /// From when on such requests count.
-    counts_from: Nanos,
+    /// From when on such requests count; `None` until it has written.
+    counts_from: Option<Nanos>,
 }
 
 impl Renewal {
-    /// Of a client that has written nothing yet, or, if it is the only one that the line can have, may have.
-    pub const fn new(has_written: bool) -> Self {
+    /// Of a client that has just connected: it has written nothing.
+    pub const fn of_new_client() -> Self {
         Self {
-            has_written,
             asked: Nanos(i64::MIN),
-            counts_from: Nanos(i64::MIN),
+            counts_from: None,
+        }
+    }
+
+    /// Of the only client that a line can have, which may have written before the line was opened.
+    pub const fn of_only_client() -> Self {
+        Self {
+            asked: Nanos(i64::MIN),
+            counts_from: Some(Nanos(i64::MIN)),
         }
     }
 
     /// The client has written at `now`.
     pub fn wrote(&mut self, now: Nanos) {
         *self = Self {
-            has_written: true,
             asked: now,
-            counts_from: now,
+            counts_from: Some(now),
         };
     }
 
-    /// The client asks at `now`, and writes nothing: whether that keeps values young which are stale after `max_age`.
+    /// The client asks at `now`, and writes nothing: returns true if that keeps values young that are stale after `max_age`.
     pub fn counts(&mut self, now: Nanos, max_age: Nanos) -> bool {
         let before = std::mem::replace(&mut self.asked, now);
+        let Some(from) = &mut self.counts_from else {
+            return false;
+        };
         if now.0.saturating_sub(before.0) > max_age.0 {
-            self.counts_from = now + max_age;
+            *from = now + max_age;
         }
-        self.has_written && now >= self.counts_from
+        now >= *from
     }
 }
 
@@ -51,13 +59,13 @@ mod tests {
 
     #[test]
     fn a_client_that_only_reads_does_not_count() {
-        let mut renewal = Renewal::new(false);
+        let mut renewal = Renewal::of_new_client();
         assert!((0..10).all(|time| !renewal.counts(Nanos(time * 50), MAX_AGE)));
     }
 
     #[test]
     fn a_client_that_was_silent_counts_when_it_writes_or_has_asked_for_long_enough() {
-        let mut renewal = Renewal::new(false);
+        let mut renewal = Renewal::of_new_client();
         renewal.wrote(Nanos(0));
         assert!(renewal.counts(Nanos(100), MAX_AGE));
         assert!(!renewal.counts(Nanos(201), MAX_AGE), "what it wrote is old");
@@ -73,7 +81,7 @@ mod tests {
 
     #[test]
     fn the_only_client_of_a_line_counts_once_it_has_asked_for_long_enough() {
-        let mut renewal = Renewal::new(true);
+        let mut renewal = Renewal::of_only_client();
         let counts = [0, 50, 100].map(|time| renewal.counts(Nanos(time), MAX_AGE));
         assert_eq!(counts, [false, false, true]);
     }

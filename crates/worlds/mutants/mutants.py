@@ -128,7 +128,8 @@ def corpus(number):
         except subprocess.TimeoutExpired:
             return time.monotonic() - begun, "corpus: hangs", seed
         if done.returncode:
-            promise = done.stdout.splitlines()[-1].split(": ")[1].split(" ", 2)[-1] if done.returncode == 1 else "panics"
+            verdict = [line for line in done.stdout.splitlines() if line.startswith("worlds: failed ")]
+            promise = verdict[-1].split(": ")[1].split(" ", 2)[-1] if verdict else "panics"
             return time.monotonic() - begun, f"corpus: {promise}", seed
     return time.monotonic() - begun, None, seed
 

@@ -48,7 +48,7 @@ impl Plan {
 
     /// The bus, and what only some buses have.
     fn fieldbus(&self, end: usize, link: &str) -> Vec<String> {
-        let serves = (end == 1) == self.controller_serves;
+        let serves = self.serves(end);
         let (kind, place) = match (self.bus, serves) {
             (Bus::Loopback, _) => return vec![format!("kind = \"loopback\"\nlink = \"{link}\"")],
             (Bus::Socket | Bus::SocketOnChange, true) => ("socket", "role_tcp = \"listen\""),
@@ -100,6 +100,11 @@ impl Plan {
         let within = (every + period.times(2) + self.cycle).times(3) + self.max_age;
         let within = Nanos(within.0.max(10_000_000));
         Some((every, is_watched.then_some(within)))
+    }
+
+    /// Whether an end waits for the other one to connect.
+    pub(crate) fn serves(&self, end: usize) -> bool {
+        (end == 1) == self.controller_serves
     }
 
     /// The watchdog of an end, as docs/driver-cfg.md has it.

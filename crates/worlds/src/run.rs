@@ -117,14 +117,10 @@ impl Run {
         clock: &dyn Clock,
         report: &(dyn Fn(&Finding) + Sync),
     ) -> Self {
-        let firsts = (0..processors as u64).map(|processor| Seed {
-            number: first.number.wrapping_add(processor * APART),
-            ..first
-        });
         let mut all = Self::default();
         thread::scope(|scope| {
             let start = |first| scope.spawn(move || Self::on_one(first, limit, clock, report));
-            let threads: Vec<_> = firsts.map(start).collect();
+            let threads: Vec<_> = firsts(first, processors).map(start).collect();
             for thread in threads {
                 all.merge(thread.join().expect("panics of worlds are findings"));
             }
@@ -138,6 +134,14 @@ impl Run {
         self.findings.extend(other.findings);
         self.pairs.merge(&other.pairs);
     }
+}
+
+/// The first seed of each processor.
+fn firsts(first: Seed, processors: usize) -> impl Iterator<Item = Seed> {
+    (0..processors as u64).map(move |processor| Seed {
+        number: first.number.wrapping_add(processor * APART),
+        ..first
+    })
 }
 
 /// The message of a panic, on one line.
@@ -195,6 +199,8 @@ mod tests {
         let limit = Nanos::from_millis(200);
         let run = Run::on_all(first, limit, 2, &*clock, &report);
         assert!(run.worlds >= 2, "{} worlds", run.worlds);
+        let numbers: Vec<u64> = firsts(first, 3).map(|seed| seed.number).collect();
+        assert_eq!(numbers, [4711, 4711 + APART, 4711 + 2 * APART]);
         assert!(run.pairs.met() > 0, "no pair has met");
     }
 }

@@ -34,7 +34,7 @@ pub(super) fn serve(
         line,
         // A line has a single client.
         source: Source {
-            renewals: vec![Renewal::new(true); units.len()].into(),
+            renewals: vec![Renewal::of_only_client(); units.len()].into(),
             writer: None,
         },
         units,

@@ -91,7 +91,7 @@ impl Service for TcpService<'_> {
         Client {
             carried: Vec::new(),
             source: Source {
-                renewals: vec![Renewal::new(false); self.units.len()].into(),
+                renewals: vec![Renewal::of_new_client(); self.units.len()].into(),
                 writer: Some(Arc::new(peer)),
             },
         }

@@ -157,7 +157,10 @@ impl ServedUnits {
                     return None;
                 }
                 unit.has_writer = true;
-                source.renewals[station].wrote(now);
+                // A station that is cut off learns nothing, as if its client were silent.
+                if is_up {
+                    source.renewals[station].wrote(now);
+                }
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
                     port.received_parts(station, now, frame, [bits]);
@@ -167,7 +170,7 @@ impl ServedUnits {
             }
             // A client that only reads must not make the values of one that writes look recent.
             (None, None) => {
-                let counts = source.renewals[station].counts(now, port.max_age());
+                let counts = is_up && source.renewals[station].counts(now, port.max_age());
                 if counts || !unit.has_writer {
                     port.touch(station, now);
                 }

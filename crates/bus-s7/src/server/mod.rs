@@ -149,7 +149,7 @@ impl tcp::Service for Service {
             conversation: ServerSession::default(),
             number: self.welcomed,
             writer: Arc::new(peer),
-            renewals: vec![Renewal::new(false); self.memory.stations.len()].into(),
+            renewals: vec![Renewal::of_new_client(); self.memory.stations.len()].into(),
             receipts: Vec::new(),
         }
     }
@@ -331,7 +331,10 @@ impl Memory for Jobs<'_> {
                 let addressed = std::mem::take(&mut station.addressed);
                 if !station.changed.is_empty() {
                     station.has_writer = true;
-                    renewals[index].wrote(now);
+                    // A station that is cut off learns nothing, as if its client were silent.
+                    if port.is_station_up(index, now) {
+                        renewals[index].wrote(now);
+                    }
                     let written = station.changed.drain(..);
                     if shared.every_write {
                         port.received_parts(index, now, &station.written, written);
@@ -341,7 +344,8 @@ impl Memory for Jobs<'_> {
                     }
                 } else if addressed || alone {
                     // A client that only reads must not make the values of one that writes look recent.
-                    let counts = renewals[index].counts(now, port.max_age());
+                    let counts = port.is_station_up(index, now)
+                        && renewals[index].counts(now, port.max_age());
                     if counts || !station.has_writer {
                         port.touch(index, now);
                     }

@@ -69,7 +69,7 @@ struct Wire {
     rx_len: usize,
 }
 
-/// When a bus took the image of its stations last.
+/// When a bus took the image of a station last, or repeated it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Taken {
     /// Not yet.
@@ -104,6 +104,8 @@ enum Outcome {
 pub struct Shape {
     /// What it sent last.
     pub last_sent: Box<[u8]>,
+    /// When the bus took that.
+    pub taken: Taken,
     /// The mask of the bits of which the peer has to see each change.
     pub latched: Box<[u8]>,
     /// Size of the frames that come in, in bytes.
@@ -112,16 +114,12 @@ pub struct Shape {
 
 impl LineFaults {
     /// The line to stations of these shapes, without any fault.
-    pub fn new(
-        board: Arc<FaultBoard>,
-        stations: impl Iterator<Item = Shape>,
-        taken: Taken,
-    ) -> Self {
+    pub fn new(board: Arc<FaultBoard>, stations: impl Iterator<Item = Shape>) -> Self {
         let wire = |shape: Shape| Wire {
             dead: false,
             came: true,
             went: true,
-            out: Outgoing::new(shape.last_sent, shape.latched, taken),
+            out: Outgoing::new(shape.last_sent, shape.latched, shape.taken),
             newest: Outcome::Handed,
             waiting: None,
             released: Nanos(i64::MIN),
@@ -232,7 +230,7 @@ impl LineFaults {
     /// The line is interrupted: the next cycle neither repeats nor delays what the bus sent before.
     pub fn carries_nothing(&mut self) {
         for wire in &mut self.stations {
-            wire.out.is_behind = true;
+            wire.out.taken = Taken::Before;
         }
     }
 
@@ -284,8 +282,14 @@ impl LineFaults {
                 self.board.duplicated.fetch_add(1, Ordering::Relaxed);
             }
         }
-        // A station that is asked by itself may have paused alone.
-        self.repeats && !self.stations[station].out.has_paused(now)
+        let is_cut = self.is_cut(station);
+        let out = &mut self.stations[station].out;
+        // A station that is asked separately may have paused alone.
+        out.repeats = self.repeats && !is_cut && !out.has_paused(now);
+        if out.repeats {
+            out.taken = Taken::At(now);
+        }
+        out.repeats
     }
 
     /// Whether nothing gets through to or from the station.
@@ -347,7 +351,7 @@ impl LineFaults {
     /// Whether the bus was given the image's newest bytes: no fault holds them back or repeats others.
     pub fn gives_newest(&self, station: usize) -> bool {
         let out = &self.stations[station].out;
-        !self.repeats && out.given != Given::Nothing && out.current == out.newest
+        !out.repeats && out.given != Given::Nothing && out.current == out.newest
     }
 
     /// Decides what happens to a frame that arrived at `now`, and stores it if it has to wait.

@@ -18,8 +18,8 @@ pub(super) struct FaultLayer {
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
-    /// When the bus took an image last, while there was no line fault: the first one begins there.
-    taken: Taken,
+    /// When the bus took the image of each station last, while there was no line fault: the first one begins there.
+    taken: Box<[Taken]>,
     /// The board was read for the message that the bus is handing in: the same faults act on all of its frames.
     has_looked: bool,
     /// A frame per station, for handing in what was held back.
@@ -37,9 +37,10 @@ struct Beneath {
 }
 
 impl FaultLayer {
-    /// The faults on `board`.
-    pub(super) fn of(board: Arc<FaultBoard>) -> Self {
+    /// The faults on `board`, of so many stations.
+    pub(super) fn new(board: Arc<FaultBoard>, stations: usize) -> Self {
         Self {
+            taken: vec![Taken::Never; stations].into(),
             board,
             ..Self::default()
         }
@@ -91,12 +92,13 @@ impl FaultLayer {
             return;
         }
         self.seen = news;
-        let (image, status, taken) = (&port.image, &port.status, self.taken);
+        let (image, status, taken) = (&port.image, &port.status, &self.taken);
         self.board.tell(status.driver());
         for fault in self.board.take_line_faults() {
             let line = self.line.get_or_insert_with(|| {
-                let shapes = (0..image.stations()).map(|station| shape(image, station));
-                Box::new(LineFaults::new(Arc::clone(&self.board), shapes, taken))
+                let shapes =
+                    (0..image.stations()).map(|station| shape(image, station, taken[station]));
+                Box::new(LineFaults::new(Arc::clone(&self.board), shapes))
             });
             line.adopt(fault);
             let sizes = (0..image.stations()).map(|station| image.rx_len(station));
@@ -137,7 +139,7 @@ impl FaultLayer {
         port: &'a mut ImagePort,
     ) -> &'a [u8] {
         let Some(line) = &mut self.line else {
-            self.taken = Taken::At(now);
+            self.taken[station] = Taken::At(now);
             return port.outgoing(station, now);
         };
         let repeats = line.repeats(station, now);
@@ -244,7 +246,7 @@ impl FaultLayer {
     /// The bus reports this of its line: kept while a fault hides it.
     pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
         if report.state == LinkState::Opening {
-            self.taken.reopen();
+            self.taken.iter_mut().for_each(Taken::reopen);
             if let Some(line) = &mut self.line {
                 line.carries_nothing();
             }
@@ -308,13 +310,14 @@ fn say_down(now: Nanos, active: &str, status: &LinkStatus) {
     status.enter(now, LinkState::Failed, Cause::Injected, &reason);
 }
 
-fn shape(image: &BusEnd, station: usize) -> Shape {
+fn shape(image: &BusEnd, station: usize, taken: Taken) -> Shape {
     let mut latched = vec![0; image.tx_len(station)];
     for bit in image.tx_latched(station) {
         latched[bit.byte] |= bit.mask;
     }
     Shape {
         last_sent: image.last_outgoing(station).into(),
+        taken,
         latched: latched.into(),
         rx_len: image.rx_len(station),
     }

@@ -24,7 +24,11 @@ impl Plan {
         let faults = self.features.faults.iter();
         let held = faults.map(|fault| match fault.effect {
             // A server repeats the answer of up to a second ago, if its client has not asked meanwhile.
-            Effect::Duplicate(_) if self.bus.asks() => 1_000_000_000,
+            Effect::Duplicate(direction)
+                if self.bus.asks() && direction != "in" && self.serves(fault.end) =>
+            {
+                1_000_000_000
+            }
             // Frames are lost, or take the place of the next, by chance: of a server the peer has old values meanwhile.
             Effect::Duplicate(_) | Effect::Drop(_) => self.cycle.0 * 20,
             _ => fault.held(),

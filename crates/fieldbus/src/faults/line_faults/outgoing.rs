@@ -28,11 +28,12 @@ pub(super) struct Outgoing {
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
-    /// The link was down or the bus has opened the line again, and the bus has taken no image since. `slow-answers` does not hold
-    /// back the next image: the outage has delayed it already.
-    pub(super) is_behind: bool,
-    /// When the bus took an image last. After a pause of more than [`PATIENCE`], such as after a lost request, the same holds.
-    taken: Option<Nanos>,
+    /// When the bus took an image last, or repeated it. After a link was down, behind a new connection, and after a pause of more
+    /// than [`PATIENCE`], such as after a lost request, `slow-answers` does not hold back the next image: the outage has delayed
+    /// it already.
+    pub(super) taken: Taken,
+    /// The frame of the current cycle repeats the one before.
+    pub(super) repeats: bool,
     /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
     overtaken: usize,
     /// The origin of the bytes that the bus was given: decides who is told that they were sent.
@@ -61,11 +62,8 @@ impl Outgoing {
             reads: false,
             held_up: None,
             waiting: None,
-            is_behind: taken == Taken::Before,
-            taken: match taken {
-                Taken::At(time) => Some(time),
-                Taken::Never | Taken::Before => None,
-            },
+            repeats: false,
+            taken,
             overtaken: 0,
             given: Given::Image,
         }
@@ -81,13 +79,17 @@ impl Outgoing {
     /// The bus takes the image at `now`. Returns whether the line has delayed it, so that no fault has to.
     pub(super) fn catches_up(&mut self, now: Nanos) -> bool {
         let has_paused = self.has_paused(now);
-        (self.is_behind, self.taken) = (false, Some(now));
+        self.taken = Taken::At(now);
         has_paused
     }
 
     /// Whether what the bus took last is of another connection, or older than [`PATIENCE`].
     pub(super) fn has_paused(&self, now: Nanos) -> bool {
-        self.is_behind || self.taken.is_some_and(|taken| now - taken > PATIENCE)
+        match self.taken {
+            Taken::Never => false,
+            Taken::At(time) => now - time > PATIENCE,
+            Taken::Before => true,
+        }
     }
 
     /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
@@ -155,8 +157,8 @@ impl Outgoing {
             }
             self.advance();
         }
-        if slow == Nanos::ZERO {
-            // The fault is over: values are current at once, edges are shown one at a time.
+        if slow == Nanos::ZERO || was_behind {
+            // The fault or the outage is over: values are current at once, edges are shown one at a time.
             take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
             self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
         }

@@ -27,12 +27,13 @@ impl Rig {
         let board = Arc::<FaultBoard>::default();
         let shape = Shape {
             last_sent: Box::new([0, 0]),
+            taken,
             latched: Box::new([0xFF, 0]),
             rx_len: 2,
         };
         Self {
             faults: Faults::new(Arc::clone(&board)),
-            wires: LineFaults::new(Arc::clone(&board), std::iter::repeat_n(shape, count), taken),
+            wires: LineFaults::new(Arc::clone(&board), std::iter::repeat_n(shape, count)),
             board,
             tick: 0,
         }
@@ -185,6 +186,16 @@ fn what_waited_for_a_link_is_not_held_back_again_and_nothing_of_before_is_repeat
     assert_eq!(rig.send(later + 1, [0, 81], true).0, [0, 80]);
 
     let mut rig = Rig::new();
+    rig.add(LineEffect::SlowAnswers(Nanos(20)), 1);
+    rig.send(0, [1, 1], true);
+    rig.send(1, [0, 2], true);
+    let down = rig.add(LineEffect::LinkDown, 1);
+    rig.end(down);
+    assert_eq!(rig.send(1_000, [0, 50], true).0, [1, 50], "the pulse");
+    assert_eq!(rig.send(1_001, [0, 51], true).0, [0, 50], "and its end");
+    assert_eq!(rig.send(1_021, [0, 52], true).0, [0, 51]);
+
+    let mut rig = Rig::new();
     rig.add(LineEffect::Duplicate(1.0, Direction::Out), 1);
     rig.send(0, [0, 1], true);
     let down = rig.add(LineEffect::LinkDown, 1);
@@ -213,6 +224,17 @@ fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_tha
     let mut taken = Taken::Never;
     taken.reopen();
     assert_eq!(taken, Taken::Never, "nothing was sent before");
+}
+
+#[test]
+fn cycles_without_a_pause_are_repeated_for_as_long_as_the_fault_lasts() {
+    let mut rig = Rig::new();
+    rig.send(0, [0, 1], true);
+    rig.add(LineEffect::Duplicate(1.0, Direction::Out), 1);
+    let step = PATIENCE.0 / 2;
+    for cycle in 1..6 {
+        assert_eq!(rig.send(cycle * step, [0, 2], true).0, [0, 1], "{cycle}");
+    }
 }
 
 #[test]
@@ -279,12 +301,12 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     let slow = rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
     rig.send(0, [1, 5], false);
     rig.send(1, [0, 6], false);
-    // A peer that stopped polling may come back.
-    let long = PATIENCE.0 * 5;
     assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
-    assert_eq!(rig.send(long, [0, 6], false).0, [1, 5]);
+    // A peer that stopped polling may come back: to values of now.
+    let long = PATIENCE.0 * 5;
+    assert_eq!(rig.send(long, [0, 6], false).0, [1, 6]);
     rig.wires.sent(0, Some(&(8..16)));
-    assert_eq!(rig.send(long + 1, [0, 6], false).0, [1, 5]);
+    assert_eq!(rig.send(long + 1, [0, 6], false).0, [1, 6]);
     let after = long + 1 + PATIENCE.0;
     assert_eq!(rig.send(after, [1, 7], false).0, [0, 6]);
     assert_eq!(rig.board.hurried.load(Ordering::Relaxed), 1);

@@ -130,7 +130,8 @@ fn run(case: &Case, ticks: u64) {
          scan = \"1ms\"\ncycle = \"1ms\"\nmode = \"{}\"\n{signals}",
         case.mode
     );
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let clock = Manual::new();
     let mut driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut slots = driver.initial_slots();

@@ -117,7 +117,8 @@ impl Cell {
                 );
             }
         }
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let slots = driver.initial_slots();
         let page = viewers.map(|_| {

@@ -78,7 +78,8 @@ mod plugin {
              [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n",
             library.display()
         );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"));
         let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         loop {

@@ -216,7 +216,8 @@ mod line {
              [[signal]]\nname = \"in\"\naddress = \"%ID0\"\ntype = \"UDINT\"\n",
             line.end(0).display()
         );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"));
         Driver::open(config, Monotonic::shared()).expect("it opens")
     }
 

@@ -164,7 +164,8 @@ impl Running {
 /// PLC uses the machine's.
 fn reaction(device: &str, controller: Option<&str>, machine: Machine, edges: usize) -> f64 {
     let clock = Monotonic::shared();
-    let config = Config::parse("device.cfg", device).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("device.cfg", device, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let shared = Arc::clone(&clock) as Arc<dyn Clock>;
     let answers = matches!(machine, Machine::Answers);
     let mut machine = match machine {
@@ -231,14 +232,15 @@ fn simulate(driver: &mut Driver, answers: bool, clock: &Monotonic, over: &Atomic
 fn controller_config(device: &str, controller: Option<&str>, machine: &Running) -> Config {
     let Some(text) = controller else {
         let text = device.replacen("[fieldbus]\n", "[fieldbus]\nrole = \"controller\"\n", 1);
-        return Config::parse("controller.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        return Config::parse("controller.cfg", &text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"));
     };
     let asked = CommandLineEnd {
         role: Role::Controller,
         moved: true,
     };
-    let mut config =
-        Config::parse_as("controller.cfg", text, Some(asked)).unwrap_or_else(|why| panic!("{why}"));
+    let mut config = Config::parse_as("controller.cfg", text, Some(asked), &tickbus::KINDS)
+        .unwrap_or_else(|why| panic!("{why}"));
     let address = loop {
         match statistic(&machine.statistics(), "address") {
             Some(address) => break address,

@@ -66,8 +66,8 @@ fn open(folder: &Path, fieldbus: &str, record: &str) -> Driver {
         }
     }
     let path = folder.join("driver.cfg");
-    let config =
-        Config::parse(path.to_str().expect("UTF-8"), &text).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse(path.to_str().expect("UTF-8"), &text, &tickbus::KINDS)
+        .unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
     Driver::open(config, Arc::clone(&clock) as _).unwrap_or_else(|why| panic!("{why}"))
 }

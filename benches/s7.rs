@@ -113,7 +113,8 @@ fn device() -> (Driver, String) {
             );
         }
     }
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     loop {

@@ -136,7 +136,8 @@ mod storm {
                     address = \"127.0.0.1:0\"\nsend = \"reply\"\n\
                     [[signal]]\nname = \"in\"\naddress = \"%IW0\"\n\
                     [[signal]]\nname = \"out\"\naddress = \"%QW0\"\n";
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let config = Config::parse("driver.cfg", text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"));
         let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
         loop {

@@ -47,7 +47,7 @@ fn config(mode: &str, signals: &str) -> Config {
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
          scan = \"1ms\"\ncycle = \"1ms\"\nmode = \"{mode}\"\n{signals}"
     );
-    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"))
 }
 
 fn bits(latch: &str) -> String {

@@ -90,7 +90,7 @@ fn config() -> Config {
             );
         }
     }
-    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"))
 }
 
 /// Reads the statistics continually.

@@ -18,6 +18,7 @@ use std::ptr::{NonNull, null_mut};
 use std::sync::Once;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use crate::KINDS;
 use crate::page::{self, Place};
 use once_cell::sync::Lazy;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Pace, Stop};
@@ -231,7 +232,7 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
             // SAFETY: as above.
             unsafe { text(tables, "tables") }?
         };
-        let mut opened = open(Path::new(path), tables)?;
+        let mut opened = open(Path::new(path), tables, &KINDS)?;
         let shown = page::show_driver(&mut opened)?;
         let slots = opened.slots().count;
         let buffer = buffer_of(Shared::<Option<Place>>::bytes(slots));

@@ -13,6 +13,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::sync::Once;
 
+use crate::KINDS;
 use log::Level;
 use tickbus_base::os::{Library, collect_log, has_log, own_file, take_log};
 use tickbus_binding::{Handles, closing, panic_message};
@@ -287,7 +288,7 @@ fn instantiate(
         let folder = folder_of(named, own.as_deref()).ok_or(
             "the importing tool names no folder of resources; an FMU of tickbus has its driver.cfg there",
         )?;
-        let instance = Instance::new(version, &folder, token)?;
+        let instance = Instance::new(version, &folder, token, &KINDS)?;
         let tenant = Box::new(Tenant {
             instance,
             journal: journal.clone(),

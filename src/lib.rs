@@ -21,7 +21,8 @@
 //! | [`programs`] | the PLC programs of demos and measurements |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`prepare`] | PLC programs put on virtual time, and taken off it byte for byte |
-//! | [`driver_cfg`] | what a driver.cfg says, with the list of bus kinds |
+//! | [`driver_cfg`] | what a driver.cfg says |
+//! | [`KINDS`] | the bus kinds that it may name |
 //! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
 //! | [`bridge`] | bridges to it: serial lines, MQTT |
@@ -31,6 +32,7 @@
 //! | [`import`] | lists of PLC tags, made into a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
+//! | [`gateway`] | a real PLC, on its own bus, as a client of a run |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | `c_api` | the functions of `include/tickbus.h` |
 //! | `fmi_api` | the functions of FMI, for the FMU that a driver.cfg becomes |
@@ -56,9 +58,11 @@ pub use tickbus_export as export;
 pub use tickbus_fieldbus::faults;
 pub use tickbus_fmi as fmi;
 pub use tickbus_function_blocks as function_blocks;
+pub use tickbus_gateway as gateway;
 pub use tickbus_image as image;
 pub use tickbus_image::signal;
 pub use tickbus_import as import;
+pub use tickbus_kinds::KINDS;
 pub use tickbus_plc as plc;
 pub use tickbus_prepare as prepare;
 pub use tickbus_programs as programs;

@@ -216,7 +216,7 @@ fn files_beside_a_driver_cfg_are_found_in_a_folder_whose_name_is_no_utf_8() {
 /// Every example in the documentation, on the rig that it concerns.
 #[test]
 fn the_faults_of_the_documentation_are_right() {
-    let rig = tickbus::driver_cfg::Config::load(&repository().join("driver.cfg"))
+    let rig = tickbus::driver_cfg::Config::load(&repository().join("driver.cfg"), &tickbus::KINDS)
         .unwrap_or_else(|why| panic!("{why}"));
     let text = fs::read_to_string(repository().join("docs/faults.md")).expect("the documentation");
     let blocks = text.split("```toml\n").skip(1);

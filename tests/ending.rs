@@ -52,7 +52,7 @@ fn motor(plc: &Plc) -> u16 {
 
 /// Starts the motor in real time.
 fn started<C: Clock + 'static>(plc: &Plc, text: &str, clock: &Arc<C>) -> End {
-    let mut end = End::open(text, clock);
+    let mut end = End::open(text, clock, &tickbus::KINDS);
     end.set("motor", 1.0);
     eventually("the motor runs", || {
         end.tick();
@@ -191,7 +191,7 @@ fn a_program_that_hangs_has_the_watchdog_of_its_file() {
     ] {
         let plc = Plc::start(|_, _| Habit::Answers);
         let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
-        let config = Config::parse("driver.cfg", &text).expect("a right file");
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS).expect("a right file");
         let (release, released) = mpsc::channel();
         let (clock, program) = (Monotonic::shared(), Box::new(Hangs(released)));
         let host = Host::open(
@@ -223,7 +223,7 @@ fn the_last_record_of_a_socket_has_the_fail_safe_values() {
              address = \"{address}\"\ncycle = \"1ms\"\nmax_age = \"20s\"\n{further}\n\
              [[signal]]\nname = \"motor\"\naddress = \"%QB0\"\nfail_safe = 7\n"
         );
-        let mut end = End::open(&text, &Monotonic::shared());
+        let mut end = End::open(&text, &Monotonic::shared(), &tickbus::KINDS);
         end.set("motor", 1.0);
         end.tick();
         let (mut peer, _) = listener.accept().expect("it connects");

@@ -226,7 +226,8 @@ fn rig() -> Result<(), Absent> {
 
 /// The same as `rig` in `tests/peers/fmi_tools.py`.
 fn record(config: &Path, file: &Path) {
-    let mut config = Config::load(config).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let mut config =
+        Config::load(config, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     config.record = Some(tickbus::record::Options::to(file).expect("a name"));
     let _logged = logged::Watch::new();
     let mut driver = Driver::open(config, Manual::new()).expect("opens");

@@ -10,9 +10,9 @@ use std::process::{ExitCode, Stdio};
 use std::thread;
 
 use foreign::Absent;
-use tickbus::driver::{Gateway, GatewayOptions};
 use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::tcp::Address;
+use tickbus::gateway::{Gateway, GatewayOptions};
 use tickbus::signal::DataType;
 use tickbus::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus::virtual_time::{
@@ -186,7 +186,8 @@ fn s7_plc(port: u16, seed: u32, ended: &Stop) -> u64 {
 
 fn run(kind: &str, plc: Plc, seed: u32) -> Result<Outcome, Absent> {
     let text = CONFIG.replace("{kind}", kind);
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let options = GatewayOptions {
         client: None,
         multiple: NonZeroU32::new(10).expect("not 0"),

@@ -75,7 +75,8 @@ fn config(driver: &str, bus: &str, names: &[&str]) -> Config {
         .expect("a String takes all");
         bytes[side] = byte + size;
     }
-    Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
 }
 
 fn program(config: &Config) -> String {
@@ -160,7 +161,8 @@ fn every_program_for_openplc_compiles() -> Result<(), Absent> {
     }
     let mut kinds = BTreeSet::new();
     for file in files {
-        let config = Config::load(&file).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let config =
+            Config::load(&file, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         if export(&config, Target::OpenPlc).is_err() {
             continue;
         }

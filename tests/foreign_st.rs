@@ -34,7 +34,8 @@ fn main() -> ExitCode {
 /// Writes the sources for `target` to `folder`; returns their paths.
 fn write(file: &str, target: Target, folder: &Path) -> Vec<PathBuf> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-    let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config =
+        Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let made = export(&config, target).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let mut sources = Vec::new();
     for file in made.files {
@@ -142,7 +143,8 @@ fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
         "tests/export/right/modbus-server.cfg",
     ] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-        let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let config =
+            Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         for target in [Target::Codesys, Target::TwinCat] {
             let made = export(&config, target).unwrap_or_else(|mistakes| panic!("{mistakes}"));
             let xml = made

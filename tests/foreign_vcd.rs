@@ -67,7 +67,7 @@ fn record(folder: &Path, file: &str) {
          mode = \"stepped\"\n[record]\nfile = \"{file}\"\n{signals}{MORE}"
     );
     let path = folder.join("driver.cfg");
-    let config = Config::parse(path.to_str().expect("UTF-8"), &text)
+    let config = Config::parse(path.to_str().expect("UTF-8"), &text, &tickbus::KINDS)
         .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let _logged = logged::Watch::new();
     let mut driver = Driver::open(config, Manual::new()).expect("opens");

@@ -27,7 +27,7 @@ const DEVICE: &str = "[driver]\nid = 1\nname = \"stormed\"\n[fieldbus]\nkind = \
 /// A device that listens, on the clock of the system, and its address.
 fn device() -> (End, SocketAddr) {
     let clock = Monotonic::shared();
-    let end = End::open(DEVICE, &clock);
+    let end = End::open(DEVICE, &clock, &tickbus::KINDS);
     let mut address = None;
     await_that("it listens", || {
         let text = end.driver.statistics();

@@ -26,6 +26,10 @@ impl Link {
 }
 
 impl Bus for Link {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, _role: &str) -> String {
         format!("kind = \"loopback\"\nlink = \"{}\"", self.0)
     }
@@ -33,7 +37,11 @@ impl Bus for Link {
     /// A controller whose image has another size.
     fn liar(&self, clock: &Arc<Manual>) -> Liar {
         let longer = "[[signal]]\nname = \"more\"\naddress = \"%QD8\"\n";
-        let controller = End::open(&(config(self, "controller", "") + longer), clock);
+        let controller = End::open(
+            &(config(self, "controller", "") + longer),
+            clock,
+            &tickbus::KINDS,
+        );
         await_that("it is on the link", || {
             controller.statistic("reason").contains("waiting")
         });
@@ -67,6 +75,10 @@ conformance!(free, crate::Link::new());
 struct Spared(Link);
 
 impl Bus for Spared {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         self.0.fieldbus(role)
     }
@@ -96,11 +108,11 @@ conformance!(
 #[test]
 fn a_second_device_on_one_link_is_told_so() {
     let (link, clock) = (Link::new(), Manual::new());
-    let first = End::open(&config(&link, "device", ""), &clock);
+    let first = End::open(&config(&link, "device", ""), &clock, &tickbus::KINDS);
     await_that("the first is on the link", || {
         first.statistic("reason").contains("waiting")
     });
-    let mut second = End::open(&config(&link, "device", ""), &clock);
+    let mut second = End::open(&config(&link, "device", ""), &clock, &tickbus::KINDS);
     await_that("the second is told", || {
         second.statistic("reason").contains("already has a device")
     });
@@ -130,7 +142,13 @@ fn stepped_ends_exchange_on_their_own_ticks() {
 #[test]
 fn what_a_former_peer_left_is_not_news_to_the_next() {
     let (link, clock) = (Link::new(), Manual::new());
-    let open = |role| End::open(&config(&link, role, "mode = \"stepped\""), &clock);
+    let open = |role| {
+        End::open(
+            &config(&link, role, "mode = \"stepped\""),
+            &clock,
+            &tickbus::KINDS,
+        )
+    };
     let (mut device, mut controller) = (open("device"), open("controller"));
     for _ in 0..2 {
         device.tick();
@@ -157,7 +175,7 @@ fn mirror(mode: &str, clock: &Arc<Manual>) -> End {
          [[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\nlatch = \"rising\"\n\
          [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\nlatch = \"rising\"\n",
     );
-    End::open(&text, clock)
+    End::open(&text, clock, &tickbus::KINDS)
 }
 
 #[test]
@@ -362,8 +380,8 @@ fn a_tick_is_a_receive_and_the_first_send_after_it() {
 #[test]
 fn age_is_never_understated_however_busy_the_machine_is() {
     let (link, clock) = (Link::new(), Monotonic::shared());
-    let mut device = End::open(&config(&link, "device", ""), &clock);
-    let mut controller = End::open(&config(&link, "controller", ""), &clock);
+    let mut device = End::open(&config(&link, "device", ""), &clock, &tickbus::KINDS);
+    let mut controller = End::open(&config(&link, "controller", ""), &clock, &tickbus::KINDS);
     await_that("the peer was there", || {
         controller.tick();
         device.tick().code == Code::Fresh

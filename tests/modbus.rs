@@ -49,6 +49,10 @@ fn device(further: &str) -> (Alone, TcpStream) {
 struct AnyPort;
 
 impl conformance::rig::Bus for AnyPort {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, _role: &str) -> String {
         "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"".to_owned()
     }

@@ -41,6 +41,10 @@ impl OpcUa {
 }
 
 impl Bus for OpcUa {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let Self { address, server } = self;
         if role == *server {
@@ -151,7 +155,7 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
              max_age = \"300ms\"\nreconnect = [\"10ms\"]\n{STATIONS}",
             bus.fieldbus(role)
         );
-        End::open(&text, &clock)
+        End::open(&text, &clock, &tickbus::KINDS)
     };
     let (mut device, mut controller) = (open("device"), open("controller"));
     let stale = |device: &End| {
@@ -192,8 +196,13 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
 fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
     for (further, is_single) in [("", false), ("writers = 1", true)] {
         let (bus, clock) = (OpcUa::new("device"), Manual::new());
-        let open =
-            |role, further| End::open(&conformance::rig::config(&bus, role, further), &clock);
+        let open = |role, further| {
+            End::open(
+                &conformance::rig::config(&bus, role, further),
+                &clock,
+                &tickbus::KINDS,
+            )
+        };
         let (mut device, mut first) = (open("device", further), open("controller", ""));
         // The first one counts up below 100, the second one from 100 on.
         let mut count = 0.0;

@@ -119,7 +119,8 @@ fn statistic(driver: &Driver, key: &str) -> Option<String> {
 fn device() -> (logged::Watch, Driver, Vec<Slot>, String) {
     let logged = logged::Watch::new();
     let text = config("address = \"127.0.0.1:0\"\nmax_age = \"100ms\"");
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut address = None;
@@ -442,7 +443,8 @@ fn a_mirror_serves_several_stations() {
         .find(|word| word.starts_with("127.0.0.1:"));
     let address = address.expect("an address").trim_end_matches([';', ',']);
     let plc = format!("role = \"controller\"\naddress = \"{address}\"");
-    let config = Config::parse("driver.cfg", &text(&plc)).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse("driver.cfg", &text(&plc), &tickbus::KINDS)
+        .unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
     let _logged = logged::Watch::new();
     let mut driver = Driver::open(config, clock).expect("opens");

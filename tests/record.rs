@@ -44,7 +44,8 @@ impl Folder {
 
     fn config(&self, text: &str) -> Config {
         let path = self.path("driver.cfg");
-        Config::parse(path.to_str().expect("UTF-8"), text).unwrap_or_else(|why| panic!("{why}"))
+        Config::parse(path.to_str().expect("UTF-8"), text, &tickbus::KINDS)
+            .unwrap_or_else(|why| panic!("{why}"))
     }
 
     /// The error on opening.

@@ -41,7 +41,8 @@ fn a_record_and_its_reply() {
                 send = \"reply\"\nevents = true\ninput_bytes = 134\noutput_bytes = 360\n\
                 [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\nlatch = \"both\"\n\
                 [[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\nlatch = \"both\"\n";
-    let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let _logged = logged::Watch::new();
     let driver = Driver::open(config, Manual::new()).expect("opens");
     let address = loop {

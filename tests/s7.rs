@@ -398,6 +398,7 @@ fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
     let mut plc = conformance::rig::End::open(
         &text.replace("write_to = \"tickbus device\"", "write_to = \"6ES7 315\""),
         &device.clock,
+        &tickbus::KINDS,
     );
     plc.set("speed", 5.0);
     device.end.set("position", 3.0);
@@ -486,6 +487,7 @@ fn the_stations_of_a_client_lie_where_their_tables_say() {
             signals.replace("%ID4", "%ID2")
         ),
         &device.clock,
+        &tickbus::KINDS,
     );
     plc.set("a", 0x0102.into());
     plc.set("b", 3.0);
@@ -515,7 +517,7 @@ fn nothing_is_written_but_the_bits_that_signals_cover() {
          [[signal]]\nname = \"far\"\naddress = \"%IW8\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"echo\"\naddress = \"%QW4\"\ntype = \"INT\"\n"
     );
-    let mut machine = conformance::rig::End::open(&text, &device.clock);
+    let mut machine = conformance::rig::End::open(&text, &device.clock, &tickbus::KINDS);
     machine.set("level", 0x0102.into());
     machine.set("open", 1.0);
     machine.set("shut", 1.0);
@@ -553,7 +555,7 @@ fn a_signal_is_read_where_its_line_says_and_else_in_its_area() {
          [[signal]]\nname = \"low\"\naddress = \"%IX102.7\"\n\
          [[signal]]\nname = \"copy\"\naddress = \"%IW4\"\ntype = \"INT\"\n"
     );
-    let mut plc = conformance::rig::End::open(&text, &device.clock);
+    let mut plc = conformance::rig::End::open(&text, &device.clock, &tickbus::KINDS);
     device.end.set("position", 515.0);
     device.end.set("copy", 7.0);
     device.until("the values arrive", |_| {

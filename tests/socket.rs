@@ -389,7 +389,7 @@ fn a_device_without_outputs_runs_for_as_long_as_somebody_listens() {
 #[test]
 fn a_refused_connection_is_told_and_tried_again() {
     let (bus, clock) = (Tcp::new("", ""), Manual::new());
-    let mut controller = End::open(&config(&bus, "controller", ""), &clock);
+    let mut controller = End::open(&config(&bus, "controller", ""), &clock, &tickbus::KINDS);
     await_that("the controller says so", || {
         controller.link().state == LinkState::Failed
     });
@@ -400,7 +400,7 @@ fn a_refused_connection_is_told_and_tried_again() {
         reason.contains("start the program that listens there"),
         "{reason}"
     );
-    let mut device = End::open(&config(&bus, "device", ""), &clock);
+    let mut device = End::open(&config(&bus, "device", ""), &clock, &tickbus::KINDS);
     await_that("they find each other", || {
         pass(&clock, 2);
         device.tick();
@@ -411,11 +411,11 @@ fn a_refused_connection_is_told_and_tried_again() {
 #[test]
 fn a_second_device_on_one_address_is_told_so() {
     let (bus, clock) = (Tcp::new("", ""), Manual::new());
-    let first = End::open(&config(&bus, "device", ""), &clock);
+    let first = End::open(&config(&bus, "device", ""), &clock, &tickbus::KINDS);
     await_that("the first listens", || {
         first.link().reason.contains("listening on")
     });
-    let second = End::open(&config(&bus, "device", ""), &clock);
+    let second = End::open(&config(&bus, "device", ""), &clock, &tickbus::KINDS);
     await_that("the second is told", || {
         second.link().reason.contains("cannot listen on")
     });
@@ -459,7 +459,7 @@ fn an_address_that_does_not_answer_is_given_up_and_holds_up_no_close() {
         controller: "",
     };
     let clock = Manual::new();
-    let controller = End::open(&config(&bus, "controller", ""), &clock);
+    let controller = End::open(&config(&bus, "controller", ""), &clock, &tickbus::KINDS);
     await_that("it waits for an answer", || clock.is_settled(1));
     assert_eq!(controller.link().reason, format!("connecting to {address}"));
     for _ in 0..5 {
@@ -472,7 +472,7 @@ fn an_address_that_does_not_answer_is_given_up_and_holds_up_no_close() {
     let expected = format!("no answer from {address} within 5s");
     assert!(reason.contains(&expected), "{reason}");
 
-    let controller = End::open(&config(&bus, "controller", ""), &clock);
+    let controller = End::open(&config(&bus, "controller", ""), &clock, &tickbus::KINDS);
     await_that("another one waits for an answer", || {
         controller.link().reason.contains("connecting")
     });
@@ -489,7 +489,7 @@ fn a_controller_whose_server_turns_it_away_says_what_to_do() {
         controller: "",
     };
     let clock = Manual::new();
-    let controller = End::open(&config(&bus, "controller", ""), &clock);
+    let controller = End::open(&config(&bus, "controller", ""), &clock, &tickbus::KINDS);
     for graceful in [true, false] {
         let (stream, _) = listener.accept().expect("it connects");
         if graceful {

@@ -289,7 +289,11 @@ fn recorded() -> tempfile::TempDir {
         folder.path().join("driver.cfg"),
     )
     .expect("the driver.cfg");
-    let example = Suite::load(&repository().join("examples/tests/rig.toml")).expect("the example");
+    let example = Suite::load(
+        &repository().join("examples/tests/rig.toml"),
+        &tickbus::KINDS,
+    )
+    .expect("the example");
     let cycle = example
         .tests
         .iter()

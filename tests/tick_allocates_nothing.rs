@@ -63,7 +63,7 @@ fn config(fieldbus: &str, faults: &str) -> Config {
         }
     }
     text += faults;
-    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"))
 }
 
 /// Every signal fault in both directions, and every line fault, beginning and ending.

@@ -7,12 +7,13 @@ use std::collections::HashSet;
 use libfuzzer_sys::fuzz_target;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Config;
+use tickbus_kinds::KINDS;
 use tickbus_fieldbus::faults::{Effect, LIMIT};
 use tickbus_image::signal::{Area, DataType};
 use tickbus_base::time::Nanos;
 
 fuzz_target!(|text: &str| {
-    match Config::parse("fuzz.cfg", text) {
+    match Config::parse("fuzz.cfg", text, &KINDS) {
         Ok(config) => {
             check_config(&config);
             check_faults(&config);

@@ -6,6 +6,7 @@
 
 use libfuzzer_sys::fuzz_target;
 use tickbus_driver_cfg::Config;
+use tickbus_kinds::KINDS;
 use tickbus_import::{ImportOptions, import};
 use tickbus_image::signal::Addressing;
 
@@ -22,9 +23,9 @@ fuzz_target!(|data: &[u8]| {
         lenient: choice & 2 != 0,
         client: None,
     };
-    match import("project.xml", bytes, reading) {
+    match import("project.xml", bytes, reading, &KINDS) {
         Ok(imported) => {
-            let config = Config::parse("driver.cfg", &imported.text)
+            let config = Config::parse("driver.cfg", &imported.text, &KINDS)
                 .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", imported.text));
             assert_eq!(config.table.signals.len(), imported.signals);
         }

@@ -6,11 +6,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_bus_s7::item;
 use tickbus_bus_s7::pdu::{Pdu, function};
-use tickbus_bus_s7::{FrameFields, SessionEvent, ConnectionParameters, Tsap, transport};
-use tickbus_driver_cfg::Options;
+use tickbus_bus_s7::{ClientOptions, FrameFields, SessionEvent, ConnectionParameters, Tsap, transport};
 use tickbus_fieldbus::Role;
 use tickbus_base::time::Nanos;
 
@@ -22,12 +21,12 @@ const CONFIG: &str = "[driver]\nid = 1\nname = \"fuzz\"\n[fieldbus]\nkind = \"s7
     [[signal]]\nname = \"word\"\naddress = \"%IW690\"\n[[signal]]\nname = \"wide\"\naddress = \"%IL8\"\n\
     type = \"LREAL\"\n";
 
+static KINDS: Kinds = Kinds::new(&[Kind::of::<ClientOptions>()]);
+
 thread_local! {
     static FRAMES: FrameFields = {
-        let config = Config::parse("fuzz.cfg", CONFIG).expect("a right file");
-        let Options::S7Client(options) = &config.bus else {
-            panic!("its bus is a client");
-        };
+        let config = Config::parse("fuzz.cfg", CONFIG, &KINDS).expect("a right file");
+        let options: &ClientOptions = config.bus.downcast_ref().expect("its bus is a client");
         FrameFields::new(options, &config.table, Role::Device)
     };
 }

@@ -12,6 +12,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 use tickbus_image::signal::Slot;
+use tickbus_kinds::KINDS;
 
 use crate::memory::Memory;
 use crate::signal::Description;
@@ -147,7 +148,7 @@ impl Handle {
         Refusal::instead_of_panic(|| {
             tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
             let place = DRIVERS.reserve()?;
-            let driver = open(path, tables)?;
+            let driver = open(path, tables, &KINDS)?;
             let config = Arc::clone(driver.config());
             if config.page.is_some() {
                 log::warn!(

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::{self, Job, span};
 use tickbus_base::time::Nanos;
-use tickbus_driver_cfg::{CommandLineEnd, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
 use tickbus_fieldbus::Role;
 use tickbus_plc::Axes;
 
@@ -23,15 +23,16 @@ pub(super) struct Arguments {
     host: host::Hosting,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let role = Role::Device;
     let asked = CommandLineEnd { role, moved: true };
     // The host reads the file again, and reports what is wrong with it.
-    let config = Config::load_as(&arguments.file, Some(asked));
+    let config = Config::load_as(&arguments.file, Some(asked), kinds);
     let axes = config.map(|config| config.axes).unwrap_or_default();
     let job = Job {
         title: "axes",
         file: &arguments.file,
+        kinds,
         role,
         program: Box::new(Axes::new(&axes)),
         interval: arguments.tick,

@@ -9,8 +9,7 @@ use std::path::PathBuf;
 use super::{Outcome, print};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
-use tickbus_driver_cfg::Options;
-use tickbus_driver_cfg::{Config, Timing};
+use tickbus_driver_cfg::{Config, Kinds, Options, Timing};
 use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::{
     Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
@@ -24,8 +23,8 @@ pub(super) struct Arguments {
     file: PathBuf,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
-    match Config::load(&arguments.file) {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
+    match Config::load(&arguments.file, kinds) {
         Ok(config) => print("check", &report(&config)),
         Err(mistakes) => {
             eprintln!("{mistakes}\ncheck: failed mistakes={}", mistakes.len());
@@ -142,9 +141,8 @@ fn role(config: &Config) -> &'static str {
 fn bus(config: &Config) -> String {
     let mut parts = vec![config.bus.kind().to_owned()];
     parts.extend(config.bus.summary(config.role, &config.table));
-    // Of the buses that learn of single writes, only this one says so here.
-    if config.events == Events::Writes && matches!(config.bus, Options::ModbusServer(_)) {
-        parts.push("every write".to_owned());
+    if config.events == Events::Writes {
+        parts.extend(config.bus.summary_of_writes().map(str::to_owned));
     }
     if config.events != Events::None {
         parts.push("with events".to_owned());

@@ -8,7 +8,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::Outcome;
 use tickbus_base::Mistake;
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_export::{Export, Target, export};
 use tickbus_fmi::{Version, made};
 
@@ -70,9 +70,9 @@ fn formats() -> impl TypedValueParser<Value = Format> {
     })
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     match arguments.format {
-        Format::Sources(target) => run_sources(arguments, target),
+        Format::Sources(target) => run_sources(arguments, target, kinds),
         Format::Fmu(version) => run_fmu(arguments, version),
     }
 }
@@ -107,12 +107,15 @@ fn make_fmu(
     version: Version,
 ) -> Result<(PathBuf, made::Package), (String, usize)> {
     let one = |mistake: Mistake| (mistake.to_string(), 1);
+    // The FMU's library has these kinds, and not those of a program that adds some.
+    let kinds = &crate::KINDS;
     // First what the user can see, then what this computer lacks.
-    Config::load(&arguments.file).map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
+    Config::load(&arguments.file, kinds)
+        .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
     let own = std::env::current_exe().ok();
     let beside = own.as_deref().and_then(Path::parent);
     let libraries = made::find_libraries(&arguments.library, beside).map_err(one)?;
-    let package = made::export(&arguments.file, version, &libraries)
+    let package = made::export(&arguments.file, version, &libraries, kinds)
         .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
     let file = arguments
         .out
@@ -143,7 +146,7 @@ fn make_fmu(
     Ok((file, package))
 }
 
-fn run_sources(arguments: &Arguments, target: Target) -> Outcome {
+fn run_sources(arguments: &Arguments, target: Target, kinds: &'static Kinds) -> Outcome {
     if !arguments.library.is_empty() {
         eprintln!(
             "--library is for fmi2 and fmi3; leave it out for {}",
@@ -151,7 +154,7 @@ fn run_sources(arguments: &Arguments, target: Target) -> Outcome {
         );
         return Outcome::Usage;
     }
-    let made = Config::load(&arguments.file).and_then(|config| export(&config, target));
+    let made = Config::load(&arguments.file, kinds).and_then(|config| export(&config, target));
     let mut stderr = std::io::stderr().lock();
     let made = match made {
         Ok(made) => made,

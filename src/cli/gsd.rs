@@ -6,7 +6,8 @@ use std::path::PathBuf;
 use super::Outcome;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_driver_cfg::{Config, Options};
+use tickbus_bus_profibus as profibus;
+use tickbus_driver_cfg::{Config, Kinds};
 
 /// Print the GSD file for the PLC's project, of the PROFIBUS stations that have none of a maker.
 #[derive(Debug, clap::Args)]
@@ -27,10 +28,10 @@ fn ident(text: &str) -> Result<u16, String> {
     read.map_err(|_| "write a number from 0 to 0xFFFF, such as 0x80E0".to_owned())
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let of_file = |mistake| Mistakes::of(&arguments.file.display().to_string(), mistake);
-    let made = Config::load(&arguments.file).and_then(|config| {
-        let Options::ProfibusDevice(options) = &config.bus else {
+    let made = Config::load(&arguments.file, kinds).and_then(|config| {
+        let Some(options) = config.bus.downcast_ref::<profibus::Options>() else {
             return Err(of_file(Mistake::new(
                 format!("the bus \"{}\" has no GSD file", config.bus.kind()),
                 "name a driver.cfg with kind = \"profibus-device\"",

@@ -9,7 +9,7 @@ use super::Outcome;
 use crate::page::{self, PageError, Place};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Host, Watch};
-use tickbus_driver_cfg::{CommandLineEnd, Config, PageOptions};
+use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds, PageOptions};
 use tickbus_fieldbus::faults::{FaultStatus, Phase};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Link, LinkState, Role};
@@ -103,6 +103,8 @@ pub(super) struct Job<'a> {
     /// The prefix of its output lines.
     pub(super) title: &'a str,
     pub(super) file: &'a Path,
+    /// The kinds of bus that it may name.
+    pub(super) kinds: &'static Kinds,
     pub(super) role: Role,
     pub(super) program: Box<dyn Program>,
     pub(super) interval: Nanos,
@@ -115,7 +117,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         role: job.role,
         moved: arguments.address.is_some(),
     };
-    let mut config = match Config::load_as(job.file, Some(asked)) {
+    let mut config = match Config::load_as(job.file, Some(asked), job.kinds) {
         Ok(config) => config,
         Err(mistakes) => {
             eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());

@@ -6,6 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 
 use super::{Outcome, print};
 use tickbus_base::toml_text::{Mistakes, PlacedMistake};
+use tickbus_driver_cfg::Kinds;
 use tickbus_image::signal::Addressing;
 use tickbus_import::{Client, ImportOptions, Imported, condensed, import};
 
@@ -60,8 +61,9 @@ fn clients() -> impl TypedValueParser<Value = Client> {
     })
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
-    match read(arguments).and_then(|imported| write(arguments, &imported).map(|()| imported)) {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
+    match read(arguments, kinds).and_then(|imported| write(arguments, &imported).map(|()| imported))
+    {
         Ok(imported) => {
             let file = arguments.table.display();
             if !imported.skipped.is_empty() {
@@ -95,7 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
+fn read(arguments: &Arguments, kinds: &'static Kinds) -> Result<Imported, Mistakes> {
     let file = arguments.table.display().to_string();
     let bytes = std::fs::read(&arguments.table).map_err(|error| {
         Mistakes::of_file(
@@ -117,6 +119,7 @@ fn read(arguments: &Arguments) -> Result<Imported, Mistakes> {
             lenient: arguments.lenient,
             client: arguments.bus,
         },
+        kinds,
     )
 }
 

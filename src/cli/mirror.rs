@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::{self, Job, span};
 use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Kinds;
 use tickbus_fieldbus::Role;
 use tickbus_programs::Mirror;
 
@@ -24,10 +25,11 @@ pub(super) struct Arguments {
     host: host::Hosting,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let job = Job {
         title: "mirror",
         file: &arguments.file,
+        kinds,
         role: Role::Device,
         program: Box::new(Mirror),
         interval: arguments.tick,

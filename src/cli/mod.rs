@@ -38,6 +38,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Kinds;
 
 /// Puts a simulated machine on a real PLC's fieldbus.
 #[derive(Debug, Parser)]
@@ -118,28 +119,28 @@ fn print(title: &str, text: &str) -> Outcome {
 /// How long the process waits at its end for the log to reach stderr.
 const LOG_FLUSH_LIMIT: Nanos = Nanos::from_secs(1);
 
-/// Runs the command with the arguments of the process.
-pub fn main() -> ExitCode {
+/// Runs the command with the arguments of the process. A driver.cfg may name these `kinds` of bus.
+pub fn main(kinds: &'static Kinds) -> ExitCode {
     let arguments = Arguments::parse();
     // Events on the line are reported on stdout.
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
-        Command::Axes(arguments) => axes::run(&arguments),
+        Command::Axes(arguments) => axes::run(&arguments, kinds),
         Command::Bridge(arguments) => bridge::run(&arguments),
-        Command::Check(arguments) => check::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments, kinds),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
-        Command::Export(arguments) => export::run(&arguments),
-        Command::Gsd(arguments) => gsd::run(&arguments),
-        Command::Import(arguments) => import::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments, kinds),
+        Command::Gsd(arguments) => gsd::run(&arguments, kinds),
+        Command::Import(arguments) => import::run(&arguments, kinds),
         Command::Logo(arguments) => logo::run(&arguments),
-        Command::Mirror(arguments) => mirror::run(&arguments),
-        Command::Plc(arguments) => plc::run(&arguments),
+        Command::Mirror(arguments) => mirror::run(&arguments, kinds),
+        Command::Plc(arguments) => plc::run(&arguments, kinds),
         #[cfg(unix)]
-        Command::Profibus(arguments) => profibus::run(&arguments),
+        Command::Profibus(arguments) => profibus::run(&arguments, kinds),
         Command::Report(arguments) => report::run(&arguments),
-        Command::Run(arguments) => run::run(&arguments),
-        Command::Sync(arguments) => sync::run(&arguments),
-        Command::Test(arguments) => test::run(&arguments),
+        Command::Run(arguments) => run::run(&arguments, kinds),
+        Command::Sync(arguments) => sync::run(&arguments, kinds),
+        Command::Test(arguments) => test::run(&arguments, kinds),
         #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
         #[cfg(unix)]

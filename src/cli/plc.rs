@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use super::Outcome;
 use super::host::{self, Job, span};
 use tickbus_base::time::Nanos;
+use tickbus_driver_cfg::Kinds;
 use tickbus_fieldbus::Role;
 use tickbus_plc as plc;
 
@@ -43,7 +44,7 @@ fn pair(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let program = match tickbus_programs::program(&arguments.program, &arguments.options) {
         Ok(program) => program,
         Err(error) => {
@@ -60,6 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     let job = Job {
         title: "plc",
         file: &arguments.config,
+        kinds,
         role: Role::Controller,
         program,
         interval,

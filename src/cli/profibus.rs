@@ -6,6 +6,7 @@ mod monitor;
 use clap::Subcommand;
 
 use super::Outcome;
+use tickbus_driver_cfg::Kinds;
 
 /// Look at a PROFIBUS line.
 #[derive(Debug, clap::Args)]
@@ -20,9 +21,9 @@ enum Command {
     Advise(advise::Arguments),
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     match &arguments.command {
         Command::Monitor(arguments) => monitor::run(arguments),
-        Command::Advise(arguments) => advise::run(arguments),
+        Command::Advise(arguments) => advise::run(arguments, kinds),
     }
 }

@@ -8,7 +8,7 @@ use super::Outcome;
 use super::host::{ToldFaults, is_news, never_ran, recording, span};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Code, Driver};
-use tickbus_driver_cfg::{CommandLineEnd, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
 use tickbus_fieldbus::{Link, Role};
 use tickbus_fmi::RealTime;
 use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Stepped, Unpacked};
@@ -116,8 +116,8 @@ fn wrong(text: impl std::fmt::Display) -> Refused {
     Refused(text.to_string(), Outcome::WrongInput)
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
-    match try_run(arguments) {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
+    match try_run(arguments, kinds) {
         Ok(outcome) => outcome,
         Err(Refused(text, outcome)) => {
             let mistakes = text.lines().count();
@@ -127,8 +127,8 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-fn try_run(arguments: &Arguments) -> Result<Outcome, Refused> {
-    let config = configured(arguments)?;
+fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refused> {
+    let config = configured(arguments, kinds)?;
     let fmu = Unpacked::open(&arguments.model).map_err(wrong)?;
     let map = match &arguments.map {
         None => Map::default(),
@@ -208,10 +208,10 @@ fn catch_interrupts(stop: &Stop, folder: &Path) -> Result<(), Refused> {
 }
 
 /// The driver.cfg as this command's end has it.
-fn configured(arguments: &Arguments) -> Result<Config, Refused> {
+fn configured(arguments: &Arguments, kinds: &'static Kinds) -> Result<Config, Refused> {
     let mut config = match arguments.role {
         FmuRole::Machine => {
-            let config = Config::load(&arguments.config).map_err(wrong)?;
+            let config = Config::load(&arguments.config, kinds).map_err(wrong)?;
             if config.role == Role::Controller {
                 return Err(wrong(format!(
                     "{}: role = \"controller\" is the PLC's end; remove it, or run the FMU with --role plc",
@@ -225,7 +225,8 @@ fn configured(arguments: &Arguments) -> Result<Config, Refused> {
                 role: Role::Controller,
                 moved: arguments.address.is_some(),
             };
-            let mut config = Config::load_as(&arguments.config, Some(asked)).map_err(wrong)?;
+            let mut config =
+                Config::load_as(&arguments.config, Some(asked), kinds).map_err(wrong)?;
             // The [record] table is the simulation's, which may run at the other end of the same line.
             config.record = None;
             config

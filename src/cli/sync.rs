@@ -11,6 +11,7 @@ use super::Outcome;
 use super::host::{PageAddress, page_address, show_run};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_base::toml_text::Mistakes;
+use tickbus_driver_cfg::Kinds;
 use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
@@ -47,9 +48,9 @@ enum Other {
     Prepare(prepare::Arguments),
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let path = match (&arguments.other, &arguments.file) {
-        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments),
+        (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, kinds),
         (Some(Other::Prepare(arguments)), _) => return prepare::run(arguments),
         (None, file) => file.as_ref().expect("it is required"),
     };

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::Outcome;
 use tickbus_base::toml_text::{Mistakes, load_text};
+use tickbus_driver_cfg::Kinds;
 use tickbus_report::page_beside;
 use tickbus_testing::{Case, Group, Suite, Test, Verdict, junit_xml};
 
@@ -45,7 +46,7 @@ struct Count {
     ticks: u64,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let mut files = Vec::new();
     for path in &arguments.paths {
         if let Err(error) = collect(path, &mut files) {
@@ -71,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     let mut count = Count::default();
     let groups: Vec<Group> = files
         .iter()
-        .map(|file| run_file(file, arguments, &mut count))
+        .map(|file| run_file(file, (arguments, kinds), &mut count))
         .collect();
     if let Some(path) = &arguments.junit
         && !arguments.list
@@ -143,9 +144,13 @@ fn is_test_file(path: &Path) -> bool {
     })
 }
 
-fn run_file(file: &Path, arguments: &Arguments, count: &mut Count) -> Group {
+fn run_file(
+    file: &Path,
+    (arguments, kinds): (&Arguments, &'static Kinds),
+    count: &mut Count,
+) -> Group {
     let name = file.display().to_string();
-    let suite = match Suite::load(file) {
+    let suite = match Suite::load(file, kinds) {
         Ok(suite) => suite,
         Err(mistakes) => {
             count.wrong += mistakes.len();

@@ -16,6 +16,7 @@ use tickbus_driver::{Code, Driver, SlotMap};
 use tickbus_driver_cfg::Config;
 
 use super::failure::Failure;
+use crate::KINDS;
 use crate::page::{self, Place};
 
 /// Keeps the memory of a shared buffer alive, and its driver on the live page.
@@ -52,7 +53,7 @@ pub(super) fn open(
     tables: &str,
     layout: &JObject<'_>,
 ) -> Result<Device<Keep>, Failure> {
-    let mut driver = tickbus_binding::open(path, tables)?;
+    let mut driver = tickbus_binding::open(path, tables, &KINDS)?;
     let place = page::show_driver(&mut driver)?;
     let shared = describe(env, &driver, place, layout)?;
     Ok(Device::new(driver, shared))
@@ -70,7 +71,7 @@ fn describe(
 
 /// Describes the driver of the file to `layout`, and opens nothing.
 pub(super) fn look(env: &mut Env<'_>, path: &Path, layout: &JObject<'_>) -> Result<(), Failure> {
-    let config = tickbus_binding::load(path, "")?;
+    let config = tickbus_binding::load(path, "", &KINDS)?;
     let slots = SlotMap::new(&config.table, config.role);
     describe_driver(env, &config, &slots, layout)
 }

@@ -1,5 +1,5 @@
-//! Enforces the project's structure: unsafe code and reading the system's clocks are confined to certain files, no file
-//! grows without limit, and docs/ARCHITECTURE.md shows the current crates.
+//! Enforces the project's structure: unsafe code and reading the system's clocks are confined to certain files, the core
+//! knows no bus, no file grows without limit, and docs/ARCHITECTURE.md shows the current crates.
 
 mod circles;
 mod glossary;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use circles::circles;
 use glossary::unknown;
-use rules::{File, mistakes};
+use rules::{File, buses_of_core, mistakes};
 
 /// All Rust sources below `directory`, in order.
 fn sources(directory: &Path) -> Vec<PathBuf> {
@@ -83,18 +83,42 @@ fn every_crate_has_its_row_in_the_table_of_rooms() {
     }
 }
 
+/// The manifests of all crates, by their folders below `crates`.
+fn manifests() -> BTreeMap<String, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |folder: &String| {
+        let folder = folder.trim_end_matches("src");
+        let manifest = fs::read_to_string(root.join(folder).join("Cargo.toml"));
+        let name = folder.trim_start_matches("crates/").trim_end_matches('/');
+        let name = if name.is_empty() { "src" } else { name };
+        (name.to_owned(), manifest.expect("a crate has a manifest"))
+    };
+    crates(root).iter().map(read).collect()
+}
+
+#[test]
+fn the_core_knows_no_bus() {
+    let manifests = manifests();
+    let named = manifests.iter();
+    let found: Vec<String> = named
+        .flat_map(|(name, manifest)| buses_of_core(name, manifest))
+        .collect();
+    assert!(found.is_empty(), "{}", found.join("\n"));
+    let manifest = "[dependencies]\ntickbus-base.workspace = true\n[dev-dependencies]\n\
+                    tickbus-bus-s7.workspace = true\n";
+    assert_eq!(buses_of_core("driver-cfg", manifest).len(), 1);
+    assert_eq!(buses_of_core("export", manifest), Vec::<String>::new());
+    let text =
+        "use tickbus_fieldbus::Bus;\nuse tickbus_bus_s7 as s7;\nfn f() { tickbus_kinds::KINDS }";
+    let found = [(2, "tickbus_bus_s7"), (3, "tickbus_kinds")];
+    finds("crates/driver-cfg/src/config.rs", text, &found);
+    finds("crates/export/src/lib.rs", text, &[]);
+}
+
 #[test]
 fn the_picture_of_the_rooms_is_that_of_their_manifests() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let manifests: BTreeMap<String, String> = (crates(root).iter())
-        .map(|folder| {
-            let folder = folder.trim_end_matches("src");
-            let manifest = fs::read_to_string(root.join(folder).join("Cargo.toml"));
-            let name = folder.trim_start_matches("crates/").trim_end_matches('/');
-            let name = if name.is_empty() { "src" } else { name };
-            (name.to_owned(), manifest.expect("a crate has a manifest"))
-        })
-        .collect();
+    let manifests = manifests();
     let file = root.join("docs/ARCHITECTURE.md");
     let text = fs::read_to_string(&file).expect("it is there");
     let right = picture::redrawn(&text, &manifests);

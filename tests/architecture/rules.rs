@@ -26,6 +26,22 @@ const UNSAFE_HOMES: &[&str] = &[
 /// Where the system's clocks may be read.
 const CLOCK_HOMES: &[&str] = &["crates/base/src/time/", "crates/conformance/", "src/cli/"];
 
+/// The crates that know no bus but the loopback: the kinds are handed in. A bus's tests stand on them, and would compile
+/// all other buses.
+const CORE: &[&str] = &[
+    "axis",
+    "base",
+    "binding",
+    "conformance",
+    "driver",
+    "driver-cfg",
+    "fieldbus",
+    "image",
+    "plc",
+    "record",
+    "test-log",
+];
+
 /// The largest number of lines in a source file.
 const MOST_LINES: usize = 700;
 
@@ -41,8 +57,37 @@ pub(crate) fn mistakes(file: File<'_>) -> Vec<String> {
     let tokens = tokens(file.text);
     let mut found = unsafe_code(file, &tokens);
     found.extend(clocks(file, &tokens));
+    found.extend(buses(file, &tokens));
     found.extend(length(file));
     found
+}
+
+/// The buses that the manifest of a crate of the core names, also for its tests.
+pub(crate) fn buses_of_core(name: &str, manifest: &str) -> Vec<String> {
+    let lines = manifest.lines().filter(|_| CORE.contains(&name));
+    let buses = lines.filter(|line| is_bus(&line.replace('-', "_")));
+    buses
+        .map(|line| format!("crates/{name}/Cargo.toml: {line}: {NO_BUS}"))
+        .collect()
+}
+
+fn is_bus(name: &str) -> bool {
+    name.starts_with("tickbus_bus_") || name.starts_with("tickbus_kinds")
+}
+
+/// What to do instead of naming a bus.
+const NO_BUS: &str = "this crate knows no bus; ask `BusOptions`, or take the kinds from the caller";
+
+fn buses(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {
+    let crate_name = file.path.strip_prefix("crates/");
+    let crate_name = crate_name.and_then(|path| path.split('/').next());
+    if !crate_name.is_some_and(|name| CORE.contains(&name)) {
+        return Vec::new();
+    }
+    let places = tokens.iter().filter(|token| is_bus(token.text));
+    places
+        .map(|token| format!("{}:{}: {}: {NO_BUS}", file.path, token.line, token.text))
+        .collect()
 }
 
 fn at_home(file: File<'_>, homes: &[&str]) -> bool {

@@ -18,11 +18,12 @@ use tickbus::signal::{Area, Plan, Slot};
 
 fn peeler(name: &str) -> Config {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("plc/peeler/{name}.cfg"));
-    Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
 fn parse(text: &str) -> Config {
-    Config::parse("test.cfg", text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+    Config::parse("test.cfg", text, &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
 }
 
 /// The bytes of an area when these signals have these values, and all others are 0.
@@ -262,7 +263,7 @@ proptest! {
 fn check_any(text: &str) -> Result<(), TestCaseError> {
     use std::collections::HashSet;
 
-    let Ok(config) = Config::parse("any.cfg", text) else {
+    let Ok(config) = Config::parse("any.cfg", text, &tickbus::KINDS) else {
         return Ok(());
     };
     let mut names = HashSet::new();

@@ -378,7 +378,8 @@ fn sized(kind: &str, inputs: usize, outputs: usize) -> Config {
          output_bytes = {outputs}\n[[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n[[signal]]\nname = \"b\"\n\
          address = \"%QX0.0\"\n"
     );
-    Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
 }
 
 /// First byte, length, and length of the local array of each PUT (`Q`) or GET (`I`).
@@ -464,8 +465,8 @@ fn no_member_of_the_control_block_is_one_that_nothing_sets() {
                  output_bytes = {}\n[[signal]]\nname = \"a\"\naddress = \"%{letter}X0.0\"\n",
                 bytes.0, bytes.1
             );
-            let config =
-                Config::parse("driver.cfg", &text).unwrap_or_else(|m| panic!("{m}\n{text}"));
+            let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
+                .unwrap_or_else(|m| panic!("{m}\n{text}"));
             let (data, link) = (source(&config, "data"), source(&config, "link"));
             let control = data
                 .split_once("DATA_BLOCK \"Cell_1\"")
@@ -496,7 +497,8 @@ fn signs_of_life_are_watched_and_given_on_every_bus() {
              [[signal]]\nname = \"PLC life\"\naddress = \"%QB1\"\n\
              [[signal]]\nname = \"Beat\"\naddress = \"%IW2\"\ntype = \"UINT\"\n"
         );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|m| panic!("{m}\n{text}"));
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS)
+            .unwrap_or_else(|m| panic!("{m}\n{text}"));
         let link = source(&config, "link");
         let beat = "\"Cell_1_in\".Image.\"Beat\"";
         for line in [
@@ -536,7 +538,7 @@ fn what_the_simulation_reads_and_writes_in_the_cpu_itself_is_not_copied() {
          alive = { signal = \"Life\", within = \"500ms\" }\nheartbeat = { signal = \"Beat\", every = \"100ms\" }\n\
          [fieldbus.at]\n\"Life\" = \"DB20.DBW8\"\n\
          [[signal]]\nname = \"Beat\"\naddress = \"%IW4\"\ntype = \"UINT\"\n[[signal]]\nname = \"Life\"\naddress = \"%QW0\"\n\
-         [[signal]]\nname = \"Run\"\naddress = \"%QX2.0\"\n",
+         [[signal]]\nname = \"Run\"\naddress = \"%QX2.0\"\n", &tickbus::KINDS,
     )
     .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let (link, copy) = (source(&config, "link"), source(&config, "copy"));

@@ -212,7 +212,8 @@ proptest! {
 fn portable_functions() -> String {
     let text = "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"modbus-server\"\n\
                 [[signal]]\nname = \"r\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
-    let config = Config::parse("driver.cfg", text).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config = Config::parse("driver.cfg", text, &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let source = file(&config, Target::OpenPlc, ".st");
     source
         .split("PROGRAM")
@@ -241,7 +242,8 @@ fn the_program_for_openplc_copies_between_registers_and_variables() {
         env!("CARGO_MANIFEST_DIR"),
         "/tests/export/right/modbus-server.cfg"
     );
-    let config = Config::load(path.as_ref()).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config = Config::load(path.as_ref(), &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let source = file(&config, Target::OpenPlc, ".st");
     let functions = portable_functions();
     let record: Vec<u8> = (0..40)

@@ -10,7 +10,8 @@ pub(crate) fn parse(fieldbus: &str, sections: &str) -> Config {
     let text = format!(
         "[driver]\nid = 7\nname = \"Cell 1\"\n[fieldbus]\nkind = \"socket\"\naddress = \"192.168.0.20:2000\"\n{fieldbus}\n{sections}"
     );
-    Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
+    Config::parse("driver.cfg", &text, &tickbus::KINDS)
+        .unwrap_or_else(|mistakes| panic!("{mistakes}\n{text}"))
 }
 
 const TYPES: [(&str, char, usize); 15] = [

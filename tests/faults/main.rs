@@ -32,6 +32,10 @@ impl Link {
 }
 
 impl Bus for Link {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, _role: &str) -> String {
         format!("kind = \"loopback\"\nlink = \"{}\"", self.0)
     }
@@ -56,6 +60,10 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, _role: &str) -> String {
         format!("kind = \"socket\"\naddress = \"127.0.0.1:{}\"", self.0)
     }
@@ -100,7 +108,7 @@ impl Stepped {
              [[signal]]\nname = \"speed\"\naddress = \"%QW2\"\ntype = \"INT\"\nfail_safe = -1\n{faults}"
         );
         Self {
-            end: End::open(&text, &Manual::new()),
+            end: End::open(&text, &Manual::new(), &tickbus::KINDS),
             ticks: 0,
         }
     }
@@ -180,7 +188,11 @@ fn without_simulation_time_the_clock_of_a_free_bus_counts() {
     let (link, clock) = (Link::new(), Manual::new());
     clock.advance(Nanos::from_secs(5));
     let faults = "[[fault]]\nkind = \"stuck\"\nsignal = \"speed\"\nvalue = 9\nat = \"2s\"\n";
-    let mut end = End::open(&(config(&link, "device", "") + faults), &clock);
+    let mut end = End::open(
+        &(config(&link, "device", "") + faults),
+        &clock,
+        &tickbus::KINDS,
+    );
     end.tick();
     clock.advance(Nanos::from_millis(1999));
     end.tick();
@@ -451,11 +463,12 @@ fn a_lost_cycle_is_decided_on_once_whatever_else_is_injected() {
 #[test]
 fn a_hosted_program_gets_wrong_inputs_and_its_outputs_arrive_wrong() {
     let (link, clock) = (Link::new(), Manual::new());
-    let mut device = End::open(&config(&link, "device", ""), &clock);
+    let mut device = End::open(&config(&link, "device", ""), &clock, &tickbus::KINDS);
     let faults = "[[fault]]\nkind = \"offset\"\nsignal = \"position\"\nby = 1000\n\
                   [[fault]]\nkind = \"stuck\"\nsignal = \"run\"\nvalue = true\n";
     let text = config(&link, "controller", "") + faults;
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let scan = Nanos::from_millis(1);
     let _logged = logged::Watch::new();
     let host = Host::open(&config, Box::new(Mirror), scan, Arc::clone(&clock) as _).expect("opens");
@@ -490,7 +503,7 @@ fn a_file_for_both_ends_has_the_faults_of_the_machine() {
     .expect("written");
     let load = |role: Option<Role>| {
         let asked = role.map(|role| CommandLineEnd { role, moved: false });
-        Config::load_as(&path, asked).map(|config| config.faults.len())
+        Config::load_as(&path, asked, &tickbus::KINDS).map(|config| config.faults.len())
     };
     let missing = load(None).expect_err("no such file").to_string();
     assert!(

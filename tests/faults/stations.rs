@@ -26,8 +26,9 @@ fn one_station_of_two_is_gone() {
         &(text("device")
             + "[[fault]]\nkind = \"station-down\"\nstation = \"two\"\ntick = 11\nticks = 100\n"),
         &clock,
+        &tickbus::KINDS,
     );
-    let mut controller = End::open(&text("controller"), &clock);
+    let mut controller = End::open(&text("controller"), &clock, &tickbus::KINDS);
     let mut tick = |number: u8| {
         let time = Nanos::from_millis(10 * i64::from(number));
         controller.set("first", f64::from(number));
@@ -85,7 +86,7 @@ fn the_other_end_of_a_loopback_sees_that_one_station_is_down() {
             )
             .expect("a String takes all");
         }
-        End::open(&text, clock)
+        End::open(&text, clock, &tickbus::KINDS)
     };
     let clock = Manual::new();
     let (mut device, mut controller) = (open("device", &clock), open("controller", &clock));

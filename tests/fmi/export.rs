@@ -43,7 +43,8 @@ const LOOPBACK: &str = "[driver]\nid = 7\nname = \"2 Tanks, ä\"\n[fieldbus]\nki
 fn model_descriptions_are_their_golden_files() {
     let folder = repository().join("tests/fmi");
     let path = folder.join("types.cfg");
-    let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config =
+        Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     for version in Version::ALL {
         let made = made::model_description(&config, version, "{token}");
         let golden = folder.join(format!("types-{}.xml", version.name()));

@@ -77,7 +77,7 @@ impl Machine {
     #[track_caller]
     pub fn open_on<C: Clock + 'static>(clock: &Arc<C>, text: &str) -> Self {
         Self {
-            end: End::open(text, clock),
+            end: End::open(text, clock, &tickbus::KINDS),
             text: text.to_owned(),
             recorder: None,
         }

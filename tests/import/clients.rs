@@ -64,7 +64,7 @@ fn lists_of_plc4x_with_data_blocks_become_an_s7_client_that_writes_only_inputs()
             ("Count", "%QW4", "INT"),
         ])
     );
-    let config = Config::parse("driver.cfg", &imported.text).expect("right");
+    let config = Config::parse("driver.cfg", &imported.text, &tickbus::KINDS).expect("right");
     assert_eq!(config.bus.kind(), "s7-client");
 }
 
@@ -118,8 +118,9 @@ fn an_address_of_either_bus_is_read_as_the_one_that_is_asked_for() {
             client: Some(client),
             ..ImportOptions::default()
         };
-        let imported = import("tags.csv", text.as_bytes(), reading).expect("a list");
-        let config = Config::parse("driver.cfg", &imported.text).expect("right");
+        let imported =
+            import("tags.csv", text.as_bytes(), reading, &tickbus::KINDS).expect("a list");
+        let config = Config::parse("driver.cfg", &imported.text, &tickbus::KINDS).expect("right");
         assert_eq!(config.bus.kind(), client.kind());
     }
 }
@@ -158,7 +159,7 @@ fn left_out(text: &str) -> Vec<String> {
         lenient: true,
         ..ImportOptions::default()
     };
-    let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
+    let imported = import("tags.csv", text.as_bytes(), reading, &tickbus::KINDS).expect("the rest");
     let skipped = imported.skipped.iter();
     skipped
         .map(|found| {

@@ -8,7 +8,7 @@ use tickbus_image::signal::Addressing;
 use crate::signals;
 
 fn read_as(file: &str, text: &str, reading: ImportOptions) -> Result<Imported, String> {
-    import(file, text.as_bytes(), reading).map_err(|mistakes| mistakes.to_string())
+    import(file, text.as_bytes(), reading, &tickbus::KINDS).map_err(|mistakes| mistakes.to_string())
 }
 
 fn read(file: &str, text: &str) -> Imported {
@@ -435,8 +435,13 @@ fn messages_of_one_kind_are_told_three_times_with_their_number() {
     for number in 0..10 {
         writeln!(text, "Tag {number};<No Value>;Int").expect("a String takes all");
     }
-    let mistakes =
-        import("hmi.csv", text.as_bytes(), ImportOptions::default()).expect_err("no addresses");
+    let mistakes = import(
+        "hmi.csv",
+        text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .expect_err("no addresses");
     assert_eq!(mistakes.len(), 11);
     let list: Vec<_> = mistakes.iter().cloned().collect();
     let told: Vec<String> = condensed(&list)

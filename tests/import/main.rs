@@ -34,13 +34,18 @@ fn err(output: &Output) -> String {
 }
 
 fn read(text: &str) -> Imported {
-    import("tags.csv", text.as_bytes(), ImportOptions::default())
-        .unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    import(
+        "tags.csv",
+        text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
 /// Name, address and type of each signal in the driver.cfg of `imported`.
 fn signals(imported: &Imported) -> Vec<(String, String, String)> {
-    let config = Config::parse("driver.cfg", &imported.text)
+    let config = Config::parse("driver.cfg", &imported.text, &tickbus::KINDS)
         .unwrap_or_else(|m| panic!("{m}\n{}", imported.text));
     assert_eq!(config.table.signals.len(), imported.signals);
     let signals = config.table.signals.iter();
@@ -56,9 +61,14 @@ fn signals(imported: &Imported) -> Vec<(String, String, String)> {
 }
 
 fn told(text: &str) -> String {
-    import("tags.csv", text.as_bytes(), ImportOptions::default())
-        .expect_err("mistakes")
-        .to_string()
+    import(
+        "tags.csv",
+        text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .expect_err("mistakes")
+    .to_string()
 }
 
 #[test]
@@ -164,7 +174,7 @@ fn lines_with_mistakes_are_left_out_when_asked_for() {
         lenient: true,
         ..ImportOptions::default()
     };
-    let imported = import("tags.csv", text.as_bytes(), reading).expect("the rest");
+    let imported = import("tags.csv", text.as_bytes(), reading, &tickbus::KINDS).expect("the rest");
     let lines: Vec<usize> = imported
         .skipped
         .iter()
@@ -192,7 +202,7 @@ fn the_driver_cfg_goes_to_a_file_that_is_not_there_and_check_finds_it_right() {
         String::from_utf8_lossy(&output.stdout),
         "import: ok signals=1 assigned=0 skipped=0\n"
     );
-    let config = Config::load(&out).expect("a right driver.cfg");
+    let config = Config::load(&out, &tickbus::KINDS).expect("a right driver.cfg");
     assert_eq!(
         (config.name.as_str(), config.table.signals[0].name.as_str()),
         ("Förderer", "Förderer läuft")
@@ -234,7 +244,7 @@ fn a_full_disk_behind_stdout_is_a_failure() {
 
 #[test]
 fn what_an_export_lists_is_read_as_the_same_table() {
-    let rig = Config::load(&repository().join("driver.cfg")).expect("the rig");
+    let rig = Config::load(&repository().join("driver.cfg"), &tickbus::KINDS).expect("the rig");
     assert_same(&rig);
 }
 
@@ -255,8 +265,13 @@ fn assert_same_of(config: &Config, target: Target) {
     if config.table.signals.is_empty() {
         return;
     }
-    let imported = import(&tags.name, tags.text.as_bytes(), ImportOptions::default())
-        .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", tags.text));
+    let imported = import(
+        &tags.name,
+        tags.text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", tags.text));
     let mut read = signals(&imported);
     let mut expected: Vec<_> = config
         .table
@@ -286,7 +301,7 @@ proptest! {
             write!(sections, "[[signal]]\nname = \"{name}|{number}\"\naddress = \"%QD{}\"\ntype = \"{kind}\"\n", 4 * number).expect("a String takes all");
         }
         let text = format!("[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\n{sections}");
-        if let Ok(config) = Config::parse("driver.cfg", &text) {
+        if let Ok(config) = Config::parse("driver.cfg", &text, &tickbus::KINDS) {
             assert_same(&config);
         }
     }
@@ -309,8 +324,8 @@ fn assert_sound(bytes: &[u8]) {
             lenient,
             ..ImportOptions::default()
         };
-        if let Ok(imported) = import("tags.csv", bytes, reading) {
-            let config = Config::parse("driver.cfg", &imported.text);
+        if let Ok(imported) = import("tags.csv", bytes, reading, &tickbus::KINDS) {
+            let config = Config::parse("driver.cfg", &imported.text, &tickbus::KINDS);
             let config = config.unwrap_or_else(|mistakes| panic!("{mistakes}\n{}", imported.text));
             assert_eq!(config.table.signals.len(), imported.signals);
         }

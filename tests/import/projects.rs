@@ -5,13 +5,23 @@ use tickbus::import::{ImportOptions, Imported, import};
 use crate::signals;
 
 fn read(file: &str, text: &str) -> Imported {
-    import(file, text.as_bytes(), ImportOptions::default())
-        .unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    import(
+        file,
+        text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .unwrap_or_else(|mistakes| panic!("{mistakes}"))
 }
 
 fn told(text: &str) -> String {
-    let wrong =
-        import("plant.xml", text.as_bytes(), ImportOptions::default()).expect_err("mistakes");
+    let wrong = import(
+        "plant.xml",
+        text.as_bytes(),
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .expect_err("mistakes");
     wrong.to_string()
 }
 

@@ -135,7 +135,13 @@ const TIA: &[&[&str]] = &[
 ];
 
 fn read(bytes: &[u8]) -> Result<Imported, String> {
-    import("tags.xlsx", bytes, ImportOptions::default()).map_err(|mistakes| mistakes.to_string())
+    import(
+        "tags.xlsx",
+        bytes,
+        ImportOptions::default(),
+        &tickbus::KINDS,
+    )
+    .map_err(|mistakes| mistakes.to_string())
 }
 
 #[test]

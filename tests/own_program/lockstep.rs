@@ -66,7 +66,8 @@ fn in_lock_step_a_program_scans_as_on_the_ticks_of_a_loopback() {
         "addressing = \"iec\"",
         &fieldbus("controller"),
     );
-    let config = Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config =
+        Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let program = HostedProgram::load(&program, &options(&[("alive", "%IX9.0"), super::IEC]));
     let program = program.unwrap_or_else(|error| panic!("{error}"));
     let plc = Host::open(&config, Box::new(program), STEP, Monotonic::shared()).expect("opens");

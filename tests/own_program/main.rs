@@ -350,7 +350,8 @@ const STEPPED: &str = "kind = \"loopback\"\nmode = \"stepped\"\nprogram = \"./pr
 
 fn open(path: &Path) -> Result<(logged::Watch, Driver), String> {
     let logged = logged::Watch::new();
-    let config = Config::load(path).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+    let config =
+        Config::load(path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
     let driver = Driver::open(config, Manual::new()).map_err(|error| error.to_string())?;
     Ok((logged, driver))
 }
@@ -418,7 +419,9 @@ fn a_program_that_does_not_fit_its_driver_cfg_is_refused() {
         "addressing = \"iec\"",
         &STEPPED.replace("alive =", "alvie ="),
     );
-    let mistakes = Config::load(&path).expect_err("refused").to_string();
+    let mistakes = Config::load(&path, &tickbus::KINDS)
+        .expect_err("refused")
+        .to_string();
     assert!(mistakes.contains("has no option \"alvie\""), "{mistakes}");
     // Without the option, the variable needs a place in the image.
     let none = STEPPED.replace("alive = \"%IX9.0\"", "");
@@ -445,7 +448,7 @@ fn addresses_count_as_the_driver_cfg_says_unless_the_option_does() {
             driver,
             "kind = \"loopback\"\nlink = \"x\"\ninput_bytes = 10",
         );
-        Config::load(&path).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+        Config::load(&path, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"))
     };
     let elements = cfg("addressing = \"iec\"");
     assert_eq!(elements.addressing, Addressing::Elements);

@@ -30,7 +30,8 @@ struct End {
 impl End {
     fn new(name: &str, options: &[(&str, &str)]) -> Self {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("plc/peeler/{name}.cfg"));
-        let config = Config::load(&file).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let config =
+            Config::load(&file, &tickbus::KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         let options: Vec<(String, String)> = options
             .iter()
             .map(|(key, value)| ((*key).to_owned(), (*value).to_owned()))

@@ -192,7 +192,8 @@ fn a_table_that_lacks_a_signal_is_told_by_its_name() {
         ),
     ] {
         let text = text.replace(from, to);
-        let config = tickbus::driver_cfg::Config::parse("charger.cfg", &text).expect("a good file");
+        let config = tickbus::driver_cfg::Config::parse("charger.cfg", &text, &tickbus::KINDS)
+            .expect("a good file");
         let mut program = tickbus::programs::program("charger", &[]).expect("a program");
         let told = program.fit(&config.table, config.addressing);
         let told = told.expect_err("a signal is missing").to_string();

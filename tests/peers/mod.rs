@@ -82,7 +82,7 @@ pub struct Alone {
 impl Alone {
     pub fn open(text: &str) -> Self {
         let clock = Manual::new();
-        let end = End::open(text, &clock);
+        let end = End::open(text, &clock, &tickbus::KINDS);
         Self { clock, end }
     }
 

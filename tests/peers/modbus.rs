@@ -48,6 +48,10 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let address = format!("\"{}\"\nframing = \"{}\"", self.address, self.framing);
         if role == self.server {

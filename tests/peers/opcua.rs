@@ -162,7 +162,7 @@ impl Device {
              reconnect = [\"50ms\"]\npki = {:?}\n{keys}\n{signals}",
             pki.display().to_string()
         );
-        let end = End::open(&text, &clock);
+        let end = End::open(&text, &clock, &tickbus::KINDS);
         Self { end, folder }
     }
 

@@ -43,6 +43,10 @@ impl Pair {
 }
 
 impl Bus for Pair {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         // A slow or absent server is not asked for its state again.
         logged::expect("does not say whether it is in RUN");

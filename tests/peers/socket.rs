@@ -32,6 +32,10 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let further = match role {
             "device" => self.device,

@@ -106,6 +106,10 @@ pub(crate) fn isolation(isolated: bool) -> String {
 }
 
 impl Bus for Udp {
+    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
+        &tickbus::KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let (library, isolation) = (udp().display(), isolation(self.isolated));
         let key = if role == "device" { "local" } else { "remote" };
@@ -219,7 +223,7 @@ impl Misbehaving {
     }
 
     pub(crate) fn open(&self, clock: &Arc<Manual>) -> End {
-        End::open(&self.text(), clock)
+        End::open(&self.text(), clock, &tickbus::KINDS)
     }
 }
 

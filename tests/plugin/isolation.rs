@@ -250,7 +250,7 @@ fn the_command_beside_the_driver_cfg_is_found() {
     let file = plugin.file("driver.cfg");
     fs::write(&file, plugin.text()).expect("written");
     let clock = Manual::new();
-    let config = Config::load(&file).expect("a right file");
+    let config = Config::load(&file, &tickbus::KINDS).expect("a right file");
     let _logged = logged::Watch::new();
     let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     await_that("it runs", || {

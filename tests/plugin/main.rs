@@ -21,7 +21,6 @@ use conformance::rig::{CYCLE, End, await_that, eventually, logged};
 use fixture::{HELPER, Misbehaving, Udp, build, misbehaving, until, until_by, until_it_echoes};
 use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
-use tickbus::driver_cfg::Options;
 use tickbus::fieldbus::{Events, plugin};
 use tickbus::time::{Manual, Monotonic, Nanos};
 
@@ -118,7 +117,7 @@ fn a_controller_that_closes_leaves_its_fail_safe_values_behind() {
             let bus = Udp::at(isolated, &address.to_string());
             let text =
                 conformance::rig::config(&bus, "controller", further).replace("300ms", "20s");
-            let mut end = End::open(&text, &Monotonic::shared());
+            let mut end = End::open(&text, &Monotonic::shared(), &tickbus::KINDS);
             end.set("speed", 10.0);
             eventually("the machine runs", || {
                 end.tick();
@@ -280,7 +279,8 @@ fn a_closed_driver_has_unloaded_its_library() {
 
 #[track_caller]
 fn refused(plugin: &Misbehaving) -> String {
-    let config = Config::parse("cell/driver.cfg", &plugin.text()).expect("a right file");
+    let config =
+        Config::parse("cell/driver.cfg", &plugin.text(), &tickbus::KINDS).expect("a right file");
     let error = Driver::open(config, Manual::new()).expect_err("refused");
     assert_eq!(error.code(), Code::BadConfig);
     error.to_string()
@@ -351,11 +351,9 @@ fn the_table_reads_whole_and_has_defaults() {
             "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"plugin\"\nlibrary = \"libx.so\"\n{lines}\n\
              [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
         );
-        let config = Config::parse("driver.cfg", &text).expect("right");
-        let Options::Plugin(options) = config.bus else {
-            panic!("{:?}", config.bus)
-        };
-        (options, config.events)
+        let config = Config::parse("driver.cfg", &text, &tickbus::KINDS).expect("right");
+        let options: Option<&plugin::Options> = config.bus.downcast_ref();
+        (options.expect("a plug-in").clone(), config.events)
     };
     let (millis, seconds) = (Nanos::from_millis, Nanos::from_secs);
     let mut expected = plugin::Options {

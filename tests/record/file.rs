@@ -273,7 +273,8 @@ fn the_commands_record_and_a_file_is_whole_however_they_end() {
         assert!(kill.expect("kill runs").success());
         let output = child.wait_with_output().expect("it ran");
         let told = String::from_utf8_lossy(&output.stdout).into_owned();
-        let config = Config::load(&folder.path("driver.cfg")).expect("a driver.cfg");
+        let config =
+            Config::load(&folder.path("driver.cfg"), &tickbus::KINDS).expect("a driver.cfg");
         let path = folder.path("run.vcd");
         let ticks = read(&path, &config);
         assert!(ticks.len() > 20);

@@ -21,7 +21,8 @@ pub fn end() -> Instant {
 
 /// Opens the driver of a driver.cfg, in real time.
 pub fn open(text: &str) -> Driver {
-    let config = Config::parse("soak.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("soak.cfg", text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     Driver::open(config, Monotonic::shared() as Arc<Monotonic>).expect("opens")
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_driver::{Code, Driver};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 
 use crate::refusal::Refusal;
 
@@ -14,22 +14,27 @@ const TABLES: &str = "tables instead of driver.cfg's";
 /// How long closing waits for the log to reach stderr.
 const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 
-/// Opens the driver that the file describes, with `tables` in place of its own; empty for none.
+/// Opens the driver that the file describes, with `tables` in place of its own; empty for none. Both may name these
+/// `kinds` of bus.
 ///
 /// # Errors
 ///
 /// `BAD_CONFIG` with every mistake of the file, or why the bus cannot be opened.
-pub fn open(path: &Path, tables: &str) -> Result<Driver, Refusal> {
-    Ok(Driver::open(load(path, tables)?, Monotonic::shared())?)
+pub fn open(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Driver, Refusal> {
+    Ok(Driver::open(
+        load(path, tables, kinds)?,
+        Monotonic::shared(),
+    )?)
 }
 
-/// Reads the file that describes a driver, with `tables` in place of its own; empty for none.
+/// Reads the file that describes a driver, with `tables` in place of its own; empty for none. Both may name these
+/// `kinds` of bus.
 ///
 /// # Errors
 ///
 /// `BAD_CONFIG` with every mistake of the file.
-pub fn load(path: &Path, tables: &str) -> Result<Config, Refusal> {
-    let config = Config::load(path).and_then(|config| config.overlaid(TABLES, tables));
+pub fn load(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Config, Refusal> {
+    let config = Config::load(path, kinds).and_then(|config| config.overlaid(TABLES, tables));
     config.map_err(|mistakes| {
         Refusal::new(
             Code::BadConfig,

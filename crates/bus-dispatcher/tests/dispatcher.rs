@@ -14,7 +14,7 @@ use std::net::TcpStream;
 use std::sync::Arc;
 use std::thread;
 
-use laboratory::Laboratory;
+use laboratory::{KINDS, Laboratory};
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos};
 use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{self, End, await_that, pass};
@@ -67,7 +67,7 @@ impl Machine {
     fn open(laboratory: &Laboratory, extra: &str) -> Self {
         let clock = Manual::new();
         let text = laboratory.config("device", extra);
-        let end = End::open(&text, &clock);
+        let end = End::open(&text, &clock, &KINDS);
         Self { end, clock }
     }
 
@@ -191,7 +191,7 @@ fn the_last_line_of_a_controller_has_the_fail_safe_values() {
         let text = laboratory
             .config("controller", further)
             .replace("300ms", "20s");
-        let mut controller = End::open(&text, &Monotonic::shared());
+        let mut controller = End::open(&text, &Monotonic::shared(), &KINDS);
         // While the data are stale, the controller sends fail-safe values as well.
         while controller.tick().code == Code::Stale {
             thread::yield_now();
@@ -268,7 +268,7 @@ fn a_name_that_no_dispatcher_takes_is_found_when_it_opens() {
     let text = Laboratory::empty()
         .config("device", "")
         .replace("\"device\"\n[", "\"Line 3\"\n[");
-    let config = Config::parse("driver.cfg", &text).expect("a right file");
+    let config = Config::parse("driver.cfg", &text, &KINDS).expect("a right file");
     let error = tickbus_driver::Driver::open(config, Manual::new())
         .expect_err("a blank")
         .to_string();
@@ -310,7 +310,7 @@ fn the_simulator_of_the_document_joins_as_it_is_written() {
     let text = format!("{}\n", block("```toml\n")).replace(kind, &moved);
     let clock = Manual::new();
     let mut machine = Machine {
-        end: End::open(&text, &clock),
+        end: End::open(&text, &clock, &KINDS),
         clock,
     };
     machine.until_reason("no input has a source yet");

@@ -11,8 +11,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_base::time::Monotonic;
 use tickbus_driver::Driver;
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_image::signal::Slot;
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_dispatcher::Options>()]);
 
 static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
 
@@ -47,7 +49,7 @@ fn values_go_both_ways() {
          [[signal]]\nname = \"run\"\naddress = \"%QX0.0\"\n\
          [[signal]]\nname = \"speed\"\naddress = \"%QW2\"\ntype = \"INT\"\n"
     );
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse("driver.cfg", &text, &KINDS).unwrap_or_else(|why| panic!("{why}"));
     let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
     let mut slots = driver.initial_slots();
     driver.exchange(None, &mut slots);

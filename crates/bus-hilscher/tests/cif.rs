@@ -10,7 +10,10 @@ use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
 use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::Verdict;
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_hilscher::cif::Options>()]);
 
 /// Two cards with connected process images.
 struct Cards {
@@ -37,6 +40,10 @@ impl Cards {
 }
 
 impl Bus for Cards {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let library = self.library.library();
         let device = u8::from(role != "device");
@@ -271,7 +278,8 @@ fn signals_that_reach_beyond_the_card_s_image_are_refused() {
 fn a_system_without_the_driver_is_told_so() {
     let text =
         format!("[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"hilscher-cif\"\n{SIGNALS}");
-    let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text).expect("a right file");
+    let config =
+        tickbus_driver_cfg::Config::parse("driver.cfg", &text, &KINDS).expect("a right file");
     let refused = tickbus_driver::Driver::open(config, Manual::new()).expect_err("refused");
     assert!(
         refused.to_string().contains("is for Windows alone"),

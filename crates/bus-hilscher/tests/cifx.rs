@@ -11,7 +11,10 @@ use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that, pass};
 use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::{BusError, Cause, Failing, Meaning, Verdict};
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_hilscher::cifx::Options>()]);
 
 /// Two cards with connected process images.
 struct Cards {
@@ -38,6 +41,10 @@ impl Cards {
 }
 
 impl Bus for Cards {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let board = if role == "device" { "cifX0" } else { "cifX1" };
         let library = self.library.library();
@@ -355,6 +362,10 @@ fn inputs_that_never_arrive_are_stale_although_the_card_takes_outputs() {
 struct Detour<'a>(&'a Cards);
 
 impl Bus for Detour<'_> {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let path = self.0.library.file("");
         let folder = path.parent().and_then(Path::file_name).expect("a folder");
@@ -436,7 +447,7 @@ fn a_library_that_is_missing_or_lacks_a_function_is_told_with_what_to_do() {
     let text = format!(
         "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"hilscher-cifx\"\nlibrary = \"libnobodyhas.so.3\"\n{SIGNALS}"
     );
-    let mut end = End::open(&text, &clock);
+    let mut end = End::open(&text, &clock, &KINDS);
     let reason = until(&mut end, &clock, "failed", "link");
     assert!(
         reason.contains("the library libnobodyhas.so.3: it cannot be loaded: "),

@@ -19,7 +19,7 @@ use tickbus_conformance::rig::{await_that, statistic};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkState;
 
-use ends::{Line, Pair, command};
+use ends::{KINDS, Line, Pair, command};
 
 const READ: Access<'_> = Access::Read {
     address: 0,
@@ -174,7 +174,7 @@ fn at_a_low_rate_the_default_age_outlasts_a_round_of_questions() {
             "[driver]\nid = 1\nname = \"slow\"\n[fieldbus]\nkind = \"{kind}\"\ndevice = \"/dev/ttyS0\"\n\
              input_bytes = 8\noutput_bytes = 8\n{extra}\n"
         );
-        Config::parse("driver.cfg", &text).map(|config| config.timing.max_age)
+        Config::parse("driver.cfg", &text, &KINDS).map(|config| config.timing.max_age)
     };
     let client = "role = \"controller\"\nbaud = 300";
     // A question takes about half a second.

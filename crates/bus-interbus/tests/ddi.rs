@@ -10,7 +10,10 @@ use tickbus_conformance::conformance;
 use tickbus_conformance::rig::{Bus, CYCLE, End, Liar, await_that};
 use tickbus_conformance::standin::{self, StandIn, until, until_it_hangs};
 use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::Verdict;
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_interbus::Options>()]);
 
 /// Two connected boards.
 struct Boards {
@@ -37,6 +40,10 @@ impl Boards {
 }
 
 impl Bus for Boards {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let library = self.library.library();
         let board = if role == "device" { 1 } else { 2 };

@@ -33,6 +33,10 @@ impl BusOptions for ServerOptions {
         Ok(Bus::Free(Box::new(server)))
     }
 
+    fn summary_of_writes(&self) -> Option<&'static str> {
+        Some("every write")
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.line.set_address(address, |_| Ok(())))
     }

@@ -37,6 +37,10 @@ impl BusOptions for Options {
         super::open(self, setup).map(Bus::Free)
     }
 
+    fn needs_command(&self) -> bool {
+        self.isolated && self.helper.is_none()
+    }
+
     fn cycle(&self) -> Option<Nanos> {
         Some(CYCLE)
     }

@@ -8,7 +8,7 @@ mod pty;
 mod rig;
 
 use peer::Master;
-use rig::{OnPort, device, exchange, project, until, until_exchanging};
+use rig::{KINDS, OnPort, device, exchange, project, until, until_exchanging};
 use tickbus_base::time::Monotonic;
 use tickbus_conformance::rig::{End, config, logged};
 
@@ -77,7 +77,7 @@ fn a_fault_of_the_driver_cfg_begins_with_what_the_plc_does() {
     let fault = "[[fault]]\nkind = \"diagnosis\"\nslot = 1\nchannel = 0\nerror = \"overload\"\n\
                  while = \"speed > 100\"\n";
     let text = format!("{}\n{fault}", config(&bus, "device", ""));
-    let mut device = End::open(&text, &Monotonic::shared());
+    let mut device = End::open(&text, &Monotonic::shared(), &KINDS);
     let master = Master::run(line.end(1), project());
     until_exchanging(&mut device, &master);
     for (number, extended) in [(101, &[0x80, 0x40, 0xA4][..]), (99, &[])] {

@@ -18,7 +18,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use peer::{Master, Project, SLOT, Slave};
-use rig::{ADDRESS, device, exchange, project, slave, until, until_exchanging};
+use rig::{ADDRESS, KINDS, device, exchange, project, slave, until, until_exchanging};
 use tickbus_base::time::Monotonic;
 use tickbus_conformance::rig::{End, await_that, logged};
 
@@ -117,7 +117,7 @@ fn two_masters_take_turns_and_either_goes_on_when_the_other_is_lost() {
              [[signal]]\nname = \"from {name}\"\nstation = \"{name}\"\naddress = \"%IW2\"\ntype = \"INT\""
         );
     }
-    let mut device = End::open(&text, &Monotonic::shared());
+    let mut device = End::open(&text, &Monotonic::shared(), &KINDS);
     let run = |end, address, station| {
         let one = Project {
             address,

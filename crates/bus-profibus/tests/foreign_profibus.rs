@@ -20,8 +20,8 @@ use std::time::Duration;
 use peer::{Master, Project, SLOT, Seen, Slave};
 use profirust::dp::PeripheralEvent;
 use rig::{
-    ADDRESS, IDENT, OnPort, RATES, device, device_at, exchange, project, project_at, slave, until,
-    until_exchanging,
+    ADDRESS, IDENT, KINDS, OnPort, RATES, device, device_at, exchange, project, project_at, slave,
+    until, until_exchanging,
 };
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance as conformance;
@@ -126,7 +126,7 @@ fn without_its_master_the_watchdog_makes_the_station_stale_at_once_and_it_comes_
         // Long enough that only the watchdog can be the reason.
         let text = config(&bus, "device", "").replace("\"300ms\"", "\"60s\"");
         let text = text.replace("baud = 500000", &format!("baud = {}", rate.1));
-        let mut device = End::open(&text, &Monotonic::shared());
+        let mut device = End::open(&text, &Monotonic::shared(), &KINDS);
         for number in [3, 4] {
             let master = Master::run(line.end(1), project_at(rate));
             until_exchanging(&mut device, &master);
@@ -155,7 +155,7 @@ fn the_master_gets_fail_safe_values_while_the_simulation_stands_still() {
     let line = pty::Line::new();
     let bus = OnPort(line.end(0).display().to_string());
     let text = config(&bus, "device", "watchdog = \"50ms\"");
-    let mut device = End::open(&text, &Monotonic::shared());
+    let mut device = End::open(&text, &Monotonic::shared(), &KINDS);
     let master = Master::run(line.end(1), project());
     until_exchanging(&mut device, &master);
     for number in [5, 6] {
@@ -323,7 +323,7 @@ fn a_station_with_a_mistake_does_not_hinder_the_others() {
         line.end(0).display(),
         SLOT - 1000
     );
-    let mut device = End::open(&text, &Monotonic::shared());
+    let mut device = End::open(&text, &Monotonic::shared(), &KINDS);
     let mistaken = Slave {
         address: 9,
         config: &[0x52],
@@ -354,7 +354,7 @@ fn an_answer_that_would_be_late_is_not_sent() {
     let text = text.replace("baud = 500000", "baud = 9600");
     let text = text.replace(&format!("max_tsdr = {}", SLOT - 1000), "max_tsdr = 60");
     let clock = Manual::new();
-    let device = End::open(&text, &clock);
+    let device = End::open(&text, &clock, &KINDS);
     let mut master = std::fs::OpenOptions::new()
         .read(true)
         .write(true)
@@ -374,7 +374,8 @@ fn an_answer_that_would_be_late_is_not_sent() {
 
 fn open(path: &std::path::Path) -> End {
     let logged = logged::Watch::new();
-    let config = tickbus_driver_cfg::Config::load(path).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        tickbus_driver_cfg::Config::load(path, &KINDS).unwrap_or_else(|why| panic!("{why}"));
     let driver = tickbus_driver::Driver::open(config, Monotonic::shared()).expect("opens");
     let slots = driver.initial_slots();
     End {

@@ -40,6 +40,10 @@ impl BusOptions for Options {
         Ok(Bus::Stepped(Box::new(bus)))
     }
 
+    fn is_stepped(&self) -> bool {
+        true
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }

@@ -13,10 +13,12 @@ use server::Server;
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos};
 use tickbus_conformance::rig::{End, await_that};
 use tickbus_driver::{Code, Host};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, Slot};
 use tickbus_virtual_time::{Outcome, Settings, StartCondition};
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_sdsp::Options>()]);
 
 /// The step of the machine and the server; the PLC scans every 10 ms.
 const STEP: Nanos = Nanos::from_millis(2);
@@ -35,7 +37,7 @@ fn config(port: u16, role: Role, file: &Path) -> Config {
         role.name(),
         file.display()
     );
-    Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"))
+    Config::parse("driver.cfg", &text, &KINDS).unwrap_or_else(|why| panic!("{why}"))
 }
 
 /// A machine that acts at random, partly depending on its inputs, but always in the same way.

@@ -12,7 +12,7 @@ use server::Server;
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos, Stop};
 use tickbus_conformance::rig::{End, SIGNALS};
 use tickbus_driver::{Code, Exchange, Host};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{Cause, LinkState};
 use tickbus_image::signal::DataType;
@@ -23,6 +23,8 @@ use tickbus_virtual_time::{
     Declaration, Ended, Outcome, Participant, Settings, StartCondition, Step, TraceHash, Variable,
     tcp,
 };
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_sdsp::Options>()]);
 
 const STEP: Nanos = Nanos::from_millis(1);
 
@@ -41,7 +43,7 @@ fn config(port: u16, role: &str, extra: &str) -> String {
 }
 
 fn open(port: u16, role: &str, extra: &str) -> End {
-    End::open(&config(port, role, extra), &Manual::new())
+    End::open(&config(port, role, extra), &Manual::new(), &KINDS)
 }
 
 /// The other end on a separate thread: ticks as long as the line has data, and lets `each` see and change them.
@@ -406,7 +408,7 @@ fn variables_are_named_by_station_or_as_one_likes() {
         tcp::join(&Address::local(port), &mut client).expect("it ends as planned");
         seen
     });
-    let mut machine = End::open(&text, &Manual::new());
+    let mut machine = End::open(&text, &Manual::new(), &KINDS);
     machine.set("out", -0.25);
     machine.set("back", -2.0);
     machine.tick();
@@ -447,7 +449,7 @@ impl Program for Counting {
 
 fn host(port: u16, extra: &str) -> Host {
     let text = config(port, "controller", extra);
-    let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse("driver.cfg", &text, &KINDS).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();
     Host::open(&config, Box::new(Counting), Nanos::from_millis(5), clock).expect("opens")
 }
@@ -537,12 +539,12 @@ fn a_run_in_shared_memory_is_that_over_tcp() {
         let text = |role: &str| config(0, role, "").replace("address = \"127.0.0.1:0\"", &at);
         let plc_text = text("controller");
         let plc = thread::spawn(move || {
-            let mut plc = End::open(&plc_text, &Manual::new());
+            let mut plc = End::open(&plc_text, &Manual::new(), &KINDS);
             while plc.tick().code == Code::Fresh {
                 plc.set("speed", plc.get("position") + 3.0);
             }
         });
-        let mut machine = End::open(&text("device"), &Manual::new());
+        let mut machine = End::open(&text("device"), &Manual::new(), &KINDS);
         while machine.tick().code == Code::Fresh {
             machine.set("position", machine.get("speed") + 2.0);
         }
@@ -580,7 +582,7 @@ fn a_pause_longer_than_the_time_out_is_waited_for() {
             .collect();
         let text = written.join("[[signal]]");
         thread::spawn(move || {
-            let mut machine = End::open(&text, &Manual::new());
+            let mut machine = End::open(&text, &Manual::new(), &KINDS);
             while machine.tick().code == Code::Fresh {}
             machine.link().reason
         })

@@ -176,7 +176,7 @@ pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
     let clock = Monotonic::shared();
     let open = |role| {
         let text = config(bus, role, "events = true").replace("300ms", "20s");
-        End::open(&text, &clock)
+        End::open(&text, &clock, bus.kinds())
     };
     let (mut device, mut controller) = (open("device"), open("controller"));
     controller.set("run", 1.0);
@@ -206,8 +206,8 @@ pub fn sends_fail_safe_values_while_it_is_blind(bus: &impl Bus) {
     let alive = "alive = { signal = \"position\", within = \"100ms\" }";
     let clock = Manual::new();
     let mut rig = Rig {
-        device: End::open(&config(bus, "device", ""), &clock),
-        controller: End::open(&config(bus, "controller", alive), &clock),
+        device: End::open(&config(bus, "device", ""), &clock, bus.kinds()),
+        controller: End::open(&config(bus, "controller", alive), &clock, bus.kinds()),
         clock,
     };
     rig.controller.set("speed", 10.0);
@@ -247,7 +247,7 @@ pub fn keeps_events_in_order(bus: &impl Bus) {
 /// Silence from the peer: stale, fail-safe values; and recovery, all by the injected clock.
 pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     let clock = Manual::new();
-    let mut device = End::open(&config(bus, "device", ""), &clock);
+    let mut device = End::open(&config(bus, "device", ""), &clock, bus.kinds());
     let first = device.tick();
     assert_eq!(
         (first.code, first.age),
@@ -304,7 +304,7 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
 pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
     let clock = Manual::new();
     let liar = bus.liar(&clock);
-    let mut device = End::open(&config(bus, "device", ""), &clock);
+    let mut device = End::open(&config(bus, "device", ""), &clock, bus.kinds());
     await_that("the device says what its peer did", || {
         pass(&clock, 1);
         device.tick();
@@ -347,10 +347,10 @@ pub fn survives_200_peers(bus: &impl Bus, test: &str) {
         return;
     }
     let clock = Manual::new();
-    let mut device = End::open(&config(bus, "device", ""), &clock);
+    let mut device = End::open(&config(bus, "device", ""), &clock, bus.kinds());
     let mut before = None;
     for life in 1..=WARM_UP + LIVES {
-        let mut controller = End::open(&config(bus, "controller", ""), &clock);
+        let mut controller = End::open(&config(bus, "controller", ""), &clock, bus.kinds());
         await_that("the next peer's value arrives", || {
             pass(&clock, 2);
             controller.set("speed", f64::from(life));
@@ -417,7 +417,7 @@ pub fn refuses_bad_configuration(bus: &impl Bus) {
             "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{table}\n\
              [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
         );
-        let told = match Config::parse("driver.cfg", &text) {
+        let told = match Config::parse("driver.cfg", &text, bus.kinds()) {
             Err(mistakes) => mistakes.to_string(),
             Ok(config) => match Driver::open(config, Manual::new()) {
                 Ok(_) => panic!("nothing was wrong with {table}"),
@@ -457,8 +457,8 @@ pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     let watches = format!("alive = {{ signal = \"copy\", {within} }}");
     let clock = Manual::new();
     let mut rig = Rig {
-        device: End::open(&config(bus, "device", &watched), &clock),
-        controller: End::open(&config(bus, "controller", &watches), &clock),
+        device: End::open(&config(bus, "device", &watched), &clock, bus.kinds()),
+        controller: End::open(&config(bus, "controller", &watches), &clock, bus.kinds()),
         clock,
     };
     let mut speed = 0.0;
@@ -504,7 +504,8 @@ pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
 /// Closing ends every thread even though the clock stands still.
 pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
     let clock = Manual::new();
-    let config = Config::parse("driver.cfg", &config(bus, "device", "")).expect("a right file");
+    let config =
+        Config::parse("driver.cfg", &config(bus, "device", ""), bus.kinds()).expect("a right file");
     Driver::open(config, clock).expect("opens").close();
 }
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_driver::{Code, Driver, Exchange};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::Link;
 use tickbus_image::signal::Slot;
 
@@ -56,8 +56,9 @@ pub struct End {
 }
 
 impl End {
-    pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>) -> Self {
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    /// Opens the driver of a driver.cfg with this text, which may name these `kinds` of bus.
+    pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>, kinds: &'static Kinds) -> Self {
+        let config = Config::parse("driver.cfg", text, kinds).unwrap_or_else(|why| panic!("{why}"));
         Self::of(config, clock)
     }
 
@@ -143,6 +144,9 @@ pub fn address(driver: &Driver) -> SocketAddr {
 
 /// A bus, with everything the suite needs to know about it.
 pub trait Bus {
+    /// The kinds of bus that its driver.cfg may name: its own.
+    fn kinds(&self) -> &'static Kinds;
+
     /// The `[fieldbus]` table of the end with `role`, without `role` and timing.
     fn fieldbus(&self, role: &str) -> String;
 
@@ -194,8 +198,8 @@ impl Rig {
     /// With further lines in the `[fieldbus]` table of both ends.
     pub fn with(bus: &impl Bus, extra: &str) -> Self {
         let clock = Manual::new();
-        let device = End::open(&config(bus, "device", extra), &clock);
-        let controller = End::open(&config(bus, "controller", extra), &clock);
+        let device = End::open(&config(bus, "device", extra), &clock, bus.kinds());
+        let controller = End::open(&config(bus, "controller", extra), &clock, bus.kinds());
         Self {
             clock,
             device,
@@ -206,7 +210,7 @@ impl Rig {
     /// A device that is open already, and a controller that connects to it.
     #[track_caller]
     pub fn around(bus: &impl Bus, clock: Arc<Manual>, device: End) -> Self {
-        let controller = End::open(&config(bus, "controller", ""), &clock);
+        let controller = End::open(&config(bus, "controller", ""), &clock, bus.kinds());
         let mut rig = Self {
             clock,
             device,

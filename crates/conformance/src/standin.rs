@@ -104,7 +104,7 @@ pub fn open(bus: &impl Bus, role: &str, extra: &str, clock: &Arc<Manual>) -> End
          max_age = \"300ms\"\nreconnect = [\"500ms\", \"10ms\"]\n{extra}\n{SIGNALS}",
         bus.fieldbus(role),
     );
-    End::open(&text, clock)
+    End::open(&text, clock, bus.kinds())
 }
 
 /// Lets time pass until the line is in `state` for `cause`; returns the reason.

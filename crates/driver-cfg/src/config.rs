@@ -6,12 +6,12 @@ use super::driver_table::read_driver;
 use super::layout;
 use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
-use crate::{Options, PageOptions};
+use crate::{Kinds, Options, PageOptions};
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
 use tickbus_fieldbus::faults::{self, Fault};
-use tickbus_fieldbus::{At, BusKind, Events, LifeSigns, Role, Written};
+use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
 use tickbus_image::signal::{Addressing, SignalTable, Station};
 use tickbus_record as record;
 
@@ -36,6 +36,8 @@ pub struct Config {
     pub timing: Timing,
     /// The options of the bus.
     pub bus: Options,
+    /// The kinds of bus with which it was read: [tables that replace its own](Self::overlaid) may name those.
+    pub kinds: &'static Kinds,
     /// What is reported as events.
     pub events: Events,
     /// The signals by which each end knows that the other one is alive.
@@ -60,19 +62,22 @@ pub struct CommandLineEnd {
     pub moved: bool,
 }
 
+/// What is known before a file is read.
+type Given = (Option<CommandLineEnd>, &'static Kinds);
+
 impl Config {
     /// The folder to which paths in the driver.cfg are relative.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Reads the driver.cfg at `path`.
+    /// Reads the driver.cfg at `path`, which may name these `kinds` of bus.
     ///
     /// # Errors
     ///
     /// When the file cannot be read or is not UTF-8, or with every mistake in it.
-    pub fn load(path: &Path) -> Result<Self, Mistakes> {
-        Self::load_as(path, None)
+    pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
+        Self::load_as(path, None, kinds)
     }
 
     /// Reads the driver.cfg at `path` for a separate process that serves the end `asked` for on its command
@@ -81,10 +86,14 @@ impl Config {
     /// # Errors
     ///
     /// As [`load`](Self::load); or the file states the other role; or its bus cannot leave the process.
-    pub fn load_as(path: &Path, asked: Option<CommandLineEnd>) -> Result<Self, Mistakes> {
+    pub fn load_as(
+        path: &Path,
+        asked: Option<CommandLineEnd>,
+        kinds: &'static Kinds,
+    ) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let shown = path.display().to_string();
-        let mut config = Self::parse_at(path, &shown, &text, asked)?;
+        let mut config = Self::parse_at(path, &shown, &text, (asked, kinds))?;
         let collector = Collector::new(&shown, &text);
         config
             .bus
@@ -129,8 +138,8 @@ impl Config {
     /// # Errors
     ///
     /// With every mistake in the text.
-    pub fn parse(file_name: &str, text: &str) -> Result<Self, Mistakes> {
-        Self::parse_as(file_name, text, None)
+    pub fn parse(file_name: &str, text: &str, kinds: &'static Kinds) -> Result<Self, Mistakes> {
+        Self::parse_as(file_name, text, None, kinds)
     }
 
     /// As [`parse`](Self::parse), for the end `asked` for on a command line; see [`load_as`](Self::load_as).
@@ -142,20 +151,16 @@ impl Config {
         file_name: &str,
         text: &str,
         asked: Option<CommandLineEnd>,
+        kinds: &'static Kinds,
     ) -> Result<Self, Mistakes> {
-        Self::parse_at(Path::new(file_name), file_name, text, asked)
+        Self::parse_at(Path::new(file_name), file_name, text, (asked, kinds))
     }
 
     /// As [`parse_as`](Self::parse_as), for a file at `path`, which need not be UTF-8: mistakes call it
     /// `shown`.
-    fn parse_at(
-        path: &Path,
-        shown: &str,
-        text: &str,
-        asked: Option<CommandLineEnd>,
-    ) -> Result<Self, Mistakes> {
+    fn parse_at(path: &Path, shown: &str, text: &str, given: Given) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(shown, text);
-        let config = read_text(&mut collector, text, |root| read(path, root, asked));
+        let config = read_text(&mut collector, text, |root| read(path, root, given));
         match collector.finish() {
             Some(mistakes) => Err(mistakes),
             None => Ok(config.expect("what is not read has a mistake")),
@@ -167,7 +172,7 @@ impl Config {
     clippy::too_many_lines,
     reason = "the tables of a file, one after the other"
 )]
-fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Option<Config> {
+fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let driver = root.require("driver", "write a [driver] table with id and name");
     let fieldbus = root.require("fieldbus", "write a [fieldbus] table with the kind of bus");
     let stations = root.take("station");
@@ -185,7 +190,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
         .map_or(Addressing::Bytes, |driver| driver.addressing);
     let mut fieldbus = fieldbus
         .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
-        .map(|table| read_fieldbus(table, asked));
+        .map(|table| read_fieldbus(table, given));
     let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     let replayed = replayed.and_then(Options::replayed);
     let record = record.map(|value| {
@@ -279,6 +284,7 @@ fn read(path: &Path, mut root: Table<'_>, asked: Option<CommandLineEnd>) -> Opti
         axes,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
+        kinds: given.1,
         events: fieldbus.events,
         life_signs,
         faults,
@@ -321,7 +327,7 @@ impl FieldbusTable<'_> {
     }
 }
 
-fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> FieldbusTable<'_> {
+fn read_fieldbus(mut table: Table<'_>, (asked, kinds): Given) -> FieldbusTable<'_> {
     let kind = table.require("kind", "write the kind of bus, such as kind = \"loopback\"");
     let role = table.take("role");
     let life_signs = Written::take(&mut table);
@@ -344,12 +350,12 @@ fn read_fieldbus(mut table: Table<'_>, asked: Option<CommandLineEnd>) -> Fieldbu
     let read = if let Some(kind) = kind {
         let moved = asked.is_some_and(|asked| asked.moved);
         // A loopback is no command's line, which is said below: of a role that only the command gave, nothing is.
-        let is_loopback = kind.as_text() == Some(<loopback::Options as BusKind>::NAME);
+        let is_loopback = kind.as_text() == Some(loopback::NAME);
         let as_written = match stated {
             None if is_loopback => Role::default(),
             _ => role,
         };
-        let read = Options::read(&kind, as_written, moved, table);
+        let read = kinds.read(&kind, as_written, moved, table);
         if let (Some((bus, _)), Some(_)) = (&read, asked)
             && bus.is_in_process()
         {
@@ -387,8 +393,7 @@ mod tests {
     use crate::loopback::{self, Peer};
     use crate::timing::{LEAST_MAX_AGE, RECONNECT};
     use tickbus_base::time::Nanos;
-    use tickbus_bus_socket::TcpRole;
-    use tickbus_image::signal::{Area, ByteOrder, DataType, Latch, Signal, Slot};
+    use tickbus_image::signal::{DataType, Latch, Signal, Slot};
 
     const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
                         link = \"cell\"\n";
@@ -397,129 +402,10 @@ mod tests {
     #[track_caller]
     fn signal(keys: &str) -> Signal {
         let text = format!("{HEAD}[[signal]]\nname = \"A\"\n{keys}\n");
-        match Config::parse("test.cfg", &text) {
+        match Config::parse("test.cfg", &text, &Kinds::LOOPBACK) {
             Ok(mut config) => config.table.signals.remove(0),
             Err(mistakes) => panic!("{mistakes}"),
         }
-    }
-
-    fn rig() -> Config {
-        rig_as(Role::Device)
-    }
-
-    fn rig_as(role: Role) -> Config {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../driver.cfg");
-        let asked = CommandLineEnd { role, moved: false };
-        Config::load_as(&path, Some(asked)).unwrap_or_else(|mistakes| panic!("{mistakes}"))
-    }
-
-    /// The rig's words in the numbering of its builders: each bit of the WORD, and its signal.
-    const COMMAND_WORD: [(usize, &str); 13] = [
-        (0, "IM1 index"),
-        (1, "IM1 jog"),
-        (2, "LA1 run"),
-        (3, "LA1 code low"),
-        (4, "LA1 code high"),
-        (5, "SC1"),
-        (7, "IM2 index"),
-        (8, "IM2 jog"),
-        (10, "LA2 run"),
-        (11, "LA2 up"),
-        (12, "SC2"),
-        (13, "Lamp"),
-        (15, "Acknowledge"),
-    ];
-    const STATUS_WORD: [(usize, &str); 11] = [
-        (0, "Step 1 complete"),
-        (1, "Step 2 complete"),
-        (2, "Step 3 complete"),
-        (3, "Step 4 complete"),
-        (4, "Step 5 complete"),
-        (5, "Step 6 complete"),
-        (11, "Package sensor 1"),
-        (12, "Package sensor 2"),
-        (13, "Homing sensor 1"),
-        (14, "Homing sensor 2"),
-        (15, "Not OK"),
-    ];
-
-    #[test]
-    fn both_rig_words_lie_bit_by_bit_as_their_builders_counted() {
-        let table = rig().table;
-        for (area, word) in [
-            (Area::Output, &COMMAND_WORD[..]),
-            (Area::Input, &STATUS_WORD[..]),
-        ] {
-            for (bit, name) in word {
-                let signal = &table.signals[table.position(name).expect(name)];
-                assert_eq!(
-                    (signal.area, signal.data_type),
-                    (area, DataType::Bool),
-                    "{name}"
-                );
-                // Big-endian: bit n of the WORD at byte k is byte k + 1 - n/8, bit n mod 8.
-                let place = (signal.byte, usize::from(signal.bit));
-                assert_eq!(place, (1 - bit / 8, bit % 8), "{name}");
-                assert_eq!(place, ByteOrder::Abcd.bit_position(2, *bit), "{name}");
-                // The word itself with this bit set, as a big-endian PLC sends it.
-                let frame = (1u16 << bit).to_be_bytes();
-                assert_eq!(usize::from(frame[signal.byte]), 1 << signal.bit, "{name}");
-                // With swapped bytes the bit is in the other byte.
-                let swapped = ByteOrder::Dcba.bit_position(2, *bit);
-                assert_eq!(swapped, (bit / 8, bit % 8), "{name}");
-                assert_eq!(
-                    usize::from((1u16 << bit).to_le_bytes()[swapped.0]),
-                    1 << swapped.1
-                );
-                assert_eq!(ByteOrder::Badc.bit_position(2, *bit), swapped, "{name}");
-            }
-            let in_word = table
-                .signals
-                .iter()
-                .filter(|signal| signal.area == area && signal.byte < 2);
-            assert_eq!(in_word.count(), word.len());
-        }
-    }
-
-    #[test]
-    fn the_rig_reads_whole() {
-        let config = rig();
-        assert_eq!(
-            (config.id, config.name.as_str(), config.role),
-            (4711, "Test rig", Role::Device)
-        );
-        let bytes = |area| config.table.stations[0].bytes(area);
-        assert_eq!((bytes(Area::Input), bytes(Area::Output)), (8, 8));
-        assert_eq!(config.timing.cycle, Some(Nanos::from_millis(2)));
-        assert_eq!(config.timing.max_age, Nanos::from_millis(250));
-        assert_eq!(config.timing.watchdog, None);
-        let Options::Socket(bus) = &config.bus else {
-            panic!("a socket");
-        };
-        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
-        assert_eq!(bus.tcp, TcpRole::Listen);
-        for cup in ["SC1", "SC2"] {
-            let signal = &config.table.signals[config.table.position(cup).expect(cup)];
-            assert_eq!(
-                signal.fail_safe,
-                Slot::from_real(1.0),
-                "{cup} must not let go"
-            );
-        }
-        let position = &config.table.signals[config.table.position("LA1 position").unwrap()];
-        let scale = position.scale.expect("a scale");
-        assert!((scale.value(27_648.0) - 250.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn the_rig_s_file_serves_its_plc_as_well() {
-        let (device, controller) = (rig(), rig_as(Role::Controller));
-        assert_eq!(controller.table, device.table);
-        let Options::Socket(bus) = &controller.bus else {
-            panic!("a socket");
-        };
-        assert_eq!(bus.address.to_string(), "127.0.0.1:20030");
-        assert_eq!(bus.tcp, TcpRole::Connect);
     }
 
     #[test]
@@ -584,17 +470,22 @@ mod tests {
                 "link = \"cell\"",
                 &format!("program = \"{name}\"\n{option}"),
             );
-            let config = Config::parse("test.cfg", &format!("{head}input_bytes = 1\n"))
-                .unwrap_or_else(|mistakes| panic!("{mistakes}"));
-            let Options::Loopback(loopback::Options {
+            let config = Config::parse(
+                "test.cfg",
+                &format!("{head}input_bytes = 1\n"),
+                &Kinds::LOOPBACK,
+            )
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+            let options = config.bus.downcast_ref::<loopback::Options>();
+            let Some(loopback::Options {
                 peer: Peer::Program { name, options, .. },
                 ..
-            }) = config.bus
+            }) = options
             else {
                 panic!("a hosted program");
             };
             assert_eq!(
-                tickbus_programs::program(&name, &options)
+                tickbus_programs::program(name, options)
                     .expect("a program")
                     .name(),
                 name
@@ -615,7 +506,7 @@ mod tests {
     fn times_have_their_defaults() {
         let timing = |keys: &str| {
             let text = format!("{HEAD}{keys}\ninput_bytes = 1\n");
-            Config::parse("test.cfg", &text)
+            Config::parse("test.cfg", &text, &Kinds::LOOPBACK)
                 .unwrap_or_else(|m| panic!("{m}"))
                 .timing
         };
@@ -630,37 +521,13 @@ mod tests {
     }
 
     #[test]
-    fn single_writes_are_events_where_the_bus_learns_of_them() {
-        for (kind, may) in [
-            ("modbus-server", true),
-            ("s7-server", true),
-            ("opcua-server\"\nanonymous = true\nhost = \"a", true),
-            ("loopback\"\nlink = \"cell", false),
-            ("socket", false),
-        ] {
-            let read = |events: &str| {
-                let text = format!(
-                    "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"{kind}\"\n{events}\n\
-                     [[signal]]\nname = \"A\"\naddress = \"%QW0\"\n"
-                );
-                Config::parse("test.cfg", &text).map(|config| config.events)
-            };
-            assert_eq!(read(""), Ok(Events::None), "{kind}");
-            assert_eq!(read("events = false"), Ok(Events::None), "{kind}");
-            assert_eq!(read("events = true"), Ok(Events::Changes), "{kind}");
-            let writes = read("events = \"writes\"");
-            assert_eq!(writes.ok(), may.then_some(Events::Writes), "{kind}");
-        }
-    }
-
-    #[test]
     fn a_thousand_mistakes_are_told_in_no_time() {
         let section = |number: i32| {
             format!("[[signal]]\nname = \"S{number}\"\naddress = \"%QX0.0\"\nhold = x\n")
         };
         let sections = (0..1000).map(section);
         let text: String = std::iter::once(HEAD.to_owned()).chain(sections).collect();
-        let mistakes = Config::parse("test.cfg", &text).expect_err("mistakes");
+        let mistakes = Config::parse("test.cfg", &text, &Kinds::LOOPBACK).expect_err("mistakes");
         assert_eq!(mistakes.len(), 1000);
     }
 }

@@ -1,222 +1,165 @@
-//! The bus kinds: a line for each.
+//! The kinds of bus that a driver.cfg can name. They are handed in: this crate knows the loopback alone, and a bus of somebody
+//! else's is one more line in the list of the program that has it.
 
-use std::ops::{Deref, DerefMut};
-use std::path::Path;
+use std::fmt;
 
-use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
-use tickbus_bus_dispatcher as dispatcher;
-use tickbus_bus_hilscher as hilscher;
-use tickbus_bus_identification as identification;
-use tickbus_bus_interbus as interbus;
-use tickbus_bus_modbus as modbus;
-use tickbus_bus_opcua as opcua;
-use tickbus_bus_plugin as plugin;
-use tickbus_bus_profibus as profibus;
-use tickbus_bus_s7 as s7;
-use tickbus_bus_sdsp as sdsp;
-use tickbus_bus_socket as socket;
-use tickbus_fieldbus::{At, BusKind, BusOptions, Events, Role};
-use tickbus_image::signal::SignalTable;
+use tickbus_fieldbus::{BusKind, BusOptions, Events, Role};
 
-use crate::loopback;
+use crate::{Options, loopback};
 
-/// Makes all that has a part for each kind from one line of it.
-macro_rules! kinds {
-    (
-        exported: $($(#[doc = $doc:literal])+ $own:ident($own_options:ty),)+
-        by_hand: $($(#[doc = $hand_doc:literal])+ $(#[cfg($cfg:meta)])? $hand:ident($hand_options:ty),)+
-    ) => {
-        /// What the `[fieldbus]` table configures, by bus kind. It dereferences to what all kinds have in common.
-        #[derive(Clone, Debug, PartialEq, Eq)]
-        pub enum Options {
-            $($(#[doc = $doc])+ $own($own_options),)+
-            $($(#[doc = $hand_doc])+ $(#[cfg($cfg)])? $hand($hand_options),)+
-        }
+/// Reads the keys of one kind in `[fieldbus]`; see [`BusKind::read`].
+type ReadOptions = fn(Role, bool, &mut Table<'_>) -> Option<Box<dyn BusOptions>>;
 
-        /// The kinds as the PLC's half of a line is made for them. There is no other match on them, and none without all
-        /// of them: an export that a kind lacks is a mistake of the compiler's.
-        #[derive(Clone, Copy, Debug)]
-        pub enum Exported<'a> {
-            $($(#[doc = $doc])+ $own(&'a $own_options),)+
-            /// A bus, by its kind, whose other end no PLC editor has a program for: the user writes it by hand.
-            ByHand(&'static str),
-        }
-
-        /// The bus kinds in this version.
-        const BUILT: &[&str] = &[
-            $(<$own_options as BusKind>::NAME,)+
-            $($(#[cfg($cfg)])? <$hand_options as BusKind>::NAME,)+
-        ];
-
-        impl Options {
-            /// The bus kind as a driver.cfg names it.
-            pub const fn kind(&self) -> &'static str {
-                match self {
-                    $(Self::$own(_) => <$own_options as BusKind>::NAME,)+
-                    $($(#[cfg($cfg)])? Self::$hand(_) => <$hand_options as BusKind>::NAME,)+
-                }
-            }
-
-            /// What the exports go by.
-            pub const fn exported(&self) -> Exported<'_> {
-                match self {
-                    $(Self::$own(options) => Exported::$own(options),)+
-                    $($(#[cfg($cfg)])? Self::$hand(_) => Exported::ByHand(self.kind()),)+
-                }
-            }
-
-            /// Reads the keys of a kind in `BUILT`.
-            fn read_kind(kind: &str, role: Role, moved: bool, table: Table<'_>) -> Option<(Self, Events)> {
-                $(if kind == <$own_options as BusKind>::NAME {
-                    return read_keys(role, moved, table).map(|(options, events)| (Self::$own(options), events));
-                })+
-                $($(#[cfg($cfg)])? if kind == <$hand_options as BusKind>::NAME {
-                    return read_keys(role, moved, table).map(|(options, events)| (Self::$hand(options), events));
-                })+
-                unreachable!("{kind} is a kind of this version")
-            }
-        }
-
-        impl Deref for Options {
-            type Target = dyn BusOptions;
-
-            fn deref(&self) -> &Self::Target {
-                match self {
-                    $(Self::$own(options) => options,)+
-                    $($(#[cfg($cfg)])? Self::$hand(options) => options,)+
-                }
-            }
-        }
-
-        impl DerefMut for Options {
-            fn deref_mut(&mut self) -> &mut Self::Target {
-                match self {
-                    $(Self::$own(options) => options,)+
-                    $($(#[cfg($cfg)])? Self::$hand(options) => options,)+
-                }
-            }
-        }
-    };
+/// A kind of bus, for a list of them.
+#[derive(Clone, Copy)]
+pub struct Kind {
+    name: &'static str,
+    learns_of_writes: bool,
+    read: ReadOptions,
 }
 
-// A kind whose PLC has a half in an editor goes to the first list, and every export says what it makes of it.
-kinds! {
-    exported:
-    /// `kind = "loopback"`: both ends in one process.
-    Loopback(loopback::Options),
-    /// `kind = "socket"`: records of fixed size over TCP.
-    Socket(socket::Options),
-    /// `kind = "modbus-server"`: Modbus clients read and write the image.
-    ModbusServer(modbus::ServerOptions),
-    /// `kind = "modbus-client"`: reads and writes the tables of a Modbus server.
-    ModbusClient(modbus::ClientOptions),
-    /// `kind = "s7-server"`: S7 communication clients read and write the image.
-    S7Server(s7::ServerOptions),
-    /// `kind = "s7-client"`: reads and writes the memory of a CPU.
-    S7Client(s7::ClientOptions),
-    /// `kind = "opcua-client"`: for PLCs that are OPC UA servers.
-    OpcuaClient(opcua::ClientOptions),
-    /// `kind = "opcua-server"`: for PLCs that are OPC UA clients.
-    OpcuaServer(opcua::ServerOptions),
-    by_hand:
-    /// `kind = "profibus-device"`: DP slaves in software on a serial line.
-    ProfibusDevice(profibus::Options),
-    /// `kind = "hilscher-cif"`: a card of the generation before.
-    HilscherCif(hilscher::cif::Options),
-    /// `kind = "hilscher-cifx"`: a cifX or netX card.
-    HilscherCifx(hilscher::cifx::Options),
-    /// `kind = "interbus-ddi"`: an INTERBUS controller board.
-    InterbusDdi(interbus::Options),
-    /// `kind = "ivi-client"`: asks a reader of code carriers.
-    IviClient(identification::ClientOptions),
-    /// `kind = "ivi-reader"`: a simulated reader of code carriers.
-    IviReader(identification::ReaderOptions),
-    /// `kind = "sdsp"`: a client of a run on virtual time.
-    Sdsp(sdsp::Options),
-    /// `kind = "dispatcher"`: a client of a virtual laboratory.
-    Dispatcher(dispatcher::Options),
-    /// `kind = "plugin"`: a vendor's shared library.
-    Plugin(plugin::Options),
-    /// `kind = "mailbox"`: the example of `examples/bus-mailbox`.
-    #[cfg(feature = "example-bus")]
-    Mailbox(tickbus_bus_mailbox::Options),
+impl Kind {
+    /// The kind whose options are a `K`.
+    pub const fn of<K: BusKind>() -> Self {
+        Self {
+            name: K::NAME,
+            learns_of_writes: K::LEARNS_OF_WRITES,
+            read: |role, moved, table| {
+                let options = K::read(role, moved, table)?;
+                Some(Box::new(options))
+            },
+        }
+    }
 }
 
-impl Options {
-    /// The recording that replaces the peer, as named in the driver.cfg.
-    pub fn replayed(&self) -> Option<&Path> {
-        match self {
-            Self::Loopback(loopback::Options {
-                peer: loopback::Peer::Replay(file),
-                ..
-            }) => Some(file),
-            _ => None,
+impl fmt::Debug for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.name.fmt(f)
+    }
+}
+
+/// The kinds that a program has: the loopback, and those of its list.
+///
+/// A program makes one `static` of it, and hands that to whatever reads a driver.cfg:
+///
+/// ```ignore
+/// static KINDS: Kinds = Kinds::new(&[Kind::of::<modbus::ServerOptions>()]);
+/// static WITH_MINE: Kinds = KINDS.and(&[Kind::of::<my_bus::Options>()]);
+/// ```
+pub struct Kinds {
+    /// Those to which `buses` were added.
+    others: Option<&'static Self>,
+    buses: &'static [Kind],
+    advice: &'static [(&'static str, &'static str)],
+}
+
+impl Kinds {
+    /// The loopback alone.
+    pub const LOOPBACK: Self = Self::new(&[]);
+
+    /// The loopback and these buses.
+    pub const fn new(buses: &'static [Kind]) -> Self {
+        Self {
+            others: None,
+            buses,
+            advice: &[],
         }
     }
 
-    /// Replaces the address from the driver.cfg by one from a command line.
-    ///
-    /// # Errors
-    ///
-    /// The bus has no address, or the text is not a valid one.
-    pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
-        let kind = self.kind();
-        self.deref_mut().set_address(address).unwrap_or_else(|| {
-            Err(Mistake::new(
-                format!("the bus \"{kind}\" has no address"),
-                format!("remove \"{address}\" from the command"),
-            ))
-        })
+    /// The same with advice for names that people try and that are no kind: for each, in lower case, what would be right.
+    #[must_use]
+    pub const fn with_advice(self, advice: &'static [(&'static str, &'static str)]) -> Self {
+        Self { advice, ..self }
     }
 
-    /// Takes the lines of `[fieldbus.at]`: the addresses of signals in the device. Reports invalid addresses,
-    /// or that the bus has no addresses of its own.
-    pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
-        if self.has_addresses() {
-            self.deref_mut().place_signals(lines, table);
-        } else if let Some(first) = lines.first() {
-            first.wrong(
-                format!("the bus \"{}\" has no addresses of its own", self.kind()),
-                "remove [fieldbus.at]; each signal lies where its \"address\" says",
-            );
+    /// These and further buses. A kind that is there already keeps its name.
+    #[must_use]
+    pub const fn and(&'static self, buses: &'static [Kind]) -> Self {
+        Self {
+            others: Some(self),
+            buses,
+            advice: self.advice,
         }
+    }
+
+    /// The names of all kinds.
+    pub fn names(&self) -> Vec<&'static str> {
+        let mut names = match self.others {
+            Some(others) => others.names(),
+            None => vec![loopback::NAME],
+        };
+        names.extend(self.buses.iter().map(|kind| kind.name));
+        names
+    }
+
+    fn find(&self, name: &str) -> Option<&Kind> {
+        let others = self.others.and_then(|others| others.find(name));
+        others.or_else(|| self.buses.iter().find(|kind| kind.name == name))
     }
 
     /// Reads `events` and the keys of the bus kind `kind`, and reports their mistakes. `moved` says that another
     /// address will replace the one that is read.
     ///
     /// The table is finished: keys that are left in it are unknown, unless the bus kind itself is unknown.
-    pub fn read(
+    pub(super) fn read(
+        &self,
         kind: &Value<'_>,
         role: Role,
         moved: bool,
-        table: Table<'_>,
-    ) -> Option<(Self, Events)> {
-        let first = BUILT[0];
+        mut table: Table<'_>,
+    ) -> Option<(Options, Events)> {
         let name = kind.text(&format!(
-            "write the kind of bus in quotes, such as \"{first}\""
+            "write the kind of bus in quotes, such as \"{}\"",
+            loopback::NAME
         ));
-        match name {
-            Some(name) if BUILT.contains(&name) => Self::read_kind(name, role, moved, table),
+        let (options, learns_of_writes) = match name.map(|name| (name, self.find(name))) {
+            Some((loopback::NAME, _)) => {
+                let options = loopback::Options::read(role, &mut table);
+                (options.map(Options::from), false)
+            }
+            Some((_, Some(kind))) => {
+                let options = (kind.read)(role, moved, &mut table);
+                let options = options.map(|options| Options::named(kind.name, options));
+                (options, kind.learns_of_writes)
+            }
             other => {
                 table.finish_open();
-                report_kind(kind, other?);
-                None
+                self.report(kind, other?.0);
+                return None;
             }
-        }
+        };
+        let events = table.take("events");
+        table.finish();
+        let events = events.map_or(Some(Events::None), |value| {
+            read_events(&value, learns_of_writes)
+        });
+        Some((options?, events?))
+    }
+
+    /// Reports that no kind is called `name`.
+    fn report(&self, kind: &Value<'_>, name: &str) {
+        let lower = name.to_ascii_lowercase();
+        let advice = self.advice.iter().find(|(known, _)| *known == lower);
+        let right = match advice {
+            Some((_, right)) => (*right).to_owned(),
+            None => did_you_mean(name, "bus kinds", &self.names()),
+        };
+        kind.wrong(format!("bus kind \"{}\" is unknown", shown(name)), right);
     }
 }
 
-/// Reads the keys of one kind, and `events`, which all kinds have.
-fn read_keys<K: BusKind>(role: Role, moved: bool, mut table: Table<'_>) -> Option<(K, Events)> {
-    let options = K::read(role, moved, &mut table);
-    let events = table.take("events");
-    table.finish();
-    let events = events.map_or(Some(Events::None), |value| {
-        read_events(&value, K::LEARNS_OF_WRITES)
-    });
-    Some((options?, events?))
+impl fmt::Debug for Kinds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Kinds").field(&self.names()).finish()
+    }
+}
+
+/// Lists of the same kinds are equal.
+impl PartialEq for Kinds {
+    fn eq(&self, other: &Self) -> bool {
+        self.names() == other.names()
+    }
 }
 
 fn read_events(value: &Value<'_>, has_writes: bool) -> Option<Events> {
@@ -235,16 +178,4 @@ fn read_events(value: &Value<'_>, has_writes: bool) -> Option<Events> {
         return None;
     }
     Some(Events::Writes)
-}
-
-fn report_kind(kind: &Value<'_>, name: &str) {
-    let right = match name.to_ascii_lowercase().as_str() {
-        "profinet" | "ethercat" | "ethernet-ip" | "ethernetip" | "canopen" | "devicenet" | "powerlink" => {
-            "this bus needs a card: kind = \"hilscher-cifx\" (docs/hilscher.md), or \"plugin\" for another vendor's; \
-             docs/which-bus.md lists what suits each PLC"
-                .to_owned()
-        }
-        _ => did_you_mean(name, "bus kinds", BUILT),
-    };
-    kind.wrong(format!("bus kind \"{}\" is unknown", shown(name)), right);
 }

@@ -1,17 +1,19 @@
 //! driver.cfg as a whole: one driver's signals, stations and timing, and what its bus needs to know.
 //!
-//! [`Config`] is what a file says, checked; [`Options`] lists the bus kinds.
+//! [`Config`] is what a file says, checked. The bus kinds that it may name are [handed in](Kinds).
 
 mod config;
 mod driver_table;
 mod kinds;
 mod layout;
 pub mod loopback;
+mod options;
 mod overlay;
 mod page;
 mod timing;
 
 pub use config::{CommandLineEnd, Config};
-pub use kinds::{Exported, Options};
+pub use kinds::{Kind, Kinds};
+pub use options::Options;
 pub use page::PageOptions;
 pub use timing::Timing;

@@ -5,11 +5,14 @@ use std::path::{Path, PathBuf};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
-use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL};
 use tickbus_programs::{self as programs, PROGRAMS};
 use tickbus_record as record;
+
+/// The kind, as a driver.cfg names it.
+pub const NAME: &str = "loopback";
 
 /// The longest name of a link, in characters.
 const LINK_LIMIT: usize = 120;
@@ -131,14 +134,6 @@ impl Options {
     }
 }
 
-impl BusKind for Options {
-    const NAME: &'static str = "loopback";
-
-    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
-        Self::read(role, table)
-    }
-}
-
 impl BusOptions for Options {
     fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
         let mode = match self.mode {
@@ -196,6 +191,10 @@ impl BusOptions for Options {
 
     fn is_in_process(&self) -> bool {
         true
+    }
+
+    fn is_stepped(&self) -> bool {
+        self.mode == Mode::Stepped || matches!(self.peer, Peer::Replay(_))
     }
 }
 

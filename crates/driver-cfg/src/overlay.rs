@@ -73,7 +73,7 @@ fn read_fieldbus(
             None => config.role,
             Some(value) => value.choice("roles", &roles)?,
         };
-        let (mut bus, events) = Options::read(&kind, role, false, table)?;
+        let (mut bus, events) = config.kinds.read(&kind, role, false, table)?;
         read_stations(&mut bus, &config.table, stations, &kind, collector);
         if let Some(at) = &at {
             bus.place_signals(&At::read(at, &config.table), &config.table);
@@ -101,7 +101,7 @@ fn read_fieldbus(
     let mode = mode?;
     let chosen = mode.choice("modes", &loopback::Mode::NAMES)?;
     let kind = config.bus.kind();
-    if let Options::Loopback(options) = &mut config.bus {
+    if let Some(options) = config.bus.downcast_mut::<loopback::Options>() {
         options.mode = chosen;
         return Some(());
     }
@@ -167,6 +167,7 @@ fn read_stations(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Kinds;
     use crate::loopback::{Mode, Peer};
     use tickbus_base::time::Nanos;
 
@@ -175,7 +176,13 @@ mod tests {
             "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nmax_age = \"3s\"\ninput_bytes = 8\n{fieldbus}\n\
              [[signal]]\nname = \"A\"\naddress = \"%IX0.0\"\n"
         );
-        Config::parse("plant.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+        Config::parse("plant.cfg", &text, &Kinds::LOOPBACK)
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"))
+    }
+
+    #[track_caller]
+    fn loopback(config: &Config) -> &loopback::Options {
+        config.bus.downcast_ref().expect("a loopback")
     }
 
     fn refusal(text: &str) -> String {
@@ -189,9 +196,7 @@ mod tests {
         let plant = plant("kind = \"loopback\"\nlink = \"cell\"");
         let other = "[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nprogram = \"mirror\"\nscan = \"5ms\"\n";
         let test = plant.clone().overlaid("test", other).expect("right");
-        let Options::Loopback(options) = &test.bus else {
-            panic!("{:?}", test.bus)
-        };
+        let options = loopback(&test);
         assert_eq!(options.mode, Mode::Stepped);
         assert!(
             matches!(&options.peer, Peer::Program { name, scan, .. } if name == "mirror" && *scan == Some(Nanos::from_millis(5)))
@@ -205,27 +210,11 @@ mod tests {
     }
 
     #[test]
-    fn a_controller_on_another_bus_ends_as_one_that_its_file_puts_there() {
-        let end = "kind = \"socket\"\nrole = \"controller\"\naddress = \"10.0.0.1:2000\"\n";
-        for stated in [
-            "",
-            "watchdog = \"off\"",
-            "at_close = \"hold\"\nwhile_stale = \"hold\"",
-        ] {
-            let machine = plant(&format!("kind = \"loopback\"\nlink = \"cell\"\n{stated}"));
-            let overlaid = machine.overlaid("other tables", &format!("[fieldbus]\n{end}"));
-            let right = plant(&format!("{end}{stated}"));
-            assert_eq!(overlaid.expect("right").timing, right.timing, "{stated}");
-        }
-    }
-
-    #[test]
     fn a_table_without_a_kind_changes_the_mode_of_the_file_s_own_bus() {
         let plant = plant("kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"7ms\"");
         let test = plant.overlaid("test", "[fieldbus]\nmode = \"stepped\"\n");
-        let Options::Loopback(options) = test.expect("right").bus else {
-            panic!("a loopback")
-        };
+        let test = test.expect("right");
+        let options = loopback(&test);
         assert_eq!(options.mode, Mode::Stepped);
         assert!(
             matches!(options.peer, Peer::Program { scan, .. } if scan == Some(Nanos::from_millis(7)))
@@ -244,51 +233,6 @@ mod tests {
             "other tables:1:1: [fieldbus] has no \"mode\"; write the mode of the file's own bus, or a kind\n\
              other tables:2:1: unknown key \"scan\" in [fieldbus]; keys here are kind, mode"
         );
-    }
-
-    const TWO_PLCS: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
-                            [[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n\
-                            [[signal]]\nname = \"a\"\naddress = \"%QX0.0\"\nstation = \"A\"\n\
-                            [[signal]]\nname = \"b\"\naddress = \"%QX0.0\"\nstation = \"B\"\n";
-
-    fn with_two_plcs(tables: &str) -> Result<Config, String> {
-        let plant = Config::parse("plant.cfg", TWO_PLCS).unwrap_or_else(|wrong| panic!("{wrong}"));
-        let overlaid = plant.overlaid("other tables", tables);
-        overlaid.map_err(|mistakes| mistakes.to_string())
-    }
-
-    #[test]
-    fn another_bus_is_told_of_the_stations_and_what_it_lacks_of_them_is_a_mistake() {
-        let told =
-            with_two_plcs("[fieldbus]\nkind = \"modbus-client\"\naddress = \"10.0.0.1:502\"\n");
-        let told = told.expect_err("stations have units");
-        for name in ["A", "B"] {
-            let lacks = format!("other tables:2:8: [[station]] \"{name}\" has no \"unit\"");
-            assert!(told.contains(&lacks), "{told}");
-        }
-        let units = "[[station]]\nname = \"B\"\nunit = 2\n[[station]]\nname = \"A\"\nunit = 1\n";
-        let table = "[fieldbus]\nkind = \"modbus-server\"\n";
-        let right = with_two_plcs(&format!("{table}{units}")).expect("right");
-        let told = format!("{:?}", right.bus);
-        let place = |unit: &str| {
-            told.find(unit)
-                .unwrap_or_else(|| panic!("no {unit} in {told}"))
-        };
-        assert!(
-            place("unit: Some(1)") < place("unit: Some(2)"),
-            "A is the first"
-        );
-        let told = with_two_plcs(&format!("{table}{}", units.replace("\"B\"", "\"C\"")));
-        assert!(
-            told.expect_err("no C")
-                .contains("the driver.cfg has no station \"C\"")
-        );
-    }
-
-    #[test]
-    fn another_bus_has_to_fit_the_signals() {
-        let told = with_two_plcs("[fieldbus]\nkind = \"socket\"\nmessage = \"axis\"\n");
-        assert!(told.expect_err("no axes").starts_with("other tables:"));
     }
 
     #[test]

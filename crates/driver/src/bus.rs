@@ -4,8 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tickbus_base::time::{Clock, Nanos};
-use tickbus_driver_cfg::Options;
-use tickbus_driver_cfg::loopback::{Mode, Peer};
+use tickbus_driver_cfg::loopback::{Mode, Options, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
 use tickbus_fieldbus::{BusSetup, Hosted, OpenError, Role};
 use tickbus_image::signal::Area;
@@ -25,7 +24,7 @@ pub(super) fn open(
     clock: &Arc<dyn Clock>,
     hosted: Option<Hosted<'_>>,
 ) -> Result<(OpenBus, Option<Program>), DriverError> {
-    if let Options::Loopback(options) = &config.bus {
+    if let Some(options) = config.bus.downcast_ref::<Options>() {
         match &options.peer {
             Peer::Link(_) => {}
             Peer::Replay(file) => {
@@ -112,31 +111,4 @@ fn open_hosted(
         OpenBus::Free(bus(device)),
         Some(Program::Thread(Box::new(host))),
     ))
-}
-
-#[cfg(all(test, not(feature = "opcua")))]
-mod tests {
-    use super::*;
-    use crate::Driver;
-    use tickbus_base::time::Manual;
-
-    #[test]
-    fn a_bus_that_is_not_in_this_build_says_how_to_get_it() {
-        for table in [
-            "kind = \"opcua-client\"\nurl = \"opc.tcp://127.0.0.1\"",
-            "kind = \"opcua-server\"\nanonymous = true",
-        ] {
-            let text = format!(
-                "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\n{table}\n\
-                 [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n"
-            );
-            let config = Config::parse("driver.cfg", &text).expect("a right file");
-            let error = Driver::open(config, Manual::new()).expect_err("it is not there");
-            assert_eq!(error.code(), crate::Code::Unsupported);
-            let told = error.to_string();
-            for part in ["driver.cfg: ", "opcua-", "--features opcua", "make dist"] {
-                assert!(told.contains(part), "\"{part}\" in {told}");
-            }
-        }
-    }
 }

@@ -41,7 +41,11 @@ impl Host {
 
     /// As [`open`](Self::open), without the watchdog: on a busy computer a late scan changes no values on the bus. For
     /// a program whose peer waits for it.
-    pub(crate) fn open_patient(
+    ///
+    /// # Errors
+    ///
+    /// As [`open`](Self::open).
+    pub fn open_patient(
         config: &Config,
         program: Box<dyn Program>,
         interval: Nanos,

@@ -476,7 +476,8 @@ mod tests {
                 let signal = format!("name = \"{place}\"\naddress = \"%{place}\"");
                 text.extend(["[[signal]]\n", &signal, "\nlatch = \"both\"\n"]);
             }
-            let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+            let config = Config::parse("driver.cfg", &text, &crate::KINDS)
+                .unwrap_or_else(|why| panic!("{why}"));
             let clock = Manual::new();
             let shared = || Arc::clone(&clock) as Arc<dyn Clock>;
             let (tick, bus) = image(directions(&config.table, Role::Controller));
@@ -512,7 +513,8 @@ mod tests {
     fn a_time_that_is_refused_is_not_the_one_before_which_no_other_counts() {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
                     program = \"mirror\"\nscan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n";
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Manual::new()).expect("opens");
         let mut slots = driver.initial_slots();
         let mut codes = [3, 1_000_000_000_000, 4, 5].map(|millis| {

@@ -91,7 +91,8 @@ mod tests {
     fn a_driver_whose_faults_are_over_takes_the_quick_way_again_whoever_injected_them() {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
                     scan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n";
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let mut watch = driver.watch();
         let mut slots = driver.initial_slots();
@@ -126,7 +127,8 @@ mod tests {
              program = \"mirror\"\nscan = \"1ms\"\n{more}[[signal]]\nname = \"life\"\naddress = \"%IB0\"\n\
              [[signal]]\nname = \"a\"\naddress = \"%IB1\"\n"
         );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", &text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         Driver::open(config, Manual::new()).expect("opens")
     }
 
@@ -159,7 +161,8 @@ mod tests {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
                     scan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n\
                     [[signal]]\nname = \"b\"\naddress = \"%QB0\"\n";
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let mut slots = driver.initial_slots();
         // The first ticks have more to do than to exchange.

@@ -137,7 +137,8 @@ mod tests {
         let text = format!(
             "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\nheartbeat = {beats}\n{signals}"
         );
-        Config::parse("driver.cfg", &text).unwrap_or_else(|mistakes| panic!("{mistakes}"))
+        Config::parse("driver.cfg", &text, &crate::KINDS)
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 
     const ONE: &str =
@@ -199,13 +200,14 @@ mod tests {
 
     #[test]
     fn one_file_serves_both_ends_and_the_other_end_watches_the_heartbeat() {
-        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\nmax_age = \"300ms\"\n\
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\nmax_age = \"300ms\"\n\
                     alive = { signal = \"plc\", within = \"500ms\" }\n\
                     heartbeat = [{ signal = \"fast\", every = \"10ms\" }, { signal = \"slow\", every = \"1s\" }]\n\
                     [[signal]]\nname = \"plc\"\naddress = \"%QX0.3\"\n\
                     [[signal]]\nname = \"fast\"\naddress = \"%IW2\"\n\
                     [[signal]]\nname = \"slow\"\naddress = \"%IB0\"\n";
-        let config = Config::parse("driver.cfg", text).unwrap_or_else(|wrong| panic!("{wrong}"));
+        let config = Config::parse("driver.cfg", text, &crate::KINDS)
+            .unwrap_or_else(|wrong| panic!("{wrong}"));
         let (signs, table) = (&config.life_signs, &config.table);
         let watched = |role| -> Vec<(String, std::ops::Range<usize>, u8, Nanos)> {
             let watches = signs

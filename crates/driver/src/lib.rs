@@ -9,7 +9,6 @@ mod exchange;
 mod extras;
 mod faults;
 mod frames;
-mod gateway;
 mod heartbeat;
 mod host;
 mod open;
@@ -28,10 +27,13 @@ mod watch;
 mod watched;
 mod watching;
 
+/// Those of this crate's tests.
+#[cfg(test)]
+static KINDS: tickbus_driver_cfg::Kinds = tickbus_driver_cfg::Kinds::LOOPBACK;
+
 pub use controller::Host;
 pub use driver::Driver;
 pub use error::DriverError;
-pub use gateway::{Gateway, GatewayOptions};
 pub use slots::SlotMap;
 pub use statistics::Snapshot;
 pub use status::Code;

@@ -120,7 +120,7 @@ mod tests {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
                     [[signal]]\nname = \"go\"\naddress = \"%QX0.0\"\nlatch = \"both\"\n\
                     [[signal]]\nname = \"speed\"\naddress = \"%QB1\"\nfail_safe = 7\n";
-        let config = Config::parse("driver.cfg", text).expect("right");
+        let config = Config::parse("driver.cfg", text, &crate::KINDS).expect("right");
         let (table, role) = (&config.table, Role::Device);
         let (mut tick, mut bus) = image(directions(table, role));
         let mut station = Station::new(table, 0, role.areas());
@@ -148,7 +148,7 @@ mod tests {
     fn one_byte() -> Config {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
                     [[signal]]\nname = \"speed\"\naddress = \"%QB0\"\nfail_safe = 7\n";
-        Config::parse("driver.cfg", text).expect("right")
+        Config::parse("driver.cfg", text, &crate::KINDS).expect("right")
     }
 
     #[test]

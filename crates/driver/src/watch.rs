@@ -198,7 +198,8 @@ mod tests {
 
     /// A driver that has ticked once, and what looks at it.
     fn watched() -> (Driver, Watch, Vec<Slot>) {
-        let config = Config::parse("driver.cfg", TEXT).unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", TEXT, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Manual::new()).expect("opens");
         let mut watch = driver.watch();
         let mut slots = driver.initial_slots();

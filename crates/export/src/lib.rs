@@ -4,6 +4,7 @@
 //! touched. The exported files state their directions and, as long as it is true, that they were never
 //! compiled by the editor for which they are made.
 
+mod exported;
 mod names;
 mod plcopen;
 mod record;
@@ -12,10 +13,10 @@ mod siemens;
 mod st;
 mod symbols;
 
+use exported::Exported;
 use st::codesys::Editor;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Options;
 use tickbus_fieldbus::Role;
 
 /// The editors that sources are made for.
@@ -87,7 +88,7 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
             "export the machine's driver.cfg, or remove \"role\"",
         ));
     }
-    if let Options::Socket(options) = &config.bus
+    if let Exported::Socket(options) = Exported::of(&config.bus)
         && !options.stations.is_empty()
     {
         return Err(Mistakes::of_file(

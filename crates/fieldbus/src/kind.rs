@@ -1,6 +1,8 @@
-//! A kind of bus, as the list of kinds in `driver-cfg` knows it: the options that a driver.cfg gives it, and all that
-//! others ask of a bus before it runs.
+//! A kind of bus, as a list of kinds knows it: the options that a driver.cfg gives it, and all that others ask of a bus
+//! before it runs.
 
+use std::any::Any;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -68,10 +70,42 @@ pub enum NamedFile {
     InClear(&'static str),
 }
 
+/// What a type of options has by `#[derive(Clone, Debug, PartialEq)]`, for code that does not know the type.
+pub trait AnyOptions: Any + fmt::Debug + Send + Sync {
+    /// A copy.
+    fn boxed(&self) -> Box<dyn BusOptions>;
+
+    /// Whether `other` has the same type, and is equal.
+    fn equals(&self, other: &dyn BusOptions) -> bool;
+}
+
+impl<T: BusOptions + Clone + PartialEq + fmt::Debug + Send + Sync + 'static> AnyOptions for T {
+    fn boxed(&self) -> Box<dyn BusOptions> {
+        Box::new(self.clone())
+    }
+
+    fn equals(&self, other: &dyn BusOptions) -> bool {
+        other.downcast_ref() == Some(self)
+    }
+}
+
+impl dyn BusOptions {
+    /// These options as those of one kind, for code that is about this kind; `None` if they are of another.
+    pub fn downcast_ref<K: BusOptions>(&self) -> Option<&K> {
+        (self as &dyn Any).downcast_ref()
+    }
+
+    /// As `downcast_ref`, to change them.
+    pub fn downcast_mut<K: BusOptions>(&mut self) -> Option<&mut K> {
+        (self as &mut dyn Any).downcast_mut()
+    }
+}
+
 /// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.
 ///
-/// Methods with a body are for buses that have something to say there.
-pub trait BusOptions {
+/// Methods with a body are for buses that have something to say there. Code that is not about one bus asks here, and does not
+/// look which bus it has.
+pub trait BusOptions: AnyOptions {
     /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
 
@@ -91,8 +125,23 @@ pub trait BusOptions {
         None
     }
 
+    /// What [`summary`](Self::summary) adds where each [write](Events::Writes) of the peer is an event.
+    fn summary_of_writes(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Whether both ends of the bus are in one process.
     fn is_in_process(&self) -> bool {
+        false
+    }
+
+    /// Whether the bus runs in the steps of the simulation, and not in real time.
+    fn is_stepped(&self) -> bool {
+        false
+    }
+
+    /// Whether the bus starts the `tickbus` command that it finds on the PATH.
+    fn needs_command(&self) -> bool {
         false
     }
 

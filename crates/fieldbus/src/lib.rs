@@ -32,7 +32,7 @@ pub use cyclic::{Cycles, Exchange, Exchanged};
 pub use dead_band::DeadBands;
 pub use error::BusError;
 pub use events::Events;
-pub use kind::{BusKind, BusOptions, BusSetup, Hosted, NamedFile, OpenError};
+pub use kind::{AnyOptions, BusKind, BusOptions, BusSetup, Hosted, NamedFile, OpenError};
 pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};

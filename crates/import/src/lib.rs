@@ -32,7 +32,7 @@ use rows::{Image, Tag, Taken, World};
 use text::FileType;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_image::signal::Addressing;
 
 /// Longer files are refused: no tag list is this large.
@@ -95,12 +95,17 @@ impl Told {
     }
 }
 
-/// Reads the `bytes` of a file; mistakes call it `file`.
+/// Reads the `bytes` of a file; mistakes call it `file`. The driver.cfg that it becomes may name these `kinds` of bus.
 ///
 /// # Errors
 ///
 /// With every mistake in the table, unless lines with mistakes are skipped; or when nothing is left.
-pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Imported, Mistakes> {
+pub fn import(
+    file: &str,
+    bytes: &[u8],
+    reading: ImportOptions,
+    kinds: &'static Kinds,
+) -> Result<Imported, Mistakes> {
     let of_file = |what: String, right: &str| Err(Mistakes::of_file(file, what, right));
     if bytes.len() > LONGEST {
         return of_file(
@@ -165,7 +170,16 @@ pub fn import(file: &str, bytes: &[u8], reading: ImportOptions) -> Result<Import
             }]
         }
     };
-    tags_of(file, &sheets, reading, origin, told)
+    let imported = tags_of(file, &sheets, reading, origin, told)?;
+    // Mistakes that only the bus can find in the addresses are reported before the file is written.
+    if let Err(mistakes) = Config::parse("driver.cfg", &imported.text, kinds) {
+        let list = mistakes.iter().map(|found| PlacedMistake {
+            place: None,
+            mistake: found.mistake.clone(),
+        });
+        return Err(Mistakes::of_list(file, list.collect()));
+    }
+    Ok(imported)
 }
 
 /// The driver.cfg of all tags in `sheets`.
@@ -245,14 +259,6 @@ fn tags_of(
         return Err(Mistakes::of(file, mistake));
     }
     let text = write::driver_cfg(Path::new(file), &tags, world);
-    // Only the bus can find some mistakes in the addresses: report them before the file is written.
-    if let Err(mistakes) = Config::parse("driver.cfg", &text) {
-        let list = mistakes.iter().map(|found| PlacedMistake {
-            place: None,
-            mistake: found.mistake.clone(),
-        });
-        return Err(Mistakes::of_list(file, list.collect()));
-    }
     Ok(Imported {
         text,
         signals: tags.len(),

@@ -16,7 +16,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_driver::Driver;
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::Slot;
 use tickbus_live_page::{LivePage, Member, Options};
@@ -65,7 +65,8 @@ impl Simulation {
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
              scan = \"1ms\"\nmode = \"stepped\"\n{SIGNALS}"
         );
-        let config = Config::parse("driver.cfg", &text).unwrap_or_else(|why| panic!("{why}"));
+        let config = Config::parse("driver.cfg", &text, &Kinds::LOOPBACK)
+            .unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let options = Options {
             grace,
@@ -516,11 +517,12 @@ fn a_simulation_that_does_not_tick_is_shown_as_it_was_and_says_so() {
 #[test]
 fn what_a_plc_never_sent_is_not_exported_as_live() {
     let page = Page::open();
-    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"page\"\n\
                 [[station]]\nname = \"North\"\n[[station]]\nname = \"South\"\n\
                 [[signal]]\nname = \"to\"\nstation = \"North\"\naddress = \"%IB0\"\n\
                 [[signal]]\nname = \"from\"\nstation = \"South\"\naddress = \"%QB0\"\n";
-    let config = Config::parse("driver.cfg", text).unwrap_or_else(|why| panic!("{why}"));
+    let config =
+        Config::parse("driver.cfg", text, &Kinds::LOOPBACK).unwrap_or_else(|why| panic!("{why}"));
     let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
     let mut slots = driver.initial_slots();
     let options = Options {

@@ -215,14 +215,14 @@ fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_driver_cfg::Config;
+    use tickbus_driver_cfg::{Config, Kinds};
 
     fn table() -> SignalTable {
         let text = "[driver]\nid = 1\nname = \"T\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"l\"\n\
                     [[signal]]\nname = \"Not OK\"\naddress = \"%IX0.0\"\n\
                     [[signal]]\nname = \"Level >= 3\"\naddress = \"%IX0.1\"\n\
                     [[signal]]\nname = \"Height\"\naddress = \"%QW2\"\ntype = \"INT\"\nunit = \"mm\"\n";
-        Config::parse("t", text)
+        Config::parse("t", text, &Kinds::LOOPBACK)
             .unwrap_or_else(|mistakes| panic!("{mistakes}"))
             .table
     }

@@ -5,9 +5,8 @@ use std::path::Path;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
-use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Options;
 use tickbus_driver_cfg::loopback::{self, Mode, Peer};
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
@@ -42,15 +41,15 @@ pub(super) struct Bench {
 }
 
 impl Suite {
-    /// Reads the test file at `path`, and the driver.cfg that it names.
+    /// Reads the test file at `path`, and the driver.cfg that it names, which may name these `kinds` of bus.
     ///
     /// # Errors
     ///
     /// With every mistake in the test file; if it has none but its driver.cfg does, with those.
-    pub fn load(path: &Path) -> Result<Self, Mistakes> {
+    pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        Self::parse(&path.display().to_string(), &text, folder)
+        Self::parse(&path.display().to_string(), &text, folder, kinds)
     }
 
     /// Reads the text of a test file; its paths are relative to `folder`.
@@ -58,11 +57,16 @@ impl Suite {
     /// # Errors
     ///
     /// As [`load`](Self::load).
-    pub fn parse(file: &str, text: &str, folder: &Path) -> Result<Self, Mistakes> {
+    pub fn parse(
+        file: &str,
+        text: &str,
+        folder: &Path,
+        kinds: &'static Kinds,
+    ) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
         let mut of_config = None;
         let read = read_text(&mut collector, text, |root| {
-            read(root, folder, &mut of_config)
+            read(root, (folder, kinds), &mut of_config)
         });
         match (collector.finish(), of_config) {
             (Some(mistakes), _) | (None, Some(mistakes)) => Err(mistakes),
@@ -81,7 +85,7 @@ impl Suite {
 /// Reads the file; mistakes in its driver.cfg, or in a file that its machine needs, go to `of_config`.
 fn read(
     mut root: Table<'_>,
-    folder: &Path,
+    (folder, kinds): (&Path, &'static Kinds),
     of_config: &mut Option<Mistakes>,
 ) -> Option<(Bench, Vec<Test>)> {
     let right = "write the path of the driver.cfg, as seen from this file";
@@ -111,7 +115,7 @@ fn read(
         }
     };
     let config = config.and_then(|value| {
-        let config = load_config(&value, right, folder, of_config)?;
+        let config = load_config(&value, right, (folder, kinds), of_config)?;
         on_simulation_time(config, &value, folder, peer?)
     });
     let (config, step) = (config?, step?);
@@ -151,11 +155,11 @@ fn read(
 fn load_config(
     value: &Value<'_>,
     right: &str,
-    folder: &Path,
+    (folder, kinds): (&Path, &'static Kinds),
     of_config: &mut Option<Mistakes>,
 ) -> Option<Config> {
     let name = value.text(right)?;
-    match Config::load(&folder.join(name)) {
+    match Config::load(&folder.join(name), kinds) {
         Ok(config) => Some(config),
         Err(mistakes) => {
             match mistakes.iter().next() {
@@ -185,14 +189,15 @@ fn on_simulation_time(
             *name = file.to_string_lossy().into_owned();
         }
         config.role = Role::Device;
-        config.bus = Options::Loopback(loopback::Options {
+        let line = loopback::Options {
             mode: Mode::Stepped,
             peer,
-        });
+        };
+        config.bus = line.into();
         config.events = Events::None;
         return Some(config);
     }
-    if let Options::Loopback(options) = &mut config.bus
+    if let Some(options) = config.bus.downcast_mut::<loopback::Options>()
         && let Peer::Program { .. } = &options.peer
     {
         options.mode = Mode::Stepped;

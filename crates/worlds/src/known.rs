@@ -32,7 +32,7 @@ pub(crate) fn parse(path: &str, text: String) -> Config {
         known.map(|known| known.config.clone())
     });
     known.unwrap_or_else(|| {
-        let config = Config::parse(path, &text)
+        let config = Config::parse(path, &text, &crate::kinds::KINDS)
             .unwrap_or_else(|why| panic!("a world that tickbus refuses:\n{why}\n{text}"));
         let path = path.to_owned();
         KNOWN.with_borrow_mut(|files| {

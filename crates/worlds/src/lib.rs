@@ -21,6 +21,7 @@ mod features;
 mod files;
 mod injector;
 mod judge;
+mod kinds;
 mod known;
 mod laboratory;
 mod neighbours;

@@ -1,8 +1,8 @@
 //! An example of a bus: `kind = "mailbox"` carries the image in two files of a folder, one for each end.
 //!
 //! It shows what a bus needs, and how little: a [frame](Frame), free of I/O; the [options](Options) that a driver.cfg
-//! gives it; and the thread that carries frames between the port and the line. `CONTRIBUTING.md` tells how a bus is
-//! added; this one is added with the feature `example-bus` of `tickbus-driver-cfg`, which its tests switch on.
+//! gives it; and the thread that carries frames between the port and the line. `src/main.rs` hands it to the `tickbus`
+//! command; nothing of tickbus knows it. `CONTRIBUTING.md` describes how a bus is added.
 
 mod frame;
 mod options;

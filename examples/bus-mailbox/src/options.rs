@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus, and its place in the list of kinds.
+//! What a driver.cfg says to the bus, and its kind, for a list of kinds.
 
 use std::path::PathBuf;
 

@@ -8,10 +8,11 @@ use std::time::Duration;
 use crate::cli::Outcome;
 use tickbus_base::os::PseudoTerminal;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, TimeHistogram};
+use tickbus_bus_profibus::Options;
 use tickbus_bus_profibus::advice::{advise, table};
 use tickbus_bus_profibus::telegram::{Control, Frame};
 use tickbus_driver::Driver;
-use tickbus_driver_cfg::{Config, Options};
+use tickbus_driver_cfg::{Config, Kinds};
 
 /// At this rate the wait before an answer, which is no part of what is measured, is short.
 const BAUD: u32 = 500_000;
@@ -36,16 +37,16 @@ pub(super) struct Arguments {
     count: u32,
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
-    let mut config = match Config::load(&arguments.file) {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
+    let mut config = match Config::load(&arguments.file, kinds) {
         Ok(config) => config,
         Err(mistakes) => {
             eprintln!("{mistakes}\nprofibus: failed mistakes={}", mistakes.len());
             return Outcome::WrongInput;
         }
     };
-    let Options::ProfibusDevice(options) = &mut config.bus else {
-        let kind = config.bus.kind();
+    let kind = config.bus.kind();
+    let Some(options) = config.bus.downcast_mut::<Options>() else {
         eprintln!("profibus: the bus is \"{kind}\"; name the driver.cfg of a \"profibus-device\"");
         return Outcome::WrongInput;
     };

@@ -8,10 +8,10 @@ use super::{report, say, stop_on_ctrl_c};
 use crate::cli::Outcome;
 use crate::cli::host::{PageAddress, page_address, show, span};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
-use tickbus_driver::{Gateway, GatewayOptions};
-use tickbus_driver_cfg::{CommandLineEnd, Config};
+use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{LinkState, Role};
+use tickbus_gateway::{Gateway, GatewayOptions};
 use tickbus_virtual_time::Meeting;
 
 /// How often the state of the PLC's line is looked at until there is one.
@@ -53,12 +53,12 @@ fn address(text: &str) -> Result<Meeting, String> {
     Ok(Meeting::Tcp(address))
 }
 
-pub(super) fn run(arguments: &Arguments) -> Outcome {
+pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let asked = CommandLineEnd {
         role: Role::Device,
         moved: false,
     };
-    let mut config = match Config::load_as(&arguments.file, Some(asked)) {
+    let mut config = match Config::load_as(&arguments.file, Some(asked), kinds) {
         Ok(config) => config,
         Err(mistakes) => {
             eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());

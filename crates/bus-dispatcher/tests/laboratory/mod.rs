@@ -9,7 +9,10 @@ use tickbus_base::time::{Manual, Monotonic, Stop};
 use tickbus_conformance::rig::{self, Bus, Liar, eventually};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Patch, Pin, Settings};
+use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::tcp::Address;
+
+pub static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_dispatcher::Options>()]);
 
 /// A dispatcher that can be stopped, and restarted on the same port.
 pub struct Laboratory {
@@ -110,6 +113,10 @@ impl Drop for Laboratory {
 }
 
 impl Bus for Laboratory {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, role: &str) -> String {
         let address = format!("kind = \"dispatcher\"\naddress = \"{}\"", self.address());
         if role == "device" {

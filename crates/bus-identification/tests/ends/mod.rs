@@ -7,8 +7,11 @@ use std::sync::Arc;
 use tempfile::TempDir;
 use tickbus_base::os::{Parity, SerialPort, SerialSettings};
 use tickbus_base::time::{Clock, Monotonic};
-use tickbus_bus_identification::{Access, Command, Family, Heads};
+use tickbus_bus_identification::{Access, ClientOptions, Command, Family, Heads, ReaderOptions};
 use tickbus_conformance::rig::{End, await_that};
+use tickbus_driver_cfg::{Kind, Kinds};
+
+pub static KINDS: Kinds = Kinds::new(&[Kind::of::<ClientOptions>(), Kind::of::<ReaderOptions>()]);
 
 /// Octets of data at both ends.
 pub const DATA: usize = 24;
@@ -89,7 +92,11 @@ impl Line {
             ("taken", "%QX0.0"),
             ("writes", "%QB1"),
         ];
-        End::open(&self.text("ivi-reader", device, heads, "", &signals), clock)
+        End::open(
+            &self.text("ivi-reader", device, heads, "", &signals),
+            clock,
+            &KINDS,
+        )
     }
 
     pub fn client(&self, heads: &[u8], extra: &str) -> End {
@@ -107,6 +114,7 @@ impl Line {
         End::open(
             &self.text("ivi-client", "", heads, &role, &signals),
             &Monotonic::shared(),
+            &KINDS,
         )
     }
 

@@ -12,10 +12,13 @@ use profirust::Baudrate;
 use tickbus_base::time::{Manual, Monotonic};
 use tickbus_conformance::rig::{Bus, End, Liar, await_that, config};
 use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::LinkState;
 
 use crate::peer::{Master, Project, SLOT, Slave};
 use crate::pty;
+
+pub static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_profibus::Options>()]);
 
 pub const ADDRESS: u8 = 8;
 pub const IDENT: u16 = 0x80E0;
@@ -24,6 +27,10 @@ pub const IDENT: u16 = 0x80E0;
 pub struct OnPort(pub String);
 
 impl Bus for OnPort {
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
+    }
+
     fn fieldbus(&self, _role: &str) -> String {
         format!(
             "kind = \"profibus-device\"\ndevice = \"{}\"\nbaud = 500000\nmax_tsdr = {}\n\
@@ -63,7 +70,7 @@ pub fn device_at(line: &pty::Line, baud: u32) -> End {
     let bus = OnPort(line.end(0).display().to_string());
     let text = config(&bus, "device", "");
     let text = text.replace("baud = 500000", &format!("baud = {baud}"));
-    End::open(&text, &Monotonic::shared())
+    End::open(&text, &Monotonic::shared(), &KINDS)
 }
 
 pub fn slave() -> Slave {

@@ -426,7 +426,8 @@ mod tests {
                 text.extend(["[[signal]]\n", &signal, "\nstation = \"", station, "\"\n"]);
             }
         }
-        let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text).expect("right");
+        let config =
+            tickbus_driver_cfg::Config::parse("driver.cfg", &text, &crate::KINDS).expect("right");
         let told = Arc::new(Mutex::new(Vec::new()));
         let program = Box::new(Witness(Arc::clone(&told)));
         let (mut cpu, mut bus) = half(program, &config, Role::Controller);
@@ -471,7 +472,8 @@ mod tests {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
                     [[signal]]\nname = \"a\"\naddress = \"%QB0\"\nfail_safe = 7\n\
                     [[signal]]\nname = \"b\"\naddress = \"%QB1\"\n";
-        let config = tickbus_driver_cfg::Config::parse("driver.cfg", text).expect("right");
+        let config =
+            tickbus_driver_cfg::Config::parse("driver.cfg", text, &crate::KINDS).expect("right");
         let seen = Arc::default();
         let program = Box::new(Seen(Arc::clone(&seen)));
         let (mut cpu, mut bus) = half(program, &config, Role::Device);
@@ -507,7 +509,7 @@ mod tests {
             + signal("B to", "%IB2", "B").as_str()
             + signal("A from", "%QB0", "A").as_str()
             + signal("B from", "%QB2", "B").as_str();
-        let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text);
+        let config = tickbus_driver_cfg::Config::parse("driver.cfg", &text, &crate::KINDS);
         let config = config.unwrap_or_else(|wrong| panic!("{wrong}"));
         let mut driver = Driver::open(config, Manual::new()).expect("opens");
         let mut slots = driver.initial_slots();

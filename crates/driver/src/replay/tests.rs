@@ -144,7 +144,8 @@ fn config(folder: &Path, stations: usize, fieldbus: &str, record: &str) -> Confi
         signal("out", "ID8", "type = \"REAL\"\nfail_safe = 1.5");
     }
     let path = folder.join("driver.cfg");
-    Config::parse(path.to_str().expect("UTF-8"), &text).unwrap_or_else(|why| panic!("{why}"))
+    Config::parse(path.to_str().expect("UTF-8"), &text, &crate::KINDS)
+        .unwrap_or_else(|why| panic!("{why}"))
 }
 
 /// The same ticks of a machine: exchanges, or halves. Returns what each showed.
@@ -296,7 +297,7 @@ fn pulses_of_several_recorded_ticks_are_seen_and_counted_in_the_one_that_they_fa
         writeln!(text, "[[signal]]\n{signal}").expect("it takes all");
     }
     let path = folder.path().join("driver.cfg");
-    let config = Config::parse(path.to_str().expect("UTF-8"), &text).expect("right");
+    let config = Config::parse(path.to_str().expect("UTF-8"), &text, &crate::KINDS).expect("right");
     let mut driver = Driver::open(config, Manual::new()).expect("opens");
     let mut slots = driver.initial_slots();
     let seen: Vec<Vec<f64>> = [0, 2, 4, 5]

@@ -3,18 +3,18 @@
 use super::body::{Body, by_hand, time};
 use super::members::Path;
 use super::{Image, Plan, line, modbus, s7comm, socket, source};
+use crate::exported::Exported;
 use crate::record::PlacedSignal;
 use crate::siemens::spelling;
 use tickbus_bus_s7::Variable;
 use tickbus_bus_socket::Message;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Exported;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{DataType, Width};
 
 /// The body for the bus of the driver.cfg.
 pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
-    let mut body = match plan.config.bus.exported() {
+    let mut body = match Exported::of(&plan.config.bus) {
         Exported::Socket(options) if matches!(options.message, Message::Axis { .. }) => {
             by_hand("socket with message = \"axis\"", notes)
         }
@@ -23,9 +23,9 @@ pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
         Exported::ModbusClient(options) => modbus::server(plan, options, notes),
         Exported::S7Server(options) => s7comm::puts_and_gets(plan, options, notes),
         Exported::S7Client(options) => s7comm::nothing(plan, options),
-        Exported::OpcuaClient(_) => opcua_server(plan),
+        Exported::OpcuaClient => opcua_server(plan),
         Exported::OpcuaServer(options) => opcua_client(plan, &options.address.to_string()),
-        Exported::Loopback(_) | Exported::ByHand(_) => by_hand(plan.config.bus.kind(), notes),
+        Exported::Loopback | Exported::ByHand => by_hand(plan.config.bus.kind(), notes),
     };
     watch(plan, &mut body);
     body
@@ -168,20 +168,20 @@ pub(super) fn text(plan: &Plan<'_>, body: &Body) -> String {
 
 /// The settings to be made in the project in addition to the sources.
 pub(super) fn steps(plan: &Plan<'_>) -> Vec<String> {
-    match plan.config.bus.exported() {
+    match Exported::of(&plan.config.bus) {
         Exported::Socket(options) => socket::steps(plan, options),
         Exported::S7Server(_) => s7comm::steps_for_puts_and_gets(),
         Exported::S7Client(options) => s7comm::steps_for_nothing(plan, options),
-        Exported::OpcuaClient(_) => vec![format!(
+        Exported::OpcuaClient => vec![format!(
             "In the CPU's properties activate the OPC UA server and its licence. Share \"{}\" and \"{}\": accessible from OPC UA, \
              and the inputs writable. In driver.cfg let node_pattern name their members.",
             plan.outputs.block, plan.inputs.block
         )],
-        Exported::Loopback(_)
+        Exported::Loopback
         | Exported::ModbusServer(_)
         | Exported::ModbusClient(_)
         | Exported::OpcuaServer(_)
-        | Exported::ByHand(_) => Vec::new(),
+        | Exported::ByHand => Vec::new(),
     }
 }
 

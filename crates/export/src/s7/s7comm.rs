@@ -7,7 +7,6 @@ use super::{Image, Plan};
 use crate::record::PlacedSignal;
 use tickbus_bus_s7::item::Object;
 use tickbus_bus_s7::{ClientOptions, ServerOptions, Start, Variable};
-use tickbus_driver_cfg::Options;
 use tickbus_image::signal::Area;
 
 /// The simulation is a CPU: its I and Q are the images.
@@ -205,9 +204,7 @@ impl<'a> Jobs<'a> {
 /// The CPU variable that the simulation itself reads or writes for a signal: named in `[fieldbus.at]`, or
 /// part of the process image. Copying would overwrite it.
 pub(super) fn direct(plan: &Plan<'_>, place: &PlacedSignal<'_>) -> Option<Variable> {
-    let Options::S7Client(options) = &plan.config.bus else {
-        return None;
-    };
+    let options: &ClientOptions = plan.config.bus.downcast_ref()?;
     let variable = options.variable(place.signal)?;
     let has_line = options.variables.contains_key(&place.signal.name);
     (has_line || !matches!(variable.object, Object::Block(_))).then_some(variable)

@@ -7,24 +7,24 @@ use std::fmt::Write as _;
 
 use super::Plan;
 use crate::File;
+use crate::exported::Exported;
 use crate::record::PlacedSignal;
 use crate::siemens::{address, spelling};
 use crate::symbols::comment;
-use tickbus_driver_cfg::Exported;
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 
 /// Whether a signal is at a place from `[fieldbus.at]`, rather than at its address.
 pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
-    match plan.config.bus.exported() {
+    match Exported::of(&plan.config.bus) {
         Exported::S7Client(options) => options.variables.contains_key(&signal.name),
         Exported::ModbusClient(options) => options.at.contains_key(&signal.name),
-        Exported::Loopback(_)
+        Exported::Loopback
         | Exported::Socket(_)
         | Exported::ModbusServer(_)
         | Exported::S7Server(_)
-        | Exported::OpcuaClient(_)
+        | Exported::OpcuaClient
         | Exported::OpcuaServer(_)
-        | Exported::ByHand(_) => false,
+        | Exported::ByHand => false,
     }
 }
 

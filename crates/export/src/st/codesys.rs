@@ -10,12 +10,12 @@ mod tcpip;
 use super::life::{self, ALIVE, Life};
 use super::registers::{BITS_OF, REAL_OF, kind};
 use super::{comment, copies, records, remark, taken, temporaries};
+use crate::exported::Exported;
 use crate::plcopen::{Kind, Project, Unit, Variable, variable};
 use crate::record::{PlacedSignal, Record, block_prefix};
 use crate::{Export, File, head};
 use parts::Link;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Exported;
 use tickbus_image::signal::DataType;
 
 /// The target editor: both read the same XML, but have different libraries.
@@ -53,15 +53,15 @@ pub(crate) fn export(config: &Config, editor: Editor) -> Export {
     let list = format!("{prefix}_io");
     let (begin, end) = (format!("{prefix}_begin"), format!("{prefix}_end"));
     // In Modbus each station starts at its own register; a record over TCP has no gaps.
-    let aligned = match config.bus.exported() {
+    let aligned = match Exported::of(&config.bus) {
         Exported::ModbusServer(_) | Exported::ModbusClient(_) => 2,
-        Exported::Loopback(_)
+        Exported::Loopback
         | Exported::Socket(_)
         | Exported::S7Server(_)
         | Exported::S7Client(_)
-        | Exported::OpcuaClient(_)
+        | Exported::OpcuaClient
         | Exported::OpcuaServer(_)
-        | Exported::ByHand(_) => 1,
+        | Exported::ByHand => 1,
     };
     let mut link = Link::of(config, editor, &list);
     let declared = [&list, &begin, &end].map(String::clone);

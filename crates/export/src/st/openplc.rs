@@ -7,12 +7,12 @@ mod served;
 mod wired;
 
 use super::{add, comment};
+use crate::exported::Exported;
 use crate::names::legal;
 use crate::record::block_prefix;
 use crate::{Export, File};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Exported;
 
 const EDITOR: &str = "OpenPLC, or another editor that compiles with iec2c";
 
@@ -32,10 +32,10 @@ const TASK: &str = "every_scan";
 /// On a bus that `OpenPLC` does not support at this end, or with an image that is too large for it.
 pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
     let mut notes = Vec::new();
-    let text = match config.bus.exported() {
+    let text = match Exported::of(&config.bus) {
         Exported::ModbusServer(options) => polled::text(config, options, &mut notes)?,
         Exported::ModbusClient(options) => served::text(config, options)?,
-        Exported::Loopback(_) | Exported::Socket(_) => hosted::text(config, &mut notes)?,
+        Exported::Loopback | Exported::Socket(_) => hosted::text(config, &mut notes)?,
         Exported::S7Client(_) => {
             return Err(refusal(
                 config,
@@ -45,13 +45,13 @@ pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
         Exported::S7Server(_) => {
             return Err(refusal(config, "OpenPLC makes no S7 connections by itself"));
         }
-        Exported::OpcuaClient(_) | Exported::OpcuaServer(_) => {
+        Exported::OpcuaClient | Exported::OpcuaServer(_) => {
             return Err(refusal(
                 config,
                 "OpenPLC's OPC UA, where a version has it, names variables in a way of its own",
             ));
         }
-        Exported::ByHand(_) => {
+        Exported::ByHand => {
             return Err(refusal(
                 config,
                 "OpenPLC does not know the bus of a vendor's library",
@@ -119,7 +119,12 @@ fn remarks(text: &mut String, lines: &[String]) {
 
 #[cfg(test)]
 mod tests {
+    use tickbus_bus_modbus as modbus;
+    use tickbus_driver_cfg::{Kind, Kinds};
+
     use super::*;
+
+    static KINDS: Kinds = Kinds::new(&[Kind::of::<modbus::ServerOptions>()]);
 
     #[test]
     fn a_signal_that_is_called_as_a_register_gets_another_name() {
@@ -127,7 +132,7 @@ mod tests {
                     [[signal]]\nname = \"in 1\"\naddress = \"%IX0.0\"\n\
                     [[signal]]\nname = \"motor\"\naddress = \"%IW2\"\n\
                     [[signal]]\nname = \"OUT_0\"\naddress = \"%QW0\"\n";
-        let config = Config::parse("driver.cfg", text).expect("it is right");
+        let config = Config::parse("driver.cfg", text, &KINDS).expect("it is right");
         let text = export(&config)
             .expect("a program")
             .files

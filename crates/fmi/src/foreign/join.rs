@@ -154,13 +154,16 @@ fn nothing_in_common(config: &Config, model: &Model) -> Mistake {
 
 #[cfg(test)]
 mod tests {
+    use tickbus_driver_cfg::Kinds;
+
     use super::*;
 
     #[test]
     fn an_input_that_the_map_joins_is_not_joined_by_its_name_too() {
         let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
                     [[signal]]\nname = \"Command\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"valve\"\naddress = \"%QX0.1\"\n";
-        let config = Config::parse("it.cfg", text).unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let config = Config::parse("it.cfg", text, &Kinds::LOOPBACK)
+            .unwrap_or_else(|mistakes| panic!("{mistakes}"));
         let text = "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"g\">\
                     <CoSimulation modelIdentifier=\"x\"/><ModelVariables>\
                     <Boolean name=\"valve\" valueReference=\"1\" causality=\"input\"/></ModelVariables></fmiModelDescription>";

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_driver::{Code, Driver, Exchange};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_image::signal::Slot;
 use tickbus_record as record;
 
@@ -51,12 +51,18 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An instance of the FMU whose resources are in `folder`; its model description has the token `given`. No bus is open yet.
+    /// An instance of the FMU whose resources are in `folder`; its model description has the token `given`. Its driver.cfg
+    /// may name these `kinds` of bus. No bus is open yet.
     ///
     /// # Errors
     ///
     /// There is no driver.cfg, it is another one than that of the export, or it is wrong: with every mistake in it.
-    pub fn new(version: Version, folder: &Path, given: &str) -> Result<Self, String> {
+    pub fn new(
+        version: Version,
+        folder: &Path,
+        given: &str,
+        kinds: &'static Kinds,
+    ) -> Result<Self, String> {
         let path = folder.join("driver.cfg");
         let bytes = std::fs::read(&path).map_err(|error| {
             format!(
@@ -73,7 +79,7 @@ impl Instance {
                 path.display()
             ));
         }
-        let config = Config::load(&path).map_err(|mistakes| mistakes.to_string())?;
+        let config = Config::load(&path, kinds).map_err(|mistakes| mistakes.to_string())?;
         let exposed = Exposed::of(&config, version);
         let mut new = Self {
             version,
@@ -461,7 +467,12 @@ mod tests {
         let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\n\
                     [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\n[[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\n";
         std::fs::write(folder.path().join("driver.cfg"), text).expect("a file");
-        let made = Instance::new(Version::Two, folder.path(), &token(text.as_bytes()));
+        let made = Instance::new(
+            Version::Two,
+            folder.path(),
+            &token(text.as_bytes()),
+            &Kinds::LOOPBACK,
+        );
         let mut instance = made.unwrap_or_else(|why| panic!("{why}"));
         for start in [-2.0, 0.0, 1000.0] {
             assert_eq!(instance.begin_at(start), Ok(()));

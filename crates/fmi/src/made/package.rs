@@ -5,7 +5,8 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_driver_cfg::{Config, Options};
+use tickbus_driver_cfg::loopback::{self, Peer};
+use tickbus_driver_cfg::{Config, Kinds};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
@@ -28,7 +29,8 @@ pub struct Package {
     pub notes: Vec<String>,
 }
 
-/// Makes an FMU of the driver.cfg at `path` and the files that it names in its folder; the same files make the same bytes.
+/// Makes an FMU of the driver.cfg at `path`, which may name these `kinds` of bus, and the files that it names in its folder;
+/// the same files make the same bytes.
 ///
 /// # Errors
 ///
@@ -38,10 +40,11 @@ pub fn export(
     path: &Path,
     version: Version,
     libraries: &[NativeLibrary],
+    kinds: &'static Kinds,
 ) -> Result<Package, Mistakes> {
     let file = path.display().to_string();
     let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
-    let config = Config::load(path)?;
+    let config = Config::load(path, kinds)?;
     let driver_cfg = std::fs::read(path).map_err(|error| {
         refused(Mistake::new(
             format!("it cannot be read: {error}"),
@@ -49,7 +52,7 @@ pub fn export(
         ))
     })?;
     // Loading has read it, and has it no more.
-    let faults = Config::parse(&file, &String::from_utf8_lossy(&driver_cfg))?.fault_file;
+    let faults = Config::parse(&file, &String::from_utf8_lossy(&driver_cfg), kinds)?.fault_file;
     let faults = faults.map(|file| match file.strip_prefix(config.folder()) {
         Ok(inside) => inside.to_owned(),
         Err(_) => file,
@@ -135,17 +138,14 @@ fn notes_on(config: &Config) -> Vec<String> {
             config.bus.kind()
         ));
     }
-    if let Options::Plugin(options) = &config.bus
-        && options.isolated
-        && options.helper.is_none()
-    {
+    if config.bus.needs_command() {
         notes.push(
             "isolated = true needs the tickbus command where the FMU runs: on the PATH, or named by TICKBUS_HELPER"
                 .to_owned(),
         );
     }
-    if let Options::Loopback(options) = &config.bus
-        && let tickbus_driver_cfg::loopback::Peer::Link(name) = &options.peer
+    if let Some(options) = config.bus.downcast_ref::<loopback::Options>()
+        && let Peer::Link(name) = &options.peer
     {
         notes.push(format!(
             "the link \"{name}\" is within this FMU alone: every FMU has a native library of its own, so no other one meets it; \

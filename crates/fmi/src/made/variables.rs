@@ -4,8 +4,7 @@ use std::ops::DerefMut as _;
 
 use tickbus_binding::SlotKind;
 use tickbus_driver::{Exchange, SlotMap};
-use tickbus_driver_cfg::loopback::{Mode, Peer};
-use tickbus_driver_cfg::{Config, Options};
+use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
 use crate::value::{Value, ValueType, Version};
@@ -354,13 +353,7 @@ fn has_address(config: &Config) -> bool {
 
 /// Whether the bus runs in the steps of the simulation.
 pub fn is_stepped(config: &Config) -> bool {
-    match &config.bus {
-        Options::Loopback(options) => {
-            options.mode == Mode::Stepped || matches!(options.peer, Peer::Replay(_))
-        }
-        Options::Sdsp(_) => true,
-        _ => false,
-    }
+    config.bus.is_stepped()
 }
 
 /// A bus that runs by itself is a PLC in real time, behind which a simulation that hurries sees few of its cycles.

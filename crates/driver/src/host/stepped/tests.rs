@@ -159,7 +159,7 @@ fn config() -> Config {
             .expect("a text takes it");
         }
     }
-    Config::parse("driver.cfg", &text).unwrap_or_else(|wrong| panic!("{wrong}"))
+    Config::parse("driver.cfg", &text, &crate::KINDS).unwrap_or_else(|wrong| panic!("{wrong}"))
 }
 
 #[test]

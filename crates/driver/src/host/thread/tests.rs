@@ -42,9 +42,9 @@ impl Program for Slow {
 
 /// What is told of a scan that takes 4 s.
 fn fault_of(can_hang: bool) -> Option<String> {
-    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"slow\"\n\
                 [[signal]]\nname = \"run\"\naddress = \"%QB0\"\n";
-    let config = Config::parse("driver.cfg", text).expect("right");
+    let config = Config::parse("driver.cfg", text, &crate::KINDS).expect("right");
     let clock = Arc::new(Manual::default());
     let (begun, has_begun) = channel();
     let (let_end, end) = channel();
@@ -54,7 +54,7 @@ fn fault_of(can_hang: bool) -> Option<String> {
         end,
     });
     let wall = Arc::clone(&clock) as Arc<dyn Clock>;
-    let host = Host::open(&config, program, Nanos::from_millis(1), wall).expect("a free port");
+    let host = Host::open(&config, program, Nanos::from_millis(1), wall).expect("opens");
     has_begun.recv().expect("the first scan");
     clock.advance(Nanos::from_secs(4));
     let fault = host.fault();

@@ -2,10 +2,10 @@
 
 use super::parts::{Link, Stream, dialled, loopback_note};
 use super::{Editor, modbus, socket, tcpip};
+use crate::exported::Exported;
 use tickbus_base::time::Nanos;
 use tickbus_bus_socket::{Message, TcpRole};
 use tickbus_driver_cfg::Config;
-use tickbus_driver_cfg::Exported;
 use tickbus_image::signal::Area;
 
 /// The default cycle of the socket bus.
@@ -13,7 +13,7 @@ const CYCLE: Nanos = Nanos::from_millis(10);
 
 impl Link {
     pub(super) fn of(config: &Config, editor: Editor, list: &str) -> Self {
-        match config.bus.exported() {
+        match Exported::of(&config.bus) {
             Exported::Socket(options)
                 if options.tcp == TcpRole::Listen
                     && !matches!(options.message, Message::Axis { .. }) =>
@@ -46,19 +46,19 @@ impl Link {
                     .to_owned(),
             ]),
             // Copying registers that are never received would overwrite what OPC UA has written.
-            Exported::OpcuaClient(_) | Exported::OpcuaServer(_) => Self {
+            Exported::OpcuaClient | Exported::OpcuaServer(_) => Self {
                 is_by_name: true,
                 ..Self::of_steps([format!(
                     "OPC UA carries the variables themselves: share {list} with its server (in CODESYS the symbol \
                      configuration, in TwinCAT the attribute OPC.UA.DA). The registers In and Out of other buses are not there."
                 )])
             },
-            Exported::Loopback(_)
+            Exported::Loopback
             | Exported::Socket(_)
             | Exported::ModbusClient(_)
             | Exported::S7Server(_)
             | Exported::S7Client(_)
-            | Exported::ByHand(_) => {
+            | Exported::ByHand => {
                 let kind = config.bus.kind();
                 let mut link = Self::of_steps([format!(
                     "What brings {list}.In and takes {list}.Out is to be written by hand: the bus \"{kind}\" of this file has \

@@ -93,7 +93,7 @@ pub(super) fn live(shared: &Shared, end: usize) {
 impl<'a> End<'a> {
     fn open(shared: &'a Shared, end: usize) -> Self {
         let course = &shared.course;
-        let config = Config::parse("driver.cfg", &course.driver_cfg(end))
+        let config = Config::parse("driver.cfg", &course.driver_cfg(end), &crate::kinds::KINDS)
             .unwrap_or_else(|why| panic!("a run that tickbus refuses:\n{why}"));
         let driver = Driver::open(config, SimulatedClock::shared())
             .unwrap_or_else(|why| panic!("a driver that does not open: {why}"));

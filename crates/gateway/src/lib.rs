@@ -11,13 +11,12 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_bus_sdsp::{Variables, connect};
+use tickbus_driver::{DriverError, Host, Watch};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 use tickbus_plc::{Program, Scan};
 use tickbus_virtual_time::{Declaration, Ended, Meeting, Outcome, Participant, Step};
-
-use super::{DriverError, Host, Watch};
 
 /// The signal whose new value begins a step of the PLC.
 const GO: &str = "sync.go";
@@ -446,8 +445,9 @@ fn check(config: &Config) -> Result<(), Mistake> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Driver;
     use tickbus_base::time::Monotonic;
+    use tickbus_driver::Driver;
+    use tickbus_driver_cfg::Kinds;
 
     const LINE: &str = "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"loopback\"\ncycle = \"100us\"\n\
         max_age = \"80ms\"\nlink = \"starved\"\n";
@@ -473,7 +473,8 @@ mod tests {
             ];
             text.extend(["[[signal]]\n", &lines.join("\n"), "\ntype = \"UDINT\"\n"]);
         }
-        Config::parse("driver.cfg", &text).unwrap_or_else(|wrong| panic!("{wrong}"))
+        Config::parse("driver.cfg", &text, &Kinds::LOOPBACK)
+            .unwrap_or_else(|wrong| panic!("{wrong}"))
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The gateway: a PLC that knows only two signals and a clock of virtual time, in lock-step.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
+#[path = "../../bus-sdsp/tests/server/mod.rs"]
 mod server;
 
 use std::num::NonZeroU32;
@@ -11,9 +12,9 @@ use std::thread::{self, JoinHandle};
 use server::Server;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_conformance::rig::End;
-use tickbus_driver::{Gateway, GatewayOptions};
-use tickbus_driver_cfg::Config;
+use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::tcp::Address;
+use tickbus_gateway::{Gateway, GatewayOptions};
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{
     Declaration, Ended, Meeting, Outcome, Participant, Settings, StartCondition, Step, Variable,
@@ -71,7 +72,7 @@ impl Plc {
         let stopped = stop.clone();
         let thread = thread::spawn(move || {
             let clock = Monotonic::shared();
-            let mut end = End::open(&text(link, "controller"), &clock);
+            let mut end = End::open(&text(link, "controller"), &clock, &Kinds::LOOPBACK);
             let (mut last_go, mut count, mut random) = (done, 0_u32, seed);
             end.set("sync.done", f64::from(done));
             end.tick();
@@ -132,7 +133,7 @@ impl Participant for Machine {
 }
 
 fn open(link: &str, timeout: Nanos, stop: &Stop) -> Gateway {
-    let config = Config::parse("driver.cfg", &text(link, "device"));
+    let config = Config::parse("driver.cfg", &text(link, "device"), &Kinds::LOOPBACK);
     let config = config.unwrap_or_else(|why| panic!("{why}"));
     let options = GatewayOptions {
         client: None,
@@ -227,7 +228,7 @@ fn a_driver_cfg_that_is_none_of_a_gateway_is_told_what_it_lacks() {
         ),
     ] {
         assert!(right.contains(from), "{from}");
-        let config = Config::parse("driver.cfg", &right.replacen(from, to, 1));
+        let config = Config::parse("driver.cfg", &right.replacen(from, to, 1), &Kinds::LOOPBACK);
         let config = config.unwrap_or_else(|why| panic!("{why}"));
         let options = GatewayOptions {
             client: None,

@@ -8,6 +8,9 @@ use std::sync::Arc;
 use tickbus_base::time::Manual;
 use tickbus_conformance::rig::{CYCLE, End, SIGNALS, await_that};
 use tickbus_conformance::standin::{StandIn, until};
+use tickbus_driver_cfg::{Kind, Kinds};
+
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_plugin::Options>()]);
 
 const SHIM: &str = "../../examples/interbus-hli-shim/shim.c";
 const HEADER: &str = concat!(
@@ -25,7 +28,7 @@ fn open(switches: &[&str], clock: &Arc<Manual>) -> (StandIn, End) {
         "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"plugin\"\nlibrary = \"{library}\"\n\
          role = \"controller\"\ncycle = \"1ms\"\n{SIGNALS}"
     );
-    let end = End::open(&text, clock);
+    let end = End::open(&text, clock, &KINDS);
     (shim, end)
 }
 

@@ -1,0 +1,54 @@
+//! The kinds of bus as the exports know them.
+
+use tickbus_bus_modbus as modbus;
+use tickbus_bus_opcua as opcua;
+use tickbus_bus_s7 as s7;
+use tickbus_bus_socket as socket;
+use tickbus_driver_cfg::{Options, loopback};
+
+/// A kind of bus as the PLC's half of a line is made for it.
+///
+/// Every export matches on this, and none without all of its variants: an export that a kind lacks does not compile.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Exported<'a> {
+    /// `kind = "loopback"`.
+    Loopback,
+    /// `kind = "socket"`.
+    Socket(&'a socket::Options),
+    /// `kind = "modbus-server"`.
+    ModbusServer(&'a modbus::ServerOptions),
+    /// `kind = "modbus-client"`.
+    ModbusClient(&'a modbus::ClientOptions),
+    /// `kind = "s7-server"`.
+    S7Server(&'a s7::ServerOptions),
+    /// `kind = "s7-client"`.
+    S7Client(&'a s7::ClientOptions),
+    /// `kind = "opcua-client"`.
+    OpcuaClient,
+    /// `kind = "opcua-server"`.
+    OpcuaServer(&'a opcua::ServerOptions),
+    /// A bus whose other end no PLC editor has a program for: the user writes it by hand.
+    ByHand,
+}
+
+impl<'a> Exported<'a> {
+    /// What the exports go by for a bus with these options.
+    pub(crate) fn of(options: &'a Options) -> Self {
+        // Each variant names the type that it asks for.
+        let found = options
+            .downcast_ref::<loopback::Options>()
+            .map(|_| Self::Loopback);
+        found
+            .or_else(|| options.downcast_ref().map(Self::Socket))
+            .or_else(|| options.downcast_ref().map(Self::ModbusServer))
+            .or_else(|| options.downcast_ref().map(Self::ModbusClient))
+            .or_else(|| options.downcast_ref().map(Self::S7Server))
+            .or_else(|| options.downcast_ref().map(Self::S7Client))
+            .or_else(|| {
+                let client = options.downcast_ref::<opcua::ClientOptions>();
+                client.map(|_| Self::OpcuaClient)
+            })
+            .or_else(|| options.downcast_ref().map(Self::OpcuaServer))
+            .unwrap_or(Self::ByHand)
+    }
+}

@@ -402,7 +402,7 @@ mod tests {
     #[track_caller]
     fn signal(keys: &str) -> Signal {
         let text = format!("{HEAD}[[signal]]\nname = \"A\"\n{keys}\n");
-        match Config::parse("test.cfg", &text, &Kinds::LOOPBACK) {
+        match Config::parse("test.cfg", &text, &crate::KINDS) {
             Ok(mut config) => config.table.signals.remove(0),
             Err(mistakes) => panic!("{mistakes}"),
         }
@@ -464,8 +464,11 @@ mod tests {
     #[test]
     fn every_hosted_program_can_be_named_with_its_options() {
         let option = "program_options = { la1_code = \"lsb-first\" }";
-        let with_options = tickbus_programs::PROGRAMS.map(|name| (name, ""));
-        for (name, option) in with_options.into_iter().chain([("rig", option)]) {
+        let with_options = tickbus_programs::PROGRAMS
+            .names()
+            .iter()
+            .map(|name| (*name, ""));
+        for (name, option) in with_options.chain([("rig", option)]) {
             let head = HEAD.replace(
                 "link = \"cell\"",
                 &format!("program = \"{name}\"\n{option}"),
@@ -473,7 +476,7 @@ mod tests {
             let config = Config::parse(
                 "test.cfg",
                 &format!("{head}input_bytes = 1\n"),
-                &Kinds::LOOPBACK,
+                &crate::KINDS,
             )
             .unwrap_or_else(|mistakes| panic!("{mistakes}"));
             let options = config.bus.downcast_ref::<loopback::Options>();
@@ -506,7 +509,7 @@ mod tests {
     fn times_have_their_defaults() {
         let timing = |keys: &str| {
             let text = format!("{HEAD}{keys}\ninput_bytes = 1\n");
-            Config::parse("test.cfg", &text, &Kinds::LOOPBACK)
+            Config::parse("test.cfg", &text, &crate::KINDS)
                 .unwrap_or_else(|m| panic!("{m}"))
                 .timing
         };
@@ -527,7 +530,7 @@ mod tests {
         };
         let sections = (0..1000).map(section);
         let text: String = std::iter::once(HEAD.to_owned()).chain(sections).collect();
-        let mistakes = Config::parse("test.cfg", &text, &Kinds::LOOPBACK).expect_err("mistakes");
+        let mistakes = Config::parse("test.cfg", &text, &crate::KINDS).expect_err("mistakes");
         assert_eq!(mistakes.len(), 1000);
     }
 }

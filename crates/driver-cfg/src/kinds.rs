@@ -5,6 +5,7 @@ use std::fmt;
 
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::{BusKind, BusOptions, Events, Role};
+use tickbus_plc::Programs;
 
 use crate::{Options, loopback};
 
@@ -39,7 +40,7 @@ impl fmt::Debug for Kind {
     }
 }
 
-/// The kinds that a program has: the loopback, and those of its list.
+/// The kinds that a program has: the loopback, and those of its list; and the PLC programs that a loopback can host.
 ///
 /// A program makes one `static` of it, and hands that to whatever reads a driver.cfg:
 ///
@@ -51,6 +52,7 @@ pub struct Kinds {
     /// Those to which `buses` were added.
     others: Option<&'static Self>,
     buses: &'static [Kind],
+    programs: Programs,
     advice: &'static [(&'static str, &'static str)],
 }
 
@@ -63,8 +65,20 @@ impl Kinds {
         Self {
             others: None,
             buses,
+            programs: Programs::NONE,
             advice: &[],
         }
+    }
+
+    /// The same with built-in PLC programs that a driver.cfg may name.
+    #[must_use]
+    pub const fn with_programs(self, programs: Programs) -> Self {
+        Self { programs, ..self }
+    }
+
+    /// The PLC programs that a driver.cfg may name.
+    pub const fn programs(&self) -> &Programs {
+        &self.programs
     }
 
     /// The same with advice for names that people try and that are no kind: for each, in lower case, what would be right.
@@ -79,6 +93,7 @@ impl Kinds {
         Self {
             others: Some(self),
             buses,
+            programs: self.programs,
             advice: self.advice,
         }
     }
@@ -115,7 +130,7 @@ impl Kinds {
         ));
         let (options, learns_of_writes) = match name.map(|name| (name, self.find(name))) {
             Some((loopback::NAME, _)) => {
-                let options = loopback::Options::read(role, &mut table);
+                let options = loopback::Options::read(role, &mut table, &self.programs);
                 (options.map(Options::from), false)
             }
             Some((_, Some(kind))) => {
@@ -151,14 +166,17 @@ impl Kinds {
 
 impl fmt::Debug for Kinds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_tuple("Kinds").field(&self.names()).finish()
+        f.debug_struct("Kinds")
+            .field("names", &self.names())
+            .field("programs", &self.programs)
+            .finish_non_exhaustive()
     }
 }
 
-/// Lists of the same kinds are equal.
+/// Lists of the same kinds and programs are equal.
 impl PartialEq for Kinds {
     fn eq(&self, other: &Self) -> bool {
-        self.names() == other.names()
+        self.names() == other.names() && self.programs.names() == other.programs.names()
     }
 }
 

@@ -12,6 +12,10 @@ mod overlay;
 mod page;
 mod timing;
 
+/// Those of this crate's tests.
+#[cfg(test)]
+static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
+
 pub use config::{CommandLineEnd, Config};
 pub use kinds::{Kind, Kinds};
 pub use options::Options;

@@ -7,8 +7,7 @@ use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
 use tickbus_fieldbus::{Bus, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
-use tickbus_plc::{HostedProgram, INTERVAL};
-use tickbus_programs::{self as programs, PROGRAMS};
+use tickbus_plc::{HostedProgram, INTERVAL, Programs};
 use tickbus_record as record;
 
 /// The kind, as a driver.cfg names it.
@@ -61,8 +60,8 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `mode`, and `link`, `replay`, or `program` with `program_options` and `scan`.
-    pub fn read(role: Role, table: &mut Table<'_>) -> Option<Self> {
+    /// Reads `mode`, and `link`, `replay`, or `program`, one of these, with `program_options` and `scan`.
+    pub fn read(role: Role, table: &mut Table<'_>, programs: &Programs) -> Option<Self> {
         let mode = table.take("mode");
         // `[fieldbus]` reads it; among the keys that a message lists, it stands here.
         table.take("events");
@@ -118,7 +117,9 @@ impl Options {
                 );
                 None
             }
-            [("program", program)] => read_program(program, program_options, scan.as_ref(), role),
+            [("program", program)] => {
+                read_program(program, program_options, scan.as_ref(), (role, programs))
+            }
             [("replay", replay)] => record::file_of(replay).map(|(file, _)| Peer::Replay(file)),
             [(_, link)] => {
                 let name = "name the link; the driver at the other end names the same";
@@ -199,13 +200,14 @@ impl BusOptions for Options {
 }
 
 impl Peer {
-    /// Reads the options of a hosted program, for a machine at this end.
+    /// Reads the options of a hosted program, one of these, for a machine at this end.
     pub fn hosted(
         program: &Value<'_>,
         options: Option<Value<'_>>,
         scan: Option<&Value<'_>>,
+        programs: &Programs,
     ) -> Option<Self> {
-        read_program(program, options, scan, Role::Device)
+        read_program(program, options, scan, (Role::Device, programs))
     }
 
     /// The same program for a text that is in `folder` and not in that of the driver.cfg: a path to a user's
@@ -226,7 +228,7 @@ fn read_program(
     program: &Value<'_>,
     options: Option<Value<'_>>,
     scan: Option<&Value<'_>>,
-    role: Role,
+    (role, programs): (Role, &Programs),
 ) -> Option<Peer> {
     if role == Role::Controller {
         program.wrong(
@@ -235,7 +237,7 @@ fn read_program(
         );
     }
     let text = program.text("write the name of a program in quotes, such as \"rig\"");
-    let known = text.filter(|name| PROGRAMS.contains(name) || HostedProgram::is_path(name));
+    let known = text.filter(|name| programs.names().contains(name) || HostedProgram::is_path(name));
     let scan = match scan {
         Some(scan) => scan.duration().map(Some),
         // In a user's own program it is compiled in.
@@ -245,14 +247,14 @@ fn read_program(
     if let (Some(name), None) = (text, known) {
         program.wrong(
             format!("there is no program \"{}\"", shown(name)),
-            did_you_mean(name, "programs", &PROGRAMS),
+            did_you_mean(name, "programs", programs.names()),
         );
     }
     let options = match options {
         None => Some(Vec::new()),
         Some(value) => value
             .table("program_options", "write them as { option = \"value\" }")
-            .and_then(|table| read_options(&table, known?)),
+            .and_then(|table| read_options(&table, known?, programs)),
     };
     Some(Peer::Program {
         name: known?.to_owned(),
@@ -262,7 +264,11 @@ fn read_program(
 }
 
 /// The options of the program called `name`, each checked by the program itself.
-fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> {
+fn read_options(
+    table: &Table<'_>,
+    name: &str,
+    programs: &Programs,
+) -> Option<Vec<(String, String)>> {
     let mut read = Some(Vec::new());
     for (key, value) in table.all() {
         // Numbers need no quotes.
@@ -279,7 +285,7 @@ fn read_options(table: &Table<'_>, name: &str) -> Option<Vec<(String, String)>> 
         let option = text.map(|text| (key.to_owned(), text));
         let made = option
             .as_ref()
-            .map(|option| programs::check(name, std::slice::from_ref(option)));
+            .map(|option| programs.check(name, std::slice::from_ref(option)));
         if let Some(Err(error)) = &made {
             value.refuse(error.mistake());
         }

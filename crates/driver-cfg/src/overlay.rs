@@ -167,7 +167,6 @@ fn read_stations(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Kinds;
     use crate::loopback::{Mode, Peer};
     use tickbus_base::time::Nanos;
 
@@ -176,7 +175,7 @@ mod tests {
             "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nmax_age = \"3s\"\ninput_bytes = 8\n{fieldbus}\n\
              [[signal]]\nname = \"A\"\naddress = \"%IX0.0\"\n"
         );
-        Config::parse("plant.cfg", &text, &Kinds::LOOPBACK)
+        Config::parse("plant.cfg", &text, &crate::KINDS)
             .unwrap_or_else(|mistakes| panic!("{mistakes}"))
     }
 

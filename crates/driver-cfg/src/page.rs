@@ -104,14 +104,14 @@ impl PageOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Config, Kinds};
+    use crate::Config;
 
     fn read(page: &str) -> Result<Option<PageOptions>, String> {
         let text = format!(
             "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
              [[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n{page}"
         );
-        let config = Config::parse("driver.cfg", &text, &Kinds::LOOPBACK);
+        let config = Config::parse("driver.cfg", &text, &crate::KINDS);
         config
             .map(|config| config.page)
             .map_err(|wrong| wrong.to_string())

@@ -73,7 +73,9 @@ fn open_hosted(
 ) -> Result<(OpenBus, Option<Program>), DriverError> {
     let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
     let folder = config.path.parent().unwrap_or(Path::new(""));
-    let mut program = tickbus_programs::program_beside(folder, name, options)
+    let programs = config.kinds.programs();
+    let mut program = programs
+        .make(folder, name, options)
         .map_err(|source| program_error(config, source))?;
     check_fit(config, &mut *program, Role::Controller)?;
     let scan = plc::interval(&*program, scan);

@@ -29,7 +29,8 @@ mod watching;
 
 /// Those of this crate's tests.
 #[cfg(test)]
-static KINDS: tickbus_driver_cfg::Kinds = tickbus_driver_cfg::Kinds::LOOPBACK;
+static KINDS: tickbus_driver_cfg::Kinds =
+    tickbus_driver_cfg::Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
 
 pub use controller::Host;
 pub use driver::Driver;

@@ -1,4 +1,4 @@
-//! The bus kinds of tickbus: the one list of them.
+//! The bus kinds of tickbus: the one list of them, with the PLC programs that are built in.
 //!
 //! Nothing below this crate knows which buses there are. What reads a driver.cfg takes the list from its caller, and the
 //! native library, the command and the Python package hand in this one. A program with a bus of its own hands in
@@ -43,6 +43,7 @@ pub static KINDS: Kinds = Kinds::new(&[
     Kind::of::<dispatcher::Options>(),
     Kind::of::<plugin::Options>(),
 ])
+.with_programs(tickbus_programs::PROGRAMS)
 .with_advice(&[
     ("profinet", CARD),
     ("ethercat", CARD),

@@ -22,6 +22,8 @@ use tickbus_image::signal::Slot;
 use tickbus_live_page::{LivePage, Member, Options};
 use tickbus_web::{Limits, Room, Serving};
 
+static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
+
 /// A simulation in a separate thread: its driver's PLC is the mirror.
 struct Simulation {
     is_over: Arc<AtomicBool>,
@@ -65,8 +67,8 @@ impl Simulation {
             "[driver]\nid = {id}\nname = \"{name}\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
              scan = \"1ms\"\nmode = \"stepped\"\n{SIGNALS}"
         );
-        let config = Config::parse("driver.cfg", &text, &Kinds::LOOPBACK)
-            .unwrap_or_else(|why| panic!("{why}"));
+        let config =
+            Config::parse("driver.cfg", &text, &KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let options = Options {
             grace,
@@ -521,8 +523,7 @@ fn what_a_plc_never_sent_is_not_exported_as_live() {
                 [[station]]\nname = \"North\"\n[[station]]\nname = \"South\"\n\
                 [[signal]]\nname = \"to\"\nstation = \"North\"\naddress = \"%IB0\"\n\
                 [[signal]]\nname = \"from\"\nstation = \"South\"\naddress = \"%QB0\"\n";
-    let config =
-        Config::parse("driver.cfg", text, &Kinds::LOOPBACK).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse("driver.cfg", text, &KINDS).unwrap_or_else(|why| panic!("{why}"));
     let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
     let mut slots = driver.initial_slots();
     let options = Options {

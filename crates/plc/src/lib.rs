@@ -14,11 +14,13 @@ use tickbus_image::signal::{Addressing, SignalTable};
 
 mod axes;
 mod hosted;
+mod programs;
 
 pub mod blocks;
 
 pub use axes::Axes;
 pub use hosted::HostedProgram;
+pub use programs::Programs;
 
 /// The inputs and outputs of one scan.
 #[derive(Debug)]

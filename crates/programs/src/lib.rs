@@ -1,12 +1,12 @@
 //! The built-in PLC programs: those of the demos, and two for commissioning and measuring.
 //!
 //! None of them is part of the driver: they are at the other end of the line, hosted by a loopback or run by `tickbus
-//! plc`. [`program`] finds a built-in program by its name, or a user's own program by its path.
+//! plc`. [`PROGRAMS`] is handed in where programs are hosted by their names.
 
 use std::path::Path;
 
 use peeler::{Charger, Lathe};
-use tickbus_plc::{HostedProgram, Program, ProgramError};
+use tickbus_plc::{Program, ProgramError, Programs};
 
 mod drum;
 mod mirror;
@@ -20,66 +20,36 @@ pub use mirror::Mirror;
 pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};
 
-/// The built-in names for [`program`].
-pub const PROGRAMS: [&str; 5] = [
-    Rig::NAME,
-    Mirror::NAME,
-    Reaction::NAME,
-    Charger::NAME,
-    Lathe::NAME,
-];
+/// The list of the built-in programs.
+pub const PROGRAMS: Programs = Programs::new(
+    &[
+        Rig::NAME,
+        Mirror::NAME,
+        Reaction::NAME,
+        Charger::NAME,
+        Lathe::NAME,
+    ],
+    built_in,
+);
 
-/// Makes the program called `name`, with its options as (key, value) pairs. If an option is given twice, the last one
-/// counts.
-///
-/// The name is one of [`PROGRAMS`], or the path of a [`HostedProgram`]: a path contains `/` or ends in `.so`, `.dll` or
-/// `.dylib`.
+fn built_in(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
+    Ok(match name {
+        Rig::NAME => Box::new(Rig::from_options(options)?),
+        Mirror::NAME => Box::new(Mirror::new(options)?),
+        Reaction::NAME => Box::new(Reaction::from_options(options)?),
+        Charger::NAME => Box::new(Charger::from_options(options)?),
+        Lathe::NAME => Box::new(Lathe::from_options(options)?),
+        _ => unreachable!("{name} is one of the list"),
+    })
+}
+
+/// Makes the program called `name`, one of [`PROGRAMS`] or a path from the current folder; see [`Programs::make`].
 ///
 /// # Errors
 ///
-/// The name is unknown, the program has no such option, or the option does not accept the value; the text says what
-/// would be right.
+/// As there.
 pub fn program(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>, ProgramError> {
-    program_beside(Path::new(""), name, options)
-}
-
-/// The same, with paths relative to `folder`.
-///
-/// # Errors
-///
-/// As for [`program`].
-pub fn program_beside(
-    folder: &Path,
-    name: &str,
-    options: &[(String, String)],
-) -> Result<Box<dyn Program>, ProgramError> {
-    match name {
-        _ if HostedProgram::is_path(name) => {
-            Ok(Box::new(HostedProgram::load(&folder.join(name), options)?))
-        }
-        Rig::NAME => Ok(Box::new(Rig::from_options(options)?)),
-        Mirror::NAME => Ok(Box::new(Mirror::new(options)?)),
-        Reaction::NAME => Ok(Box::new(Reaction::from_options(options)?)),
-        Charger::NAME => Ok(Box::new(Charger::from_options(options)?)),
-        Lathe::NAME => Ok(Box::new(Lathe::from_options(options)?)),
-        _ => Err(ProgramError::UnknownName {
-            name: name.to_owned(),
-            known: &PROGRAMS,
-        }),
-    }
-}
-
-/// Checks without loading anything that there can be a program called `name` that takes `options`.
-///
-/// # Errors
-///
-/// As for [`program`].
-pub fn check(name: &str, options: &[(String, String)]) -> Result<(), ProgramError> {
-    if HostedProgram::is_path(name) {
-        HostedProgram::check_options(name, options)
-    } else {
-        program(name, options).map(drop)
-    }
+    PROGRAMS.make(Path::new(""), name, options)
 }
 
 #[cfg(test)]
@@ -96,8 +66,8 @@ mod tests {
 
     #[test]
     fn every_built_in_program_can_be_made_by_its_name() {
-        for name in PROGRAMS {
-            assert_eq!(program(name, &[]).expect("built in").name(), name);
+        for name in PROGRAMS.names() {
+            assert_eq!(program(name, &[]).expect("built in").name(), *name);
         }
     }
 

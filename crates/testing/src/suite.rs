@@ -111,7 +111,8 @@ fn read(
         None => Some(None),
         // The driver.cfg may be in a different folder from this file.
         Some(program) => {
-            Peer::hosted(program, options, scan.as_ref()).map(|peer| Some(peer.seen_from(folder)))
+            let peer = Peer::hosted(program, options, scan.as_ref(), kinds.programs());
+            peer.map(|peer| Some(peer.seen_from(folder)))
         }
     };
     let config = config.and_then(|value| {

@@ -158,12 +158,14 @@ mod tests {
 
     use super::*;
 
+    static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
+
     #[test]
     fn an_input_that_the_map_joins_is_not_joined_by_its_name_too() {
         let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
                     [[signal]]\nname = \"Command\"\naddress = \"%QX0.0\"\n[[signal]]\nname = \"valve\"\naddress = \"%QX0.1\"\n";
-        let config = Config::parse("it.cfg", text, &Kinds::LOOPBACK)
-            .unwrap_or_else(|mistakes| panic!("{mistakes}"));
+        let config =
+            Config::parse("it.cfg", text, &KINDS).unwrap_or_else(|mistakes| panic!("{mistakes}"));
         let text = "<fmiModelDescription fmiVersion=\"3.0\" modelName=\"x\" instantiationToken=\"g\">\
                     <CoSimulation modelIdentifier=\"x\"/><ModelVariables>\
                     <Boolean name=\"valve\" valueReference=\"1\" causality=\"input\"/></ModelVariables></fmiModelDescription>";

@@ -461,18 +461,15 @@ fn failed(code: Code, reason: &str) -> String {
 mod tests {
     use super::*;
 
+    static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
+
     #[test]
     fn a_simulation_may_begin_before_zero() {
         let folder = tempfile::tempdir().expect("a folder");
         let text = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\n\
                     [[signal]]\nname = \"in\"\naddress = \"%IX0.0\"\n[[signal]]\nname = \"out\"\naddress = \"%QX0.0\"\n";
         std::fs::write(folder.path().join("driver.cfg"), text).expect("a file");
-        let made = Instance::new(
-            Version::Two,
-            folder.path(),
-            &token(text.as_bytes()),
-            &Kinds::LOOPBACK,
-        );
+        let made = Instance::new(Version::Two, folder.path(), &token(text.as_bytes()), &KINDS);
         let mut instance = made.unwrap_or_else(|why| panic!("{why}"));
         for start in [-2.0, 0.0, 1000.0] {
             assert_eq!(instance.begin_at(start), Ok(()));

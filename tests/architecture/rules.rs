@@ -26,8 +26,8 @@ const UNSAFE_HOMES: &[&str] = &[
 /// Where the system's clocks may be read.
 const CLOCK_HOMES: &[&str] = &["crates/base/src/time/", "crates/conformance/", "src/cli/"];
 
-/// The crates that know no bus but the loopback: the kinds are handed in. A bus's tests stand on them, and would compile
-/// all other buses.
+/// The crates that know no bus but the loopback: the kinds are handed in. The tests of a bus use these crates, and would
+/// otherwise compile all other buses.
 const CORE: &[&str] = &[
     "axis",
     "base",
@@ -75,7 +75,7 @@ fn is_bus(name: &str) -> bool {
     name.starts_with("tickbus_bus_") || name.starts_with("tickbus_kinds")
 }
 
-/// What to do instead of naming a bus.
+/// The advice for a crate that names a bus.
 const NO_BUS: &str = "this crate knows no bus; ask `BusOptions`, or take the kinds from the caller";
 
 fn buses(file: File<'_>, tokens: &[Token<'_>]) -> Vec<String> {

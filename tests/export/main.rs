@@ -46,7 +46,7 @@ fn files(folder: &Path) -> Vec<(String, String)> {
     files
 }
 
-/// The kinds whose other end no PLC editor has a program for: users write it by hand.
+/// The kinds for whose other end no PLC editor has a program: users write that by hand.
 const BY_HAND: [&str; 9] = [
     "profibus-device",
     "hilscher-cif",
@@ -108,7 +108,7 @@ fn exports_are_their_golden_files() {
         );
     }
     assert_eq!(kinds.len(), 9, "each bus that this version has: {kinds:?}");
-    // A new kind has to be decided on: it has golden files, or stands here.
+    // A new kind needs golden files, or its name here.
     for kind in tickbus::KINDS.names() {
         let is_by_hand = BY_HAND.contains(&kind);
         assert!(kinds.contains(kind) || is_by_hand, "{kind} has no export");

@@ -62,7 +62,7 @@ pub struct CommandLineEnd {
     pub moved: bool,
 }
 
-/// What is known before a file is read.
+/// The values known before a file is read.
 type Given = (Option<CommandLineEnd>, &'static Kinds);
 
 impl Config {

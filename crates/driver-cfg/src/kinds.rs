@@ -1,5 +1,5 @@
-//! The kinds of bus that a driver.cfg can name. They are handed in: this crate knows the loopback alone, and a bus of somebody
-//! else's is one more line in the list of the program that has it.
+//! The kinds of bus that a driver.cfg can name. They are handed in: this crate knows only the loopback, and a third-party bus
+//! is one more line in the list of the program that has it.
 
 use std::fmt;
 
@@ -49,7 +49,7 @@ impl fmt::Debug for Kind {
 /// static WITH_MINE: Kinds = KINDS.and(&[Kind::of::<my_bus::Options>()]);
 /// ```
 pub struct Kinds {
-    /// Those to which `buses` were added.
+    /// The lists of buses that were added.
     others: Option<&'static Self>,
     buses: &'static [Kind],
     programs: Programs,
@@ -81,13 +81,13 @@ impl Kinds {
         &self.programs
     }
 
-    /// The same with advice for names that people try and that are no kind: for each, in lower case, what would be right.
+    /// The same with advice for names that users try and that are no kind: pairs of a name in lower case and the advice.
     #[must_use]
     pub const fn with_advice(self, advice: &'static [(&'static str, &'static str)]) -> Self {
         Self { advice, ..self }
     }
 
-    /// These and further buses. A kind that is there already keeps its name.
+    /// These and further buses. A kind that the list already has keeps its name.
     #[must_use]
     pub const fn and(&'static self, buses: &'static [Kind]) -> Self {
         Self {

@@ -1,6 +1,6 @@
 //! driver.cfg as a whole: one driver's signals, stations and timing, and what its bus needs to know.
 //!
-//! [`Config`] is what a file says, checked. The bus kinds that it may name are [handed in](Kinds).
+//! [`Config`] is a file's content, checked. The bus kinds that it may name are [handed in](Kinds).
 
 mod config;
 mod driver_table;

@@ -1,4 +1,4 @@
-//! What the `[fieldbus]` table configures: the options of one bus, whatever its kind.
+//! The options of one bus of any kind: the content of the table `[fieldbus]`.
 
 use std::ops::{Deref, DerefMut};
 use std::path::Path;

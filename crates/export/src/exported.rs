@@ -1,4 +1,4 @@
-//! The kinds of bus as the exports know them.
+//! The kinds of bus in the view of the exports.
 
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
@@ -6,9 +6,9 @@ use tickbus_bus_s7 as s7;
 use tickbus_bus_socket as socket;
 use tickbus_driver_cfg::{Options, loopback};
 
-/// A kind of bus as the PLC's half of a line is made for it.
+/// The kinds of bus, as the PLC's half of a line depends on them.
 ///
-/// Every export matches on this, and none without all of its variants: an export that a kind lacks does not compile.
+/// Every export matches on all variants, so a kind that an export forgets does not compile.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Exported<'a> {
     /// `kind = "loopback"`.
@@ -27,12 +27,12 @@ pub(crate) enum Exported<'a> {
     OpcuaClient,
     /// `kind = "opcua-server"`.
     OpcuaServer(&'a opcua::ServerOptions),
-    /// A bus whose other end no PLC editor has a program for: the user writes it by hand.
+    /// A bus for whose other end no PLC editor has a program: users write that by hand.
     ByHand,
 }
 
 impl<'a> Exported<'a> {
-    /// What the exports go by for a bus with these options.
+    /// The variant for a bus with these options.
     pub(crate) fn of(options: &'a Options) -> Self {
         // Each variant names the type that it asks for.
         let found = options

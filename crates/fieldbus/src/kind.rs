@@ -70,12 +70,12 @@ pub enum NamedFile {
     InClear(&'static str),
 }
 
-/// What a type of options has by `#[derive(Clone, Debug, PartialEq)]`, for code that does not know the type.
+/// The derived traits of a type of options (`Clone`, `Debug`, `PartialEq`), for code that does not know the type.
 pub trait AnyOptions: Any + fmt::Debug + Send + Sync {
     /// A copy.
     fn boxed(&self) -> Box<dyn BusOptions>;
 
-    /// Whether `other` has the same type, and is equal.
+    /// Returns true if `other` has the same type and is equal.
     fn equals(&self, other: &dyn BusOptions) -> bool;
 }
 
@@ -103,8 +103,8 @@ impl dyn BusOptions {
 
 /// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.
 ///
-/// Methods with a body are for buses that have something to say there. Code that is not about one bus asks here, and does not
-/// look which bus it has.
+/// Methods with a body are for buses that differ there. Code that is not about one bus calls these methods, and does not ask
+/// which bus it has.
 pub trait BusOptions: AnyOptions {
     /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
@@ -125,7 +125,7 @@ pub trait BusOptions: AnyOptions {
         None
     }
 
-    /// What [`summary`](Self::summary) adds where each [write](Events::Writes) of the peer is an event.
+    /// The addition to [`summary`](Self::summary) if each [write](Events::Writes) of the peer is an event.
     fn summary_of_writes(&self) -> Option<&'static str> {
         None
     }
@@ -135,12 +135,12 @@ pub trait BusOptions: AnyOptions {
         false
     }
 
-    /// Whether the bus runs in the steps of the simulation, and not in real time.
+    /// Returns true if the bus runs in the steps of the simulation, and not in real time.
     fn is_stepped(&self) -> bool {
         false
     }
 
-    /// Whether the bus starts the `tickbus` command that it finds on the PATH.
+    /// Returns true if the bus starts the `tickbus` command that it finds on the PATH.
     fn needs_command(&self) -> bool {
         false
     }

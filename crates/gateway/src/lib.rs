@@ -114,7 +114,7 @@ impl Side {
     }
 }
 
-/// What the gateway and the scan of its image hand each other.
+/// The values that the gateway and the scan of its image hand to each other.
 #[derive(Debug, Default)]
 struct Desk {
     frames: Mutex<Frames>,
@@ -139,7 +139,7 @@ impl Desk {
     }
 }
 
-/// What stands where a machine's program would.
+/// The stand-in for the machine's program.
 #[derive(Debug)]
 struct Desktop(Arc<Desk>);
 
@@ -320,7 +320,7 @@ impl Gateway {
         }
     }
 
-    /// What is missing, for people.
+    /// The missing parts, as text for users.
     fn missing(&mut self) -> String {
         let (timeout, link) = (self.timeout, self.host.link());
         let go = self.go;

@@ -1,7 +1,7 @@
 //! The bus kinds of tickbus: the one list of them, with the PLC programs that are built in.
 //!
-//! Nothing below this crate knows which buses there are. What reads a driver.cfg takes the list from its caller, and the
-//! native library, the command and the Python package hand in this one. A program with a bus of its own hands in
+//! No crate below this one knows the list. Code that reads a driver.cfg takes the list from its caller, and the native
+//! library, the command and the Python package hand in this one. A program with a bus of its own hands in
 //! [`KINDS`] and that:
 //!
 //! ```ignore
@@ -24,7 +24,7 @@ use tickbus_driver_cfg::{Kind, Kinds};
 #[cfg(test)]
 mod tests;
 
-/// All kinds: those of these crates, and the loopback, which is always there.
+/// All kinds: those of these crates, and the loopback, which every list has.
 pub static KINDS: Kinds = Kinds::new(&[
     Kind::of::<socket::Options>(),
     Kind::of::<modbus::ServerOptions>(),
@@ -54,6 +54,6 @@ pub static KINDS: Kinds = Kinds::new(&[
     ("powerlink", CARD),
 ]);
 
-/// For the names of buses that only cards have.
+/// Advice for names of buses that only cards have.
 const CARD: &str = "this bus needs a card: kind = \"hilscher-cifx\" (docs/hilscher.md), or \"plugin\" for another vendor's; \
                     docs/which-bus.md lists what suits each PLC";

@@ -1,4 +1,4 @@
-//! What a driver.cfg can say of the kinds of the list.
+//! Tests of driver.cfg files that name the kinds of the list.
 
 mod overlay;
 mod rig;

@@ -54,7 +54,7 @@ impl Programs {
         (self.make)(name, options)
     }
 
-    /// Whether there can be a program called `name` that takes `options`, without loading anything.
+    /// Checks, without loading anything, that there can be a program called `name` that takes `options`.
     ///
     /// # Errors
     ///

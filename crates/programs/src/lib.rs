@@ -43,7 +43,7 @@ fn built_in(name: &str, options: &[(String, String)]) -> Result<Box<dyn Program>
     })
 }
 
-/// Makes the program called `name`, one of [`PROGRAMS`] or a path from the current folder; see [`Programs::make`].
+/// Makes the program called `name`, one of [`PROGRAMS`] or a path relative to the current folder; see [`Programs::make`].
 ///
 /// # Errors
 ///

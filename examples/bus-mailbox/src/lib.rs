@@ -2,7 +2,7 @@
 //!
 //! It shows what a bus needs, and how little: a [frame](Frame), free of I/O; the [options](Options) that a driver.cfg
 //! gives it; and the thread that carries frames between the port and the line. `src/main.rs` hands it to the `tickbus`
-//! command; nothing of tickbus knows it. `CONTRIBUTING.md` describes how a bus is added.
+//! command; nothing in tickbus knows this bus. `CONTRIBUTING.md` describes how a bus is added.
 
 mod frame;
 mod options;

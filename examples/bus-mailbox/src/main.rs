@@ -1,4 +1,4 @@
-//! The `tickbus` command with a further bus: what a program of your own needs to have one.
+//! The `tickbus` command with one more bus, as a program of your own would have it.
 
 use std::process::ExitCode;
 

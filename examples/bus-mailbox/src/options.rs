@@ -1,4 +1,4 @@
-//! What a driver.cfg says to the bus, and its kind, for a list of kinds.
+//! The options of the bus in a driver.cfg, and its kind, for a list of kinds.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! The example of a bus passes what every bus passes, and the command has it although nothing of tickbus knows it.
+//! The example of a bus passes the tests that every bus passes, and its command has the bus although nothing in tickbus knows it.
 
 use std::path::Path;
 use std::process::Command;
@@ -91,7 +91,7 @@ fn the_command_has_the_bus_beside_its_own() {
     }
 }
 
-/// What would have to be forked to have it.
+/// The crates that would have to be forked to have the bus.
 #[test]
 fn nothing_of_tickbus_names_the_bus() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

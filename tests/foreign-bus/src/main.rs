@@ -1,4 +1,4 @@
-//! A bus of somebody else's, and the program that has it: tickbus is used as it is, and not forked.
+//! A third-party bus, and the program that has it: tickbus is used unchanged, and not forked.
 //!
 //! The bus joins its two ends by memory. The program opens both, and ends when each has seen what the other wrote.
 
@@ -13,12 +13,12 @@ use tickbus_fieldbus::{
 };
 use tickbus_image::signal::{Slot, SignalTable};
 
-/// What a driver.cfg of this program may name: the loopback, and this bus.
+/// The kinds that a driver.cfg of this program can name: the loopback, and this bus.
 static KINDS: Kinds = Kinds::new(&[Kind::of::<Options>()]);
 
 const CYCLE: Nanos = Nanos::from_millis(1);
 
-/// What the device and the controller sent last.
+/// The bytes that the device and the controller sent last.
 static WIRE: Mutex<[Option<Vec<u8>>; 2]> = Mutex::new([None, None]);
 
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,7 +5,9 @@ mod rig;
 
 use std::collections::BTreeSet;
 
+#[cfg(not(feature = "opcua"))]
 use tickbus_base::time::Manual;
+#[cfg(not(feature = "opcua"))]
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Events;

@@ -289,7 +289,8 @@ impl Station {
             self.is_pending = false;
         }
         if self.is_repeated(request) {
-            if is_owner && self.state == State::DataExch {
+            // Another request says nothing about the outputs: those of before an outage stay old while the configuration is repeated.
+            if is_owner && self.state == State::DataExch && request.dsap.is_none() {
                 process.alive(self.address, now);
             }
             reply.extend_from_slice(&self.last.answer);

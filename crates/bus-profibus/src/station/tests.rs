@@ -211,6 +211,18 @@ fn a_repeated_request_gets_the_same_answer_and_is_not_served_twice() {
 }
 
 #[test]
+fn a_repeated_configuration_does_not_renew_the_outputs_of_before() {
+    let mut rig = Rig::exchanging(identity(), 0, 0);
+    rig.raw(None, 0x5D, &[1, 2]);
+    assert_eq!(rig.parameterise(LOCK, 0), Came::Short);
+    for _ in 0..2 {
+        assert_eq!(rig.raw(Some(62), 0x5D, &[0x50, 0x60]), Came::Short);
+    }
+    assert_eq!(rig.station.state(), State::DataExch);
+    assert_eq!((rig.machine.outputs.len(), rig.machine.alive), (1, 0));
+}
+
+#[test]
 fn inputs_that_are_lost_on_the_way_are_sent_with_the_repetition() {
     let mut rig = Rig::exchanging(identity(), 0, 0);
     rig.machine.loses = true;

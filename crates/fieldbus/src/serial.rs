@@ -2,12 +2,14 @@
 
 use std::fmt;
 #[cfg(unix)]
-use std::io::ErrorKind;
+use std::io::{self, ErrorKind};
 #[cfg(unix)]
 use std::path::Path;
 
 #[cfg(unix)]
-use tickbus_base::os::{SerialPort, SerialSettings};
+use tickbus_base::os::{SerialLine, SerialPort, SerialSettings};
+#[cfg(unix)]
+use tickbus_base::time::Clock;
 use tickbus_base::toml_text::Value;
 
 use super::BusError;
@@ -28,38 +30,44 @@ pub fn read_device(value: &Value<'_>) -> Option<String> {
 /// It does not exist, is not a serial port, or does not support the settings.
 #[cfg(unix)]
 pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
-    SerialPort::open(Path::new(device), settings).map_err(|error| {
-        let right = match error.kind() {
-            ErrorKind::NotFound => {
-                "plug it in, or correct \"device\"; ls /dev/serial/by-id shows what is there"
-            }
-            ErrorKind::PermissionDenied => {
-                "get the right to use it; on Debian and Ubuntu that is the group dialout"
-            }
-            ErrorKind::ResourceBusy => "end the other program that has it",
-            _ if settings.rs485 => {
-                "if its driver cannot switch the direction of RS-485, remove rs485 = true and take an adapter that \
-                 does so by itself"
-            }
-            _ => "check that it is a serial port that can be set so",
-        };
-        BusError::Link(format!(
-            "cannot open {device} at {settings} ({error}); {right}"
-        ))
-    })
+    SerialPort::open(Path::new(device), settings).map_err(|error| no_port(device, settings, &error))
 }
 
 /// Opens the port as [`open`] does, so that it marks characters that were damaged on the line, for
-/// [`Marks`](tickbus_base::os::Marks).
+/// [`Marks`](tickbus_base::os::Marks). The port is that of the clock's simulation, if it has one.
 ///
 /// # Errors
 ///
 /// As of [`open`].
 #[cfg(unix)]
-pub fn open_marking(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
-    let port = open(device, settings)?;
-    port.mark_damaged().map_err(|error| gone(device, error))?;
-    Ok(port)
+pub fn open_marking(
+    device: &str,
+    settings: SerialSettings,
+    clock: &dyn Clock,
+) -> Result<SerialLine, BusError> {
+    SerialLine::open(device, settings, clock.simulation())
+        .map_err(|error| no_port(device, settings, &error))
+}
+
+#[cfg(unix)]
+fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> BusError {
+    let right = match error.kind() {
+        ErrorKind::NotFound => {
+            "plug it in, or correct \"device\"; ls /dev/serial/by-id shows what is there"
+        }
+        ErrorKind::PermissionDenied => {
+            "get the right to use it; on Debian and Ubuntu that is the group dialout"
+        }
+        ErrorKind::ResourceBusy => "end the other program that has it",
+        _ if settings.rs485 => {
+            "if its driver cannot switch the direction of RS-485, remove rs485 = true and take an adapter that \
+             does so by itself"
+        }
+        _ => "check that it is a serial port that can be set so",
+    };
+    BusError::Link(format!(
+        "cannot open {device} at {settings} ({error}); {right}"
+    ))
 }
 
 /// The serial port `device` is gone.

@@ -34,7 +34,7 @@ pub fn mutant(number: u32) -> bool {
 }
 """
 # Crates whose lines are changed at random.
-CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7"]
+CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7", "bus-profibus"]
 
 
 def write_tree(texts):

@@ -17,11 +17,13 @@ pub enum Bus {
     S7,
     /// Lines of values, which a dispatcher in a process of its own passes on.
     Dispatcher,
+    /// PROFIBUS DP on a serial line; the controller is the master.
+    Profibus,
 }
 
 impl Bus {
     /// The names of all.
-    pub(crate) const NAMES: [&str; 7] = [
+    pub(crate) const NAMES: [&str; 8] = [
         "loopback",
         "socket",
         "on change",
@@ -29,6 +31,7 @@ impl Bus {
         "modbus rtu",
         "s7",
         "dispatcher",
+        "profibus",
     ];
 
     /// The name, as a feature of a world.
@@ -38,12 +41,15 @@ impl Bus {
 
     /// Whether one end asks and the other answers.
     pub(crate) fn asks(self) -> bool {
-        matches!(self, Self::Modbus | Self::ModbusRtu | Self::S7)
+        matches!(
+            self,
+            Self::Modbus | Self::ModbusRtu | Self::S7 | Self::Profibus
+        )
     }
 
-    /// Whether each station is asked by itself: a unit of Modbus.
+    /// True if each station is asked separately: a unit of Modbus, a slave of PROFIBUS.
     pub(crate) fn has_units(self) -> bool {
-        matches!(self, Self::Modbus | Self::ModbusRtu)
+        matches!(self, Self::Modbus | Self::ModbusRtu | Self::Profibus)
     }
 
     /// Whether one message carries several stations.

@@ -88,6 +88,12 @@ impl Simulation for SimulatedClock {
         Ok(Box::new(Socket(id)))
     }
 
+    fn open_serial(&self, _device: &str) -> io::Result<Box<dyn SimulatedStream>> {
+        let process = scheduler::process();
+        let id = network(|network, _, now| network.open_serial(process, now));
+        Ok(Box::new(SerialPort(id)))
+    }
+
     fn write(&self, file: &File, path: &Path, bytes: &[u8]) -> io::Result<usize> {
         let process = scheduler::process();
         scheduler::disk(|disk, _| disk.write(process, file, path, bytes))
@@ -157,5 +163,54 @@ impl Drop for Socket {
             network.close_listener(self.0, now);
             network.close(self.0, now);
         });
+    }
+}
+
+/// A port of the serial line.
+#[derive(Debug)]
+struct SerialPort(u64);
+
+impl SimulatedSocket for SerialPort {
+    fn identity(&self) -> u64 {
+        self.0
+    }
+
+    fn local_addr(&self) -> io::Result<SocketAddr> {
+        Err(ErrorKind::Unsupported.into())
+    }
+}
+
+impl SimulatedStream for SerialPort {
+    fn read(&self, buffer: &mut [u8]) -> io::Result<usize> {
+        network(|network, _, now| network.read_serial(self.0, buffer, now))
+    }
+
+    fn write(&self, bytes: &[u8]) -> io::Result<usize> {
+        let times = scheduler::awake_since();
+        network(|network, random, _| network.write_serial(self.0, bytes, times, random))
+    }
+
+    fn wait(&self, _interest: Interest, _limit: Nanos) -> bool {
+        true
+    }
+
+    fn shutdown_write(&self) -> io::Result<()> {
+        Ok(())
+    }
+
+    fn close_by_reset(&self) {}
+
+    fn peer_addr(&self) -> io::Result<SocketAddr> {
+        Err(ErrorKind::Unsupported.into())
+    }
+
+    fn take_error(&self) -> io::Result<Option<io::Error>> {
+        Ok(None)
+    }
+}
+
+impl Drop for SerialPort {
+    fn drop(&mut self) {
+        network(|network, _, _| network.wire.close(self.0));
     }
 }

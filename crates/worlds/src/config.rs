@@ -3,6 +3,7 @@
 use tickbus_base::time::Nanos;
 
 use crate::plan::{Bus, FAIL_SAFE, Plan, Watchdog};
+use crate::{master, wire};
 
 /// The port of the world's line.
 pub(crate) const PORT: u16 = 20_030;
@@ -22,19 +23,19 @@ impl Plan {
         lines.extend(self.timing(end));
         lines.extend(self.life_signs(end));
         lines.extend(self.record_section(end));
-        lines.push(self.signal_sections(end, self.bus.has_units()));
+        lines.push(self.signal_sections(end, true));
         lines.extend(self.fault_sections(end));
         lines.join("\n")
     }
 
-    /// The stations and their signals; a station is a unit of Modbus, or is not.
-    pub(crate) fn signal_sections(&self, end: usize, has_units: bool) -> String {
+    /// The stations and their signals, with or without the keys of the bus.
+    pub(crate) fn signal_sections(&self, end: usize, has_keys: bool) -> String {
         let mut lines = Vec::new();
         for station in 0..self.stations {
             if self.stations > 1 {
                 lines.push(format!("[[station]]\nname = \"s{station}\""));
-                if has_units {
-                    lines.push(format!("unit = {}", station + 1));
+                if has_keys {
+                    lines.extend(self.station_keys(end, station));
                 }
             }
         }
@@ -44,6 +45,24 @@ impl Plan {
             }
         }
         lines.join("\n")
+    }
+
+    /// The keys of a station that only some buses have.
+    fn station_keys(&self, end: usize, station: usize) -> Option<String> {
+        match self.bus {
+            Bus::Modbus | Bus::ModbusRtu => Some(format!("unit = {}", station + 1)),
+            Bus::Profibus if end == 0 => Some(format!(
+                "address = {}\nident = {}",
+                usize::from(master::FIRST) + station,
+                master::IDENT
+            )),
+            _ => None,
+        }
+    }
+
+    /// The time within which a slave of PROFIBUS has to answer, in bits.
+    fn slot_bits(&self) -> i64 {
+        (self.slot() / wire::bits(1)).clamp(200, 16_383)
     }
 
     /// The bus, and what only some buses have.
@@ -58,6 +77,7 @@ impl Plan {
             (Bus::S7, true) => ("s7-server", ""),
             (Bus::S7, false) => ("s7-client", ""),
             (Bus::Dispatcher, _) => ("dispatcher", NAMES[end].1),
+            (Bus::Profibus, _) => return self.profibus(end),
         };
         let mut lines = vec![format!(
             "kind = \"{kind}\"\naddress = \"127.0.0.1:{PORT}\"\n{place}"
@@ -79,6 +99,25 @@ impl Plan {
         if self.bus.asks() && !serves {
             let other = ["controller", "device"][end];
             lines.push(format!("write_to = \"tickbus {other}\""));
+        }
+        lines
+    }
+
+    fn profibus(&self, end: usize) -> Vec<String> {
+        if end == 1 {
+            let watchdog = (self.max_age.0 * 3 / 1_000_000).clamp(10, 2_500);
+            return vec![format!(
+                "kind = \"profibus-master\"\nslot_bits = {}\nwatchdog_ms = {watchdog}",
+                self.slot_bits()
+            )];
+        }
+        let (device, baud) = (master::DEVICE, wire::BAUD);
+        let late = self.slot_bits() - 15;
+        let mut lines = vec![format!(
+            "kind = \"profibus-device\"\ndevice = \"{device}\"\nbaud = {baud}\nmax_tsdr = {late}"
+        )];
+        if self.stations == 1 {
+            lines.extend(self.station_keys(end, 0));
         }
         lines
     }
@@ -138,8 +177,12 @@ impl Plan {
     fn timing(&self, end: usize) -> Vec<String> {
         let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
         let mut lines = vec![format!(
-            "cycle = \"{cycle}\"\nmax_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
+            "max_age = \"{max_age}\"\nreconnect = [\"{reconnect}\"]"
         )];
+        // The master of PROFIBUS alone decides when it asks.
+        if self.bus != Bus::Profibus || end == 1 {
+            lines.push(format!("cycle = \"{cycle}\""));
+        }
         match self.ends[end].watchdog {
             Watchdog::Default => {}
             Watchdog::Off => lines.push("watchdog = \"off\"".to_owned()),

@@ -2,6 +2,7 @@
 
 use tickbus_bus_dispatcher as dispatcher;
 use tickbus_bus_modbus as modbus;
+use tickbus_bus_profibus as profibus;
 use tickbus_bus_s7 as s7;
 use tickbus_bus_sdsp as sdsp;
 use tickbus_bus_socket as socket;
@@ -15,4 +16,6 @@ pub(crate) static KINDS: Kinds = Kinds::new(&[
     Kind::of::<s7::ClientOptions>(),
     Kind::of::<sdsp::Options>(),
     Kind::of::<dispatcher::Options>(),
+    Kind::of::<profibus::Options>(),
+    Kind::of::<crate::master::Options>(),
 ]);

@@ -6,7 +6,9 @@ use std::net::{Ipv4Addr, SocketAddr};
 
 use tickbus_base::time::{Interest, Ready};
 
+use crate::delivery::Delivery;
 use crate::random::Random;
+use crate::wire::{self, Wire};
 
 /// How the network of a world behaves.
 #[derive(Clone, Copy, Debug)]
@@ -45,19 +47,6 @@ struct Piece {
     is_last: bool,
     bytes: Vec<u8>,
     read: usize,
-}
-
-/// Bytes that a process has read.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Delivery {
-    /// When they arrived at its computer.
-    pub at: i64,
-    /// When they were sent, or earlier.
-    pub sent: i64,
-    /// The process that sent them.
-    pub from: usize,
-    /// They are the last ones of what it wanted to send then; before that, nobody can know what it is.
-    pub is_whole: bool,
 }
 
 #[derive(Debug)]
@@ -100,6 +89,8 @@ pub(crate) struct Network {
     cut_until: i64,
     /// When the newest connection of each process was made, though it may have ended.
     last_connected: BTreeMap<usize, i64>,
+    /// The serial line.
+    pub(crate) wire: Wire,
     /// What each process has read.
     pub(crate) deliveries: BTreeMap<usize, Vec<Delivery>>,
 }
@@ -155,6 +146,9 @@ impl Network {
             return (connected.unwrap_or(i64::MAX), i64::MAX);
         }
         let of_interest = |at: i64, is: bool| if is { at } else { i64::MAX };
+        if let Some(at) = self.wire.readable_at(id) {
+            return (of_interest(at, reads), of_interest(i64::MIN, writes));
+        }
         let Some(end) = self.ends.get(&id) else {
             return (of_interest(i64::MIN, reads), of_interest(i64::MIN, writes));
         };
@@ -263,6 +257,7 @@ impl Network {
             end.reset.get_or_insert(now);
             end.incoming.clear();
         }
+        self.wire.unplug();
     }
 
     /// Nothing arrives for `span`, and then everything.
@@ -282,10 +277,12 @@ impl Network {
             }
         }
         self.cut_until = self.cut_until.max(now + span);
+        self.wire.cut(now + span);
     }
 
     /// The system closes what a process that was killed has left.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
+        self.wire.kill(process);
         self.listeners
             .retain(|_, listening| listening.process != process);
         let ids: Vec<u64> = self
@@ -332,6 +329,39 @@ impl Network {
             };
             other.reset.get_or_insert(found);
         }
+    }
+
+    /// Opens a port of the serial line.
+    pub(crate) fn open_serial(&mut self, process: usize, now: i64) -> u64 {
+        let id = self.identity();
+        self.wire.open(id, process);
+        self.last_connected.insert(process, now);
+        id
+    }
+
+    /// Reads from a port of the serial line.
+    pub(crate) fn read_serial(
+        &mut self,
+        id: u64,
+        buffer: &mut [u8],
+        now: i64,
+    ) -> io::Result<usize> {
+        self.wire.read(id, buffer, now, &mut self.deliveries)
+    }
+
+    /// Writes to a port of the serial line. Where a connection would carry its bytes in pieces, some telegrams are damaged.
+    pub(crate) fn write_serial(
+        &mut self,
+        id: u64,
+        bytes: &[u8],
+        times: (i64, i64),
+        random: &mut Random,
+    ) -> io::Result<usize> {
+        let conditions = wire::Conditions {
+            latency: self.conditions.latency,
+            damages: self.conditions.splits * 20,
+        };
+        self.wire.write(id, bytes, times, conditions, random)
     }
 
     /// The next connection of a listener, and the address of the other end.

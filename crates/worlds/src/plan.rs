@@ -10,6 +10,7 @@ use crate::network::Conditions;
 use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
 use crate::seed::Seed;
+use crate::{master, wire};
 
 /// What befalls a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], who stands between them; spans say how long it lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +37,9 @@ const LATER: u64 = 0x6C61_7465_7200;
 
 /// The bit of `more` that allows several units of Modbus.
 const UNITS: u32 = 19;
+
+/// The bit of `more` that allows PROFIBUS.
+const PROFIBUS: u32 = 20;
 
 /// When it does.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,10 +205,17 @@ impl Plan {
         } else {
             bus
         };
+        let allows = |bit: u32, chance: u64| {
+            seed.more >> bit & 1 == 1
+                && Random::new(scramble(seed.number ^ LATER ^ u64::from(bit))).once_in(chance)
+        };
+        let bus = if allows(PROFIBUS, 24) {
+            Bus::Profibus
+        } else {
+            bus
+        };
         let many = usize::try_from(random.within(2, 3)).expect("small");
-        let has_units = bus.has_units()
-            && seed.more >> UNITS & 1 == 1
-            && Random::new(scramble(seed.number ^ LATER ^ u64::from(UNITS))).once_in(3);
+        let has_units = bus.has_units() && allows(UNITS, 3);
         let stations = if is(0) && bus.has_stations() || has_units {
             many
         } else {
@@ -223,7 +234,8 @@ impl Plan {
         let mut plan = Self {
             seed,
             bus,
-            controller_serves: is(12),
+            // The master of PROFIBUS asks.
+            controller_serves: is(12) && bus != Bus::Profibus,
             stations,
             cycle,
             max_age,
@@ -253,7 +265,7 @@ impl Plan {
             let bytes = plan.features.frame() * plan.stations;
             plan.conditions.capacity = plan.conditions.capacity.max(bytes);
         }
-        if has_units {
+        if has_units || bus == Bus::Profibus {
             // A unit has half of max_age for an answer, and the others wait meanwhile.
             plan.max_age = plan.max_age.max(Nanos(plan.round_trip()));
         }
@@ -261,7 +273,7 @@ impl Plan {
         plan.events.extend(between);
         plan.events.sort_by_key(|event| event.at);
         let slowest = plan.ends[0].period.max(plan.ends[1].period).max(cycle);
-        let line = plan.round_trip() + plan.habits.late * 8;
+        let line = plan.round_trip() + plan.habits.late * 8 + plan.restart();
         let count = if plan.features.pairs { 2 } else { 1 };
         plan.pulses = Nanos(((slowest.0 * 6 + hold.0 * 2 + line) * count).max(max_age.0 / 2));
         // Edges between two exchanges merge.
@@ -294,6 +306,11 @@ impl Plan {
     /// The time that the network takes for a whole cycle at most, in ns.
     pub(crate) fn round_trip(&self) -> i64 {
         // A request is asked and answered before the next one, in as many pieces as the connection takes.
+        if self.bus == Bus::Profibus {
+            // Each request may be repeated, and so may the one for other masters.
+            let requests = i64::try_from(self.stations).expect("small") + 1;
+            return self.slot() * master::TRIES * requests;
+        }
         let ways = match self.bus {
             Bus::Dispatcher => 8,
             bus if bus.asks() => 12 * self.stations,
@@ -307,6 +324,27 @@ impl Plan {
         };
         let pieces = i64::try_from(pieces).expect("small");
         self.conditions.latency.1 * ways * pieces
+    }
+
+    /// The time within which a slave of PROFIBUS answers even if its thread runs late, in ns.
+    pub(crate) fn slot(&self) -> i64 {
+        let preempted = if self.habits.preempts > 0 {
+            3_000_000
+        } else {
+            0
+        };
+        let answer = wire::characters(self.features.frame() + 11);
+        self.conditions.latency.1 * 2 + self.habits.late * 4 + preempted + answer * 2 + 1_000_000
+    }
+
+    /// The time that a slave of PROFIBUS takes to come back after two damaged telegrams in a row, in ns: its master asks for its
+    /// diagnosis twice, and sends parameters and configuration, one in a bus cycle, and some of these may be damaged as well.
+    fn restart(&self) -> i64 {
+        if self.bus == Bus::Profibus && self.conditions.splits > 0 {
+            self.cycle.0 * 10 + self.slot() * 4
+        } else {
+            0
+        }
     }
 
     /// What befalls who stands between the ends.

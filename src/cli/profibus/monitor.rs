@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::Outcome;
 use crate::cli::host::span;
-use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialPort, SerialSettings};
+use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialLine, SerialSettings};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
 use tickbus_fieldbus::serial;
@@ -76,7 +76,8 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
         return Err("a line has a speed; write --baud 19200".to_owned());
     }
     let device = arguments.device.display().to_string();
-    let mut port = serial::open_marking(&device, settings).map_err(|error| error.to_string())?;
+    let mut port = serial::open_marking(&device, settings, &*Monotonic::shared())
+        .map_err(|error| error.to_string())?;
     let create = |file: &Option<PathBuf>| file.as_deref().map(create).transpose();
     let mut keep = Keep {
         prints: arguments.telegrams,
@@ -112,7 +113,7 @@ fn create(file: &Path) -> Result<BufWriter<File>, String> {
 
 fn watch(
     arguments: &Arguments,
-    port: &mut SerialPort,
+    port: &mut SerialLine,
     keep: &mut Keep,
     stop: &Stop,
 ) -> Result<(), Ending> {

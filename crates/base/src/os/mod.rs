@@ -23,6 +23,8 @@ mod process_watch;
 mod pseudo_terminal;
 mod serial;
 #[cfg(unix)]
+mod serial_line;
+#[cfg(unix)]
 mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
@@ -55,6 +57,8 @@ pub use pseudo_terminal::PseudoTerminal;
 #[cfg(unix)]
 pub use serial::SerialPort;
 pub use serial::{Parity, SerialSettings};
+#[cfg(unix)]
+pub use serial_line::SerialLine;
 #[cfg(unix)]
 pub use shared_memory::SharedMemory;
 pub use time_stamp_counter::TimeStampCounter;

@@ -37,6 +37,16 @@ impl Pollable for TcpListener {
     }
 }
 
+#[cfg(unix)]
+impl Pollable for super::SerialLine {
+    fn source(&self) -> Source<'_> {
+        match self {
+            Self::Os(port) => Source::Os(port.as_fd()),
+            Self::Simulated(stream) => Source::Simulated(stream.identity()),
+        }
+    }
+}
+
 impl<P: Pollable + ?Sized> Pollable for Box<P> {
     fn source(&self) -> Source<'_> {
         (**self).source()

@@ -67,6 +67,17 @@ pub trait Simulation {
     /// The connection fails at once.
     fn connect(&self, address: SocketAddr) -> io::Result<Box<dyn SimulatedStream>>;
 
+    /// Opens the serial port that the system calls `device`. Its characters are read in the code of
+    /// [`Marks`](crate::os::Marks).
+    ///
+    /// # Errors
+    ///
+    /// The simulation has no such port.
+    fn open_serial(&self, device: &str) -> io::Result<Box<dyn SimulatedStream>> {
+        let _ = device;
+        Err(io::ErrorKind::NotFound.into())
+    }
+
     /// Writes to a file, as [`std::io::Write::write`]: the disk may be full, and a killed process writes nothing.
     ///
     /// # Errors

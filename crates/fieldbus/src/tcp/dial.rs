@@ -7,7 +7,7 @@ use crate::{BusError, Port};
 use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet, Pollable};
 #[cfg(unix)]
-use tickbus_base::os::{LinkedTerminal, SerialPort};
+use tickbus_base::os::{LinkedTerminal, SerialLine, SerialPort};
 use tickbus_base::time::{Nanos, Stop};
 
 use super::{Address, close_by_reset, close_gracefully, connect, is_for_later, no_wait};
@@ -108,6 +108,9 @@ impl<S: Stream + ?Sized> Stream for Box<S> {
 
 #[cfg(unix)]
 impl Stream for SerialPort {}
+
+#[cfg(unix)]
+impl Stream for SerialLine {}
 
 #[cfg(unix)]
 impl Stream for LinkedTerminal {}

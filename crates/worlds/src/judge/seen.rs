@@ -1,6 +1,6 @@
 //! What a tick shows.
 
-use crate::network::Delivery;
+use crate::delivery::Delivery;
 
 /// What a station shows in one tick.
 #[derive(Clone, Debug)]

@@ -1,0 +1,58 @@
+//! Serial lines of the operating system, or of a [simulation](crate::time::Simulation).
+
+use std::io::{self, Read, Write};
+use std::path::Path;
+
+use super::{SerialPort, SerialSettings};
+use crate::time::{SimulatedStream, Simulation};
+
+/// An open serial port that [marks](SerialPort::mark_damaged) damaged characters.
+#[derive(Debug)]
+pub enum SerialLine {
+    /// Of the operating system.
+    Os(SerialPort),
+    /// Of a simulation.
+    Simulated(Box<dyn SimulatedStream>),
+}
+
+impl SerialLine {
+    /// Opens the port that the system calls `device`.
+    ///
+    /// # Errors
+    ///
+    /// As of [`SerialPort::open`] and [`SerialPort::mark_damaged`].
+    pub fn open(
+        device: &str,
+        settings: SerialSettings,
+        simulation: Option<&dyn Simulation>,
+    ) -> io::Result<Self> {
+        if let Some(simulation) = simulation {
+            return Ok(Self::Simulated(simulation.open_serial(device)?));
+        }
+        let port = SerialPort::open(Path::new(device), settings)?;
+        port.mark_damaged()?;
+        Ok(Self::Os(port))
+    }
+}
+
+impl Read for SerialLine {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self {
+            Self::Os(port) => port.read(buffer),
+            Self::Simulated(stream) => stream.read(buffer),
+        }
+    }
+}
+
+impl Write for SerialLine {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Os(port) => port.write(bytes),
+            Self::Simulated(stream) => stream.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}

@@ -1,9 +1,9 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are crates of their own
-//! under `crates/`, each of use without the others; this crate is the native library of the Java driver, the `tickbus`
-//! command, and one name for all of them. They stand in the order of the data's way; what each uses is in its manifest
-//! (`docs/ARCHITECTURE.md` tells why):
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are separate crates under
+//! `crates/`, and each can be used without the others. This crate is the native library of the Java driver, the
+//! `tickbus` command, and one name for all of the rooms. The rooms are listed in the order in which data pass through
+//! them. Each manifest lists the rooms that a room uses, and `docs/ARCHITECTURE.md` explains why:
 //!
 //! | room | what lives there |
 //! |---|---|

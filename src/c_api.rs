@@ -1,7 +1,7 @@
-//! The functions of `include/tickbus.h`: a simulator in C.
+//! The functions of `include/tickbus.h`: the interface for simulators in C.
 //!
-//! As in [`jni`](super::jni), the tick and its halves take no lock, make no system call and allocate nothing. A function never
-//! unwinds into its caller.
+//! As in [`jni`](super::jni), the tick and its halves take no lock, make no system call and allocate nothing. A
+//! function never unwinds into its caller.
 
 #![allow(
     unsafe_code,
@@ -30,25 +30,25 @@ use tickbus_binding::{
 use tickbus_driver::Code;
 use tickbus_image::signal::Signal;
 
-/// Every driver that is open through this interface.
+/// The drivers that are open through this interface.
 static DRIVERS: Handles<Opened> = Handles::new();
 
-/// The buffers of closed drivers. Their memory is used again and never given back, so that a caller that moves values after
-/// closing moves them into memory that is there.
+/// The buffers of closed drivers. Their memory is reused and never freed, so that a caller that moves values after
+/// closing still accesses valid memory.
 static RETIRED: Mutex<Vec<Buffer>> = Mutex::new(Vec::new());
 
-/// Texts that were handed out: their pointers stay valid.
+/// The texts handed out so far: their pointers stay valid.
 static TEXTS: Lazy<Mutex<HashSet<&'static CStr>>> = Lazy::new(Mutex::default);
 
-/// Armed by the first driver.
+/// Registers the exit handler, once, with the first driver.
 #[cfg(unix)]
 static AT_EXIT: Once = Once::new();
 
 thread_local! {
-    /// Why this thread's last failed call failed.
+    /// The reason why this thread's last failed call failed.
     static LAST: RefCell<CString> = RefCell::default();
-    /// If that was a tick: its driver and code. The text is made when it is asked for. Without a destructor, which would be
-    /// registered in memory that is allocated by the tick.
+    /// The driver and code of the last failed call, if it was a tick. The text is built only on request. The type has
+    /// no destructor, since the tick would have to allocate memory to register one.
     static LAST_TICK: Cell<Option<(i64, Code)>> = const { Cell::new(None) };
 }
 
@@ -68,7 +68,7 @@ struct CSignal {
 }
 
 impl CSignal {
-    /// A signal that does not exist: reads 0, and cannot be set.
+    /// A signal that does not exist: reads 0 and cannot be set.
     const NONE: Self = Self {
         name: c"".as_ptr(),
         address: c"".as_ptr(),
@@ -83,16 +83,17 @@ impl CSignal {
     };
 }
 
-/// Memory of a buffer: a number of words that are never given back. Not a slice, since a caller may write there at any time.
+/// The memory of a buffer: a number of words that are never freed. Not a slice, since a caller can write to it at any
+/// time.
 struct Buffer {
     words: NonNull<u64>,
     length: usize,
 }
 
-// SAFETY: the memory is not bound to a thread; it is reached through the device that has it, and by the caller.
+// SAFETY: the memory is not bound to a thread; only the device that owns it and the caller access it.
 unsafe impl Send for Buffer {}
 
-/// An open driver; its buffer goes back to [`RETIRED`].
+/// An open driver; closing it returns its buffer to [`RETIRED`].
 struct Opened {
     device: Device<Option<Place>>,
     buffer: Buffer,
@@ -109,7 +110,7 @@ fn retired() -> MutexGuard<'static, Vec<Buffer>> {
     RETIRED.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A buffer of this many bytes: one that is free, or a new one.
+/// Returns a buffer of at least this many bytes: a free one, or a new one.
 fn buffer_of(bytes: usize) -> Buffer {
     let length = bytes.div_ceil(size_of::<u64>());
     let mut retired = retired();
@@ -123,7 +124,7 @@ fn buffer_of(bytes: usize) -> Buffer {
     }
 }
 
-/// The same text as a C string that stays; it ends where it has a zero.
+/// Returns the text as a C string that is never freed; the text ends at its first zero.
 fn permanent(text: &str) -> *const c_char {
     let bytes: Vec<u8> = text.bytes().take_while(|&byte| byte != 0).collect();
     let text = CString::new(bytes).unwrap_or_default();
@@ -136,23 +137,23 @@ fn permanent(text: &str) -> *const c_char {
     kept.as_ptr()
 }
 
-/// Closes the drivers that are open when the process ends.
+/// Closes the drivers that are still open when the process ends.
 #[cfg(unix)]
 fn close_all() {
     closing(|| DRIVERS.close_all(Opened::close));
 }
 
-/// Keeps why a call failed, and returns its code.
+/// Stores why a call failed, and returns the code.
 fn failed(refusal: &Refusal) -> i32 {
     let text = refusal.to_string().replace('\0', " ");
     let text = CString::new(text).unwrap_or_default();
-    // A thread that is ending, as in a handler of `atexit`, may have no place for it.
+    // A thread that is ending, as in a handler of `atexit`, may have no storage left.
     let _ = LAST.try_with(|last| last.replace(text));
     LAST_TICK.set(None);
     refusal.code.code()
 }
 
-/// Does what may fail, and returns a count or a status.
+/// Does `work`, which can fail, and returns a count or a status.
 fn answer(work: impl FnOnce() -> Result<i32, Refusal>) -> i32 {
     Refusal::instead_of_panic(work).unwrap_or_else(|refusal| failed(&refusal))
 }
@@ -166,22 +167,22 @@ fn tick(driver: i64, work: impl FnOnce(&mut Device<Option<Place>>) -> Code) -> i
     code.code()
 }
 
-/// The text behind a pointer.
+/// Reads the text behind a pointer.
 ///
 /// # Safety
 ///
-/// `text` must be null or point to a C string that stays while it is used.
+/// `text` must be null or point to a C string that exists as long as it is used.
 unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<&'a str, Refusal> {
     if text.is_null() {
         return Err(Refusal::new(Code::BadArgument, format!("{what} is NULL")));
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     let bytes = unsafe { CStr::from_ptr(text) };
     let wrong = |why| Refusal::new(Code::BadArgument, format!("{what} is not UTF-8: {why}"));
     bytes.to_str().map_err(wrong)
 }
 
-/// Writes as much of a text as there is room for, with a final 0, and returns the length of all of it.
+/// Writes as much of a text as fits, with a final 0, and returns the length of the whole text.
 ///
 /// # Safety
 ///
@@ -189,7 +190,7 @@ unsafe fn text<'a>(text: *const c_char, what: &str) -> Result<&'a str, Refusal> 
 unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
     if !into.is_null() && room > 0 {
         let count = text.len().min(room - 1);
-        // SAFETY: the caller's promise; `count` + 1 is at most `room`.
+        // SAFETY: promised by the caller; `count` + 1 is at most `room`.
         unsafe {
             into.cast::<u8>()
                 .copy_from_nonoverlapping(text.as_ptr(), count);
@@ -199,9 +200,9 @@ unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
     i32::try_from(text.len()).unwrap_or(i32::MAX)
 }
 
-/// Why a tick failed, with the line's own reason if it has one.
+/// Returns why a tick failed, with the line's own reason if there is one.
 fn why(driver: i64, code: Code) -> Refusal {
-    // Nothing else depends on the line; and the thread that has the driver is left alone.
+    // No other code depends on the line, so the thread that is using the driver is left alone.
     if code != Code::BusFailed {
         return DRIVERS.reason(driver, code);
     }
@@ -221,7 +222,7 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
         if driver.is_null() {
             return Err(Refusal::new(Code::BadArgument, "driver is NULL"));
         }
-        // SAFETY: the caller's promises, here and below.
+        // SAFETY: promised by the caller, here and below.
         unsafe { driver.write(0) };
         let place = DRIVERS.reserve()?;
         // SAFETY: as above.
@@ -236,8 +237,8 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
         let shown = page::show_driver(&mut opened)?;
         let slots = opened.slots().count;
         let buffer = buffer_of(Shared::<Option<Place>>::bytes(slots));
-        // SAFETY: memory that is never given back, of at least this size, initialised, and of nobody else until this driver
-        // is closed. The header demands of the caller that it leaves the slots alone during a call.
+        // SAFETY: this memory is never freed, has at least this size, is initialised, and has no other user until this
+        // driver is closed. The header requires callers to leave the slots alone during a call.
         let shared = unsafe { Shared::new(buffer.words.cast(), slots, shown) };
         let shared =
             shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
@@ -306,7 +307,7 @@ unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal)
                 no_signal(format!("there is no signal {index}; expected 0 to {last}"))
             })
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         unsafe { describe(driver, signal, find) }
     })
 }
@@ -318,7 +319,7 @@ unsafe extern "C" fn tb_signal_at(driver: i64, index: i32, signal: *mut CSignal)
 unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSignal) -> i32 {
     answer(|| {
         let find = |signals: &[Signal]| {
-            // SAFETY: the caller's promise.
+            // SAFETY: promised by the caller.
             let name = unsafe { text(name, "name") }?;
             let found = signals.iter().position(|signal| signal.name == name);
             let names = signals.iter().map(|signal| &*signal.name);
@@ -331,7 +332,7 @@ unsafe extern "C" fn tb_find(driver: i64, name: *const c_char, signal: *mut CSig
                 })
             })
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         unsafe { describe(driver, signal, find) }
     })
 }
@@ -340,7 +341,7 @@ fn no_signal(text: String) -> Refusal {
     Refusal::new(Code::BadArgument, text)
 }
 
-/// Describes the signal whose index `find` gives.
+/// Describes the signal whose index `find` returns.
 ///
 /// # Safety
 ///
@@ -353,8 +354,8 @@ unsafe fn describe(
     if into.is_null() {
         return Err(Refusal::new(Code::BadArgument, "signal is NULL"));
     }
-    // What a caller uses who does not look at the status.
-    // SAFETY: the caller's promise.
+    // For a caller that does not check the status.
+    // SAFETY: promised by the caller.
     unsafe { into.write(CSignal::NONE) };
     let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
     let index = find(&config.table.signals)?;
@@ -385,7 +386,7 @@ unsafe fn describe(
 unsafe extern "C" fn tb_statistics(driver: i64, into: *mut c_char, room: usize) -> i32 {
     answer(|| {
         let snapshot = DRIVERS.visit(driver, |opened| opened.device.snapshot())?;
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         Ok(unsafe { hand_over(&snapshot.to_string(), into, room) })
     })
 }
@@ -402,7 +403,7 @@ unsafe extern "C" fn tb_events(driver: i64, into: *mut i64, room: usize) -> i32 
         let mut words = [0; EVENTS * EVENT_WORDS];
         let room = room.min(EVENTS) * EVENT_WORDS;
         let count = DRIVERS.visit(driver, |opened| opened.device.events(&mut words[..room]))?;
-        // SAFETY: the caller's promise; an event is three words.
+        // SAFETY: promised by the caller; an event is three words.
         unsafe { into.copy_from_nonoverlapping(words.as_ptr(), count * EVENT_WORDS) };
         Ok(i32::try_from(count).unwrap_or(i32::MAX))
     })
@@ -414,7 +415,7 @@ unsafe extern "C" fn tb_events(driver: i64, into: *mut i64, room: usize) -> i32 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tb_inject(driver: i64, fault: *const c_char) -> i32 {
     answer(|| {
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         let fault = unsafe { text(fault, "fault") }?;
         let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
         let fault = read_fault(fault, &config)?;
@@ -440,7 +441,7 @@ extern "C" fn tb_end_fault(driver: i64, fault: i32) -> i32 {
 unsafe extern "C" fn tb_faults(driver: i64, into: *mut c_char, room: usize) -> i32 {
     answer(|| {
         let board = DRIVERS.visit(driver, |opened| opened.device.board())?;
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         Ok(unsafe { hand_over(&faults(&board), into, room) })
     })
 }
@@ -453,7 +454,7 @@ unsafe extern "C" fn tb_page(driver: i64, into: *mut c_char, room: usize) -> i32
     answer(|| {
         let config = DRIVERS.visit(driver, |opened| opened.device.config())?;
         let url = config.page.is_some().then(page::url).flatten();
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         Ok(unsafe { hand_over(&url.unwrap_or_default(), into, room) })
     })
 }
@@ -470,7 +471,7 @@ unsafe extern "C" fn tb_wait_until(due: *mut i64, period: i64) -> i64 {
             return Err(Refusal::new(Code::BadArgument, text));
         }
         let clock = Monotonic::shared();
-        // SAFETY: the caller's promise, here and below.
+        // SAFETY: promised by the caller, here and below.
         let at = match unsafe { due.read() } {
             0 => clock.now(),
             at => Nanos(at),

@@ -1,7 +1,9 @@
-//! The functions of FMI 2.0 and 3.0: what an importing tool calls in the FMU that `tickbus export --for fmi2` or `fmi3` makes.
+//! The functions of FMI 2.0 and 3.0: an importing tool calls these in the FMU that `tickbus export --for fmi2` or
+//! `fmi3` makes.
 //!
-//! An instance is [`tickbus_fmi::made::Instance`]; here are the handles, the pointers of the caller, and the way of messages into
-//! the tool's own log. A function never unwinds into its caller, and never calls back while it has the instance.
+//! An instance is a [`tickbus_fmi::made::Instance`]. This module keeps the handles, reads and writes through the
+//! caller's pointers, and passes messages to the tool's own log. A function never unwinds into its caller, and never
+//! calls back while it holds the instance.
 
 #![allow(
     unsafe_code,
@@ -21,7 +23,7 @@ use tickbus_driver::Code;
 use tickbus_fmi::made::{Instance, folder_of};
 use tickbus_fmi::{Status, Version};
 
-/// Functions that are one call of the instance.
+/// Defines functions that are one call of the instance.
 macro_rules! calls {
     ($($name:ident: $work:expr;)+) => {$(
         #[unsafe(no_mangle)]
@@ -31,8 +33,8 @@ macro_rules! calls {
     )+};
 }
 
-/// The two functions for variables of a type: ours, and as it stands in the lists. FMI 3.0 tells the number of values beside
-/// that of the variables.
+/// Defines the get and set functions for variables of a type: our own type, and the type in the lists. FMI 3.0 passes
+/// the number of values in addition to that of the variables.
 macro_rules! numbers {
     ($($get:ident, $set:ident: $own:ty as $outer:ty $(, $length:ident)?;)+) => {$(
         #[unsafe(no_mangle)]
@@ -40,7 +42,7 @@ macro_rules! numbers {
             instance: *mut c_void, references: *const u32, count: usize, values: *mut $outer $(, $length: usize)?
         ) -> c_int {
             let [.., length] = [count $(, $length)?];
-            // SAFETY: by the standard's header, these are null or lists as long as the call says.
+            // SAFETY: by the standard's header, these are null or lists with the lengths given in the call.
             let (references, values) = unsafe { (list(references, count), room(values, length)) };
             call(instance, |instance| {
                 same(references.len(), count, values.len())?;
@@ -63,8 +65,8 @@ macro_rules! numbers {
     )+};
 }
 
-/// Functions that the model description does without. Those of C that have more parameters than this one are called all the
-/// same: the caller removes them.
+/// Defines functions that the model description declares as missing. In C some of them have more parameters than this;
+/// calling them is fine, since the caller removes the parameters.
 macro_rules! lacking {
     ($($name:ident,)+) => {$(
         #[unsafe(no_mangle)]
@@ -77,10 +79,10 @@ macro_rules! lacking {
 mod three;
 mod two;
 
-/// Every instance of FMUs that this library is in.
+/// The instances of all FMUs that contain this library.
 static INSTANCES: Handles<Box<Tenant>> = Handles::new();
 
-/// `fmi2CallbackLogger`. Its further arguments, which would be those of the format, are never there.
+/// `fmi2CallbackLogger`. Its further arguments, those of the format, are never passed.
 type LoggerOfTwo = unsafe extern "C" fn(
     env: *mut c_void,
     name: *const c_char,
@@ -105,33 +107,33 @@ enum Logger {
     Three(LoggerOfThree),
 }
 
-/// The tool's log, as one instance has it.
+/// The tool's log for one instance.
 #[derive(Clone)]
 struct Journal {
     logger: Option<Logger>,
     env: *mut c_void,
     name: CString,
-    /// Whether the tool wants every change of the line.
+    /// True if the tool wants every change of the line.
     all: bool,
 }
 
-// SAFETY: `env` is a number to this library, which hands it back to the tool's own function in calls that the tool has made. Both
-// standards let a tool call an instance from one thread after the other.
+// SAFETY: `env` is only a number to this library, which passes it back to the tool's own function during calls by the
+// tool. Both standards allow a tool to call an instance from one thread after another.
 unsafe impl Send for Journal {}
 
-/// An instance, and the log of the tool that has made it.
+/// An instance, and the log of the tool that created it.
 struct Tenant {
     instance: Instance,
     journal: Journal,
-    /// The message of the panic that it has ended by.
+    /// The message of the panic that ended the instance.
     broken: Option<String>,
 }
 
 impl Journal {
-    /// Tells the tool one message.
+    /// Passes one message to the tool.
     fn tell(&self, status: Status, category: &CStr, text: &str) {
         let text = text.replace('\0', " ");
-        // The text is the format itself: tools that do not format would show "%s".
+        // The text is used as the format: tools that do not format would show "%s".
         let text = match self.logger {
             None => return eprintln!("tickbus: {text}"),
             Some(Logger::Two(_)) => text.replace('%', "%%"),
@@ -140,8 +142,8 @@ impl Journal {
         let text = CString::new(text).unwrap_or_default();
         match self.logger {
             None => {}
-            // SAFETY: the tool has handed in this function with this `env`, to be called during its calls; all texts outlive the
-            // call, and the format asks for no further argument.
+            // SAFETY: the tool passed this function and this `env`, to be called during its own calls. All texts
+            // outlive the call, and the format needs no further argument.
             Some(Logger::Two(logger)) => unsafe {
                 logger(
                     self.env,
@@ -162,7 +164,7 @@ impl Journal {
         self.tell(Status::Error, c"logStatusError", text);
     }
 
-    /// Tells what tickbus has logged meanwhile, on whichever thread.
+    /// Passes on the lines that tickbus has logged in the meantime, on any thread.
     fn pass_on_log(&self) {
         if !has_log() {
             return;
@@ -179,10 +181,10 @@ impl Journal {
     }
 }
 
-/// What a call has to tell when the instance is released.
+/// The result and the log of a call, to report once the instance is released.
 type Told = (Result<(), String>, Journal);
 
-/// Calls `work` with an instance, and answers with a status.
+/// Calls `work` with an instance, and returns a status.
 #[inline]
 fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), String>) -> c_int {
     let mut work = Some(work);
@@ -192,7 +194,7 @@ fn call(handle: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), Stri
     })
 }
 
-/// A step; discarded if the bus has come to its end, after which there is none.
+/// Does one step. Returns "discard" if the bus has ended; no step follows then.
 fn step(handle: *mut c_void, from: f64, length: f64) -> c_int {
     let mut is_over = false;
     let status = call(handle, |instance| {
@@ -206,7 +208,7 @@ fn step(handle: *mut c_void, from: f64, length: f64) -> c_int {
     status
 }
 
-/// The same, once for all of the functions: there are more than a hundred.
+/// As `call`, but compiled only once for all of the functions: there are more than a hundred.
 #[inline(never)]
 fn call_once(
     handle: *mut c_void,
@@ -251,7 +253,7 @@ fn tell((result, journal): Told) -> c_int {
     }
 }
 
-/// There is no instance whose log could be told.
+/// Reports a handle without an instance, for which there is no log of a tool.
 #[cold]
 fn unknown(code: Code) -> c_int {
     let what = match code {
@@ -263,7 +265,7 @@ fn unknown(code: Code) -> c_int {
     Status::Error as c_int
 }
 
-/// Keeps this library in the process for good: threads of it may outlast an instance.
+/// Keeps this library loaded for good: its threads may outlast an instance.
 fn pin() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -274,7 +276,7 @@ fn pin() {
     });
 }
 
-/// Makes an instance; null if that fails, which the tool is told why.
+/// Creates an instance. Returns null if that fails, after reporting the reason to the tool.
 fn instantiate(
     version: Version,
     named: Option<&Path>,
@@ -305,12 +307,12 @@ fn instantiate(
     })
 }
 
-/// Ends an instance.
+/// Frees an instance.
 fn free(handle: *mut c_void) {
     if handle.is_null() {
         return;
     }
-    // Closing may panic, as all can that runs a bus.
+    // Closing can panic, like any code that runs a bus.
     let freed = catch_unwind(AssertUnwindSafe(|| {
         closing(|| {
             INSTANCES.close(handle as i64, |mut tenant| {
@@ -326,7 +328,7 @@ fn free(handle: *mut c_void) {
     }
 }
 
-/// Whether the tool wants every change of the line.
+/// Sets whether the tool wants every change of the line.
 fn set_logging(handle: *mut c_void, all: bool) -> c_int {
     let done = INSTANCES.tick(handle as i64, |tenant| tenant.journal.all = all);
     done.map_or_else(unknown, |()| Status::Ok as c_int)
@@ -344,7 +346,7 @@ fn reset(instance: &mut Instance) -> Result<(), String> {
     Ok(())
 }
 
-/// Answers a call of a function that this FMU says it has not.
+/// Answers a call of a function that this FMU declares as missing.
 fn lacking(handle: *mut c_void, name: &str) -> c_int {
     call(handle, |_| {
         Err(format!(
@@ -353,44 +355,44 @@ fn lacking(handle: *mut c_void, name: &str) -> c_int {
     })
 }
 
-/// The text behind a pointer; `None` for NULL and what is not UTF-8.
+/// Returns the text behind a pointer; `None` for NULL and for text that is not UTF-8.
 ///
 /// # Safety
 ///
-/// `text` must be null or point to a C string that stays while it is used.
+/// `text` must be null or point to a C string that exists as long as it is used.
 unsafe fn text<'a>(text: *const c_char) -> Option<&'a str> {
     if text.is_null() {
         return None;
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     unsafe { CStr::from_ptr(text) }.to_str().ok()
 }
 
-/// What a pointer and a length hand in; empty for NULL.
+/// Returns the list behind a pointer and a length; empty for NULL.
 ///
 /// # Safety
 ///
-/// `first` must be null or point to `count` initialised values, which nobody changes meanwhile.
+/// `first` must be null or point to `count` initialised values, which nobody changes in the meantime.
 #[inline]
 unsafe fn list<'a, T>(first: *const T, count: usize) -> &'a [T] {
     if first.is_null() || count == 0 {
         return &[];
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     unsafe { std::slice::from_raw_parts(first, count) }
 }
 
-/// The same to write into.
+/// Returns the list behind a pointer and a length, for writing.
 ///
 /// # Safety
 ///
-/// As [`list`]; and nobody reads there meanwhile.
+/// As [`list`]; in addition, nobody reads the values in the meantime.
 #[inline]
 unsafe fn room<'a, T>(first: *mut T, count: usize) -> &'a mut [T] {
     if first.is_null() || count == 0 {
         return &mut [];
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     unsafe { std::slice::from_raw_parts_mut(first, count) }
 }
 
@@ -405,7 +407,7 @@ fn same(references: usize, asked: usize, values: usize) -> Result<(), String> {
     ))
 }
 
-/// A value, of how it stands in a list.
+/// Converts a value from its type in a list.
 trait Inner<O> {
     fn inner(outer: O) -> Self;
 }
@@ -417,7 +419,7 @@ impl<T> Inner<T> for T {
     }
 }
 
-/// Of FMI 2.0.
+/// The Boolean of FMI 2.0.
 impl Inner<c_int> for bool {
     #[inline]
     fn inner(outer: c_int) -> Self {
@@ -425,7 +427,8 @@ impl Inner<c_int> for bool {
     }
 }
 
-/// Of FMI 3.0. It is read as a byte: what a caller hands in need not be 0 or 1, as a `bool` of Rust has to be.
+/// The Boolean of FMI 3.0, read as a byte: callers may pass values other than 0 and 1, which a Rust `bool` must not
+/// have.
 impl Inner<u8> for bool {
     #[inline]
     fn inner(outer: u8) -> Self {
@@ -437,13 +440,13 @@ impl Inner<u8> for bool {
 ///
 /// # Safety
 ///
-/// `references` and `values` must be null or point to as many of them, each value null or a C string.
+/// `references` and `values` must be null or point to as many elements as stated; each value is null or a C string.
 unsafe fn set_texts(
     handle: *mut c_void,
     (references, count): (*const u32, usize),
     (values, value_count): (*const *const c_char, usize),
 ) -> c_int {
-    // SAFETY: the caller's promise, here and below.
+    // SAFETY: promised by the caller, here and below.
     let (references, values) = unsafe { (list(references, count), list(values, value_count)) };
     call(handle, |instance| {
         same(references.len(), count, values.len())?;
@@ -459,17 +462,17 @@ unsafe fn set_texts(
     })
 }
 
-/// Gets texts, which stay until they are set again.
+/// Gets texts, which stay valid until they are set again.
 ///
 /// # Safety
 ///
-/// `references` and `values` must be null or point to as many of them.
+/// `references` and `values` must be null or point to as many elements as stated.
 unsafe fn get_texts(
     handle: *mut c_void,
     (references, count): (*const u32, usize),
     (values, value_count): (*mut *const c_char, usize),
 ) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     let (references, values) = unsafe { (list(references, count), room(values, value_count)) };
     call(handle, |instance| {
         same(references.len(), count, values.len())?;

@@ -1,8 +1,8 @@
 //! The native methods of the Java class `tickbus.Tickbus`.
 //!
-//! Each is one line that calls into the rooms above. `xChangeData` is the tick; `receiveNative` and
-//! `sendNative` are its halves: raw functions that take no lock, make no system call, allocate nothing and
-//! never throw. All others go through the jni crate and throw `tickbus.FieldbusException`.
+//! Each is one line that calls into the rooms above. `xChangeData` is the tick; `receiveNative` and `sendNative` are
+//! its halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All others use
+//! the jni crate and throw `tickbus.FieldbusException`.
 
 #![allow(
     unsafe_code,
@@ -30,30 +30,30 @@ use tickbus_report::page_beside;
 use crate::page;
 use failure::{Failure, ThrowFieldbusException};
 
-/// Every driver that this process has open.
+/// The drivers that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 
-/// Armed by the first driver.
+/// Registers the exit handler, once, with the first driver.
 #[cfg(unix)]
 static AT_EXIT: Once = Once::new();
 
-/// Closes the drivers that are open when the process ends, after the JVM's shutdown hooks.
+/// Closes the drivers that are still open when the process ends, after the JVM's shutdown hooks.
 #[cfg(unix)]
 fn close_all() {
-    // The JVM has ended, and takes no reference back any more.
+    // The JVM has ended and no longer accepts the release of references.
     closing(|| DRIVERS.close_all(|device| std::mem::forget(device.close())));
 }
 
-/// Called by the JVM when it loads the library.
+/// The JVM calls this function when it loads the library.
 ///
 /// # Safety
 ///
-/// `vm` must be the pointer that the JVM hands in.
+/// `vm` must be the pointer that the JVM passes.
 #[unsafe(no_mangle)]
 unsafe extern "system" fn JNI_OnLoad(vm: *mut jni::sys::JavaVM, _reserved: *mut c_void) -> jint {
     let found = catch_unwind(|| {
         tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         unsafe { JavaVM::from_raw(vm) }.attach_current_thread(failure::find_exception)
     });
     if matches!(found, Ok(Ok(()))) {

@@ -1,41 +1,41 @@
 //! Puts a simulated machine on a real PLC's fieldbus.
 //!
-//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are crates of their own
-//! under `crates/`, each of use without the others; this crate is the native library of the Java driver, the `tickbus`
-//! command, and one name for all of them. They stand in the order of the data's way; what each uses is in its manifest
-//! (`docs/ARCHITECTURE.md` tells why):
+//! A simulator exchanges one *process image* with the PLC at every simulation tick. The rooms are separate crates under
+//! `crates/`, and each can be used without the others. This crate is the native library of the Java driver, the
+//! `tickbus` command, and one name for all of the rooms. The rooms are listed in the order in which data pass through
+//! them. Each manifest lists the rooms that a room uses, and `docs/ARCHITECTURE.md` explains why:
 //!
-//! | room | what lives there |
+//! | room | contents |
 //! |---|---|
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
-//! | [`os`] | what only the operating system can do: waiting for sockets, and time |
+//! | [`os`] | the work of the operating system: waiting for sockets, and time |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
-//! | [`axis`] | axes: their command and feedback structures, motion profiles, what a command means |
+//! | [`axis`] | axes: their command and feedback structures, motion profiles, the meaning of a command |
 //! | [`faults`] | injected faults: wrong values, and trouble on the line |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
-//! | [`record`] | recordings: what every tick saw, written to VCD or CSV and read again |
+//! | [`record`] | recordings: the values that every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
 //! | [`programs`] | the PLC programs of demos and measurements |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
 //! | [`prepare`] | PLC programs put on virtual time, and taken off it byte for byte |
-//! | [`driver_cfg`] | what a driver.cfg says |
-//! | [`KINDS`] | the bus kinds that it may name |
+//! | [`driver_cfg`] | the contents of a driver.cfg |
+//! | [`KINDS`] | the bus kinds that it can name |
 //! | [`driver`] | one device: open, exchange, statistics, close |
 //! | [`dispatcher`] | the dispatcher of a virtual laboratory: clients, patch, routing |
 //! | [`bridge`] | bridges to it: serial lines, MQTT |
 //! | [`export`] | the PLC's half of a driver.cfg: sources for PLC editors |
 //! | [`fmi`] | FMI both ways: a driver.cfg as an FMU, foreign FMUs as machines |
 //! | [`function_blocks`] | a small controller whose program is a plan of function blocks |
-//! | [`import`] | lists of PLC tags, made into a driver.cfg |
+//! | [`import`] | lists of PLC tags, converted to a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | [`gateway`] | a real PLC, on its own bus, as a client of a run |
 //! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
 //! | `c_api` | the functions of `include/tickbus.h` |
-//! | `fmi_api` | the functions of FMI, for the FMU that a driver.cfg becomes |
+//! | `fmi_api` | the functions of FMI, for the FMU made from a driver.cfg |
 //! | [`cli`] | the `tickbus` command |
 //!
 //! Directions are named from the PLC, as everywhere in the field: `%I` is a PLC input, which the

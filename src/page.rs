@@ -1,6 +1,6 @@
 //! The live page of this process, which all of its drivers share.
 //!
-//! Without the feature `page` there is none, and a driver.cfg that asks for one is told so.
+//! A build without the feature `page` has no page, and rejects a driver.cfg that asks for one.
 
 #[cfg(not(feature = "page"))]
 mod none;
@@ -17,7 +17,7 @@ use std::io::{self, Write as _};
 use tickbus_binding::Refusal;
 use tickbus_driver::{Code, Driver};
 
-/// Why a driver cannot be shown.
+/// Says why a driver cannot be shown.
 #[derive(Debug)]
 pub(crate) enum PageError {
     /// This build has no pages.
@@ -32,7 +32,7 @@ pub(crate) enum PageError {
 }
 
 impl PageError {
-    /// Whether the driver.cfg must be changed, rather than the system.
+    /// Returns true if the driver.cfg must be changed, rather than the system.
     pub(crate) const fn is_wrong_input(&self) -> bool {
         !matches!(self, Self::NotServed(_))
     }
@@ -48,12 +48,12 @@ impl std::fmt::Display for PageError {
     }
 }
 
-/// Shows a simulation's driver on the page, if its driver.cfg asks for one; whoever started the simulation reads the address
-/// on stderr.
+/// Shows a simulation's driver on the page, if its driver.cfg asks for one. The address is printed on stderr, for
+/// whoever started the simulation.
 pub(crate) fn show_driver(driver: &mut Driver) -> Result<Option<Place>, Refusal> {
     let config = std::sync::Arc::clone(driver.config());
     let announce = |url: &str| {
-        // Without a reader of stderr the simulation runs all the same.
+        // The simulation runs even without a reader of stderr.
         let _ = writeln!(io::stderr(), "tickbus: live page at {url}");
     };
     Ok(show(&config, || Some(driver.watch()), announce)?)

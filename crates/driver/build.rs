@@ -1,4 +1,4 @@
-//! Makes the `Code` enum of `src/status.rs` from the table `src/status.tsv`.
+//! Generates the `Code` enum of `src/status.rs` from the table `src/status.tsv`.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::{env, fs};
 
 const TABLE: &str = "src/status.tsv";
 
-/// What a row has in one of its columns.
+/// Reads one column of a row.
 type Column = for<'r> fn(&'r Row<'_>) -> &'r str;
 
 struct Row<'a> {
@@ -66,14 +66,14 @@ fn row(at: usize, line: &str) -> Row<'_> {
     }
 }
 
-/// `NOT_OPEN` as `NotOpen`.
+/// Converts `NOT_OPEN` to `NotOpen`.
 fn variant(name: &str) -> String {
     name.split('_')
         .flat_map(|word| [word[..1].to_owned(), word[1..].to_ascii_lowercase()])
         .collect()
 }
 
-/// Text for a doc comment, with names from configuration files marked as code.
+/// Prepares a text for a doc comment: names from configuration files are marked as code.
 fn marked(text: &str) -> String {
     let words = text.split(' ').map(|word| {
         let name = word.trim_end_matches([';', ',', ':']);

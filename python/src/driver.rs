@@ -19,13 +19,13 @@ use crate::signal::{Event, Signal};
 use crate::view::Slots;
 
 const NANOS_PER_SECOND: f64 = 1e9;
-/// Beyond this, a double of seconds is no time in nanoseconds of 64 bits.
+/// Beyond this, a double of seconds does not fit a time of 64 bits in nanoseconds.
 const MOST_SECONDS: f64 = 9.2e9;
 
-/// Statuses as members of the enumeration of the package: those that ticks return, made once.
+/// Members of the package's enumeration of statuses, created once: those that ticks return.
 static DONE: PyOnceLock<[Py<PyAny>; 3]> = PyOnceLock::new();
 
-/// An open driver; the package's class is made of it.
+/// An open driver; the package's class is derived from it.
 #[pyclass(frozen, subclass, module = "tickbus._native")]
 pub(crate) struct Driver {
     handle: Handle,
@@ -53,7 +53,7 @@ impl Driver {
     }
 
     fn tick(&self, py: Python<'_>, half: Half, time: Option<Nanos>) -> PyResult<Py<PyAny>> {
-        // Only a stepped bus waits. Everywhere else a tick takes less time than letting the interpreter's lock go.
+        // Only a stepped bus waits. On other buses a tick takes less time than releasing the interpreter's lock.
         let code = if self.handle.is_stepped {
             py.detach(|| self.handle.tick(half, time))
         } else {
@@ -83,7 +83,7 @@ impl Driver {
     }
 }
 
-/// The time of a tick, from seconds or from nanoseconds.
+/// Returns the time of a tick, given in seconds or in nanoseconds.
 fn time(seconds: Option<f64>, nanos: Option<i64>) -> PyResult<Option<Nanos>> {
     match (seconds, nanos) {
         (None, None) => Ok(None),
@@ -102,7 +102,7 @@ fn time(seconds: Option<f64>, nanos: Option<i64>) -> PyResult<Option<Nanos>> {
     }
 }
 
-/// Seconds, for people and simulators.
+/// Converts to seconds, for people and simulators.
 #[expect(clippy::cast_precision_loss, reason = "to the nearest double")]
 fn seconds(nanos: Nanos) -> f64 {
     if nanos == Nanos::MAX {
@@ -149,7 +149,7 @@ impl Driver {
                 integer_slots,
             }),
             (Err(error), _) | (_, (Err(error), _) | (_, Err(error))) => {
-                // There is no memory left; what cannot be used must not stay open.
+                // There is no memory left; a driver that cannot be used must not stay open.
                 let _ = handle.close();
                 Err(error)
             }
@@ -158,17 +158,18 @@ impl Driver {
 
     /// One tick: sends the signals that this end writes, then receives those that it reads.
     ///
-    /// ``time`` is the simulation's, in seconds since it began, or ``ns`` in nanoseconds; stepped buses run the PLC by it,
-    /// and recordings use it. Without it the last one given is kept; if none was ever given, it is the computer's time since
-    /// the first tick. Returns ``Status.FRESH``, ``UNCHANGED`` or ``STALE``; raises ``FieldbusError``.
+    /// ``time`` is the simulation's time in seconds since it began, or ``ns`` in nanoseconds; stepped buses run the PLC
+    /// by it, and recordings use it. Without a time the last given one is kept; if none was ever given, the computer's
+    /// time since the first tick is used. Returns ``Status.FRESH``, ``UNCHANGED`` or ``STALE``; raises
+    /// ``FieldbusError``.
     #[pyo3(signature = (time = None, *, ns = None))]
     fn exchange(&self, py: Python<'_>, time: Option<f64>, ns: Option<i64>) -> PyResult<Py<PyAny>> {
         self.tick(py, Half::Exchange, self::time(time, ns)?)
     }
 
-    /// Begins a tick: receives the signals that this end reads. The model computes, and ``send()`` ends the tick.
+    /// Begins a tick: receives the signals that this end reads. The model then computes, and ``send()`` ends the tick.
     ///
-    /// Time and result are as with ``exchange()``.
+    /// Time and result are as in ``exchange()``.
     #[pyo3(signature = (time = None, *, ns = None))]
     fn receive(&self, py: Python<'_>, time: Option<f64>, ns: Option<i64>) -> PyResult<Py<PyAny>> {
         self.tick(py, Half::Receive, self::time(time, ns)?)
@@ -179,9 +180,9 @@ impl Driver {
         self.tick(py, Half::Send, None).map(drop)
     }
 
-    /// A signal by its name, always the same object; ``plc["Valve"]`` is the same.
+    /// Returns a signal by its name, always the same object; ``plc["Valve"]`` is the same.
     ///
-    /// Raises ``UnknownSignalError``, a ``KeyError``, whose message has the nearest name.
+    /// Raises ``UnknownSignalError``, a ``KeyError``, whose message contains the nearest name.
     fn signal(&self, py: Python<'_>, name: &str) -> PyResult<Py<Signal>> {
         Ok(self.find(py, name)?.clone_ref(py))
     }
@@ -217,17 +218,18 @@ impl Driver {
         PyTuple::new(py, &self.signals)
     }
 
-    /// The values of all signals as a writable buffer of doubles, in the order of ``signals``, then the counts of edges.
+    /// The values of all signals as a writable buffer of doubles, in the order of ``signals``, followed by the edge
+    /// counts.
     ///
-    /// ``numpy.asarray(plc.slots)`` copies nothing: take it once, and what is written there is sent with the next tick. What the
-    /// other end writes is overwritten by the next tick.
+    /// ``numpy.asarray(plc.slots)`` copies nothing: create the array once. The next tick sends the values written to
+    /// it, and overwrites the values that the other end writes.
     #[getter]
     fn slots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMemoryView>> {
         PyMemoryView::from(self.slots.bind(py))
     }
 
-    /// The same memory as ``slots``, as signed integers: for the 64-bit integers without scale, for which doubles are too
-    /// coarse (``Signal.is_integer_slot``).
+    /// The same memory as ``slots``, as signed integers: for 64-bit integers without scale, for which doubles are not
+    /// precise enough (``Signal.is_integer_slot``).
     #[getter]
     fn integer_slots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyMemoryView>> {
         PyMemoryView::from(self.integer_slots.bind(py))
@@ -245,44 +247,45 @@ impl Driver {
             .collect()
     }
 
-    /// Age in seconds of the data that the last tick read; infinite if nothing has arrived yet.
+    /// Age in seconds of the data that the last tick read; infinite if no data have arrived yet.
     #[getter]
     fn age(&self) -> f64 {
         seconds(self.handle.memory.age())
     }
 
-    /// How many bus cycles had arrived by the last tick.
+    /// The number of bus cycles that had arrived by the last tick.
     #[getter]
     fn sequence(&self) -> u64 {
         self.handle.memory.sequence()
     }
 
-    /// How many ticks there were.
+    /// The number of ticks so far.
     #[getter]
     fn ticks(&self) -> u64 {
         self.handle.memory.ticks()
     }
 
-    /// The time in seconds up to which the simulation may run before it has to exchange again, on a stepped bus; on others the
-    /// time that was given.
+    /// The time in seconds up to which the simulation can run before it must exchange again, on a stepped bus; on other
+    /// buses the time that was given.
     #[getter]
     fn granted(&self) -> f64 {
         seconds(self.handle.memory.granted())
     }
 
-    /// The same in nanoseconds.
+    /// The same time in nanoseconds.
     #[getter]
     fn granted_ns(&self) -> i64 {
         self.handle.memory.granted().0
     }
 
-    /// Whether the bus has come to an end of its own, such as that of a run on virtual time: further ticks bring nothing.
+    /// True if the bus has ended on its own, for example because a run on virtual time is over: further ticks bring
+    /// nothing.
     #[getter]
     fn is_over(&self, py: Python<'_>) -> PyResult<bool> {
         Self::done(py, self.handle.is_over())
     }
 
-    /// Whether the bus is stepped: the PLC runs by the simulation's time, and a tick waits for it.
+    /// True if the bus is stepped: the PLC runs on the simulation's time, and a tick waits for it.
     #[getter]
     fn is_stepped(&self) -> bool {
         self.handle.is_stepped
@@ -300,16 +303,17 @@ impl Driver {
         &self.name
     }
 
-    /// Whether the driver can no longer be used: it is closed, or the parent's of this forked process.
+    /// True if the driver can no longer be used: it is closed, or belongs to the parent of this forked process.
     #[getter]
     fn closed(&self) -> bool {
         self.handle.memory.is_closed() || self.handle.is_forked()
     }
 
-    /// Closes; a second time it does nothing. What was set since the last ``send()`` or ``exchange()`` is not sent; a recording has it
-    /// if ``receive()`` had begun a tick.
+    /// Closes the driver; a second call does nothing. Values set since the last ``send()`` or ``exchange()`` are not
+    /// sent; a recording contains them if ``receive()`` had begun a tick.
     ///
-    /// In a forked child of the process that opened the driver it does nothing, too. Arrays of ``slots`` stay valid memory.
+    /// In a forked child of the process that opened the driver, the call does nothing either. Arrays of ``slots`` stay
+    /// valid memory.
     fn close(&self, py: Python<'_>) -> PyResult<()> {
         Self::done(py, py.detach(|| self.handle.close()))
     }
@@ -343,10 +347,10 @@ impl Driver {
     }
 }
 
-/// A driver that nobody refers to any more is closed.
+/// Closes a driver that nobody refers to any more.
 impl Drop for Driver {
     fn drop(&mut self) {
-        // Nobody is left who could be told.
+        // Nobody is left to receive an error.
         let _ = self.handle.close();
     }
 }

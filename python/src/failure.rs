@@ -1,4 +1,4 @@
-//! A refusal as an exception of the package.
+//! Converts a refusal to an exception of the package.
 
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -7,17 +7,17 @@ use pyo3::types::PyType;
 use tickbus_binding::Refusal;
 use tickbus_driver::Code;
 
-/// The module that has the exceptions.
+/// The module that defines the exceptions.
 const ERRORS: &str = "tickbus._errors";
 
-/// `FieldbusError(code, message)`.
+/// Creates `FieldbusError(code, message)`.
 pub(crate) fn raised(py: Python<'_>, refusal: &Refusal) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let arguments = (refusal.code.code(), refusal.to_string());
     make(py, &CLASS, "FieldbusError", arguments)
 }
 
-/// `UnknownSignalError(code, message)`.
+/// Creates `UnknownSignalError(code, message)`.
 pub(crate) fn unknown_signal(py: Python<'_>, what: String) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
     let arguments = (Code::BadArgument.code(), what);

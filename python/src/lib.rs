@@ -1,9 +1,9 @@
 //! The extension module `tickbus._native` of the Python package `tickbus`.
 //!
-//! It holds what a tick needs and what only the driver knows; all else of the package is in Python. An open driver is a
-//! number in a table of [`Handles`](tickbus_binding::Handles), as in the other bindings, and its values pass through
-//! `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on whatever thread, can make
-//! wrong values and nothing worse.
+//! This module contains the parts that a tick needs and that only the driver knows; the rest of the package is written
+//! in Python. An open driver is a number in a table of [`Handles`](tickbus_binding::Handles), as in the other bindings.
+//! Its values pass through `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on
+//! any thread, can produce wrong values and nothing worse.
 
 mod driver;
 mod failure;
@@ -41,7 +41,7 @@ mod _native {
         module.add("STATUS_TABLE", table)
     }
 
-    /// To be called in a child process right after a fork: drivers of the parent are not the child's.
+    /// Must be called in a child process right after a fork: the parent's drivers do not belong to the child.
     #[pyfunction]
     fn forked() {
         crate::opened::forked();

@@ -7,10 +7,11 @@ use tickbus_base::time::Nanos;
 use tickbus_driver::Exchange;
 use tickbus_image::signal::Slot;
 
-/// The slots as Python sees them, and what the last tick found.
+/// The slots as Python sees them, and the results of the last tick.
 ///
-/// Python may write here at any time, NumPy even without its interpreter's lock. So all words are atomic, and the driver works
-/// on slots of its own: a tick copies what this end writes from here, and what it reads to here.
+/// Python can write here at any time, and NumPy even without the interpreter's lock. All words are therefore atomic,
+/// and the driver works on its own slots: a tick copies the values that this end writes from here, and those that it
+/// reads to here.
 pub(crate) struct Memory {
     words: Box<[AtomicU64]>,
     closed: AtomicBool,
@@ -21,7 +22,7 @@ pub(crate) struct Memory {
 }
 
 impl Memory {
-    /// With these values.
+    /// Creates the memory with these values.
     pub(crate) fn new(slots: &[Slot]) -> Self {
         Self {
             words: slots.iter().map(|slot| AtomicU64::new(slot.0)).collect(),
@@ -33,12 +34,12 @@ impl Memory {
         }
     }
 
-    /// The words of all slots, which live as long as `self`.
+    /// Returns the words of all slots, which live as long as `self`.
     pub(crate) fn words(&self) -> &[AtomicU64] {
         &self.words
     }
 
-    /// The value of a slot.
+    /// Returns the value of a slot.
     pub(crate) fn get(&self, slot: usize) -> Slot {
         Slot(self.words[slot].load(Ordering::Relaxed))
     }
@@ -48,7 +49,7 @@ impl Memory {
         self.words[slot].store(value.0, Ordering::Relaxed);
     }
 
-    /// Copies from here to `slots`.
+    /// Copies from this memory to `slots`.
     pub(crate) fn gather(&self, range: &Range<usize>, slots: &mut [Slot]) {
         let words = &self.words[range.clone()];
         for (slot, word) in slots[range.clone()].iter_mut().zip(words) {
@@ -56,7 +57,7 @@ impl Memory {
         }
     }
 
-    /// Copies from `slots` to here.
+    /// Copies from `slots` to this memory.
     pub(crate) fn scatter(&self, range: &Range<usize>, slots: &[Slot]) {
         let words = &self.words[range.clone()];
         for (slot, word) in slots[range.clone()].iter().zip(words) {
@@ -64,14 +65,14 @@ impl Memory {
         }
     }
 
-    /// Tells what a tick found.
+    /// Stores the result of a tick.
     pub(crate) fn tell(&self, done: Exchange) {
         self.sequence.store(done.sequence, Ordering::Relaxed);
         self.age.store(done.age.0, Ordering::Relaxed);
         self.granted.store(done.granted.0, Ordering::Relaxed);
     }
 
-    /// Counts a tick that begins.
+    /// Counts a tick when it begins.
     pub(crate) fn count(&self) {
         self.ticks.fetch_add(1, Ordering::Relaxed);
     }
@@ -84,22 +85,22 @@ impl Memory {
         self.closed.load(Ordering::Relaxed)
     }
 
-    /// Bus cycles that had arrived by the last tick.
+    /// Returns the bus cycles that had arrived by the last tick.
     pub(crate) fn sequence(&self) -> u64 {
         self.sequence.load(Ordering::Relaxed)
     }
 
-    /// Age of the data at the last tick; [`Nanos::MAX`] if nothing has arrived yet.
+    /// Returns the age of the data at the last tick; [`Nanos::MAX`] if no data have arrived yet.
     pub(crate) fn age(&self) -> Nanos {
         Nanos(self.age.load(Ordering::Relaxed))
     }
 
-    /// How far the simulation may go.
+    /// Returns the time up to which the simulation can run.
     pub(crate) fn granted(&self) -> Nanos {
         Nanos(self.granted.load(Ordering::Relaxed))
     }
 
-    /// How many ticks there were.
+    /// Returns the number of ticks so far.
     pub(crate) fn ticks(&self) -> u64 {
         self.ticks.load(Ordering::Relaxed)
     }

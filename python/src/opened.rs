@@ -17,18 +17,18 @@ use tickbus_kinds::KINDS;
 use crate::memory::Memory;
 use crate::signal::Description;
 
-/// Every driver that is open in this process.
+/// The drivers that are open in this process.
 static DRIVERS: Handles<Opened> = Handles::new();
 
-/// How often this process and those before it have been forked.
+/// The number of forks of this process and its ancestors.
 static FORKS: AtomicU64 = AtomicU64::new(0);
 
-/// The most events that a call hands over: as many as the driver's ring holds.
+/// The most events that a call returns: the capacity of the driver's ring.
 const MOST_EVENTS: usize = 4096;
-/// The most that are taken at once.
+/// The most events that are taken at once.
 const EVENTS: usize = 64;
 
-/// Called in a child process after a fork.
+/// Notes a fork; called in the child process.
 pub(crate) fn forked() {
     FORKS.fetch_add(1, Ordering::Relaxed);
 }
@@ -41,7 +41,7 @@ pub(crate) enum Half {
     Send,
 }
 
-/// An open driver with slots of its own.
+/// An open driver with its own slots.
 struct Opened {
     driver: Driver,
     slots: Vec<Slot>,
@@ -107,7 +107,7 @@ impl Opened {
     }
 }
 
-/// The slots for which `wanted` holds, in runs.
+/// Returns the slots for which `wanted` is true, in runs.
 fn runs(count: usize, wanted: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for slot in (0..count).filter(|&slot| wanted(slot)) {
@@ -119,7 +119,7 @@ fn runs(count: usize, wanted: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     runs
 }
 
-/// A driver that was opened. Dropping it leaves the driver open.
+/// An opened driver. Dropping the handle leaves the driver open.
 pub(crate) struct Handle {
     number: i64,
     forks: u64,
@@ -127,7 +127,7 @@ pub(crate) struct Handle {
     pub(crate) is_stepped: bool,
 }
 
-/// What is known of a driver when it has been opened.
+/// The facts about a driver when it has been opened.
 pub(crate) struct Facts {
     pub(crate) handle: Handle,
     pub(crate) id: i32,
@@ -135,7 +135,7 @@ pub(crate) struct Facts {
     pub(crate) signals: Vec<Description>,
 }
 
-/// Why a forked child cannot use its parent's driver.
+/// Returns why a forked child cannot use its parent's driver.
 fn forked_child() -> Refusal {
     let text = "this driver was opened by the parent process, and a forked child has none of its threads; \
                 open it in the child, or start the child by \"spawn\"";
@@ -143,7 +143,7 @@ fn forked_child() -> Refusal {
 }
 
 impl Handle {
-    /// Opens what a driver.cfg describes, with `tables` in place of its own.
+    /// Opens the driver that a driver.cfg describes, with `tables` in place of its own.
     pub(crate) fn open(path: &Path, tables: &str) -> Result<Facts, Refusal> {
         Refusal::instead_of_panic(|| {
             tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
@@ -187,12 +187,12 @@ impl Handle {
         })
     }
 
-    /// Whether this process is a forked child of the one that opened the driver.
+    /// Returns true if this process is a forked child of the one that opened the driver.
     pub(crate) fn is_forked(&self) -> bool {
         self.forks != FORKS.load(Ordering::Relaxed)
     }
 
-    /// Calls `work` with the driver, if it is this process's and open; waits for a tick that is in its way.
+    /// Calls `work` with the driver, if it is open and belongs to this process; waits for a running tick.
     fn visit<R>(&self, work: impl FnOnce(&mut Opened) -> R) -> Result<R, Refusal> {
         if self.is_forked() {
             return Err(forked_child());
@@ -200,7 +200,7 @@ impl Handle {
         DRIVERS.visit(self.number, work)
     }
 
-    /// A tick or a half of one; a code below zero if it failed. Waits for another thread's tick, too.
+    /// Does a tick or a half of one; returns a code below zero if it failed. Waits for another thread's tick.
     pub(crate) fn tick(&self, half: Half, time: Option<Nanos>) -> Code {
         if self.is_forked() {
             return Code::NotOpen;
@@ -214,7 +214,7 @@ impl Handle {
         }
     }
 
-    /// Why a call failed with this code.
+    /// Returns why a call failed with this code.
     #[cold]
     pub(crate) fn reason(&self, code: Code) -> Refusal {
         match self.visit(|opened| opened.driver.snapshot()) {
@@ -251,7 +251,7 @@ impl Handle {
         self.visit(|opened| Arc::clone(opened.driver.board()))
     }
 
-    /// Closes the driver; does nothing if it is closed already, or the parent process's.
+    /// Closes the driver; does nothing if it is closed already or belongs to the parent process.
     pub(crate) fn close(&self) -> Result<(), Refusal> {
         if self.is_forked() {
             return Ok(());

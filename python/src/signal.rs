@@ -14,15 +14,15 @@ use tickbus_image::signal::{DataType, Slot};
 use crate::failure::raised;
 use crate::memory::Memory;
 
-/// From here on every double is a whole number.
+/// From this value on, every double is a whole number.
 const ALL_WHOLE: f64 = 4_503_599_627_370_496.0;
 
-/// How a slot is shown in Python.
+/// Says how a slot is shown in Python.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// A double that is a bool.
+    /// A double that stands for a bool.
     Bool,
-    /// A double that is a whole number: an integer of up to 32 bits without scale.
+    /// A double that stands for a whole number: an integer of up to 32 bits without scale.
     Whole,
     /// A double.
     Real,
@@ -41,7 +41,7 @@ impl Kind {
                 let whole = slot.real() as i64;
                 whole.into_bound_py_any(py)
             }
-            // What was set is no whole number: it is rounded when it is sent.
+            // A value that was set need not be a whole number: it is rounded when it is sent.
             Self::Whole | Self::Real => slot.real().into_bound_py_any(py),
             Self::Signed => slot.signed().into_bound_py_any(py),
             Self::Unsigned => slot.unsigned().into_bound_py_any(py),
@@ -49,7 +49,7 @@ impl Kind {
     }
 }
 
-/// What is known of a signal.
+/// The description of a signal.
 pub(crate) struct Description {
     pub(crate) name: String,
     address: String,
@@ -89,8 +89,8 @@ impl Description {
 
 /// One signal of an open driver.
 ///
-/// Get it once by its name, ``plc["Valve"]``, and keep it. ``value`` is what came with the last ``receive()`` or ``exchange()``,
-/// or what is to be sent with the next ``send()`` or ``exchange()``.
+/// Get it once by its name, ``plc["Valve"]``, and keep it. ``value`` is the value received with the last ``receive()``
+/// or ``exchange()``, or the value to be sent with the next ``send()`` or ``exchange()``.
 #[pyclass(frozen, module = "tickbus")]
 pub(crate) struct Signal {
     description: Description,
@@ -117,9 +117,9 @@ impl Signal {
         Ok(())
     }
 
-    /// The number in any object that has one.
+    /// Returns the number in any object that has one.
     fn number(&self, value: &Bound<'_, PyAny>) -> PyResult<f64> {
-        // Not what can merely be read as a number, such as a text.
+        // A text, which can only be parsed as a number, is refused.
         let number: f64 = value.extract().map_err(|error: PyErr| {
             if error.is_instance_of::<PyOverflowError>(value.py()) {
                 let name = &self.description.name;
@@ -151,8 +151,9 @@ impl Signal {
 impl Signal {
     /// The value in the signal's unit.
     ///
-    /// A bool for a BOOL, an int for an integer without scale, else a float. What is set is sent with the next ``send()`` or
-    /// ``exchange()``, rounded half away from zero; out of range it is sent as the nearest value that fits.
+    /// A bool for a BOOL, an int for an integer without scale, otherwise a float. A value that is set is sent with the
+    /// next ``send()`` or ``exchange()``, rounded half away from zero; out of range, the nearest value that fits is
+    /// sent.
     #[getter]
     fn value<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.must_be_open(py)?;
@@ -182,7 +183,7 @@ impl Signal {
         };
         let bits = match (exact, kind) {
             (Some(exact), _) => exact,
-            // The casts keep to the limits of their types.
+            // The casts saturate at the limits of their types.
             #[expect(clippy::cast_possible_truncation, reason = "see above")]
             (None, Kind::Signed) => Slot::from_signed(self.number(value)?.round() as i64),
             #[expect(
@@ -198,7 +199,8 @@ impl Signal {
         Ok(())
     }
 
-    /// How many edges, of the kind that ``latch`` in driver.cfg names, came with the last ``receive()`` or ``exchange()``.
+    /// The number of edges, of the kind that ``latch`` in driver.cfg names, received with the last ``receive()`` or
+    /// ``exchange()``.
     #[getter]
     fn edges<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.must_be_open(py)?;
@@ -244,25 +246,26 @@ impl Signal {
         &self.description.station
     }
 
-    /// Where the value is among ``Driver.slots``.
+    /// The index of the value in ``Driver.slots``.
     #[getter]
     fn slot(&self) -> usize {
         self.description.slot
     }
 
-    /// Where the number of edges is among ``Driver.slots``; None if they are not counted.
+    /// The index of the edge count in ``Driver.slots``; None if edges are not counted.
     #[getter]
     fn edges_slot(&self) -> Option<usize> {
         self.description.edges
     }
 
-    /// Whether this end writes the signal: a ``%I``, if it is the machine.
+    /// True if this end writes the signal: a ``%I``, if this end is the machine.
     #[getter]
     fn is_written(&self) -> bool {
         self.description.is_written
     }
 
-    /// Whether ``slot`` is to be read as an integer, from ``Driver.integer_slots``: a LINT, ULINT or LWORD without scale.
+    /// True if ``slot`` must be read as an integer, from ``Driver.integer_slots``: a LINT, ULINT or LWORD without
+    /// scale.
     #[getter]
     fn is_integer_slot(&self) -> bool {
         matches!(self.description.kind, Kind::Signed | Kind::Unsigned)
@@ -286,16 +289,16 @@ impl Signal {
     }
 }
 
-/// A change of a signal by the PLC, of which buses with ``events = true`` tell each.
+/// A change of a signal by the PLC; buses with ``events = true`` report every change.
 #[pyclass(frozen, module = "tickbus")]
 pub(crate) struct Event {
     /// The signal.
     #[pyo3(get)]
     signal: Py<Signal>,
-    /// What was written, as ``Signal.value`` shows it.
+    /// The value written, as ``Signal.value`` shows it.
     #[pyo3(get)]
     value: Py<PyAny>,
-    /// When, in nanoseconds on the driver's clock.
+    /// The time of the change, in nanoseconds on the driver's clock.
     #[pyo3(get)]
     time_ns: i64,
 }

@@ -1,4 +1,4 @@
-//! The slots as a buffer, for NumPy and `memoryview`.
+//! The slots as a buffer for NumPy and `memoryview`.
 
 #![allow(
     unsafe_code,
@@ -15,28 +15,28 @@ use pyo3::prelude::*;
 
 use crate::memory::Memory;
 
-/// The bytes of an item.
+/// The size of an item in bytes.
 const ITEM: isize = size_of::<u64>().cast_signed();
 
-/// All slots of a driver as a writable buffer of doubles, or of signed integers. It keeps the memory, also when the driver is
-/// closed.
+/// All slots of a driver as a writable buffer of doubles or of signed integers. The buffer keeps the memory, even after
+/// the driver is closed.
 #[pyclass(frozen, module = "tickbus._native")]
 pub(crate) struct Slots {
     memory: Arc<Memory>,
-    /// As the module `struct` writes it.
+    /// The format in the notation of the module `struct`.
     format: &'static CStr,
-    /// Shape and strides, to which exported buffers point.
+    /// Shape and strides; exported buffers point to them.
     shape: [isize; 1],
     strides: [isize; 1],
 }
 
 impl Slots {
-    /// Every slot as a double.
+    /// Creates the buffer of doubles.
     pub(crate) fn reals(memory: &Arc<Memory>) -> Self {
         Self::new(memory, c"d")
     }
 
-    /// Every slot as a signed integer.
+    /// Creates the buffer of signed integers.
     pub(crate) fn integers(memory: &Arc<Memory>) -> Self {
         Self::new(memory, c"q")
     }
@@ -55,7 +55,7 @@ impl Slots {
 impl Slots {
     /// # Safety
     ///
-    /// Called by Python alone, with a `view` to be filled.
+    /// Only Python calls this, with a `view` to fill.
     unsafe fn __getbuffer__(
         slf: Bound<'_, Self>,
         view: *mut ffi::Py_buffer,
@@ -74,9 +74,9 @@ impl Slots {
                 null_mut()
             }
         };
-        // SAFETY: `view` is Python's to be filled. The words are atomic, so that writing through a pointer to them is allowed;
-        // they, the format, the shape and the strides live as long as `slf`, of which `obj` is a reference that Python
-        // gives back when it releases the buffer. An object does not move, and a frozen one does not change.
+        // SAFETY: Python passes `view` to be filled. The words are atomic, so writing through a pointer to them is
+        // allowed. The words, the format, the shape and the strides live as long as `slf`: `obj` is a reference to it,
+        // which Python releases with the buffer. An object does not move, and a frozen one does not change.
         unsafe {
             (*view).buf = words.as_ptr().cast_mut().cast::<c_void>();
             (*view).len = ITEM * words.len().cast_signed();

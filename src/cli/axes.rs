@@ -26,7 +26,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let role = Role::Device;
     let asked = CommandLineEnd { role, moved: true };
-    // The host reads the file again, and reports what is wrong with it.
+    // The host reads the file again, and reports its mistakes.
     let config = Config::load_as(&arguments.file, Some(asked), kinds);
     let axes = config.map(|config| config.axes).unwrap_or_default();
     let job = Job {

@@ -1,4 +1,4 @@
-//! `tickbus bridge`: clients of the dispatcher that do not connect with it themselves.
+//! `tickbus bridge`: connects programs and brokers that cannot connect to the dispatcher themselves.
 
 mod mqtt;
 #[cfg(unix)]

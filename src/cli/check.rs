@@ -33,7 +33,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     }
 }
 
-/// The complete report on a valid driver.cfg.
+/// Returns the complete report on a valid driver.cfg.
 fn report(config: &Config) -> String {
     let mut out = String::new();
     let stations = &config.table.stations;
@@ -167,7 +167,7 @@ fn timing(timing: &Timing) -> String {
     )
 }
 
-/// A line for each signal by which an end knows that the other one is alive, as seen from this end.
+/// Writes a line for each life sign: a signal that shows one end that the other is alive, as seen from this end.
 fn life_signs(config: &Config, line: &mut impl FnMut(&str, &str)) {
     let name = |signal: usize| &config.table.signals[signal].name;
     for watch in config
@@ -269,7 +269,7 @@ fn row(
 /// The WORD around a BOOL, by station, area and even byte offset.
 type WordKey = (usize, Area, usize);
 
-/// The WORDs that contain a part of a signal other than a BOOL.
+/// Returns the WORDs that contain a part of a signal other than a BOOL.
 fn words_of_values(signals: &[Signal]) -> HashSet<WordKey> {
     let values = signals
         .iter()
@@ -282,8 +282,8 @@ fn words_of_values(signals: &[Signal]) -> HashSet<WordKey> {
         .collect()
 }
 
-/// The bit number of a BOOL in the big-endian WORD at the even offset: old bus cards and many wiring lists
-/// count that way. Empty if there is no such WORD.
+/// Returns the bit number of a BOOL in the big-endian WORD at the even offset: old bus cards and many wiring lists
+/// count this way. Empty if there is no such WORD.
 fn bit_of_word(signal: &Signal, station: &Station, taken: &HashSet<WordKey>) -> String {
     let size = Width::Word.bytes();
     let even = signal.byte & !1;
@@ -347,7 +347,7 @@ fn fail_safe(signal: &Signal) -> String {
     }
 }
 
-/// Rows under their headings, in columns; columns without content are left out.
+/// Arranges rows under their headings in columns; columns without content are left out.
 fn aligned<const N: usize>(
     headings: &[&str; N],
     rows: impl Iterator<Item = [String; N]>,

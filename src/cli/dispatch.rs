@@ -82,7 +82,7 @@ fn settings(arguments: &Arguments) -> Settings {
     }
 }
 
-/// Makes it a dispatcher of a laboratory of several; returns the way to the others.
+/// Connects the dispatcher to others of the same laboratory; returns the link to them.
 fn join(
     arguments: &Arguments,
     dispatcher: &mut Dispatcher,
@@ -104,7 +104,7 @@ fn join(
     Ok(joined.post)
 }
 
-/// Serves the patch bay, and prints its address.
+/// Serves the patch bay and prints its address.
 #[cfg(feature = "page")]
 fn serve_page(
     address: &Address,
@@ -120,7 +120,7 @@ fn serve_page(
     room.serve(std::sync::Arc::new(site), Monotonic::shared())
 }
 
-/// Stops it after a time, unless the process has ended before.
+/// Stops the dispatcher after `span`, unless the process ends earlier.
 fn stop_after(span: Nanos, stop: &Stop) -> io::Result<()> {
     let stop = stop.clone();
     let clock = Monotonic::shared();

@@ -38,10 +38,10 @@ pub(super) struct Arguments {
     force: bool,
 }
 
-/// What is made of a driver.cfg.
+/// The formats that a driver.cfg can be exported to.
 #[derive(Clone, Copy, Debug)]
 enum Format {
-    /// The PLC's half, for an editor.
+    /// The PLC's half, for a PLC editor.
     Sources(Target),
     /// An FMU.
     Fmu(Version),
@@ -61,7 +61,7 @@ impl Format {
     }
 }
 
-/// Reads the name of an editor or of a version of FMI.
+/// Parses the name of an editor or of a version of FMI.
 fn formats() -> impl TypedValueParser<Value = Format> {
     PossibleValuesParser::new(Format::all().map(Format::name)).map(|name| {
         let mut all = Format::all();
@@ -101,15 +101,15 @@ fn run_fmu(arguments: &Arguments, version: Version) -> Outcome {
     }
 }
 
-/// Writes an FMU; else what is wrong, and how often.
+/// Writes an FMU. Returns the mistakes as a text, and their number.
 fn make_fmu(
     arguments: &Arguments,
     version: Version,
 ) -> Result<(PathBuf, made::Package), (String, usize)> {
     let one = |mistake: Mistake| (mistake.to_string(), 1);
-    // The FMU's library has these kinds, and not those of a program that adds some.
+    // The FMU's library has these kinds, not those that a custom program adds.
     let kinds = &crate::KINDS;
-    // First what the user can see, then what this computer lacks.
+    // First the mistakes that the user can see, then the parts that this computer lacks.
     Config::load(&arguments.file, kinds)
         .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
     let own = std::env::current_exe().ok();
@@ -134,7 +134,7 @@ fn make_fmu(
             "name another --out, or add --force",
         )));
     }
-    // Whole or not at all: an importing tool may look at the folder.
+    // Completely or not at all: an importing tool may be watching the folder.
     let part = file.with_extension("fmu.part");
     let written = fs::write(&part, &package.bytes).and_then(|()| fs::rename(&part, &file));
     written.map_err(|error| {
@@ -207,7 +207,7 @@ fn folder_beside(arguments: &Arguments) -> PathBuf {
         .with_file_name(format!("{stem}-{}", arguments.format.name()))
 }
 
-/// Writes all files, or none if any of them would overwrite another one.
+/// Writes all files, or none if one of them would overwrite another file.
 fn write(made: &Export, folder: &Path, force: bool) -> Result<(), Vec<String>> {
     let paths: Vec<PathBuf> = made
         .files

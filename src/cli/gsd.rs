@@ -1,4 +1,4 @@
-//! `tickbus gsd FILE`: the GSD file of a machine of one's own.
+//! `tickbus gsd FILE`: the GSD file of a custom machine.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -40,7 +40,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         let made = options.gsd(&config.name, &config.table, arguments.ident);
         made.map_err(of_file)
     });
-    // If the reader of stdout is gone (`| head`), that need not be reported.
+    // A reader of stdout that is gone (`| head`) need not be reported.
     match made {
         Ok(text) => {
             let _ = std::io::stdout().lock().write_all(text.as_bytes());

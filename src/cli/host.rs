@@ -1,4 +1,4 @@
-//! Shared by `tickbus plc` and `tickbus mirror`: hosts a PLC program at one end of a bus until it is stopped.
+//! Shared by `tickbus plc` and `tickbus mirror`: hosts a PLC program at one end of a bus until stopped.
 
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -17,7 +17,7 @@ use tickbus_plc::Program;
 use tickbus_record as record;
 use tickbus_virtual_time::Controls;
 
-/// How often the command checks its line.
+/// The interval at which the command checks its line.
 const LOOK: Nanos = Nanos::from_millis(20);
 
 /// Arguments that both commands have.
@@ -49,7 +49,7 @@ pub(super) struct Hosting {
     stats: Option<Stats>,
 }
 
-/// Where the page is to be served; `None` leaves it to the driver.cfg.
+/// The address at which to serve the page; `None` leaves it to the driver.cfg.
 #[derive(Clone, Debug)]
 pub(super) struct PageAddress(Option<Address>);
 
@@ -60,7 +60,7 @@ pub(super) fn page_address(text: &str) -> Result<PageAddress, String> {
 }
 
 impl PageAddress {
-    /// Asks for the page in the name of the driver.cfg.
+    /// Asks for the page on behalf of the driver.cfg.
     pub(super) fn ask(&self, config: &mut Config) {
         let page = config.page.get_or_insert_default();
         if let Some(address) = &self.0 {
@@ -68,14 +68,14 @@ impl PageAddress {
         }
     }
 
-    /// Where it is for what has no driver.cfg.
+    /// Returns the address of the page for a command without a driver.cfg.
     pub(super) fn listen(&self) -> Address {
         let usual = || PageOptions::default().listen;
         self.0.clone().unwrap_or_else(usual)
     }
 }
 
-/// When statistics are printed.
+/// Says when statistics are printed.
 #[derive(Clone, Copy, Debug)]
 enum Stats {
     AtEnd,
@@ -103,7 +103,7 @@ pub(super) struct Job<'a> {
     /// The prefix of its output lines.
     pub(super) title: &'a str,
     pub(super) file: &'a Path,
-    /// The kinds of bus that it may name.
+    /// The kinds of bus that the file can name.
     pub(super) kinds: &'static Kinds,
     pub(super) role: Role,
     pub(super) program: Box<dyn Program>,
@@ -136,7 +136,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());
         return Outcome::WrongInput;
     }
-    // The [record] table is the simulation's, which may run at the other end of the same line.
+    // The [record] table belongs to the simulation, which may run at the other end of the same line.
     config.record = match arguments.record.as_deref().map(recording).transpose() {
         Ok(record) => record,
         Err(error) => {
@@ -173,16 +173,16 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         Err(outcome) => return outcome,
     };
     let is_done = || report.as_ref().is_some_and(|report| report.is_done());
-    // If the reader of stdout is gone (`| head`), the line keeps running.
+    // The line keeps running even if the reader of stdout is gone (`| head`).
     let told = watch(title, &host, arguments, &*clock, &stop, &is_done);
     let statistics = host.statistics();
     let (scans, stale) = host.scans();
-    // Of a run on virtual time.
+    // Only a run on virtual time has a hash.
     let hash = host.fact("sdsp.hash").map(|hash| format!(" hash={hash}"));
     let hash = hash.unwrap_or_default();
     let fault = host.fault();
     let unmet = host.has_only_failed().then(|| never_ran(&host.link()));
-    // A scan that never ends is detected here if the command was too short to detect it before.
+    // Closing detects a scan that never ends, even if the command was too short to detect it earlier.
     let unended = host.close();
     let fault = fault.or(unended);
     let failure = fault
@@ -208,12 +208,12 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     }
 }
 
-/// Why a command fails whose line has never come up.
+/// Returns why a command failed whose line has never come up.
 pub(super) fn never_ran(link: &Link) -> String {
     format!("the line never ran: {}", link.reason)
 }
 
-/// Shows what a command runs on the page that its driver.cfg asks for, and prints the address.
+/// Shows the command's driver or program on the page that its driver.cfg asks for, and prints the address.
 pub(super) fn show(
     title: &str,
     config: &Config,
@@ -222,7 +222,7 @@ pub(super) fn show(
     page::show(config, watch, announce(title)).map_err(|error| not_shown(title, &error))
 }
 
-/// Shows a run on virtual time on the page, and prints the address.
+/// Shows a run on virtual time on the page and prints the address.
 pub(super) fn show_run(
     title: &str,
     name: &str,
@@ -247,7 +247,7 @@ fn not_shown(title: &str, error: &PageError) -> Outcome {
     }
 }
 
-/// The recording asked for on the command line: relative to the current folder, not to that of the
+/// Returns the recording asked for on the command line. Its path is relative to the current folder, not to that of the
 /// driver.cfg.
 pub(super) fn recording(file: &Path) -> Result<record::Options, String> {
     let path = std::path::absolute(file)
@@ -276,7 +276,7 @@ fn watch(
     let mut result = Ok(());
     while !stop.is_stopped() && !is_done() && host.fault().is_none() {
         let now = clock.now();
-        // Asked first: what it has said last is still to be reported.
+        // Read before the link: the program's last reports are still to be printed.
         let is_over = now >= end || host.is_over();
         let link = host.link();
         let mut text = String::new();
@@ -302,7 +302,7 @@ fn watch(
     result
 }
 
-/// The injected faults as last reported: how often each had begun, and its state.
+/// The injected faults as last reported: how often each has begun, and its state.
 #[derive(Debug, Default)]
 pub(super) struct ToldFaults(Vec<(u64, Phase)>);
 
@@ -325,10 +325,10 @@ impl ToldFaults {
     }
 }
 
-/// Whether to report a line's state: it has changed, or what it waits for has.
+/// Returns true if a line's state is to be reported: the state has changed, or the thing that it waits for has.
 pub(super) fn is_news(told: Option<&Link>, link: &Link) -> bool {
     let Some(told) = told else {
-        // At the very beginning every line is closed.
+        // At the beginning every line is closed.
         return link.state != LinkState::Closed;
     };
     (told.state, told.cause, told.since) != (link.state, link.cause, link.since)

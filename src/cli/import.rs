@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     bus: Option<Client>,
 }
 
-/// Reads the kind of a client bus.
+/// Parses the kind of a client bus.
 fn clients() -> impl TypedValueParser<Value = Client> {
     const ALL: [Client; 2] = [Client::Modbus, Client::S7];
     PossibleValuesParser::new(ALL.map(Client::kind)).map(|kind| {

@@ -20,13 +20,13 @@ pub(super) fn dialled(text: &str) -> Result<Address, String> {
     Ok(address)
 }
 
-/// Prints a line of the command `title`. If the reader of stdout is gone, the command goes on.
+/// Prints a line of the command `title`. The command continues even if the reader of stdout is gone.
 pub(super) fn say(title: &str, line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "{title}: {line}").and_then(|()| out.flush());
 }
 
-/// What Ctrl-C stops; if it cannot be caught, that is reported.
+/// Returns a stop that Ctrl-C triggers; reports an error if Ctrl-C cannot be caught.
 pub(super) fn until_ctrl_c(title: &str) -> Result<Stop, Outcome> {
     let stop = Stop::new();
     let handler = {

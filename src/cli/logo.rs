@@ -15,7 +15,7 @@ use tickbus_dispatcher::{Counts, PORT, Role};
 use tickbus_fieldbus::tcp::Address;
 use tickbus_function_blocks::{Controller, Program, Terminals};
 
-/// Without news the dispatcher is asked whether it is there after this time.
+/// The time without news after which the client checks that the dispatcher is alive.
 const KEEP_ALIVE: Nanos = Nanos::from_secs(5);
 
 /// Run a small controller, like a LOGO!, in a virtual laboratory: a program of function blocks.
@@ -67,7 +67,7 @@ fn say(line: &str) {
     lab::say("logo", line);
 }
 
-/// The program and the connections.
+/// Reads the program and the connections.
 fn read(arguments: &Arguments) -> Result<(Program, Client), Mistakes> {
     let terminals = Terminals {
         inputs: arguments.inputs.into(),

@@ -1,8 +1,8 @@
 //! The `tickbus` command.
 //!
-//! One file per subcommand, with its arguments and `run`, which returns an `Outcome`.
+//! Each subcommand has one file, with its arguments and `run`, which returns an `Outcome`.
 
-/// As the one of `std`, which panics if the reader of stderr is gone (`2>&1 | head`).
+/// Like the macro of `std`, which panics if the reader of stderr is gone (`2>&1 | head`).
 macro_rules! eprintln {
     ($($text:tt)*) => {{
         use std::io::Write as _;
@@ -76,7 +76,7 @@ enum Command {
     FmuHelper,
 }
 
-/// How a command ended, for its exit code.
+/// Says how a command ended, for its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
     /// 0: done.
@@ -100,7 +100,7 @@ impl From<Outcome> for ExitCode {
     }
 }
 
-/// Writes a report to stdout. A reader that is gone (`| head`) need not be reported; a full disk must be.
+/// Writes a report to stdout. A reader that is gone (`| head`) is not reported; a full disk is.
 fn print(title: &str, text: &str) -> Outcome {
     use std::io::Write as _;
     let mut stdout = std::io::stdout().lock();
@@ -116,10 +116,10 @@ fn print(title: &str, text: &str) -> Outcome {
     }
 }
 
-/// How long the process waits at its end for the log to reach stderr.
+/// The longest time that the process waits at its end for the log to reach stderr.
 const LOG_FLUSH_LIMIT: Nanos = Nanos::from_secs(1);
 
-/// Runs the command with the arguments of the process. A driver.cfg may name these `kinds` of bus.
+/// Runs the command with the arguments of the process. A driver.cfg can name these `kinds` of bus.
 pub fn main(kinds: &'static Kinds) -> ExitCode {
     let arguments = Arguments::parse();
     // Events on the line are reported on stdout.

@@ -1,4 +1,4 @@
-//! `tickbus plc PROGRAM --config FILE`: a PLC program as a process of its own.
+//! `tickbus plc PROGRAM --config FILE`: runs a PLC program in a separate process.
 
 use std::path::PathBuf;
 

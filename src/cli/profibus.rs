@@ -1,4 +1,4 @@
-//! `tickbus profibus`: what is on a PROFIBUS line, and which times its project should have.
+//! `tickbus profibus`: shows the traffic on a PROFIBUS line, and the times that its project should have.
 
 mod advise;
 mod monitor;

@@ -1,4 +1,4 @@
-//! `tickbus report RECORDING`: an HTML page about a run.
+//! `tickbus report RECORDING`: makes an HTML page about a run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,10 +62,10 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// What the page shows in addition to the recording.
+/// The data that the page shows in addition to the recording.
 struct Beside {
     statistics: Option<RunStatistics>,
-    /// Each with its file name.
+    /// Each text with its file name.
     texts: Vec<(String, String)>,
 }
 
@@ -145,7 +145,7 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         texts: &beside.texts,
     };
     let mut told = String::new();
-    // What precedes a damaged place in the recording is worth a page; mistakes on the command line are not.
+    // A recording is worth a page up to a damaged place; mistakes on the command line are not.
     if mistakes.is_empty() {
         let beside = || arguments.recording.with_extension("html");
         let out = arguments.out.clone().unwrap_or_else(beside);

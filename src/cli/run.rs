@@ -15,16 +15,16 @@ use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Stepped, Unpacked
 use tickbus_fmi::made::is_stepped;
 use tickbus_image::signal::Slot;
 
-/// How often the command checks its line.
+/// The interval at which the command checks its line.
 const LOOK: Nanos = Nanos::from_millis(20);
 
-/// How long a run may take to end after a Ctrl-C, before another one ends the process.
+/// The time that a run has to end after a Ctrl-C, before another Ctrl-C ends the process.
 const PATIENCE: Nanos = Nanos::from_secs(1);
 
-/// The step where neither the command line nor the FMU names one.
+/// The step if neither the command line nor the FMU names one.
 const STEP: Nanos = Nanos::from_millis(10);
 
-/// How much that is joined with nothing is listed.
+/// The most unjoined signals and variables that are listed.
 const LISTED: usize = 20;
 
 /// Run an FMU (FMI 2.0 or 3.0, co-simulation) as the machine on a bus, or as the PLC.
@@ -44,7 +44,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
 
-    /// What the FMU is.
+    /// The FMU's role on the bus.
     #[arg(long, value_enum, default_value = "machine")]
     role: FmuRole,
 
@@ -86,12 +86,12 @@ pub(super) struct Arguments {
     stats: bool,
 }
 
-/// What an FMU is on the bus.
+/// The FMU's role on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum FmuRole {
-    /// It writes %I and reads %Q.
+    /// Writes %I and reads %Q.
     Machine,
-    /// It reads %I and writes %Q.
+    /// Reads %I and writes %Q.
     Plc,
 }
 
@@ -109,7 +109,7 @@ fn tolerance(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Why the command ends early: all lines, and how.
+/// Says why the command ends early: all lines, and the outcome.
 struct Refused(String, Outcome);
 
 fn wrong(text: impl std::fmt::Display) -> Refused {
@@ -180,8 +180,8 @@ fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refu
     Ok(tick(line, machine, times, arguments.stats, &*clock, &stop))
 }
 
-/// Lets Ctrl-C stop the run; a later one ends this process, for an FMU that hangs in a step never comes back. `folder` is where
-/// the FMU was unpacked to.
+/// Lets Ctrl-C stop the run. A later Ctrl-C ends this process, since an FMU may hang in a step for ever. `folder`
+/// contains the unpacked FMU.
 fn catch_interrupts(stop: &Stop, folder: &Path) -> Result<(), Refused> {
     let (stop, folder) = (stop.clone(), folder.to_owned());
     let clock = Monotonic::shared();
@@ -192,7 +192,7 @@ fn catch_interrupts(stop: &Stop, folder: &Path) -> Result<(), Refused> {
         if now < *last_chance.get_or_insert(now + PATIENCE) {
             return;
         }
-        // Nothing can be done if it stays.
+        // Nothing can be done if the folder stays.
         let _ = std::fs::remove_dir_all(&folder);
         eprintln!(
             "run: interrupted again, while the FMU or the line did not come back; a recording may lack its end"
@@ -207,7 +207,7 @@ fn catch_interrupts(stop: &Stop, folder: &Path) -> Result<(), Refused> {
     })
 }
 
-/// The driver.cfg as this command's end has it.
+/// Returns the driver.cfg for this command's end.
 fn configured(arguments: &Arguments, kinds: &'static Kinds) -> Result<Config, Refused> {
     let mut config = match arguments.role {
         FmuRole::Machine => {
@@ -227,7 +227,7 @@ fn configured(arguments: &Arguments, kinds: &'static Kinds) -> Result<Config, Re
             };
             let mut config =
                 Config::load_as(&arguments.config, Some(asked), kinds).map_err(wrong)?;
-            // The [record] table is the simulation's, which may run at the other end of the same line.
+            // The [record] table belongs to the simulation, which may run at the other end of the same line.
             config.record = None;
             config
         }
@@ -251,14 +251,14 @@ fn configured(arguments: &Arguments, kinds: &'static Kinds) -> Result<Config, Re
     Ok(config)
 }
 
-/// The step that an FMU proposes.
+/// Returns the step that an FMU proposes.
 #[expect(clippy::cast_possible_truncation, reason = "it saturates")]
 fn proposed(seconds: Option<f64>) -> Option<Nanos> {
     let step = Nanos((seconds? * 1e9).round() as i64);
     (step > Nanos::ZERO).then_some(step)
 }
 
-/// What is joined, and what is not.
+/// Describes the joined and the unjoined signals and variables.
 fn told(fmu: &Unpacked, join: &Join, step: Nanos, pace: f64) -> String {
     let model = &fmu.model;
     let pace = match pace {
@@ -283,18 +283,18 @@ fn told(fmu: &Unpacked, join: &Join, step: Nanos, pace: f64) -> String {
     format!("run: {}\n", lines.join("\nrun: "))
 }
 
-/// `1 input`, `2 inputs`.
+/// Returns `1 input` or `2 inputs`.
 fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Prints; if the reader of stdout is gone (`| head`), the line keeps running.
+/// Prints a text. The line keeps running even if the reader of stdout is gone (`| head`).
 fn say(text: &str) {
     let mut out = io::stdout().lock();
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
 
-/// How time passes.
+/// The settings for the passing of time.
 #[derive(Clone, Copy)]
 struct Times {
     step: Nanos,
@@ -302,7 +302,7 @@ struct Times {
     end: Option<Nanos>,
 }
 
-/// The driver, and what was told of it.
+/// The driver, and the state that was last reported.
 struct Line {
     driver: Driver,
     slots: Vec<Slot>,
@@ -312,7 +312,7 @@ struct Line {
 }
 
 impl Line {
-    /// Tells what has changed, now and then.
+    /// Reports changes, at most once per [`LOOK`].
     fn look(&mut self, now: Nanos) {
         if now < self.looked + LOOK {
             return;
@@ -332,7 +332,7 @@ impl Line {
     }
 }
 
-/// Ticks until the end of the time, of the FMU, of a run on virtual time, or of patience.
+/// Ticks until the end of the duration, of the FMU or of a run on virtual time, until a failure, or until stopped.
 fn tick(
     mut line: Line,
     mut machine: Machine,
@@ -347,7 +347,7 @@ fn tick(
     let mut failure = None;
     let mut by_itself = false;
     while !stop.is_stopped() && !by_itself && end.is_none_or(|end| time + step <= end) {
-        // As in a test: the machine moves on, then the PLC sees it.
+        // As in a test: the machine moves first, then the PLC sees the result.
         match machine.step(time, step, &mut line.slots) {
             Ok(stepped) => by_itself = stepped == Stepped::Ended,
             Err(why) => {
@@ -358,7 +358,7 @@ fn tick(
         time += step;
         let done = line.driver.exchange(time, &mut line.slots);
         if line.driver.is_over() && done.code.code() >= 0 {
-            // The run had no further step.
+            // The run on virtual time had no further step.
             time = time - step;
             break;
         }
@@ -385,7 +385,7 @@ fn tick(
             }
         }
     }
-    // What happened in the last steps.
+    // Report what happened in the last steps.
     line.looked = Nanos::ZERO - LOOK;
     line.look(clock.now());
     let ended = machine.end();

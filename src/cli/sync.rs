@@ -41,7 +41,7 @@ pub(super) struct Arguments {
     page: Option<PageAddress>,
 }
 
-/// What else belongs to a run in lock-step.
+/// Other commands for a run in lock-step.
 #[derive(Debug, clap::Subcommand)]
 enum Other {
     Gateway(gateway::Arguments),
@@ -84,7 +84,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let commands = thread::Builder::new().name("tickbus-commands".to_owned());
     let spawned = commands.spawn({
         let controls = controls.clone();
-        // It ends with the process: a read of stdin cannot be cancelled.
+        // The thread ends with the process: a read of stdin cannot be cancelled.
         move || obey(&controls)
     });
     if let Err(error) = spawned {
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     report(serve(file, logic, &controls))
 }
 
-/// Is stopped by Ctrl-C.
+/// Returns a stop that Ctrl-C triggers.
 fn stop_on_ctrl_c() -> Option<Stop> {
     let stop = Stop::new();
     let caught = ctrlc::set_handler({
@@ -106,7 +106,7 @@ fn stop_on_ctrl_c() -> Option<Stop> {
     Some(stop)
 }
 
-/// Prints a line. If the reader of stdout is gone, the run goes on.
+/// Prints a line. The run continues even if the reader of stdout is gone.
 fn say(line: &str) {
     let mut out = io::stdout().lock();
     let _ = writeln!(out, "sync: {line}").and_then(|()| out.flush());
@@ -164,7 +164,8 @@ fn serve(
     }
 }
 
-/// The last line: what came of the run. Texts come from clients: a quote or a line break in them is written as `\"` or `\n`.
+/// Prints the last line: the result of the run. Its texts come from clients, so a quote or a line break in them is
+/// written as `\"` or `\n`.
 fn report(outcome: Result<virtual_time::Outcome, Ended>) -> Outcome {
     let ended = match outcome {
         Ok(outcome) => {

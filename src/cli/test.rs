@@ -37,7 +37,7 @@ pub(super) struct Arguments {
     list: bool,
 }
 
-/// The numbers of tests by result.
+/// The number of tests for each result.
 #[derive(Default)]
 struct Count {
     passed: usize,
@@ -108,10 +108,10 @@ fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
     }
 }
 
-/// The test files at `path`, in order of their names.
+/// Collects the test files at `path`, sorted by name.
 fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     if !path.is_dir() {
-        // Whether it exists and can be read is found out when it is read.
+        // Reading the file later shows whether it exists and can be read.
         files.push(path.to_owned());
         return Ok(());
     }
@@ -119,7 +119,7 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     let mut entries: Vec<PathBuf> = entries?.into_iter().map(|entry| entry.path()).collect();
     entries.sort();
     for entry in entries {
-        // Links are not followed: one may lead back up. Their targets can be named on the command line.
+        // Links are not followed, since they may lead back up. Their targets can be named on the command line.
         if entry.is_dir() && !entry.is_symlink() {
             collect(&entry, files)?;
         } else if entry.extension().is_some_and(|ending| ending == "toml") && is_test_file(&entry) {
@@ -129,11 +129,11 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Whether a file in a folder is meant as a test file: it has a driver.cfg or a test. Other TOML files, such as
-/// Cargo.toml, lie beside.
+/// Returns true if a file in a folder is a test file: it has a driver.cfg or a test. Other TOML files, such as
+/// Cargo.toml, can be in the same folder.
 fn is_test_file(path: &Path) -> bool {
     let Ok(text) = load_text(path) else {
-        // Running it reports why.
+        // Running the file reports why.
         return true;
     };
     text.lines().map(str::trim_start).any(|line| {
@@ -178,7 +178,7 @@ fn run_file(
     Group { name, cases }
 }
 
-/// A file that cannot be read, in the form that a CI server shows.
+/// Describes a file that cannot be read, in the form that a CI server shows.
 fn wrong_file(mistakes: &Mistakes) -> Case {
     let first = mistakes.iter().next();
     let line = first.and_then(|found| found.place);
@@ -243,8 +243,8 @@ fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) 
     }
 }
 
-/// Runs a failed test again with a recorder; being deterministic, it fails in the same way. Returns where the
-/// recording is.
+/// Runs a failed test again with a recorder. Tests are deterministic, so it fails in the same way. Returns the path of
+/// the recording.
 fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
     let stem = Path::new(&suite.file).file_stem().unwrap_or_default();
     let name = format!("{} - {}", stem.to_string_lossy(), test.name);
@@ -287,7 +287,7 @@ fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
     std::fs::write(path, text)
 }
 
-/// Prints a line on stdout; if its reader is gone (`| head`), the tests go on.
+/// Prints a line on stdout. The tests continue even if the reader is gone (`| head`).
 fn tell(line: &str) {
     let _ = writeln!(std::io::stdout().lock(), "{line}");
 }

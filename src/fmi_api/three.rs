@@ -20,8 +20,8 @@ extern "C" fn fmi3GetVersion() -> *const c_char {
 
 /// # Safety
 ///
-/// As `fmi3Functions.h` says, as for all functions here: texts are C strings or null, lists have as many values as the call says,
-/// and `env` stays as long as the instance.
+/// As `fmi3Functions.h` requires, as for all functions here: texts are C strings or null, lists have as many values as
+/// the call states, and `env` exists as long as the instance.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3InstantiateCoSimulation(
     name: *const c_char,
@@ -37,7 +37,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
     logger: Option<LoggerOfThree>,
     _intermediate_update: *const c_void,
 ) -> *mut c_void {
-    // SAFETY: the caller's promises.
+    // SAFETY: promised by the caller.
     let (name, token, resources) = unsafe { (text(name), text(token), text(resources)) };
     let journal = Journal {
         logger: logger.map(Logger::Three),
@@ -45,7 +45,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
         name: CString::new(name.unwrap_or("tickbus")).unwrap_or_default(),
         all: logging,
     };
-    // A path, by the standard; some tools hand in a URI, as in 2.0.
+    // By the standard this is a path; some tools pass a URI, as in 2.0.
     let folder = resources.map(|path| {
         if path.starts_with("file:") {
             folder_of_uri(path)
@@ -127,7 +127,7 @@ unsafe extern "C" fn fmi3GetString(
     values: *mut *const c_char,
     value_count: usize,
 ) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
+    // SAFETY: promised by the caller, as for `fmi3InstantiateCoSimulation`.
     unsafe { get_texts(instance, (references, count), (values, value_count)) }
 }
 
@@ -139,13 +139,13 @@ unsafe extern "C" fn fmi3SetString(
     values: *const *const c_char,
     value_count: usize,
 ) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi3InstantiateCoSimulation`.
+    // SAFETY: promised by the caller, as for `fmi3InstantiateCoSimulation`.
     unsafe { set_texts(instance, (references, count), (values, value_count)) }
 }
 
 /// # Safety
 ///
-/// The pointers must be null or point to a value each.
+/// Each pointer must be null or point to a value.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi3DoStep(
     instance: *mut c_void,
@@ -161,7 +161,7 @@ unsafe extern "C" fn fmi3DoStep(
     let is_over = status == Status::Discard as c_int;
     for (flag, value) in [(event, false), (terminate, is_over), (early_return, false)] {
         if !flag.is_null() {
-            // SAFETY: the caller's promise.
+            // SAFETY: promised by the caller.
             unsafe { flag.write(value) };
         }
     }
@@ -171,7 +171,7 @@ unsafe extern "C" fn fmi3DoStep(
         } else {
             from
         };
-        // SAFETY: the caller's promise.
+        // SAFETY: promised by the caller.
         unsafe { last.write(done) };
     }
     status

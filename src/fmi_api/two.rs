@@ -15,7 +15,7 @@ use super::{
 /// `fmi2Error`.
 const ERROR: c_int = Status::Error as c_int;
 
-/// `fmi2CallbackFunctions`; what this library does not call is not typed.
+/// `fmi2CallbackFunctions`; functions that this library does not call have no types here.
 #[repr(C)]
 struct Callbacks {
     logger: Option<LoggerOfTwo>,
@@ -37,8 +37,8 @@ extern "C" fn fmi2GetVersion() -> *const c_char {
 
 /// # Safety
 ///
-/// As `fmi2Functions.h` says, as for all functions here: texts are C strings or null, lists have as many values as the call says,
-/// and `callbacks` stays as long as the instance.
+/// As `fmi2Functions.h` requires, as for all functions here: texts are C strings or null, lists have as many values as
+/// the call states, and `callbacks` exists as long as the instance.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2Instantiate(
     name: *const c_char,
@@ -49,7 +49,7 @@ unsafe extern "C" fn fmi2Instantiate(
     _visible: c_int,
     logging: c_int,
 ) -> *mut c_void {
-    // SAFETY: the caller's promises, here and below.
+    // SAFETY: promised by the caller, here and below.
     let (name, guid, resources) = unsafe { (text(name), text(guid), text(resources)) };
     // SAFETY: as above.
     let callbacks = unsafe { callbacks.as_ref() };
@@ -119,7 +119,7 @@ unsafe extern "C" fn fmi2GetString(
     count: usize,
     values: *mut *const c_char,
 ) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi2Instantiate`.
+    // SAFETY: promised by the caller, as for `fmi2Instantiate`.
     unsafe { get_texts(instance, (references, count), (values, count)) }
 }
 
@@ -130,7 +130,7 @@ unsafe extern "C" fn fmi2SetString(
     count: usize,
     values: *const *const c_char,
 ) -> c_int {
-    // SAFETY: the caller's promises, as for `fmi2Instantiate`.
+    // SAFETY: promised by the caller, as for `fmi2Instantiate`.
     unsafe { set_texts(instance, (references, count), (values, count)) }
 }
 
@@ -150,7 +150,7 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated`.
 const TERMINATED: c_int = 3;
 
-/// No step is ever pending, and one was discarded only if the bus has come to its end.
+/// No step is ever pending, and a step is discarded only if the bus has ended.
 #[unsafe(no_mangle)]
 unsafe extern "C" fn fmi2GetBooleanStatus(
     instance: *mut c_void,
@@ -165,7 +165,7 @@ unsafe extern "C" fn fmi2GetBooleanStatus(
         is_over = instance.is_over();
         Ok(())
     });
-    // SAFETY: the caller's promise, as for `fmi2Instantiate`.
+    // SAFETY: promised by the caller, as for `fmi2Instantiate`.
     unsafe { value.write((kind == TERMINATED && is_over).into()) };
     status
 }
@@ -184,7 +184,7 @@ unsafe extern "C" fn fmi2GetRealStatus(
         time = instance.time();
         Ok(())
     });
-    // SAFETY: the caller's promise, as for `fmi2Instantiate`.
+    // SAFETY: promised by the caller, as for `fmi2Instantiate`.
     unsafe { value.write(time) };
     status
 }

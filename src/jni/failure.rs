@@ -1,4 +1,4 @@
-//! How failures reach Java: one exception class, one policy.
+//! Failures in Java: one exception class, one policy.
 
 use std::any::Any;
 
@@ -11,7 +11,7 @@ use once_cell::sync::OnceCell;
 use tickbus_binding::{Refusal, panic_message};
 use tickbus_driver::Code;
 
-/// Why a native method failed.
+/// Says why a native method failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failure {
     /// A status code, and what happened.
@@ -23,7 +23,7 @@ pub(super) enum Failure {
 }
 
 impl Failure {
-    /// A failure with its own description.
+    /// Creates a failure with its own description.
     pub(super) fn coded(code: Code, what: impl std::fmt::Display) -> Self {
         Refusal::new(code, what).into()
     }
@@ -35,14 +35,14 @@ impl Failure {
 /// thread can lose the code it is running.
 static EXCEPTION: OnceCell<Global<JClass<'static>>> = OnceCell::new();
 
-/// Finds the exception class. To be called while the library is being loaded, when the JVM looks up classes
-/// in the class loader that loads it.
+/// Finds the exception class. Must be called while the library is being loaded, when the JVM looks up classes in the
+/// class loader that loads it.
 pub(super) fn find_exception(env: &mut Env<'_>) -> Result<(), Error> {
     let find = || {
         let class = env.find_class(jni_str!("tickbus/FieldbusException"))?;
         env.new_global_ref(class)
     };
-    // If the library is loaded again, the class is here already.
+    // If the library is loaded again, the class has been found already.
     EXCEPTION.get_or_try_init(find).map(|_| ())
 }
 
@@ -104,7 +104,7 @@ fn throw(env: &mut Env<'_>, failure: &Failure) -> Result<(), Error> {
     )?;
     let exception = env.cast_local::<JThrowable>(exception)?;
     match env.throw(exception) {
-        // The crate's way of saying that the exception is now pending, as intended.
+        // The jni crate reports in this way that the exception is now pending, as intended.
         Err(Error::JavaException) => Ok(()),
         other => other,
     }

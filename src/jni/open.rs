@@ -1,5 +1,4 @@
-//! Opening a driver for Java: its signals are described to a `tickbus.Layout`, which allocates the shared
-//! buffer.
+//! Opens a driver for Java, and describes its signals to a `tickbus.Layout`, which allocates the shared buffer.
 
 #![allow(unsafe_code, reason = "the shared buffer is memory that the JVM gives")]
 
@@ -25,7 +24,7 @@ pub(super) struct Keep {
     _place: Option<Place>,
 }
 
-/// The file named by Java: a path, or a `file:` URI for a path that the JVM cannot represent as text. The URI
+/// Returns the file named by Java: a path, or a `file:` URI for a path that the JVM cannot represent as text. The URI
 /// has the bytes of the name as percent escapes.
 pub(super) fn file_of(name: &str) -> PathBuf {
     let Some(escaped) = name.strip_prefix("file://") else {
@@ -69,7 +68,7 @@ fn describe(
     buffer(env, driver.slots().count, place, layout)
 }
 
-/// Describes the driver of the file to `layout`, and opens nothing.
+/// Describes the driver of the file to `layout` without opening it.
 pub(super) fn look(env: &mut Env<'_>, path: &Path, layout: &JObject<'_>) -> Result<(), Failure> {
     let config = tickbus_binding::load(path, "", &KINDS)?;
     let slots = SlotMap::new(&config.table, config.role);
@@ -129,7 +128,7 @@ fn describe_signal(
     Ok(())
 }
 
-/// Java counts bytes and slots as int.
+/// Converts a number to an int, with which Java counts bytes and slots.
 fn index(number: usize) -> Result<i32, Failure> {
     i32::try_from(number).map_err(|_| {
         Failure::coded(
@@ -166,10 +165,10 @@ fn buffer(
         _buffer: env.new_global_ref(buffer)?,
         _place: place,
     };
-    // SAFETY: a direct buffer's address stays the same and valid for its capacity, checked above, as
-    // long as it is reachable, which `keep` sees to; the JVM zeroes it. Only the package `tickbus`
-    // has the Java end. Its signals move slots outside the native call, on the one thread that ticks
-    // the driver, as its documentation demands; no slot is ever an address, index or length.
+    // SAFETY: a direct buffer's address stays valid for its capacity, which was checked above, as long as the buffer is
+    // reachable, which `keep` ensures; the JVM zeroes the memory. Only the package `tickbus` has the Java end. Its
+    // signals access slots outside the native call, on the one thread that ticks the driver, as its documentation
+    // demands. No slot is ever an address, index or length.
     unsafe { Shared::new(address, slots, keep) }
         .ok_or_else(|| unusable("is not aligned for 8-byte words".into()))
 }

@@ -7,11 +7,11 @@ use tickbus_virtual_time::Controls;
 
 use super::PageError;
 
-/// A place that no driver has.
+/// The place of a driver on the page; without pages there is none.
 #[derive(Debug)]
 pub(crate) enum Place {}
 
-/// Nothing, unless the driver.cfg asks for a page.
+/// Does nothing, unless the driver.cfg asks for a page, which is an error.
 pub(crate) fn show(
     config: &Config,
     _watch: impl FnOnce() -> Option<Watch>,
@@ -26,7 +26,7 @@ pub(crate) fn show(
     )))
 }
 
-/// Nothing: there are no pages.
+/// Returns an error: this build has no pages.
 pub(crate) fn show_run(
     _name: &str,
     _listen: &Address,
@@ -37,7 +37,7 @@ pub(crate) fn show_run(
     Err(PageError::Unsupported(text.to_owned()))
 }
 
-/// There is no page.
+/// Returns `None`: there is no page.
 pub(crate) fn url() -> Option<String> {
     None
 }

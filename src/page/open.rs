@@ -1,4 +1,4 @@
-//! The page that is served: opened for the first driver that asks for one, closed with the last.
+//! The page that is served: opened for the first driver that asks for one, and closed with the last.
 
 use std::fs;
 use std::path::Path;
@@ -15,16 +15,16 @@ use tickbus_web::{Limits, Room, Serving};
 
 use super::PageError;
 
-/// The page of this process, while there is one.
+/// The page of this process, if there is one.
 static PAGE: Mutex<Weak<Open>> = Mutex::new(Weak::new());
 
-/// The largest picture that is read, in bytes.
+/// The largest picture that can be read, in bytes.
 const LARGEST: u64 = 16 << 20;
 
-/// What is served.
+/// The served page.
 #[derive(Debug)]
 struct Open {
-    // Dropped in this order: nobody asks a page that has ended.
+    // Dropped in this order, so that nobody asks a page that has ended.
     _serving: Serving,
     page: LivePage,
     url: String,
@@ -41,7 +41,7 @@ pub(crate) struct Place {
 
 impl Drop for Place {
     fn drop(&mut self) {
-        // While the address is given up, nobody may want it.
+        // Locked so that nobody asks for the address while it is being released.
         let present = present();
         self.member = None;
         self.open = None;
@@ -50,17 +50,17 @@ impl Drop for Place {
 }
 
 fn present() -> MutexGuard<'static, Weak<Open>> {
-    // It is replaced as a whole.
+    // The value is only ever replaced as a whole.
     PAGE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The address of the page with its token, while there is one.
+/// Returns the address of the page with its token, if there is a page.
 pub(crate) fn url() -> Option<String> {
     Some(present().upgrade()?.url.clone())
 }
 
-/// Shows what `watch` gives on the page, if the driver.cfg asks for one. `announce` is given the address of a page that was
-/// not there before.
+/// Shows the views of `watch` on the page, if the driver.cfg asks for one. `announce` receives the address of a new
+/// page.
 pub(crate) fn show(
     config: &Config,
     watch: impl FnOnce() -> Option<Watch>,
@@ -93,7 +93,7 @@ pub(crate) fn show(
     }))
 }
 
-/// Shows a run on virtual time on the page, which is served at `listen` unless there is one.
+/// Shows a run on virtual time on the page, which is served at `listen` unless there is one already.
 pub(crate) fn show_run(
     name: &str,
     listen: &Address,
@@ -107,7 +107,8 @@ pub(crate) fn show_run(
     })
 }
 
-/// The page that there is, or a new one at `asked`; `any` is what asks for any port.
+/// Returns the present page, or a new one at `asked`; `any` is the setting for a port that the system chooses, for the
+/// error message.
 fn open(
     name: &str,
     (asked, any): (&Address, &str),
@@ -145,14 +146,14 @@ fn open(
         asked: asked.clone(),
     });
     *present = Arc::downgrade(&open);
-    // Who reads the log must not be able to force anything: the token is for whoever started this.
+    // Readers of the log must not be able to force signals: only whoever started this process gets the token.
     let (plain, _) = open.url.split_once('#').unwrap_or((&open.url, ""));
     log::info!("the live page is at {plain}");
     announce(&open.url);
     Ok(open)
 }
 
-/// Reads the picture of a driver; mistakes in it are told, and leave the rest alive.
+/// Reads the picture of a driver. Mistakes in it are logged, and the rest of the picture works.
 fn read_picture(config: &Config, file: &Path) -> Result<Picture, PageError> {
     let path = config.folder().join(file);
     let wrong = |what: String| {

@@ -24,40 +24,41 @@ pub struct Config {
     pub id: i32,
     /// The driver's name, for people.
     pub name: String,
-    /// Which end of the bus it is.
+    /// The end of the bus that the driver serves.
     pub role: Role,
-    /// What the numbers of addresses in the file count; the addresses in `table` count bytes.
+    /// The unit that the addresses in the file count in; the addresses in `table` count bytes.
     pub addressing: Addressing,
-    /// Its stations and signals.
+    /// The driver's stations and signals.
     pub table: SignalTable,
-    /// Its axes; their signals are in `table` like all others.
+    /// The driver's axes; their signals are in `table` like all others.
     pub axes: Vec<Axis>,
     /// Cycle times and time-outs.
     pub timing: Timing,
     /// The options of the bus.
     pub bus: Options,
-    /// The kinds of bus with which it was read: [tables that replace its own](Self::overlaid) may name those.
+    /// The kinds of bus known when the file was read: [tables that replace the file's own](Self::overlaid) can name
+    /// them.
     pub kinds: &'static Kinds,
-    /// What is reported as events.
+    /// The events to report.
     pub events: Events,
-    /// The signals by which each end knows that the other one is alive.
+    /// The signals that show each end that the other one is alive.
     pub life_signs: LifeSigns,
     /// Faults to inject at this end.
     pub faults: Vec<Fault>,
     /// The file with further faults; [`load`](Self::load) reads it.
     pub fault_file: Option<PathBuf>,
-    /// What to record, if anything.
+    /// The recording to make, if any.
     pub record: Option<record::Options>,
-    /// The live page, if one is asked for.
+    /// The live page, if the file asks for one.
     pub page: Option<PageOptions>,
 }
 
-/// What a command line says about its end of the bus.
+/// Says which end of the bus a command line asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CommandLineEnd {
-    /// The end. A file without a role serves both.
+    /// The end. A file without a role serves both ends.
     pub role: Role,
-    /// Whether the file's address will be replaced; see [`Options::set_address`].
+    /// True if another address will replace the file's; see [`Options::set_address`].
     /// [`Options::set_address`].
     pub moved: bool,
 }
@@ -66,26 +67,26 @@ pub struct CommandLineEnd {
 type Given = (Option<CommandLineEnd>, &'static Kinds);
 
 impl Config {
-    /// The folder to which paths in the driver.cfg are relative.
+    /// Returns the folder to which paths in the driver.cfg are relative.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
     }
 
-    /// Reads the driver.cfg at `path`, which may name these `kinds` of bus.
+    /// Reads the driver.cfg at `path`, which can name these `kinds` of bus.
     ///
     /// # Errors
     ///
-    /// When the file cannot be read or is not UTF-8, or with every mistake in it.
+    /// Returns an error if the file cannot be read or is not UTF-8, or every mistake in it.
     pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
         Self::load_as(path, None, kinds)
     }
 
-    /// Reads the driver.cfg at `path` for a separate process that serves the end `asked` for on its command
-    /// line.
+    /// Reads the driver.cfg at `path` for a separate process that serves the end `asked` for on its command line.
     ///
     /// # Errors
     ///
-    /// As [`load`](Self::load); or the file states the other role; or its bus cannot leave the process.
+    /// As [`load`](Self::load). Also an error if the file states the other role, or if its bus cannot leave the
+    /// process.
     pub fn load_as(
         path: &Path,
         asked: Option<CommandLineEnd>,
@@ -107,7 +108,7 @@ impl Config {
         Ok(config)
     }
 
-    /// What its faults are read for.
+    /// Returns the context in which the driver's faults are read.
     pub fn fault_scope(&self) -> faults::Scope<'_> {
         faults::Scope {
             table: &self.table,
@@ -119,7 +120,7 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// When the file cannot be read, or with every mistake in it.
+    /// Returns an error if the file cannot be read, or every mistake in it.
     pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
         let text = load_text(path)?;
         let file = path.display().to_string();
@@ -137,7 +138,7 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// With every mistake in the text.
+    /// Returns every mistake in the text.
     pub fn parse(file_name: &str, text: &str, kinds: &'static Kinds) -> Result<Self, Mistakes> {
         Self::parse_as(file_name, text, None, kinds)
     }
@@ -146,7 +147,7 @@ impl Config {
     ///
     /// # Errors
     ///
-    /// With every mistake in the text.
+    /// Returns every mistake in the text.
     pub fn parse_as(
         file_name: &str,
         text: &str,
@@ -156,8 +157,7 @@ impl Config {
         Self::parse_at(Path::new(file_name), file_name, text, (asked, kinds))
     }
 
-    /// As [`parse_as`](Self::parse_as), for a file at `path`, which need not be UTF-8: mistakes call it
-    /// `shown`.
+    /// As [`parse_as`](Self::parse_as), for a file at `path`, which need not be UTF-8. Mistakes call the file `shown`.
     fn parse_at(path: &Path, shown: &str, text: &str, given: Given) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(shown, text);
         let config = read_text(&mut collector, text, |root| read(path, root, given));
@@ -257,7 +257,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     let scope = table.as_ref().map(|table| faults::Scope {
         table,
-        // What is wrong with the bus is reported already.
+        // Mistakes in the bus table have been reported already.
         has_diagnosis: bus.is_none_or(|bus| bus.has_diagnosis()),
     });
     let faults = faults
@@ -265,7 +265,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         .unwrap_or_default();
 
     let (driver, fieldbus) = (driver?, fieldbus?);
-    // In a file that serves both ends the faults are the machine's: injected at both ends, they would happen
+    // In a file that serves both ends, the faults belong to the machine: injected at both ends, they would happen
     // twice.
     let is_other_end = fieldbus.is_for_both && fieldbus.role == Role::Controller;
     let (faults, fault_file) = if is_other_end {
@@ -294,7 +294,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
             None => None,
         },
         page: match page {
-            // As with faults: both ends cannot have one address.
+            // As with faults: the two ends cannot share one address.
             Some(page) => Some(page?).filter(|_| !is_other_end),
             None => None,
         },
@@ -303,7 +303,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
 
 struct FieldbusTable<'a> {
     role: Role,
-    /// Whether the file states no role and serves both ends.
+    /// True if the file states no role and serves both ends.
     is_for_both: bool,
     /// The end that the file describes.
     own_role: Role,
@@ -349,7 +349,8 @@ fn read_fieldbus(mut table: Table<'_>, (asked, kinds): Given) -> FieldbusTable<'
     let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
     let read = if let Some(kind) = kind {
         let moved = asked.is_some_and(|asked| asked.moved);
-        // A loopback is no command's line, which is said below: of a role that only the command gave, nothing is.
+        // A loopback in a separate process is reported below; a role that only the command gave must cause no other
+        // mistake.
         let is_loopback = kind.as_text() == Some(loopback::NAME);
         let as_written = match stated {
             None if is_loopback => Role::default(),
@@ -369,7 +370,7 @@ fn read_fieldbus(mut table: Table<'_>, (asked, kinds): Given) -> FieldbusTable<'
         }
         read
     } else {
-        // Without the bus kind it is unknown which keys are valid.
+        // Without the bus kind, the valid keys are unknown.
         table.finish_open();
         None
     };
@@ -447,7 +448,7 @@ mod tests {
                 "address = \"%QL0\"\ntype = \"LREAL\"\nfail_safe = -0.5",
                 Slot::from_real(-0.5),
             ),
-            // Without a fail-safe value, all bits zero: 4 mA, not an impossible 0 mA.
+            // Without a fail-safe value, all bits are zero: 4 mA, not an impossible 0 mA.
             (
                 "address = \"%QW0\"\nscale = { raw = [0, 27648], value = [4, 20] }",
                 Slot::from_real(4.0),

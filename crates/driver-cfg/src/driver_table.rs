@@ -9,7 +9,7 @@ const NAME_LIMIT: usize = 120;
 /// The longest path of a file, in characters.
 pub(crate) const PATH_LIMIT: usize = 1000;
 
-/// What `[driver]` says.
+/// The contents of `[driver]`.
 pub(crate) struct DriverTable {
     pub(crate) id: Option<i32>,
     pub(crate) name: Option<String>,

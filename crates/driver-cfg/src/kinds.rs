@@ -1,5 +1,5 @@
-//! The kinds of bus that a driver.cfg can name. They are handed in: this crate knows only the loopback, and a third-party bus
-//! is one more line in the list of the program that has it.
+//! The kinds of bus that a driver.cfg can name. The program passes them in: this crate knows only the loopback, and a
+//! third-party bus is one more line in the list of the program that contains it.
 
 use std::fmt;
 
@@ -12,7 +12,7 @@ use crate::{Options, loopback};
 /// Reads the keys of one kind in `[fieldbus]`; see [`BusKind::read`].
 type ReadOptions = fn(Role, bool, &mut Table<'_>) -> Option<Box<dyn BusOptions>>;
 
-/// A kind of bus, for a list of them.
+/// A kind of bus, as an entry in a list of kinds.
 #[derive(Clone, Copy)]
 pub struct Kind {
     name: &'static str,
@@ -21,7 +21,7 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// The kind whose options are a `K`.
+    /// Returns the kind whose options are of type `K`.
     pub const fn of<K: BusKind>() -> Self {
         Self {
             name: K::NAME,
@@ -40,16 +40,17 @@ impl fmt::Debug for Kind {
     }
 }
 
-/// The kinds that a program has: the loopback, and those of its list; and the PLC programs that a loopback can host.
+/// The kinds of bus that a program supports: the loopback and the kinds in its list. Also the PLC programs that a
+/// loopback can host.
 ///
-/// A program makes one `static` of it, and hands that to whatever reads a driver.cfg:
+/// A program declares one `static` of this type, and passes it to every function that reads a driver.cfg:
 ///
 /// ```ignore
 /// static KINDS: Kinds = Kinds::new(&[Kind::of::<modbus::ServerOptions>()]);
 /// static WITH_MINE: Kinds = KINDS.and(&[Kind::of::<my_bus::Options>()]);
 /// ```
 pub struct Kinds {
-    /// The lists of buses that were added.
+    /// The list that this one extends.
     others: Option<&'static Self>,
     buses: &'static [Kind],
     programs: Programs,
@@ -57,10 +58,10 @@ pub struct Kinds {
 }
 
 impl Kinds {
-    /// The loopback alone.
+    /// Contains only the loopback.
     pub const LOOPBACK: Self = Self::new(&[]);
 
-    /// The loopback and these buses.
+    /// Returns the loopback and these buses.
     pub const fn new(buses: &'static [Kind]) -> Self {
         Self {
             others: None,
@@ -70,24 +71,24 @@ impl Kinds {
         }
     }
 
-    /// The same with built-in PLC programs that a driver.cfg may name.
+    /// Adds built-in PLC programs that a driver.cfg can name.
     #[must_use]
     pub const fn with_programs(self, programs: Programs) -> Self {
         Self { programs, ..self }
     }
 
-    /// The PLC programs that a driver.cfg may name.
+    /// Returns the PLC programs that a driver.cfg can name.
     pub const fn programs(&self) -> &Programs {
         &self.programs
     }
 
-    /// The same with advice for names that users try and that are no kind: pairs of a name in lower case and the advice.
+    /// Adds advice for names that users try but that are not a kind: pairs of a name in lower case and the advice.
     #[must_use]
     pub const fn with_advice(self, advice: &'static [(&'static str, &'static str)]) -> Self {
         Self { advice, ..self }
     }
 
-    /// These and further buses. A kind that the list already has keeps its name.
+    /// Adds further buses. A kind that is already in the list keeps its name.
     #[must_use]
     pub const fn and(&'static self, buses: &'static [Kind]) -> Self {
         Self {
@@ -98,7 +99,7 @@ impl Kinds {
         }
     }
 
-    /// The names of all kinds.
+    /// Returns the names of all kinds.
     pub fn names(&self) -> Vec<&'static str> {
         let mut names = match self.others {
             Some(others) => others.names(),
@@ -114,9 +115,9 @@ impl Kinds {
     }
 
     /// Reads `events` and the keys of the bus kind `kind`, and reports their mistakes. `moved` says that another
-    /// address will replace the one that is read.
+    /// address will replace the one in the file.
     ///
-    /// The table is finished: keys that are left in it are unknown, unless the bus kind itself is unknown.
+    /// This finishes the table: keys left in it are unknown, unless the bus kind itself is unknown.
     pub(super) fn read(
         &self,
         kind: &Value<'_>,
@@ -173,7 +174,7 @@ impl fmt::Debug for Kinds {
     }
 }
 
-/// Lists of the same kinds and programs are equal.
+/// Two lists are equal if they have the same kinds and programs.
 impl PartialEq for Kinds {
     fn eq(&self, other: &Self) -> bool {
         self.names() == other.names() && self.programs.names() == other.programs.names()

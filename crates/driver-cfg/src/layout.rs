@@ -49,7 +49,7 @@ struct Declared<'a> {
     sizes: Sizes<'a>,
 }
 
-/// Reads the `[[signal]]` and the `[[axis]]` tables; signals come in the order of the file.
+/// Reads the `[[signal]]` and `[[axis]]` tables; signals are in the order of the file.
 pub(super) fn read_signals<'a>(
     signals: Vec<Table<'a>>,
     axes: Vec<Table<'a>>,
@@ -74,10 +74,10 @@ pub(super) fn read_signals<'a>(
     (read, all.into_iter().map(|(_, section)| section).collect())
 }
 
-/// Lays out the signals over their stations and reports conflicts.
+/// Assigns the signals to their stations and reports conflicts.
 ///
-/// `declared` are the `[[station]]` tables, `sizes` those of `[fieldbus]`; `bus` reads its own keys from the
-/// former. Returns a table even if there were mistakes, as far as that makes sense.
+/// `declared` are the `[[station]]` tables and `sizes` the sizes in `[fieldbus]`; `bus` reads its own keys from the
+/// `[[station]]` tables. Returns a table even if there were mistakes, as far as that makes sense.
 pub(super) fn lay_out<'a>(
     mut sections: Vec<Section<'a>>,
     declared: Option<Vec<Table<'a>>>,
@@ -96,7 +96,7 @@ pub(super) fn lay_out<'a>(
     };
     // A signal whose station is unknown is not checked against the areas.
     let mut placed = vec![true; sections.len()];
-    // The station of a table with many signals is looked up, and reported, only once.
+    // A table's station is looked up and reported only once, even if the table has many signals.
     let mut of_tables = HashMap::new();
     for (section, placed) in sections.iter_mut().zip(&mut placed) {
         let look_up = || station_of(section, &stations, certain);
@@ -130,7 +130,7 @@ pub(super) fn lay_out<'a>(
     Some(SignalTable { stations, signals })
 }
 
-/// Reads the `[[station]]` tables; the flag says whether all their names are known.
+/// Reads the `[[station]]` tables. The flag is true if all their names are known.
 fn read_stations<'a>(
     tables: Vec<Table<'a>>,
     of_fieldbus: &Sizes<'a>,
@@ -165,7 +165,7 @@ fn read_stations<'a>(
             bus.read_station(count, &mut table);
             table.finish();
         } else {
-            // Without the bus kind it is unknown which keys are valid.
+            // Without the bus kind, the valid keys are unknown.
             table.finish_open();
         }
         let label = name
@@ -201,7 +201,7 @@ fn read_stations<'a>(
     Some((stations, certain))
 }
 
-/// The index of a signal's station; `certain` says that all names of stations are known.
+/// Returns the index of a signal's station; `certain` is true if all station names are known.
 fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -> Option<usize> {
     let names = || {
         stations
@@ -240,7 +240,7 @@ fn station_of(section: &Section<'_>, stations: &[Declared<'_>], certain: bool) -
     found
 }
 
-/// Reports duplicate names, whatever else is wrong with the tables; `what` is their noun, such as "signal".
+/// Reports duplicate names, even if the tables have other mistakes; `what` is their noun, such as "signal".
 pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     let mut first: HashMap<&str, Value<'_>> = HashMap::new();
     for table in tables {
@@ -264,7 +264,7 @@ pub(super) fn check_twins(tables: &[Table<'_>], what: &str) {
     }
 }
 
-/// Reports signals with the name of an edge count, or of a signal of an axis.
+/// Reports signals that have the name of an edge count or of an axis signal.
 fn check_names(sections: &[Section<'_>]) {
     let mut first: HashMap<&str, &Section<'_>> = HashMap::new();
     for section in sections {
@@ -272,7 +272,7 @@ fn check_names(sections: &[Section<'_>]) {
             continue;
         };
         let twins = section.structure.is_none() && taken.structure.is_none();
-        // If one name is derived and one written, the written one has to change.
+        // If one name is derived and the other written, the written one must change.
         let (wrong, other) = if section.has_own_name() {
             (section, taken)
         } else {
@@ -310,12 +310,13 @@ fn check_names(sections: &[Section<'_>]) {
     }
 }
 
-/// The line that a message about another signal names.
+/// Returns the line that a message about another signal names.
 fn line_of(section: &Section<'_>) -> usize {
     section.name.as_ref().unwrap_or(&section.address).line()
 }
 
-/// The size of one area of the station that has the signals `here`: as stated, or as far as they reach.
+/// Returns the size of one area of the station that has the signals `here`: the stated size, or as far as the signals
+/// reach.
 fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usize]) -> usize {
     let in_area = || {
         here.iter()
@@ -355,7 +356,7 @@ fn size_of(area: Area, sizes: &Sizes<'_>, sections: &[Section<'_>], here: &[usiz
     stated
 }
 
-/// No bit may belong to two signals. Each signal is reported once, as the later of two in the file.
+/// Checks that no bit belongs to two signals. Each signal is reported once, as the later of two in the file.
 fn check_overlaps(sections: &[Section<'_>], placed: &[bool]) {
     let mut order: Vec<usize> = (0..sections.len())
         .filter(|number| placed[*number])

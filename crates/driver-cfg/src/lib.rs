@@ -1,6 +1,6 @@
-//! driver.cfg as a whole: one driver's signals, stations and timing, and what its bus needs to know.
+//! A complete driver.cfg: the signals, stations and timing of one driver, and the settings of its bus.
 //!
-//! [`Config`] is a file's content, checked. The bus kinds that it may name are [handed in](Kinds).
+//! [`Config`] is the checked content of a file. The caller passes in the [bus kinds](Kinds) that the file can name.
 
 mod config;
 mod driver_table;
@@ -12,7 +12,7 @@ mod overlay;
 mod page;
 mod timing;
 
-/// Those of this crate's tests.
+/// The kinds that this crate's tests use.
 #[cfg(test)]
 static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);
 

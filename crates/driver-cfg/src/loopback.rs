@@ -10,7 +10,7 @@ use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL, Programs};
 use tickbus_record as record;
 
-/// The kind, as a driver.cfg names it.
+/// The name of the kind in a driver.cfg.
 pub const NAME: &str = "loopback";
 
 /// The longest name of a link, in characters.
@@ -19,10 +19,10 @@ const LINK_LIMIT: usize = 120;
 /// How the bus is clocked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Mode {
-    /// By its own thread and clock.
+    /// Clocked by its own thread.
     #[default]
     Free,
-    /// By the ticking thread, in simulation time.
+    /// Clocked by the ticking thread, in simulation time.
     Stepped,
 }
 
@@ -31,22 +31,22 @@ impl Mode {
     pub const NAMES: [(&str, Self); 2] = [("free", Self::Free), ("stepped", Self::Stepped)];
 }
 
-/// What is at the other end.
+/// The other end of the loopback.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Peer {
     /// The driver that names the same link, in the other role.
     Link(String),
     /// A PLC program hosted in this process.
     Program {
-        /// Its name, or its path relative to the folder of the driver.cfg.
+        /// The program's name, or its path relative to the folder of the driver.cfg.
         name: String,
-        /// Its options as key-value pairs.
+        /// The program's options as key-value pairs.
         options: Vec<(String, String)>,
-        /// Its scan interval; `None` leaves it to the program. Positive.
+        /// The scan interval; `None` leaves it to the program. Positive.
         scan: Option<Nanos>,
     },
-    /// The recording in this file, relative to the folder of the driver.cfg: what its peer sent drives this
-    /// end.
+    /// The recording in this file, relative to the folder of the driver.cfg: the values that the recorded peer sent
+    /// drive this end.
     Replay(PathBuf),
 }
 
@@ -55,15 +55,15 @@ pub enum Peer {
 pub struct Options {
     /// How the bus is clocked.
     pub mode: Mode,
-    /// What is at the other end.
+    /// The other end.
     pub peer: Peer,
 }
 
 impl Options {
-    /// Reads `mode`, and `link`, `replay`, or `program`, one of these, with `program_options` and `scan`.
+    /// Reads `mode`, and one of `link`, `replay` and `program`; `program` comes with `program_options` and `scan`.
     pub fn read(role: Role, table: &mut Table<'_>, programs: &Programs) -> Option<Self> {
         let mode = table.take("mode");
-        // `[fieldbus]` reads it; among the keys that a message lists, it stands here.
+        // `[fieldbus]` reads this key; taking it here puts it in its place in the list of keys that a message shows.
         table.take("events");
         let link = table.take("link");
         let program = table.take("program");
@@ -170,7 +170,7 @@ impl BusOptions for Options {
         }
     }
 
-    /// Opens one end of a named link. A hosted program and a replayed recording are the driver's to start.
+    /// Opens one end of a named link. Hosted programs and replayed recordings are started by the driver.
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
         match (&self.peer, self.mode) {
             (Peer::Link(name), Mode::Free) => {
@@ -200,7 +200,7 @@ impl BusOptions for Options {
 }
 
 impl Peer {
-    /// Reads the options of a hosted program, one of these, for a machine at this end.
+    /// Reads the options of a hosted program, which is one of `programs`, for a machine at this end.
     pub fn hosted(
         program: &Value<'_>,
         options: Option<Value<'_>>,
@@ -210,8 +210,8 @@ impl Peer {
         read_program(program, options, scan, (Role::Device, programs))
     }
 
-    /// The same program for a text that is in `folder` and not in that of the driver.cfg: a path to a user's
-    /// own program is relative to that folder.
+    /// Returns the same program for a text in `folder` instead of the folder of the driver.cfg: the path of a user's
+    /// own program is relative to `folder`.
     #[must_use]
     pub fn seen_from(mut self, folder: &Path) -> Self {
         if let Self::Program { name, .. } = &mut self
@@ -240,7 +240,7 @@ fn read_program(
     let known = text.filter(|name| programs.names().contains(name) || HostedProgram::is_path(name));
     let scan = match scan {
         Some(scan) => scan.duration().map(Some),
-        // In a user's own program it is compiled in.
+        // A user's own program has its interval compiled in.
         None if known.is_some_and(HostedProgram::is_path) => Some(None),
         None => Some(Some(INTERVAL)),
     };
@@ -263,7 +263,7 @@ fn read_program(
     })
 }
 
-/// The options of the program called `name`, each checked by the program itself.
+/// Reads the options of the program called `name`; the program checks each of them.
 fn read_options(
     table: &Table<'_>,
     name: &str,

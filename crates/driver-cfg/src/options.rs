@@ -9,8 +9,8 @@ use tickbus_image::signal::SignalTable;
 
 use crate::loopback;
 
-/// The options of a bus, with the name of its kind. They dereference to what all kinds have in common; code that is about
-/// one kind asks for its type by `downcast_ref`.
+/// The options of a bus, with the name of its kind. They dereference to the part that all kinds share; code for one
+/// kind gets the concrete type with `downcast_ref`.
 #[derive(Debug)]
 pub struct Options {
     kind: &'static str,
@@ -18,7 +18,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// The options of a bus of the kind `K`.
+    /// Creates the options of a bus of the kind `K`.
     pub fn of<K: BusKind>(options: K) -> Self {
         Self::named(K::NAME, Box::new(options))
     }
@@ -27,12 +27,12 @@ impl Options {
         Self { kind, bus }
     }
 
-    /// The bus kind as a driver.cfg names it.
+    /// Returns the bus kind as a driver.cfg names it.
     pub const fn kind(&self) -> &'static str {
         self.kind
     }
 
-    /// The recording that replaces the peer, as named in the driver.cfg.
+    /// Returns the recording that replaces the peer, as named in the driver.cfg.
     pub fn replayed(&self) -> Option<&Path> {
         match &self.downcast_ref::<loopback::Options>()?.peer {
             loopback::Peer::Replay(file) => Some(file),
@@ -40,11 +40,11 @@ impl Options {
         }
     }
 
-    /// Replaces the address from the driver.cfg by one from a command line.
+    /// Replaces the address from the driver.cfg with one from a command line.
     ///
     /// # Errors
     ///
-    /// The bus has no address, or the text is not a valid one.
+    /// The bus has no address, or the text is not a valid address.
     pub fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
         let kind = self.kind;
         self.bus.set_address(address).unwrap_or_else(|| {
@@ -55,8 +55,8 @@ impl Options {
         })
     }
 
-    /// Takes the lines of `[fieldbus.at]`: the addresses of signals in the device. Reports invalid addresses,
-    /// or that the bus has no addresses of its own.
+    /// Reads the lines of `[fieldbus.at]`: the addresses of signals in the device. Reports invalid addresses, and a bus
+    /// that has no addresses of its own.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         if self.has_addresses() {
             self.bus.place_signals(lines, table);

@@ -9,19 +9,20 @@ use tickbus_image::signal::SignalTable;
 use tickbus_record as record;
 
 impl Config {
-    /// The same driver with other tables: `text` is TOML as in a driver.cfg; mistakes call it `origin`. For
+    /// Returns the same driver with other tables: `text` is TOML as in a driver.cfg; mistakes call it `origin`. For
     /// example, a test uses the plant's own signal table, but in simulation time.
     ///
-    /// A `[fieldbus]` with a `kind` replaces the file's own, except for what belongs to the device and not to
-    /// the bus: sizes, cycle times, time-outs and life signs stay. What the file leaves open about the end is that of the new
-    /// line: a controller has a watchdog and leaves its fail-safe values behind. `[[station]]` tables give what that bus
-    /// needs to know about the file's stations, by name. A `[fieldbus]` without a `kind` changes only the
-    /// `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
-    /// recording removes the file's own, which belongs to the plant. So does the file's `[page]`, if the bus is replaced.
+    /// A `[fieldbus]` with a `kind` replaces the file's own, except for the keys that belong to the device and not to
+    /// the bus: sizes, cycle times, time-outs and life signs stay. Keys about this end that the file leaves open get
+    /// the defaults of the new line: a controller has a watchdog and leaves its fail-safe values behind. `[[station]]`
+    /// tables contain the keys that the new bus needs for the file's stations, by name. A `[fieldbus]` without a `kind`
+    /// changes only the `mode` of the file's own loopback. A `[record]` replaces the file's own; a bus that replays a
+    /// recording removes the file's own, which belongs to the plant. Replacing the bus also removes the file's
+    /// `[page]`.
     ///
     /// # Errors
     ///
-    /// With every mistake in the text.
+    /// Returns every mistake in the text.
     pub fn overlaid(self, origin: &str, text: &str) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(origin, text);
         let config = read_text(&mut collector, text, |root| read(self, root));
@@ -83,7 +84,7 @@ fn read_fieldbus(
             config.record = None;
         }
         config.page = None;
-        // What this end leaves behind depends on the line that it is put on.
+        // The values that this end leaves behind depend on the new line.
         config.timing.fit(Line::of(role, Some(&bus)));
         config.bus = bus;
         config.events = events;

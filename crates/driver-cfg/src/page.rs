@@ -6,13 +6,13 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 use tickbus_fieldbus::tcp::Address;
 
-/// The port of a page where none is stated.
+/// The default port of a page.
 const PORT: u16 = 20080;
 
-/// How long signals stay forced for nobody, where it is not stated.
+/// The default time that signals stay forced when nobody looks.
 const GRACE: Nanos = Nanos::from_secs(10);
 
-/// The shortest that can be stated: a page that is loaded again is away for a moment.
+/// The shortest time that can be stated: reloading a page interrupts it for a moment.
 const LEAST_GRACE: Nanos = Nanos::from_secs(1);
 
 /// The longest path of a picture, in characters.
@@ -21,18 +21,18 @@ const PATH_LIMIT: usize = 1000;
 /// The live page of a driver.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PageOptions {
-    /// Where it is served; port 0 lets the system choose one.
+    /// The address that serves the page; with port 0 the system chooses a port.
     pub listen: Address,
-    /// How long signals stay forced when nobody with the token looks any more; `None` for as long as the driver runs.
+    /// How long signals stay forced once nobody with the token looks any more; `None` for as long as the driver runs.
     pub grace: Option<Nanos>,
-    /// The picture of the machine as written there: relative to the folder of the driver.cfg.
+    /// The picture of the machine as written in the file: relative to the folder of the driver.cfg.
     pub picture: Option<PathBuf>,
-    /// The file in which its token survives a restart, relative to the folder of the driver.cfg.
+    /// The file that keeps the page's token across restarts, relative to the folder of the driver.cfg.
     pub token_file: Option<PathBuf>,
 }
 
 impl Default for PageOptions {
-    /// On port 20080 of this machine alone, 10 s, without a picture.
+    /// Listens on port 20080 of this machine only, releases forced signals after 10 s, and has no picture.
     fn default() -> Self {
         Self {
             listen: Address::local(PORT),

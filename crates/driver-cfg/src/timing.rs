@@ -21,10 +21,10 @@ pub(super) const LEAST_MAX_AGE: Nanos = Nanos::from_millis(250);
 /// The shortest bus cycle that an operating system can keep.
 const LEAST_CYCLE: Nanos = Nanos::from_micros(50);
 
-/// The shortest `watchdog`: pauses of a busy machine must not look like a stopped simulation.
+/// The shortest `watchdog`: pauses on a busy computer must not look like a stopped simulation.
 const LEAST_WATCHDOG: Nanos = Nanos::from_millis(10);
 
-/// The longest of these times: the age of data that never came must be beyond it.
+/// The longest of these times: the age of data that never arrived must be greater.
 const LONGEST: Nanos = Nanos::from_secs(24 * 3600);
 
 /// The value of `watchdog` that disables it.
@@ -36,19 +36,19 @@ const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 /// The most pauses in `reconnect`.
 const RECONNECT_LIMIT: usize = 100;
 
-/// The bus that a driver has, as far as its times depend on it.
+/// The properties of a driver's bus that its times depend on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Line {
-    /// The end of it.
+    /// The end of the bus.
     pub(super) role: Role,
     /// The bus's own cycle.
     pub(super) cycle: Option<Nanos>,
-    /// Whether this end writes into a memory of the peer, which keeps the values.
+    /// True if this end writes into a memory of the peer, which keeps the values.
     pub(super) is_client: bool,
 }
 
 impl Line {
-    /// The end with `role` of `bus`; `None` if that is wrong in the file.
+    /// Returns the line for the end with `role` of `bus`, which is `None` if the file's bus is wrong.
     pub(super) fn of(role: Role, bus: Option<&Options>) -> Self {
         Self {
             role,
@@ -67,16 +67,16 @@ pub struct Timing {
     pub max_age: Nanos,
     /// A simulation that has not ticked for longer than this has stopped; `None` disables the check.
     pub watchdog: Option<Nanos>,
-    /// What the peer has after this end has closed.
+    /// The values that the peer has after this end has closed.
     pub at_close: Outputs,
-    /// What the peer gets while this end knows nothing of it.
+    /// The values that the peer gets while this end has no valid data from it.
     pub while_stale: Outputs,
     /// Pauses between attempts to reach the peer; the last one repeats. Never empty, all positive.
     pub reconnect: Vec<Nanos>,
     stated: Stated,
 }
 
-/// What the file states of keys whose defaults depend on the line.
+/// The stated values of keys whose defaults depend on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Stated {
     watchdog: Watchdog,
@@ -92,11 +92,11 @@ enum Watchdog {
 }
 
 impl Timing {
-    /// Decides what the file leaves open about the end of `line`.
+    /// Decides the values that the file leaves open for the end of `line`.
     pub(super) fn fit(&mut self, line: Line) {
         let is_controller = line.role == Role::Controller;
         let ten_cycles = self.cycle.or(line.cycle).unwrap_or_default().times(10);
-        // A controller that stops must not leave its outputs on. It may scan as slowly as the other end may answer.
+        // A controller that stops must not leave its outputs on. Its scan can be as slow as the other end's answers.
         let usual_watchdog = is_controller.then(|| self.max_age.max(ten_cycles).max(LEAST_MAX_AGE));
         let usual_end = if is_controller || line.is_client {
             Outputs::FailSafe
@@ -109,7 +109,7 @@ impl Timing {
             Watchdog::After(limit) => Some(limit),
         };
         self.at_close = self.stated.at_close.unwrap_or(usual_end);
-        // A machine does not depend on its PLC: sensors go on.
+        // A machine does not depend on its PLC: its sensors continue.
         self.while_stale = if is_controller {
             self.stated.while_stale.unwrap_or(Outputs::FailSafe)
         } else {
@@ -142,7 +142,7 @@ impl<'a> TimingKeys<'a> {
         }
     }
 
-    /// Reads them, for this line.
+    /// Reads the times, for this line.
     pub(super) fn read(&self, line: Line) -> Option<Timing> {
         let of_bus = line.cycle;
         let span = |value: &Option<Value<'_>>, least, why| match value {

@@ -1,4 +1,4 @@
-//! Creates the bus that a driver.cfg describes, and the PLC program behind it if one is hosted.
+//! Creates the bus that a driver.cfg describes, and the hosted PLC program behind it, if any.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -17,8 +17,8 @@ use super::host::{HostThread, Program, ScanSetup, SteppedHost, check_fit, progra
 use super::replay::Replay;
 use tickbus_driver_cfg::Config;
 
-/// Creates the bus that `config` names, and starts the hosted program at its other end, if any. `hosted` is a program at
-/// this end.
+/// Creates the bus that `config` names and, if a program is hosted at its other end, starts it. `hosted` is a program
+/// at this end.
 pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
@@ -64,7 +64,7 @@ pub(super) fn open(
     Ok((bus.into(), None))
 }
 
-/// The loopback with a PLC program at its other end, by its name, options and scan interval.
+/// Opens the loopback with a PLC program at its other end, given by its name, options and scan interval.
 fn open_hosted(
     config: &Config,
     mode: Mode,

@@ -8,7 +8,7 @@ use tickbus_fieldbus::{Bus, Free, Lead, Port, Stepped};
 use super::replay::Replay;
 use super::supervise::BusThread;
 
-/// An opened bus that does not run yet.
+/// A bus that is open but does not run yet.
 pub(super) enum OpenBus {
     /// Needs a thread.
     Free(Box<dyn Free>),
@@ -19,14 +19,14 @@ pub(super) enum OpenBus {
 /// A bus that runs on the tick.
 pub(super) enum SteppedBus {
     Any(Box<dyn Stepped>),
-    /// Knows the values that the tick shows, and not only frames.
+    /// Knows the values that the tick shows, not only frames.
     Replay(Box<Replay>),
 }
 
 /// How the bus runs.
 #[expect(clippy::large_enum_variant, reason = "there is one in a driver")]
 pub(super) enum BusHandle {
-    /// On its own thread; dropping this ends it.
+    /// Runs on its own thread; dropping this ends it.
     #[expect(dead_code, reason = "kept for its drop")]
     Free(BusThread),
     /// On the tick, in simulation time.
@@ -55,7 +55,7 @@ impl SteppedBus {
         }
     }
 
-    /// Who hands out the time.
+    /// Returns who hands out the time.
     pub(super) fn lead(&self) -> Lead {
         match self {
             Self::Any(bus) => bus.lead(),

@@ -1,4 +1,4 @@
-//! A PLC program at one end of a bus, by itself: the other front door, beside that of a simulation.
+//! A PLC program alone at one end of a bus: the second front door, next to the one for simulations.
 
 use std::sync::{Arc, PoisonError};
 
@@ -17,18 +17,18 @@ use tickbus_driver_cfg::Config;
 
 /// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
 ///
-/// In the role Device, a program replaces the machine: `%Q` are its inputs, `%I` its outputs.
+/// In the role Device, the program replaces the machine: `%Q` are its inputs, `%I` its outputs.
 #[derive(Debug)]
 pub struct Host(HostThread);
 
 impl Host {
-    /// Opens the bus that `config` describes and starts scanning `program` every `interval`. It does not wait
-    /// for the peer: scans begin at once, and are told that the peer is not there. On a bus that hands out the time they
-    /// begin with its first step, and `interval` is one of virtual time.
+    /// Opens the bus that `config` describes and starts scanning `program` every `interval`. Opening does not wait for
+    /// the peer: scans begin at once, and see that the peer is absent. On a bus that hands out the time, scans begin
+    /// with the bus's first step, and `interval` is virtual time.
     ///
     /// # Errors
     ///
-    /// Program and signal table do not fit, the bus must be stepped by a simulation, the recording cannot be
+    /// The program does not fit the signal table, the bus must be stepped by a simulation, the recording cannot be
     /// created, or the system refused a thread.
     pub fn open(
         config: &Config,
@@ -39,8 +39,8 @@ impl Host {
         Self::open_with(config, program, (interval, true), clock)
     }
 
-    /// As [`open`](Self::open), without the watchdog: on a busy computer a late scan changes no values on the bus. For
-    /// a program whose peer waits for it.
+    /// As [`open`](Self::open), without the watchdog: on a busy computer a late scan changes no values on the bus.
+    /// Meant for a program whose peer waits for it.
     ///
     /// # Errors
     ///
@@ -107,57 +107,57 @@ impl Host {
         thread.map(Self)
     }
 
-    /// The state of the line.
+    /// Returns the state of the line.
     pub fn link(&self) -> Link {
         self.0.status.observe_call(self.0.counters.clock.now());
         self.0.status.link()
     }
 
-    /// The counters and the state of the line, one `key=value` per line.
+    /// Returns the counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         let now = self.0.counters.clock.now();
         self.0.figures().statistics(now).to_string()
     }
 
-    /// Lets another thread look at the program's image, and force its signals; `None` if one has been given out already. As
-    /// long as it asks for nothing, a scan pays for a look at one word.
+    /// Lets another thread look at the program's image and force its signals. Returns `None` if the watch has been
+    /// handed out already. While the watch asks for nothing, a scan only checks one word.
     pub fn watch(&self) -> Option<Watch> {
         let mut watch = self.0.watch.lock().unwrap_or_else(PoisonError::into_inner);
         watch.take()
     }
 
-    /// The injected faults of this end.
+    /// Returns the injected faults of this end.
     pub fn injected_faults(&self) -> Vec<FaultStatus> {
         self.0.board.list()
     }
 
-    /// The number of scans so far, and of those with stale data.
+    /// Returns the number of scans so far, and how many of them had stale data.
     pub fn scans(&self) -> (u64, u64) {
         self.0.counters.scan_counters.scans()
     }
 
-    /// Why the program is no longer scanned, if so: it panicked, or a scan does not end.
+    /// Returns why the program is no longer scanned, if so: it panicked, or a scan does not end.
     pub fn fault(&self) -> Option<String> {
         self.0.counters.fault()
     }
 
-    /// Whether the program is scanned no more: the run of its bus has come to its end, or there is a
+    /// Returns true if the program is no longer scanned: the run of its bus has ended, or there is a
     /// [`fault`](Self::fault).
     pub fn is_over(&self) -> bool {
         self.0.is_over()
     }
 
-    /// Whether the line has failed, and has never come up.
+    /// Returns true if the line has failed and has never come up.
     pub fn has_only_failed(&self) -> bool {
         self.0.status.has_only_failed()
     }
 
-    /// What the bus has told about itself under this key of the statistics.
+    /// Returns what the bus reported under this key of the statistics.
     pub fn fact(&self, key: &'static str) -> Option<String> {
         self.0.status.fact(key)
     }
 
-    /// Stops scanning and closes the bus. Returns why the program did not end, if so.
+    /// Stops scanning and closes the bus. If the program did not end, returns why.
     pub fn close(mut self) -> Option<String> {
         self.0.end()
     }

@@ -1,4 +1,4 @@
-//! An open driver, and what can be asked of it between ticks.
+//! An open driver, and the calls on it between ticks.
 
 use std::sync::Arc;
 
@@ -29,7 +29,7 @@ pub struct Driver {
     pub(super) stations: Vec<Station>,
     pub(super) line: BusHandle,
     pub(super) clock: Arc<dyn Clock>,
-    /// The same clock, for the tick.
+    /// The same clock, read quickly for the tick.
     pub(super) quick: QuickClock,
     pub(super) max_age: Nanos,
     pub(super) status: LinkStatus,
@@ -38,50 +38,50 @@ pub struct Driver {
     /// The clock's time and the tick's time at the first tick.
     pub(super) first_now: Nanos,
     pub(super) first_time: Nanos,
-    /// The last simulation time given.
+    /// The last simulation time that the simulation gave.
     pub(super) given: Option<Nanos>,
     /// The current tick, between its halves.
     pub(super) tick: Option<Tick>,
     /// The result of the last tick.
     pub(super) last: Exchange,
-    /// What is done around every exchange; nothing in most drivers.
+    /// The extra work around every exchange; most drivers have none.
     pub(super) extras: Option<Box<Extras>>,
-    /// A free bus, one station, no extras and no recorder.
+    /// True for a free bus with one station, no extras and no recorder.
     pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
-    /// Where another thread looks at it.
+    /// Lets another thread look at the driver.
     pub(super) watched: Option<Box<Watched>>,
 }
 
 impl Driver {
-    /// What the driver was opened with.
+    /// Returns the configuration that the driver was opened with.
     pub fn config(&self) -> &Arc<Config> {
         &self.config
     }
 
-    /// The arrangement of values in the slots.
+    /// Returns the arrangement of values in the slots.
     pub fn slots(&self) -> &SlotMap {
         &self.slots
     }
 
-    /// Whether the bus is stepped: a tick may wait for it.
+    /// Returns true if the bus is stepped: a tick may then wait for the bus.
     pub fn is_stepped(&self) -> bool {
         matches!(self.line, BusHandle::Stepped { .. })
     }
 
-    /// Whether the bus has come to an end of its own: a run on virtual time is over. Ticks then bring nothing.
+    /// Returns true if the bus has ended on its own because a run on virtual time is over. Ticks then bring nothing.
     pub fn is_over(&self) -> bool {
         matches!(&self.line, BusHandle::Stepped { bus, .. } if bus.lead() == Lead::Ended)
     }
 
-    /// What the bus has told about itself under this key of the statistics.
+    /// Returns what the bus reported under this key of the statistics.
     pub fn fact(&self, key: &'static str) -> Option<String> {
         self.status.fact(key)
     }
 
-    /// The slots before the first exchange: every signal at its fail-safe value.
+    /// Returns the slots before the first exchange: every signal has its fail-safe value.
     pub fn initial_slots(&self) -> Vec<Slot> {
         let mut slots = vec![Slot::default(); self.slots.count];
         for (slot, signal) in slots.iter_mut().zip(&self.config.table.signals) {
@@ -90,23 +90,23 @@ impl Driver {
         slots
     }
 
-    /// The state of the line.
+    /// Returns the state of the line.
     pub fn link(&self) -> Link {
         self.observe();
         self.status.link()
     }
 
-    /// Whether the line has failed, and has never come up.
+    /// Returns true if the line has failed and has never come up.
     pub fn has_only_failed(&self) -> bool {
         self.status.has_only_failed()
     }
 
-    /// The counters and the state of the line, one `key=value` per line.
+    /// Returns the counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         self.snapshot().to_string()
     }
 
-    /// A copy of the data for the statistics, to be formatted when the driver is no longer locked.
+    /// Copies the data for the statistics, so that the caller can format them after releasing its lock on the driver.
     pub fn snapshot(&self) -> Snapshot {
         let now = self.clock.now();
         Snapshot {
@@ -126,8 +126,8 @@ impl Driver {
         }
     }
 
-    /// Per station, what the bus says of it: the time since its peer was heard from, whether its data are valid, and how
-    /// many frames were received.
+    /// Returns what the bus reports about each station: the time since its peer was last heard, whether its data are
+    /// valid, and the number of frames received.
     fn told(&self, now: Nanos) -> impl Iterator<Item = (Nanos, bool, u64)> + Clone {
         let image = &self.image;
         (0..image.stations()).map(move |station| {
@@ -139,7 +139,7 @@ impl Driver {
         })
     }
 
-    /// Checks the line from outside, in case the bus cannot.
+    /// Checks the state of the line, in case the bus itself cannot.
     fn observe(&self) {
         let now = self.clock.now();
         let ages = self.told(now).map(|(age, ..)| age);
@@ -147,7 +147,7 @@ impl Driver {
         self.status.observe_call(now);
     }
 
-    /// Takes the oldest events, as many as fit into `into`; returns their number.
+    /// Moves the oldest events into `into`, as many as fit, and returns their number.
     pub fn poll_events(&mut self, into: &mut [Event]) -> usize {
         let mut taken = 0;
         while let Some(place) = into.get_mut(taken) {

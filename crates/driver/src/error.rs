@@ -1,4 +1,4 @@
-//! Why a driver cannot be opened.
+//! The reasons why a driver cannot be opened.
 
 use tickbus_base::Mistake;
 use tickbus_plc as plc;
@@ -6,7 +6,7 @@ use tickbus_record::{RecorderError, RecordingError};
 
 use super::Code;
 
-/// Why a driver cannot be opened.
+/// Says why a driver cannot be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum DriverError {
     /// The system refused a thread.
@@ -14,7 +14,7 @@ pub enum DriverError {
         "the system refused a thread for {what}: {source}; close other programs or raise the limit"
     )]
     System {
-        /// The part of the driver that needs it.
+        /// The part of the driver that needs the thread.
         what: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -32,21 +32,21 @@ pub enum DriverError {
     Fit {
         /// The driver.cfg.
         file: String,
-        /// What does not fit, and what would.
+        /// The misfit, and what would fit.
         mistake: Mistake,
     },
-    /// The bus does not find what the driver.cfg names.
+    /// The bus does not find something that the driver.cfg names.
     #[error("{file}: {mistake}")]
     Bus {
         /// The driver.cfg.
         file: String,
-        /// What is missing, and what to do.
+        /// The missing thing, and what to do about it.
         mistake: Mistake,
     },
     /// The recording cannot be made.
     #[error("{0}")]
     Record(String),
-    /// The recording that stands in for the peer cannot be read, or is of other signals.
+    /// The recording that replaces the peer cannot be read, or contains other signals.
     #[error(transparent)]
     Replay(#[from] RecordingError),
     /// A fault cannot be injected.
@@ -70,17 +70,17 @@ impl From<RecorderError> for DriverError {
 }
 
 impl DriverError {
-    /// The system refused the thread of this part.
+    /// Creates the error for a thread that the system refused.
     pub(crate) fn no_thread(what: &'static str, source: std::io::Error) -> Self {
         Self::System { what, source }
     }
 
-    /// Whether the driver.cfg must be changed, rather than the system.
+    /// Returns true if the driver.cfg must be changed, rather than the system.
     pub fn is_wrong_input(&self) -> bool {
         matches!(self.code(), Code::BadConfig | Code::Unsupported)
     }
 
-    /// The status code for it.
+    /// Returns the status code of this error.
     pub fn code(&self) -> Code {
         match self {
             Self::System { .. } => Code::BusFailed,

@@ -1,11 +1,11 @@
-//! The tick: the process image goes out and comes in, at once or in two halves.
+//! The tick: sends and receives the process image, at once or in two halves.
 //!
 //! [`Driver::exchange`] sends, then receives; the simulation computes its answer until the next exchange.
-//! [`Driver::receive`] and [`Driver::send`] are the two halves in the other order, with the simulation's
-//! model between them, so that it answers within the same tick.
+//! [`Driver::receive`] and [`Driver::send`] are the two halves in the other order, with the simulation's model between
+//! them, so that the simulation answers within the same tick.
 //!
-//! Nothing here allocates, locks or calls the system, unless the bus is a stepped one. The time is asked for once in each
-//! call: of the processor's counter, and once in a millisecond of the clock, where that is no system call.
+//! On a free bus, nothing here allocates, locks or calls the system. Each call reads the time once: from the
+//! processor's counter, and once per millisecond from the clock, which is no system call either.
 #![allow(
     clippy::inline_always,
     reason = "the parts of an exchange are functions for the reader alone"
@@ -24,12 +24,12 @@ use super::tick_counters::TickTimes;
 use super::{Code, Driver, Exchange, TickCounters};
 
 impl Driver {
-    /// Exchanges the process image, as one tick: sends this end's values from `slots`, and puts the received
-    /// values there.
+    /// Exchanges the process image, as one tick: sends this end's values from `slots`, and puts the received values
+    /// there.
     ///
-    /// `time` is the simulation's, and must not decrease on a stepped bus. With `None` the last given time is
-    /// kept. If none was ever given, the time of a tick is the clock's time since the first one; a stepped
-    /// bus then runs to the time that it granted last.
+    /// `time` is the simulation's time, and must not decrease on a stepped bus. With `None` the last given time is
+    /// kept. If no time was ever given, a tick's time is the clock's time since the first tick; a stepped bus then runs
+    /// to the time that it granted last.
     ///
     /// # Panics
     ///
@@ -43,9 +43,9 @@ impl Driver {
         }
     }
 
-    /// The exchange of a driver that has nothing to do but to exchange, which is what most of them do in most ticks: what
-    /// [`exchange_at`](Self::exchange_at) comes to, in half of its instructions. `None` if there is more to do: a
-    /// first tick, or one that another has to be ended before.
+    /// Exchanges for a driver that has nothing else to do, which is the case for most drivers in most ticks. The result
+    /// is that of [`exchange_at`](Self::exchange_at), in half as many instructions. Returns `None` if there is more to
+    /// do: in a first tick, or when an earlier tick must be ended first.
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
         let tick = self.counters.ticks + 1;
@@ -90,13 +90,13 @@ impl Driver {
         Some(found)
     }
 
-    /// Adds a tick to the sample that began then, and delivered data of that age.
+    /// Adds a tick to the sample; the tick began at `begun` and delivered data of this age.
     #[inline(never)]
     fn sample(&mut self, begun: Nanos, age: Nanos) {
         self.samples.add(self.quick.now() - begun, age);
     }
 
-    /// Finds out whether [`exchange_simply`](Self::exchange_simply) will do.
+    /// Decides whether [`exchange_simply`](Self::exchange_simply) is enough.
     pub(super) fn simplify(&mut self) {
         self.is_simple = matches!(self.line, BusHandle::Free(_))
             && self.stations.len() == 1
@@ -123,7 +123,7 @@ impl Driver {
             self.end(self.last, slots);
             return self.last;
         }
-        // Each by itself: read back as a whole, what was just written in parts would be waited for.
+        // Field by field: loading the whole struct right after partial stores would stall.
         let Exchange {
             code,
             sequence,
@@ -141,8 +141,8 @@ impl Driver {
     /// Begins a tick by receiving: puts the received values into `slots`. The simulation computes its answer
     /// and gives it to [`send`](Self::send) within the same tick.
     ///
-    /// `time` is as in [`exchange`](Self::exchange). A stepped bus runs the peer up to that time, with what
-    /// was sent in the previous tick. A tick without [`send`](Self::send) ends when the next one begins.
+    /// `time` is as in [`exchange`](Self::exchange). A stepped bus runs the peer up to that time, with the values sent
+    /// in the previous tick. A tick without [`send`](Self::send) ends when the next one begins.
     ///
     /// # Panics
     ///
@@ -170,11 +170,11 @@ impl Driver {
         found
     }
 
-    /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns
-    /// what `receive` found, or an error. If `receive` failed, nothing is sent.
+    /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns the result of
+    /// `receive`, or an error. If `receive` failed, nothing is sent.
     ///
-    /// Further calls in the same tick publish the newer values. They are not ticks: they are not counted, and
-    /// a recording has the values of the first call.
+    /// Further calls in the same tick publish newer values. These calls are not ticks: they are not counted, and a
+    /// recording contains the values of the first call.
     ///
     /// # Panics
     ///
@@ -199,9 +199,9 @@ impl Driver {
         done
     }
 
-    /// Ends a tick that [`receive`](Self::receive) began and that was not answered, with the values in
-    /// `slots`, so that a recording contains it. Call it before closing the driver; without such a tick it
-    /// does nothing.
+    /// Ends a tick that [`receive`](Self::receive) began and [`send`](Self::send) did not end, with the values in
+    /// `slots`, so that a recording contains it. Call this before closing the driver; without such a tick the call does
+    /// nothing.
     ///
     /// # Panics
     ///
@@ -220,7 +220,7 @@ impl Driver {
         );
     }
 
-    /// The time on the line: the clock's, or the simulation's on a stepped bus.
+    /// Returns the time on the line: the clock's, or the simulation's on a stepped bus.
     #[inline]
     fn now(&mut self) -> Nanos {
         match &self.line {
@@ -230,7 +230,7 @@ impl Driver {
         }
     }
 
-    /// Begins a tick and gives the time on the line.
+    /// Begins a tick and returns the time on the line.
     #[inline(always)]
     fn begin(&mut self, asked: Option<Nanos>, slots: &[Slot]) -> Result<Nanos, BusError> {
         self.check(slots);
@@ -265,7 +265,7 @@ impl Driver {
         if time < before {
             return Err(went_back(before, time));
         }
-        // Asked first: a time that is refused must not become the one before which no other counts.
+        // Ask the bus first: a refused time must not become the lower limit for later times.
         bus.as_stepped().accepts(time)?;
         self.given = given;
         shown.set(time);
@@ -283,7 +283,7 @@ impl Driver {
         }
     }
 
-    /// The half that sends.
+    /// Sends: the first half.
     #[inline(always)]
     fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
         if let Some(extras) = &mut self.extras {
@@ -299,7 +299,7 @@ impl Driver {
         }
     }
 
-    /// Hands what is sent to the bus: the values of all stations at once.
+    /// Hands the values of all stations to the bus at once.
     #[inline]
     fn write(&mut self, now: Nanos, slots: &[Slot]) {
         let (image, stations) = (&mut self.image, &self.stations);
@@ -320,7 +320,7 @@ impl Driver {
         image.write_kept(now, is_same);
     }
 
-    /// The half that receives: what it found, and whether it could.
+    /// Receives: returns what was found, and whether receiving succeeded.
     #[inline(always)]
     fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
         let (granted, done) = match &mut self.line {
@@ -358,7 +358,7 @@ impl Driver {
         (found, done)
     }
 
-    /// What there is to say when the bus failed and this was found.
+    /// Returns the result when the bus failed and `found` was found.
     #[cold]
     fn failed(&mut self, found: Exchange, error: &BusError) -> Exchange {
         let now = self.now();
@@ -371,7 +371,7 @@ impl Driver {
         }
     }
 
-    /// Adds the time since `begun` to the current tick, if that is in the sample.
+    /// Adds the time since `begun` to the current tick, if the tick is in the sample.
     #[inline]
     fn lap(&mut self, begun: Nanos) {
         if TickTimes::takes(self.counters.ticks) {
@@ -387,7 +387,7 @@ impl Driver {
         self.end(self.last, slots);
     }
 
-    /// Ends the tick that is under way, if there is one: counts it, and records it.
+    /// Ends the current tick, if there is one: counts and records it.
     #[inline]
     fn end(&mut self, found: Exchange, slots: &[Slot]) {
         let Some(tick) = self.tick.take() else {
@@ -416,7 +416,7 @@ impl Driver {
     }
 }
 
-/// Encodes the values of all stations, and hands them to the bus at once.
+/// Encodes the values of all stations and hands them to the bus at once.
 #[inline(never)]
 fn write(
     image: &mut TickEnd,
@@ -453,7 +453,7 @@ mod tests {
     use tickbus_fieldbus::{LinkStatus, Port, Role};
     use tickbus_image::{TickEnd, image};
 
-    /// A driver on a free loopback, whose other end is cycled by hand.
+    /// A driver on a free loopback; the test drives the other end by hand.
     struct Rig {
         driver: Driver,
         clock: Arc<Manual>,
@@ -494,7 +494,7 @@ mod tests {
             }
         }
 
-        /// Lets time pass, in which the other end sends this, if anything; waits until the bus has nothing more to do.
+        /// Lets `pause` pass while the other end sends `sent`, if anything; waits until the bus has nothing left to do.
         fn pass(&mut self, pause: Nanos, sent: Option<u8>) {
             let now = self.clock.now();
             let (tick, port, end) = &mut self.peer;
@@ -537,9 +537,9 @@ mod tests {
             let draw =
                 |shift: u32, below: u64| usize::try_from((random >> shift) % below).expect("small");
             let (bit, level) = (draw(20, 16), [0.0, 1.0, 1.0, f64::NAN][draw(24, 4)]);
-            // None before the first one that is given, and in some ticks after it.
+            // Without a time before the first given one, and in some ticks after it.
             let time = (step >= 200 && draw(28, 4) != 0).then_some(Nanos::from_millis(step));
-            // Also longer than data count for.
+            // Sometimes longer than data stay valid.
             let pause = Nanos::from_millis([0, 0, 1, 1, 1, 30][draw(30, 6)]);
             let sent = (draw(34, 2) == 0).then_some(draw(36, 256).to_le_bytes()[0]);
             let (is_halved, is_answered) = (draw(44, 8) == 0, draw(47, 3) != 0);
@@ -577,7 +577,7 @@ mod tests {
             codes.iter().all(|count| *count > 20),
             "all kinds of ticks: {codes:?}"
         );
-        // When the bus thread looks at its line is its own affair.
+        // The bus thread decides when to look at its line.
         let is_of_ticks = |line: &&str| {
             !["link.", "cause", "state", "reason", "log."]
                 .iter()

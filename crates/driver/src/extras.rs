@@ -1,4 +1,4 @@
-//! What some drivers do around every exchange, and most do not.
+//! The extra work of some drivers around every exchange.
 
 use tickbus_axis::Reflexes;
 use tickbus_base::time::Nanos;
@@ -7,11 +7,10 @@ use tickbus_image::signal::Slot;
 
 use super::heartbeat::Beat;
 
-/// What is done to the slots around an exchange. A driver without any of it has none of this, and its tick pays for one
-/// look.
+/// Changes the slots around an exchange. A driver without extra work has no `Extras`, and its tick pays for one check.
 #[derive(Debug, Default)]
 pub(super) struct Extras {
-    /// What the axes need done on every tick.
+    /// The axes' work on every tick.
     pub(super) reflexes: Option<Reflexes>,
     /// Faults to inject.
     pub(super) faults: Option<Faults>,
@@ -20,7 +19,7 @@ pub(super) struct Extras {
 }
 
 impl Extras {
-    /// `None` if there is nothing to do.
+    /// Returns `None` if there is nothing to do.
     pub(super) fn new(reflexes: Option<Reflexes>, beats: Box<[Beat]>) -> Option<Box<Self>> {
         let any = reflexes.is_some() || !beats.is_empty();
         any.then(|| {
@@ -32,7 +31,7 @@ impl Extras {
         })
     }
 
-    /// The simulation hands its values over: the first thing in the half that sends.
+    /// Runs first in the sending half, when the simulation hands its values over.
     #[cold]
     pub(super) fn handed_over(&mut self, slots: &mut [Slot]) {
         if let Some(reflexes) = &mut self.reflexes {
@@ -40,7 +39,7 @@ impl Extras {
         }
     }
 
-    /// A tick begins.
+    /// Runs when a tick begins.
     #[cold]
     pub(super) fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
@@ -48,7 +47,7 @@ impl Extras {
         }
     }
 
-    /// The slots are about to be sent.
+    /// Runs just before the slots are sent.
     #[cold]
     pub(super) fn sending(&mut self, now: Nanos, slots: &mut [Slot]) {
         for beat in &mut self.beats {
@@ -59,7 +58,7 @@ impl Extras {
         }
     }
 
-    /// The slots were sent.
+    /// Runs after the slots were sent.
     #[cold]
     pub(super) fn sent(&mut self, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
@@ -70,7 +69,7 @@ impl Extras {
         }
     }
 
-    /// The slots have what was received.
+    /// Runs when the slots contain the received values.
     #[cold]
     pub(super) fn received(&mut self, slots: &mut [Slot]) {
         if let Some(reflexes) = &mut self.reflexes {

@@ -9,14 +9,15 @@ use tickbus_base::toml_text::Mistakes;
 use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Faults, Slots};
 
 impl Driver {
-    /// Injects a fault; it can begin at the next exchange. Gives its number.
+    /// Injects a fault, which can begin at the next exchange. Returns the fault's number.
     ///
     /// # Errors
     ///
-    /// Too many faults wait or are active.
+    /// Too many faults are waiting or active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
         self.is_simple = false;
-        // What a tick put away when all faults were over: it has room for one of them alone, and puts that away again.
+        // Use the spare that a tick put away when all faults were over: it holds only faults, and can be put away
+        // again.
         if self.extras.is_none()
             && let Some(watched) = &mut self.watched
         {
@@ -33,7 +34,7 @@ impl Driver {
             edges: &self.slots.edges,
         };
         let id = faults.add(fault, slots)?;
-        // Adopted now, so that the tick need not allocate memory.
+        // Adopt the fault now, so that the tick need not allocate memory.
         if let BusHandle::Stepped { port, .. } = &mut self.line {
             let now = port.clock().now();
             port.observe(now);
@@ -45,35 +46,35 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// With every mistake in the text; or when too many faults wait or are active.
+    /// Returns every mistake in the text, or an error when too many faults are waiting or active.
     pub fn inject_text(&mut self, text: &str) -> Result<u32, Mistakes> {
         let fault = faults::read_one(text, self.config.fault_scope())?;
         self.inject_read(&fault)
     }
 
-    /// As [`inject_text`](Self::inject_text), for a fault that was already read.
+    /// As [`inject_text`](Self::inject_text), for a fault that has already been read.
     ///
     /// # Errors
     ///
-    /// Too many faults wait or are active.
+    /// Too many faults are waiting or active.
     pub fn inject_read(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
         self.inject(fault)
             .map_err(|mistake| Mistakes::of("fault", mistake))
     }
 
-    /// Ends a fault at the next exchange; false if no fault has this number.
+    /// Ends a fault at the next exchange. Returns false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
         let extras = self.extras.as_mut();
         let faults = extras.and_then(|extras| extras.faults.as_mut());
         faults.is_some_and(|faults| faults.end(id))
     }
 
-    /// Where the faults publish their state, readable from any thread.
+    /// Returns the board where the faults publish their state, readable from any thread.
     pub fn board(&self) -> &Arc<FaultBoard> {
         &self.board
     }
 
-    /// The injected faults in order of injection; those that ended long ago may be missing.
+    /// Returns the injected faults in order of injection; faults that ended long ago may be missing.
     pub fn injected_faults(&self) -> Vec<FaultStatus> {
         self.board.list()
     }
@@ -96,7 +97,7 @@ mod tests {
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let mut watch = driver.watch();
         let mut slots = driver.initial_slots();
-        // One tick that somebody looks at; whether the next one is quick.
+        // Ticks once while watched; returns true if the next tick is quick.
         let mut tick = |driver: &mut Driver, watch: &mut Watch| {
             watch.ask(false);
             driver.exchange(None, &mut slots);
@@ -120,7 +121,7 @@ mod tests {
         driver.close();
     }
 
-    /// A driver on a stepped bus that stands still when nobody ticks.
+    /// A driver on a stepped bus whose time stands still unless someone ticks.
     fn stepped(more: &str) -> Driver {
         let text = format!(
             "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
@@ -165,7 +166,7 @@ mod tests {
             Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let mut slots = driver.initial_slots();
-        // The first ticks have more to do than to exchange.
+        // The first ticks do more than exchange.
         for _ in 0..3 {
             driver.exchange(None, &mut slots);
         }

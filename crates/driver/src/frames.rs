@@ -1,10 +1,10 @@
-//! The frames of each end: which area it writes and reads, and their fail-safe values.
+//! The frames of each end: the areas that it writes and reads, and their fail-safe values.
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, SignalTable, fail_safe_frame};
 use tickbus_image::{StationStreams, latched_bits};
 
-/// Size in bytes of a station's area.
+/// Returns the size of a station's area in bytes.
 pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
     match area {
         Area::Input => table.stations[station].input_bytes,
@@ -12,7 +12,7 @@ pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usi
     }
 }
 
-/// The streams of each station's image at the end with `role`.
+/// Returns the streams of each station's image at the end with `role`.
 pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<StationStreams> {
     let (tx, rx) = role.areas();
     (0..table.stations.len())

@@ -1,4 +1,4 @@
-//! The heartbeat: a signal that counts up as long as the simulation ticks, so that the PLC knows it is alive.
+//! The heartbeat: a signal that counts up while the simulation ticks, so that the PLC knows that it is alive.
 
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::{Heartbeat, Role};
@@ -10,7 +10,7 @@ use tickbus_driver_cfg::Config;
 #[derive(Clone, Debug)]
 pub(super) struct Beat {
     slot: usize,
-    /// The highest count; it wraps to 0 after this.
+    /// The highest count, after which the count wraps to 0.
     last: u64,
     is_integer_slot: bool,
     every: Nanos,
@@ -35,7 +35,7 @@ impl Beat {
         }
     }
 
-    /// The heartbeats that the end with `role` sends.
+    /// Returns the heartbeats that the end with `role` sends.
     pub(super) fn all(config: &Config, role: Role) -> Box<[Self]> {
         let beats = config.life_signs.beats(&config.table, role);
         beats
@@ -45,7 +45,7 @@ impl Beat {
             .collect()
     }
 
-    /// In a tick at `now`: counts up if due, and puts the count into its slot.
+    /// Runs in a tick at `now`: counts up if due, and puts the count into its slot.
     pub(super) fn beat(&mut self, now: Nanos, slots: &mut [Slot]) {
         let every = self.every;
         if self
@@ -72,7 +72,7 @@ impl Beat {
     }
 }
 
-/// The heartbeats of a PLC program, whose outputs are bytes.
+/// The heartbeats of a PLC program, which writes its outputs as bytes.
 #[derive(Debug)]
 pub(super) struct FrameBeats(Vec<FrameBeat>);
 
@@ -85,7 +85,7 @@ struct FrameBeat {
 }
 
 impl FrameBeats {
-    /// The heartbeats that the end with `role` sends from one of its stations.
+    /// Returns the heartbeats that the end with `role` sends from one of its stations.
     pub(super) fn new(config: &Config, role: Role, station: usize) -> Self {
         let (writes, _) = role.areas();
         let beats = config.life_signs.beats(&config.table, role);
@@ -106,7 +106,7 @@ impl FrameBeats {
         Self(beats.collect())
     }
 
-    /// In a scan at `now`: counts up those that are due, and puts them into `frame`.
+    /// Runs in a scan at `now`: counts up the heartbeats that are due, and puts them into `frame`.
     pub(super) fn beat(&mut self, now: Nanos, frame: &mut [u8]) {
         for FrameBeat {
             beat,

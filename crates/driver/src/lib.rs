@@ -27,7 +27,7 @@ mod watch;
 mod watched;
 mod watching;
 
-/// Those of this crate's tests.
+/// The kinds that this crate's tests use.
 #[cfg(test)]
 static KINDS: tickbus_driver_cfg::Kinds =
     tickbus_driver_cfg::Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);

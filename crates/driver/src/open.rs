@@ -1,4 +1,4 @@
-//! Opening a driver, and closing it.
+//! Opens and closes a driver.
 
 use std::sync::Arc;
 
@@ -22,8 +22,8 @@ use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
 use tickbus_driver_cfg::Config;
 
 impl Driver {
-    /// Opens the driver that `config` describes. A free bus starts on its own thread and keeps trying until
-    /// its peer is there; opening does not wait for that.
+    /// Opens the driver that `config` describes. A free bus starts on its own thread and keeps trying until it reaches
+    /// its peer; opening does not wait for that.
     ///
     /// # Errors
     ///
@@ -50,7 +50,7 @@ impl Driver {
             OpenBus::Free(_) => clock,
             OpenBus::Stepped(_) => Arc::clone(&simulation_time) as _,
         };
-        // Before the bus starts: what has to be found out for it would be time in which the bus finds no tick.
+        // Before the bus starts: setting up this clock takes time, in which the bus would find no tick.
         let quick = QuickClock::new(Arc::clone(&clock));
         let watchdog = config.timing.watchdog;
         let board = Arc::<FaultBoard>::default();
@@ -88,7 +88,7 @@ impl Driver {
         let stations = (0..config.table.stations.len())
             .map(|index| Station::new(&config.table, index, (tx, rx)))
             .collect();
-        // They are the machine's: a PLC has its own.
+        // Reflexes belong to the machine: a PLC has its own.
         let reflexes = match config.role {
             Role::Device => Reflexes::new(&config.axes),
             Role::Controller => None,
@@ -125,8 +125,8 @@ impl Driver {
         Ok(driver)
     }
 
-    /// Closes the driver: leaves the peer with the fail-safe values if `at_close` asks for that, stops its threads and
-    /// waits for them to end. Logs its last statistics. A tick that has begun is recorded only if
+    /// Closes the driver: leaves the peer with the fail-safe values if `at_close` asks for that, stops the threads and
+    /// waits until they have ended. Logs the last statistics. An unfinished tick is recorded only if
     /// [`end_tick`](Self::end_tick) has ended it.
     pub fn close(self) {
         self.board.tell(self.status.driver());

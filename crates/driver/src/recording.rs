@@ -1,4 +1,4 @@
-//! Recordings: of a driver's ticks, and of the scans of a hosted program.
+//! Recordings of a driver's ticks and of a hosted program's scans.
 
 use std::sync::Arc;
 
@@ -10,7 +10,7 @@ use tickbus_record::{Columns, Recorder, RecorderCounters, Rows, When};
 use super::{Code, DriverError, SlotMap};
 use tickbus_driver_cfg::Config;
 
-/// Starts the recording that `config` asks for. The values of the area `sent` have yet to pass the codec.
+/// Starts the recording that `config` asks for. The values of the area `sent` have not passed the codec yet.
 pub(super) fn recorder(
     config: &Config,
     slots: &SlotMap,
@@ -44,12 +44,12 @@ pub(super) struct ScanRecorder {
     edges: Vec<Option<usize>>,
     slots: Vec<Slot>,
     scans: u64,
-    /// The time of the first scan: times in the recording count from it.
+    /// The time of the first scan; times in the recording are relative to it.
     begun: Option<Nanos>,
 }
 
 impl ScanRecorder {
-    /// Starts the recording that `config` asks for; one that is `lossless` makes scans wait rather than drops them.
+    /// Starts the recording that `config` asks for. A `lossless` recording makes scans wait instead of dropping them.
     pub(super) fn start(
         config: &Config,
         role: Role,
@@ -88,7 +88,7 @@ impl ScanRecorder {
             .record(self.scans, time, code.code(), none, &self.slots);
     }
 
-    /// The recorder's counters.
+    /// Returns the recorder's counters.
     pub(super) fn counters(&self) -> Arc<RecorderCounters> {
         Arc::clone(self.recorder.counters())
     }

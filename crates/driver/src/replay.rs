@@ -1,9 +1,9 @@
-//! A recording as the other end of the line: what the recorded peer sent drives this end, and what this end
-//! sends is compared with what it sent in the recording.
+//! A recording as the other end of the line: the values that the recorded peer sent drive this end, and the values that
+//! this end sends are compared with those in the recording.
 //!
-//! The tick shows the recorded values, counts and statuses as they are. No sequence of frames could lead to all of them:
-//! what arrived while data did not count is not in the recording. The frames that a replay hands in besides keep the line
-//! alive, make events, and stand in while faults of the line are injected.
+//! The tick shows the recorded values, counts and statuses as they are. No sequence of frames could lead to all of
+//! them: a recording does not contain frames that arrived while data were not valid. The replay also delivers frames,
+//! which keep the line alive, cause events, and provide the values while faults of the line are injected.
 
 mod differences;
 mod station;
@@ -27,7 +27,7 @@ use tickbus_image::TickEnd;
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record::{Columns, FileClaim, Recording, RecordingError, Tick, ValueKind};
 
-/// The most missing signals that a message names.
+/// The most missing signals that an error message names.
 const NAMED: usize = 5;
 
 /// The results of a replay so far; readable from any thread.
@@ -36,16 +36,16 @@ pub(super) struct ReplayCounters {
     file: String,
     /// Recorded ticks that were replayed.
     ticks: AtomicU64,
-    /// Recorded ticks that were compared: all, unless several fell into one tick of this run.
+    /// Recorded ticks that were compared: all of them, unless several fell into one tick of this run.
     compared: AtomicU64,
     differences: AtomicU64,
-    /// Signals of this end that are not in the recording.
+    /// Signals of this end that the recording does not contain.
     unknown: u64,
     ended: AtomicBool,
 }
 
 impl ReplayCounters {
-    /// Adds the results.
+    /// Adds the results to the statistics.
     pub(super) fn write(&self, statistics: &mut Statistics) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         statistics.text("replay.file", &self.file);
@@ -58,12 +58,12 @@ impl ReplayCounters {
     }
 }
 
-/// Which columns of the recording belong to which signals.
+/// Maps columns of the recording to signals.
 struct Map {
-    /// Per signal of this driver.
+    /// The column of each signal of this driver.
     signals: Vec<Option<usize>>,
     edges: Vec<Option<usize>>,
-    /// Per station of this driver, if the recording has several.
+    /// The column of each station of this driver, if the recording has several.
     stations: Vec<Option<usize>>,
 }
 
@@ -75,19 +75,19 @@ pub(super) struct Replay {
     /// The next recorded tick, if there is one.
     next: Tick,
     more: bool,
-    /// Why there is no next tick, if the recording is damaged.
+    /// The reason why there is no next tick, if the recording is damaged.
     broken: Option<RecordingError>,
     /// The last replayed tick.
     present: Tick,
     /// This driver's slots with the recorded values.
     slots: Vec<Slot>,
-    /// A recorded tick fell on this one.
+    /// True if a recorded tick fell on the current tick.
     is_new: bool,
-    /// When this end last sent.
+    /// The time when this end last sent.
     sent: Option<Nanos>,
-    /// The current tick has not been compared yet.
+    /// True if the current tick has not been compared yet.
     uncompared: bool,
-    /// Simulation time at the start of the replay, minus that of the recording.
+    /// Simulation time at the start of the replay, minus the recording's time.
     offset: Option<Nanos>,
     max_age: Nanos,
     differences: Differences,
@@ -162,7 +162,7 @@ impl Replay {
         Ok((replay, scan_counters))
     }
 
-    /// When the next recorded tick is due, if there is one.
+    /// Returns the time when the next recorded tick is due, if there is one.
     fn due(&self, now: Nanos) -> Option<Nanos> {
         let offset = self.offset.unwrap_or(now - self.next.time);
         self.more.then(|| self.next.time + offset)
@@ -172,7 +172,7 @@ impl Replay {
     fn advance(&mut self) {
         self.present.clone_from(&self.next);
         self.more = self.recording.next(&mut self.next).unwrap_or_else(|error| {
-            // The ticks before the damage are valid.
+            // The ticks before the damaged one are valid.
             self.broken = Some(error);
             false
         });
@@ -196,8 +196,8 @@ impl Replay {
         }
     }
 
-    /// Shows what the recorded tick showed, in place of what came through the image: puts values and counts of edges into
-    /// `slots`, and sets the statuses of the stations. Returns the status of all, and the age of the data.
+    /// Shows what the recorded tick showed, in place of the received values: puts values and edge counts into `slots`,
+    /// and sets the statuses of the stations. Returns the combined status and the age of the data.
     pub(super) fn show(
         &self,
         mut age: Nanos,
@@ -208,7 +208,7 @@ impl Replay {
         let has_ended = self.scan_counters.ended.load(Ordering::Relaxed);
         let mut all = Code::Fresh;
         for (station, own) in stations.iter_mut().zip(&self.stations) {
-            // After the end of a recording, data become stale as on any line.
+            // After the end of a recording, data become stale as on any other line.
             if self.is_new || !(has_ended && station.status == Code::Stale) {
                 let code = own.code().unwrap_or(station.status);
                 if code == Code::Stale {
@@ -222,14 +222,14 @@ impl Replay {
         (all, age)
     }
 
-    /// Tells of every latched signal that this end reads how many edges there were so far.
+    /// Calls `tell` with every latched signal that this end reads, and the number of its edges so far.
     pub(super) fn edges(&self, mut tell: impl FnMut(usize, u32)) {
         for station in &self.stations {
             station.edges(&mut tell);
         }
     }
 
-    /// Hands in the last recorded values as frames.
+    /// Delivers the last recorded values as frames.
     fn deliver(&mut self, now: Nanos, port: &mut Port) {
         for (index, station) in self.stations.iter_mut().enumerate() {
             match station.status {
@@ -237,7 +237,7 @@ impl Replay {
                     Some(Some(frame)) => port.received(index, now, frame),
                     _ => port.touch(index, now),
                 },
-                // Just older than permitted, so that the line is stale as the recorded one was.
+                // Just older than permitted, so that the line is stale like the recorded one.
                 STALE => port.touch(index, now - self.max_age - Nanos(1)),
                 // A failed exchange received nothing.
                 _ => {}
@@ -245,8 +245,8 @@ impl Replay {
         }
     }
 
-    /// Compares what this end sends with what it sent in the recording, once the current tick has both: a
-    /// simulation that exchanges has sent before it receives, one that answers within its tick sends
+    /// Compares the values that this end sends with those in the recording, once the current tick has both. A
+    /// simulation that exchanges has sent before it receives; a simulation that answers within its tick sends
     /// afterwards.
     fn compare(&mut self, now: Nanos) {
         if !self.uncompared || self.sent != Some(now) {
@@ -274,7 +274,7 @@ impl Replay {
     }
 }
 
-/// The statuses of a recorded tick; below 0 it failed.
+/// The statuses of a recorded tick; a tick with a status below 0 failed.
 const FRESH: i32 = 0;
 const UNCHANGED: i32 = 1;
 const STALE: i32 = 2;
@@ -297,7 +297,7 @@ impl Stepped for Replay {
         self.is_new = false;
         self.stations.iter_mut().for_each(Station::begin);
         if self.offset.is_some() {
-            // The levels may have been shaped in the tick before.
+            // The previous tick may have shaped the levels.
             self.take_values();
         }
         while let Some(due) = self.due(now).filter(|due| *due <= now) {
@@ -305,7 +305,7 @@ impl Stepped for Replay {
             self.advance();
             self.is_new = true;
         }
-        // The peer was also there between two recorded ticks.
+        // The peer was also alive between two recorded ticks.
         if self.is_new || self.more {
             self.deliver(now, port);
         }
@@ -355,7 +355,7 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// The recording lacks signals that this end reads, or has them with another type.
+    /// The recording does not contain signals that this end reads, or has them with another type.
     fn new(config: &Config, columns: &Columns) -> Result<Self, String> {
         let (_, rx) = config.role.areas();
         let all = columns.columns.iter().enumerate();
@@ -413,7 +413,7 @@ impl Map {
     }
 }
 
-/// "did you mean" within a sentence, for which a list of all names would be too long.
+/// Shortens "did you mean" for use within a sentence, where a list of all names would be too long.
 fn meant(near: &str) -> String {
     near.strip_prefix("did you mean ")
         .map(|name| format!(" (it has {})", name.trim_end_matches('?')))

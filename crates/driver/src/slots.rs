@@ -14,7 +14,7 @@ pub struct SlotMap {
 }
 
 impl SlotMap {
-    /// The arrangement for the end with `role`.
+    /// Returns the arrangement for the end with `role`.
     pub fn new(table: &SignalTable, role: Role) -> Self {
         let (_, rx) = role.areas();
         let mut count = table.signals.len();

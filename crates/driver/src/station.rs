@@ -8,11 +8,11 @@ use tickbus_image::{Arrival, TickEnd, is_stale};
 /// One station of an open driver, as the tick sees it.
 #[derive(Debug)]
 pub(super) struct Station {
-    /// Its place in the signal table.
+    /// The station's place in the signal table.
     index: usize,
     pub(super) encode: Plan,
     decode: Plan,
-    /// Whether the slots hold fail-safe values.
+    /// True if the slots hold fail-safe values.
     pub(super) stale: bool,
     /// The result of the last exchange for this station.
     pub(super) status: Code,
@@ -30,15 +30,15 @@ impl Station {
         }
     }
 
-    /// The slots hold what a recording has instead of what was received, and this was its status. The next
-    /// [`receive`](Self::receive) shows what was received again.
+    /// Notes that the slots hold values from a recording instead of received ones, with this status. The next
+    /// [`receive`](Self::receive) shows the received values again.
     pub(super) fn shown_instead(&mut self, image: &mut TickEnd, status: Code) {
         self.status = status;
         self.stale = status == Code::Stale;
         image.overridden(self.index);
     }
 
-    /// Receives from the frame taken over last into the slots, and sets the status. Returns the age of the data.
+    /// Receives into the slots from the frame taken over last, and sets the status. Returns the age of the data.
     #[inline]
     pub(super) fn receive(
         &mut self,
@@ -139,12 +139,12 @@ mod tests {
         assert_eq!(shown((2, 1), false, &[0, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown((2, 1), false, &[1, 8]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown((2, 1), true, &[1, 9]), (false, 1.0, 9.0, 0.0));
-        // Too old when it is looked at: its edge waits.
+        // Too old when the tick looks at it: the edge waits.
         assert_eq!(shown((20, 9), true, &[0, 3]), (true, 0.0, 7.0, 0.0));
         assert_eq!(shown((21, 20), true, &[0, 4]), (false, 0.0, 4.0, 1.0));
     }
 
-    /// A byte that is 7 when it does not count.
+    /// Returns a configuration with one byte, whose fail-safe value is 7.
     fn one_byte() -> Config {
         let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
                     [[signal]]\nname = \"speed\"\naddress = \"%QB0\"\nfail_safe = 7\n";
@@ -166,7 +166,7 @@ mod tests {
         let mut station = Station::new(table, 0, role.areas());
         let map = SlotMap::new(table, role);
         let mut slots = vec![Slot::from_real(7.0); map.count];
-        // The model: what came last and when, and whether a tick has seen it.
+        // The model: the last value, the time of its arrival, and whether a tick has seen it.
         let (mut value, mut heard, mut is_valid, mut is_new) = (7, None, true, false);
         let (mut now, mut random) = (0, seed);
         for step in 0..1_000 {
@@ -186,7 +186,7 @@ mod tests {
                     bus.touch(0, Nanos(now));
                 }
                 2 => {
-                    // A PLC goes into STOP, or into RUN, without a frame.
+                    // A PLC changes to STOP or RUN without sending a frame.
                     is_valid = draw(34, 2) == 0;
                     bus.set_valid(0, is_valid);
                 }

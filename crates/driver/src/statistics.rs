@@ -15,8 +15,8 @@ use tickbus_record::RecorderCounters;
 
 /// The data of a driver's statistics at one moment.
 ///
-/// Copying them takes a microsecond or two, formatting them may take a hundred times as long: a caller that
-/// has locked the driver releases it in between.
+/// Copying them takes a microsecond or two, formatting them can take a hundred times as long: a caller that has locked
+/// the driver releases it in between.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     pub(super) config: Arc<Config>,
@@ -33,21 +33,21 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Adds values that were saturated, and those that were not a number, which the simulator's language has converted.
+    /// Adds the saturated values and the NaN values that the simulator's language binding has converted.
     pub fn add_conversions(&mut self, [saturated, not_a_number]: [u64; 2]) {
         let counters = &mut self.counters;
         counters.saturated = counters.saturated.wrapping_add(saturated);
         counters.not_a_number = counters.not_a_number.wrapping_add(not_a_number);
     }
 
-    /// The statistics.
+    /// Returns the statistics.
     pub fn statistics(&self) -> Statistics {
         let ages = self.stations.iter().map(|(age, _, _)| *age);
         self.status.observe(self.now, ages);
         self.gather()
     }
 
-    /// The statistics, without a look at how old the stations' data are.
+    /// Returns the statistics, without checking how old the stations' data are.
     pub(super) fn gather(&self) -> Statistics {
         self.status.observe_call(self.now);
         let mut statistics = Statistics::default();
@@ -70,7 +70,7 @@ impl Snapshot {
         statistics
     }
 
-    /// Adds the age of each station's data and its number of bus cycles; nothing for a single station.
+    /// Adds the age of each station's data and its number of bus cycles; adds nothing for a single station.
     fn write_stations(&self, statistics: &mut Statistics) {
         if self.stations.len() < 2 {
             return;
@@ -88,7 +88,7 @@ impl Snapshot {
     }
 }
 
-/// One `key=value` per line.
+/// Writes one `key=value` per line.
 impl fmt::Display for Snapshot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.statistics().fmt(f)

@@ -1,14 +1,14 @@
-//! Status codes, from the table `status.tsv`: build.rs makes the enum, a Java test compares its own.
+//! Status codes from the table `status.tsv`: build.rs generates the enum, and a Java test compares Java's own.
 
 include!(concat!(env!("OUT_DIR"), "/status.rs"));
 
 impl Code {
-    /// The number by which Java knows it.
+    /// Returns the number that Java uses for this code.
     pub const fn code(self) -> i32 {
         self as i32
     }
 
-    /// The worse of two: an error over stale, stale over unchanged, unchanged over fresh.
+    /// Returns the worse of two codes: an error over stale, stale over unchanged, unchanged over fresh.
     #[must_use]
     pub fn worse(self, other: Self) -> Self {
         let rank = |code: Self| {
@@ -26,7 +26,7 @@ impl Code {
     }
 }
 
-/// `STALE (2): nothing has come …`
+/// Writes `STALE (2): nothing has come …`.
 impl std::fmt::Display for Code {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} ({}): {}", self.name(), self.code(), self.text())

@@ -1,4 +1,4 @@
-//! The thread of a free bus: runs it, and runs it again after its line has failed.
+//! The thread of a free bus: runs the bus, and restarts it after its line has failed.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -11,28 +11,29 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
 use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};
 
-/// The longest wait for a peer to take the last values.
+/// The longest time to wait for the peer to take the last values.
 const LONGEST_FAREWELL: Nanos = Nanos::from_secs(2);
 
-/// A bus thread; dropping it sends the fail-safe values if its driver asks for that, stops the bus and waits for its end.
+/// A bus thread. Dropping it sends the fail-safe values if the driver asks for that, then stops the bus and waits until
+/// the thread has ended.
 ///
-/// A bus that does not end within its `close_timeout` is in a call that never returns. Its thread is left
-/// behind with everything it uses, because nothing can be freed safely.
+/// A bus that does not end within its `close_timeout` is stuck in a call that never returns. Its thread is left behind
+/// with everything it uses, because nothing can be freed safely.
 #[derive(Debug)]
 pub(super) struct BusThread {
     stop: Stop,
     name: String,
     status: LinkStatus,
     close_timeout: Nanos,
-    /// How the fail-safe values are sent at the end; `None` if the peer keeps what it has.
+    /// Sends the fail-safe values at the end; `None` if the peer keeps its last values.
     farewell: Option<Farewell>,
     clock: Arc<dyn Clock>,
     thread: Option<Thread>,
 }
 
 impl BusThread {
-    /// Starts a thread that serves `bus`, with the pauses of `timing` between attempts (the last one
-    /// repeats), and with what `timing` says of outputs.
+    /// Starts a thread that serves `bus`. `timing` has the pauses between attempts (the last one repeats), and the
+    /// settings for the outputs.
     pub(super) fn start(
         bus: Box<dyn Free>,
         mut port: Port,
@@ -54,7 +55,7 @@ impl BusThread {
         let thread = Thread::spawn(&*clock, &format!("bus {name}"), {
             let (stop, status, clock) = (stop.clone(), status.clone(), Arc::clone(&clock));
             move || {
-                // Freeing what a bus holds, such as unloading a library, may take time: the thread ends after that.
+                // Freeing the bus's resources, such as unloading a library, may take time: the thread ends after that.
                 let (mut bus, mut port) = (bus, port);
                 wake_on_time();
                 serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
@@ -71,7 +72,7 @@ impl BusThread {
         })
     }
 
-    /// Leaves the peer with the fail-safe values, if there is a peer.
+    /// Leaves the peer, if there is one, with the fail-safe values.
     fn take_leave(&self) {
         let Some(farewell) = &self.farewell else {
             return;
@@ -83,7 +84,7 @@ impl BusThread {
         self.stop.wake();
         let limit = self.status.max_age().min(LONGEST_FAREWELL);
         if !farewell.wait(&*self.clock, limit) {
-            // The log has told of a line that does not run, or tells it now.
+            // For any other state, the log has reported the reason already, or does so now.
             let is_news =
                 link.state == LinkState::Running && self.status.state() == LinkState::Running;
             log::log!(
@@ -151,14 +152,14 @@ fn serve(
         status.enter(now, LinkState::Failed, (&ended).into(), &reason);
         let next = now + pause;
         while clock.now() < next && !stop.is_stopped() {
-            // This may return early because of a wake meant for the previous attempt.
+            // May return early because of a wake-up meant for the previous attempt.
             clock.wait_until(next, stop);
         }
     }
     status.enter(clock.now(), LinkState::Closed, Cause::Closed, "closed");
 }
 
-/// The message of a panic.
+/// Returns the message of a panic.
 pub fn panic_text(panic: &(dyn Any + Send)) -> &str {
     panic
         .downcast_ref::<&'static str>()

@@ -1,7 +1,8 @@
-//! The tap: another thread looks at a driver, and injects faults into it, without the tick waiting for it.
+//! The tap: another thread looks at a driver and injects faults into it, and the tick never waits for that thread.
 //!
-//! The tick looks at one word at its end. If something is wanted, it hands over one copy of what it has, through a triple
-//! buffer, and takes over what was ordered: faults that were prepared outside. Memory is neither allocated nor freed here.
+//! At its end, the tick checks one word. If something is wanted, the tick hands over one copy of its state through a
+//! triple buffer, and takes over the orders: faults that the other thread has prepared. Memory is neither allocated nor
+//! freed here.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -13,17 +14,17 @@ use tickbus_image::{Reader, Writer, triple_buffer};
 
 use super::view::View;
 
-/// A copy of the values is wanted.
+/// Requests a copy of the values.
 const VALUES: u8 = 1;
-/// Copies of the distributions as well.
+/// Requests copies of the distributions as well.
 const TIMES: u8 = 2;
-/// There are orders.
+/// Signals that orders are waiting.
 const ORDERS: u8 = 4;
 
-/// How many orders wait at most.
+/// The most orders that can wait.
 const ORDERS_LIMIT: usize = 256;
 
-/// What is to be done at the end of a tick.
+/// An order for the end of a tick.
 #[derive(Debug)]
 #[expect(
     clippy::large_enum_variant,
@@ -34,7 +35,7 @@ enum Order {
     End(u32),
 }
 
-/// What a tick has been asked for.
+/// The requests to a tick.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted(u8);
 
@@ -58,7 +59,7 @@ pub(super) struct Tap {
     wanted: Arc<AtomicU8>,
     views: Writer<View>,
     orders: Receiver<Order>,
-    /// The way back for what only others may free.
+    /// The way back for memory that only the other thread can free.
     retired: SyncSender<Retired>,
 }
 
@@ -71,12 +72,12 @@ pub(super) struct Handle {
     retired: Receiver<Retired>,
 }
 
-/// Makes both ends; `initial` is seen before the first tick.
+/// Creates both ends; `initial` is visible before the first tick.
 pub(super) fn tap(initial: &View) -> (Tap, Handle) {
     let wanted = Arc::<AtomicU8>::default();
     let (writer, reader) = triple_buffer(initial);
     let (send, orders) = sync_channel(ORDERS_LIMIT);
-    // An order retires one fault at most, and orders are sent by who empties this.
+    // An order retires at most one fault, and the sender of orders empties this queue first.
     let (retired, take) = sync_channel(2 * ORDERS_LIMIT);
     let tap = Tap {
         wanted: Arc::clone(&wanted),
@@ -94,31 +95,31 @@ pub(super) fn tap(initial: &View) -> (Tap, Handle) {
 }
 
 impl Tap {
-    /// Whether anything is wanted.
+    /// Returns true if anything is wanted.
     #[inline]
     pub(super) fn is_wanted(&self) -> bool {
         self.wanted.load(Ordering::Relaxed) != 0
     }
 
-    /// What is wanted; it is wanted no more then.
+    /// Returns the requests, and clears them.
     pub(super) fn take_wanted(&self) -> Wanted {
         Wanted(self.wanted.swap(0, Ordering::Acquire))
     }
 
-    /// Hands over a copy, which `fill` makes of an older one.
+    /// Hands over a copy, which `fill` builds on top of an older one.
     pub(super) fn show(&mut self, fill: impl FnOnce(&mut View)) {
         self.views.with_buffer(fill);
         self.views.publish();
     }
 
-    /// Carries out what was ordered.
+    /// Carries out the orders.
     pub(super) fn obey(&mut self, faults: &mut Faults) {
-        // Nobody ever waits to send, so that receiving wakes nobody.
+        // No sender ever waits, so receiving wakes nobody.
         loop {
             match self.orders.try_recv() {
                 Ok(Order::Inject(prepared)) => {
                     if let Some(retired) = faults.adopt(prepared) {
-                        // There is room, see above; what is left over without it is freed here.
+                        // There is room, see above; without room the fault is freed here.
                         let _ = self.retired.try_send(retired);
                     }
                 }

@@ -1,4 +1,4 @@
-//! A tick: what is kept while it is under way, and its result.
+//! A tick: the data kept while it runs, and its result.
 
 use tickbus_base::time::Nanos;
 
@@ -9,12 +9,12 @@ use super::Code;
 pub struct Exchange {
     /// [`Code::Fresh`], [`Code::Unchanged`], [`Code::Stale`], or an error.
     pub code: Code,
-    /// Bus cycles that have arrived, over all stations.
+    /// Number of bus cycles that have arrived, over all stations.
     pub sequence: u64,
     /// Age of the oldest station's data; [`Nanos::MAX`] when nothing ever arrived.
     pub age: Nanos,
-    /// The time up to which the simulation may run before the next exchange; on buses that do not step it,
-    /// the simulation's own time.
+    /// The time up to which the simulation can run before the next exchange. On buses that do not step the simulation,
+    /// this is its own time.
     pub granted: Nanos,
 }
 
@@ -33,6 +33,6 @@ impl Exchange {
 pub(super) struct Tick {
     /// Simulation time; if the simulation gives none, the clock's time since the first tick.
     pub(super) time: Nanos,
-    /// The time spent in its calls so far; measured only for ticks in the sample.
+    /// The time spent in this tick's calls so far; measured only for ticks in the sample.
     pub(super) taken: Nanos,
 }

@@ -1,4 +1,4 @@
-//! What the tick counts and measures of itself.
+//! The counters and measurements of the tick.
 
 use super::Code;
 use tickbus_base::statistics::Statistics;
@@ -47,8 +47,7 @@ impl TickCounters {
     }
 }
 
-/// One tick out of this many is timed: the second reading of the clock costs half as much as a small
-/// exchange.
+/// One tick out of this many is timed: the second reading of the clock costs half as much as a small exchange.
 const SAMPLED: u64 = 32;
 
 /// Distributions over a sample of the ticks.
@@ -61,14 +60,14 @@ pub(super) struct TickTimes {
 }
 
 impl TickTimes {
-    /// Whether this tick is one of the sample.
+    /// Returns true if this tick is in the sample.
     #[inline]
     pub(super) const fn takes(tick: u64) -> bool {
         tick.is_multiple_of(SAMPLED)
     }
 
-    /// Adds a tick to the sample: its calls took `span`, and delivered data of `age`; `Nanos::MAX` if there
-    /// never were any.
+    /// Adds a tick to the sample. Its calls took `span`, and delivered data of `age`, which is `Nanos::MAX` if no data
+    /// ever arrived.
     pub(super) fn add(&mut self, span: Nanos, age: Nanos) {
         self.exchange.record(span);
         if age != Nanos::MAX {
@@ -82,7 +81,7 @@ impl TickTimes {
         self.age.copy_from(&other.age);
     }
 
-    /// Adds both.
+    /// Adds both distributions to the statistics.
     pub(super) fn write(&self, statistics: &mut Statistics) {
         statistics.distribution("exchange", &self.exchange);
         statistics.distribution("age", &self.age);

@@ -1,4 +1,4 @@
-//! What a tick shows of itself to another thread.
+//! The copy of a tick that another thread can see.
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
@@ -6,27 +6,27 @@ use tickbus_image::signal::Slot;
 use super::tick_counters::TickTimes;
 use super::{Code, TickCounters};
 
-/// A tick as it ended, copied.
+/// A copy of a tick at its end.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// The values of the signals, in the order of the signal table: as the simulation or the PLC program wrote them, and
-    /// as it was shown those that it reads.
+    /// The values of the signals, in the order of the signal table: written values as the simulation or the PLC program
+    /// wrote them, read values as it saw them.
     pub slots: Box<[Slot]>,
-    /// Per signal, how many of its latched edges there were so far; the counts wrap. Zero without a latch.
+    /// Per signal, the number of its latched edges so far; the counts wrap. Zero without a latch.
     pub edges: Box<[u32]>,
-    /// Per station, what its peer has sent.
+    /// Per station, the state of its data.
     pub stations: Box<[StationView]>,
-    /// When the tick ended, on the clock of the line.
+    /// The time when the tick ended, on the clock of the line.
     pub now: Nanos,
     /// The number of the tick, from 1; 0 before the first.
     pub tick: u64,
-    /// The time of the tick, as the simulation counts it.
+    /// The time of the tick, on the simulation's clock.
     pub time: Nanos,
-    /// The status of its exchange.
+    /// The status of the exchange.
     pub code: Code,
     pub(super) counters: TickCounters,
     pub(super) events_lost: u64,
-    /// The distributions, if they were asked for.
+    /// The distributions, if they were requested.
     pub(super) times: TickTimes,
     pub(super) has_times: bool,
 }
@@ -34,20 +34,20 @@ pub struct View {
 /// One station in a [`View`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StationView {
-    /// Its part of the exchange.
+    /// The station's status in the exchange.
     pub status: Code,
-    /// How old its data are; [`Nanos::MAX`] if there never were any.
+    /// The age of the station's data; [`Nanos::MAX`] if no data ever arrived.
     pub age: Nanos,
-    /// Whether its data are valid: its PLC runs, and signals that should change do.
+    /// True if the station's data are valid: its PLC runs, and signals that should change do.
     pub is_valid: bool,
-    /// Whether the slots of what it sends hold fail-safe values.
+    /// True if the slots of the values that the station sends hold fail-safe values.
     pub is_fail_safe: bool,
     /// Bus cycles that have arrived.
     pub cycles: u64,
 }
 
 impl View {
-    /// Before the first tick, with these values.
+    /// Creates the view before the first tick, with these values.
     pub(super) fn new(slots: Vec<Slot>, stations: usize) -> Self {
         let station = StationView {
             status: Code::Stale,

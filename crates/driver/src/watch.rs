@@ -18,9 +18,10 @@ use super::tap::Handle;
 use super::tick_counters::TickTimes;
 use super::view::View;
 
-/// Looks at a driver or a hosted program from another thread, and forces its signals. Neither waits for the other.
+/// Looks at a driver or a hosted program from another thread, and forces its signals. Neither thread waits for the
+/// other.
 ///
-/// What it sees is a copy that a tick made at its end, after it was [asked](Self::ask).
+/// The watch sees a copy that a tick made at its end, after a [request](Self::ask).
 #[derive(Debug)]
 pub struct Watch {
     pub(super) config: Arc<Config>,
@@ -32,49 +33,50 @@ pub struct Watch {
     pub(super) board: Arc<FaultBoard>,
     pub(super) clock: Arc<dyn Clock>,
     pub(super) figures: Box<dyn Figures>,
-    /// The distributions that came last.
+    /// The distributions that arrived last.
     pub(super) times: TickTimes,
-    /// When the copy was asked for that has not come yet.
+    /// The time of the request for a copy that has not arrived yet.
     pub(super) asked: Option<Nanos>,
 }
 
-/// What the copies of the ticks do not have.
+/// The data that the copies of the ticks do not contain.
 pub(super) trait Figures: fmt::Debug + Send {
-    /// The statistics at this moment.
+    /// Returns the statistics at this moment.
     fn statistics(&self, now: Nanos, view: &View, times: &TickTimes) -> Statistics;
 
-    /// Whether they are a driver's.
+    /// Returns true if the figures are a driver's.
     fn is_driver(&self) -> bool;
 }
 
 impl Watch {
-    /// What it was opened with.
+    /// Returns the configuration that the driver or program was opened with.
     pub fn config(&self) -> &Arc<Config> {
         &self.config
     }
 
-    /// Which end of the line it is.
+    /// Returns the end of the line that is watched.
     pub fn role(&self) -> Role {
         self.role
     }
 
-    /// The area that it writes.
+    /// Returns the area that this end writes.
     pub fn writes(&self) -> Area {
         self.role.areas().0
     }
 
-    /// Whether it is a simulation's driver, and not a PLC program.
+    /// Returns true for a simulation's driver, and false for a PLC program.
     pub fn is_driver(&self) -> bool {
         self.figures.is_driver()
     }
 
-    /// The clock of the line, which [`View::now`] and [`Link::since`] are on. On a stepped bus that is simulation time.
+    /// Returns the clock of the line, on which [`View::now`] and [`Link::since`] are. On a stepped bus that is
+    /// simulation time.
     pub fn clock(&self) -> &dyn Clock {
         &*self.clock
     }
 
-    /// Asks for a copy at the end of the next tick; `with_times` for new distributions as well, which take the tick some
-    /// microseconds.
+    /// Asks for a copy at the end of the next tick. `with_times` asks for new distributions as well, which cost the
+    /// tick some microseconds.
     pub fn ask(&mut self, with_times: bool) {
         let now = self.clock.now();
         self.asked.get_or_insert(now);
@@ -93,8 +95,8 @@ impl Watch {
             if view.has_times {
                 times.copy_from(&view.times);
             }
-            // In case the bus cannot look at its line itself. A copy that is older than the state of the line says nothing
-            // against it.
+            // In case the bus cannot check its line itself. A copy that is older than the state of the line does not
+            // change the state.
             if view.now >= since {
                 let ages = view.stations.iter().map(|station| station.age);
                 self.status.observe(view.now, ages);
@@ -103,29 +105,29 @@ impl Watch {
         true
     }
 
-    /// The copy that was taken over last.
+    /// Reads the copy that was taken over last.
     pub fn view<R>(&self, read: impl FnOnce(&View) -> R) -> R {
         self.handle.with(read)
     }
 
-    /// The state of the line at this moment.
+    /// Returns the state of the line at this moment.
     pub fn link(&self) -> Link {
         self.status.observe_call(self.clock.now());
         self.status.link()
     }
 
-    /// The statistics: the line's at this moment, the tick's as of the last copy.
+    /// Returns the statistics: the line's at this moment, the tick's as of the last copy.
     pub fn statistics(&self) -> Statistics {
         let now = self.clock.now();
         self.view(|view| self.figures.statistics(now, view, &self.times))
     }
 
-    /// The injected faults in order of injection; those that ended long ago may be missing.
+    /// Returns the injected faults in order of injection; faults that ended long ago may be missing.
     pub fn faults(&self) -> Vec<FaultStatus> {
         self.board.list()
     }
 
-    /// Whether a fault waits or is active.
+    /// Returns true if a fault is waiting or active.
     pub fn is_fault_on(&self, id: u32) -> bool {
         let faults = self.board.list();
         faults
@@ -133,12 +135,13 @@ impl Watch {
             .any(|fault| fault.id == id && fault.phase != Phase::Over)
     }
 
-    /// Holds the signal with this index to a value: a fault of the kind "stuck", called `forced: <its name>`. The driver
-    /// reads it at the end of the next tick, so the tick after that is the first that shows it. Returns the fault's number.
+    /// Holds the signal with this index at a value, by a fault of the kind "stuck" called `forced: <its name>`. The
+    /// driver reads the order at the end of the next tick, so the tick after that is the first that shows the value.
+    /// Returns the fault's number.
     ///
     /// # Errors
     ///
-    /// Too many faults wait or are active, or the simulation takes over no more orders.
+    /// Too many faults are waiting or active, or the simulation no longer takes orders.
     ///
     /// # Panics
     ///
@@ -164,17 +167,17 @@ impl Watch {
         Ok(id)
     }
 
-    /// Ends a fault. The next tick learns of that at its end, and the one after that is the first without it.
+    /// Ends a fault. The next tick reads the order at its end, and the tick after that is the first without the fault.
     ///
     /// # Errors
     ///
-    /// The simulation takes over no more orders.
+    /// The simulation no longer takes orders.
     pub fn end_fault(&mut self, id: u32) -> Result<(), Mistake> {
         self.handle.end(id)
     }
 
-    /// How long no tick has come that was asked for a copy; [`Nanos::MAX`] before the first. Zero while the copy that was
-    /// asked for last has come, however long ago: nobody knows of the ticks since.
+    /// Returns how long a requested copy has been overdue; [`Nanos::MAX`] before the first tick. Returns zero if the
+    /// copy requested last has arrived, however long ago: later ticks are unknown.
     pub fn silence(&self) -> Nanos {
         let now = self.clock.now();
         self.view(|view| match (view.tick, self.asked) {
@@ -196,7 +199,7 @@ mod tests {
                         program = \"mirror\"\nscan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n\
                         [[signal]]\nname = \"b\"\naddress = \"%QB0\"\n";
 
-    /// A driver that has ticked once, and what looks at it.
+    /// Returns a driver that has ticked once, and a watch on it.
     fn watched() -> (Driver, Watch, Vec<Slot>) {
         let config =
             Config::parse("driver.cfg", TEXT, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
@@ -211,11 +214,11 @@ mod tests {
     #[test]
     fn a_copy_that_nobody_took_over_for_long_is_no_silence() {
         let (mut driver, mut watch, mut slots) = watched();
-        // It ticks on, and nobody asks.
+        // The driver continues to tick, and nobody asks.
         driver.exchange(Nanos::from_millis(400), &mut slots);
         assert!(watch.update());
         assert_eq!(watch.silence(), Nanos::ZERO);
-        // It owes a copy: here because nobody takes it over.
+        // The driver owes a copy, here because nobody takes the copy over.
         watch.ask(false);
         let asked = watch.clock().now();
         driver.exchange(Nanos::from_millis(700), &mut slots);
@@ -233,7 +236,7 @@ mod tests {
         watch.status.enter(now, state, cause, "nothing has come");
         assert!(watch.update());
         assert_eq!(watch.status.state(), LinkState::Stale);
-        // A newer one does.
+        // A newer copy does.
         watch.ask(false);
         driver.exchange(Nanos::from_millis(401), &mut slots);
         assert!(watch.update());

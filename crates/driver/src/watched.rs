@@ -1,18 +1,18 @@
-//! What the tick of a driver keeps while another thread may look at it.
+//! The tick's data for a thread that looks at the driver.
 
 use super::extras::Extras;
 use super::tap::Tap;
 
-/// What a tick needs to be looked at.
+/// The data that a tick needs to show itself to another thread.
 #[derive(Debug)]
 pub(super) struct Watched {
     pub(super) tap: Tap,
-    /// What a driver without faults gets when the first one comes, so that it need not be allocated then.
+    /// Spare extras for the first fault of a driver without faults, so that the tick need not allocate them.
     pub(super) spare: Option<Box<Extras>>,
 }
 
 impl Watched {
-    /// Whether anything is wanted of this tick.
+    /// Returns true if anything is wanted of this tick.
     #[inline]
     pub(super) fn is_wanted(&self) -> bool {
         self.tap.is_wanted()

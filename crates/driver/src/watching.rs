@@ -1,4 +1,4 @@
-//! A driver that another thread looks at: the tick's part.
+//! The tick's part in letting another thread look at a driver.
 
 use std::sync::Arc;
 
@@ -22,13 +22,13 @@ use super::watch::{Figures, Watch};
 use super::watched::Watched;
 use super::{Code, Driver};
 
-/// What belongs to the statistics of a driver and is not in the ticks' copies.
+/// The sources of a driver's statistics that are not in the ticks' copies.
 #[derive(Debug)]
 struct DriverFigures {
     config: Arc<Config>,
     status: LinkStatus,
     board: Arc<FaultBoard>,
-    /// What is at the other end, and the recording.
+    /// The counters of the program at the other end, and those of the recording.
     program: Option<ProgramCounters>,
     record: Option<Arc<RecorderCounters>>,
 }
@@ -59,8 +59,8 @@ impl Figures for DriverFigures {
 }
 
 impl Driver {
-    /// Lets another thread look at this driver, and force its signals. As long as it asks for nothing, a tick pays for a
-    /// look at one word. An earlier handle sees nothing new from now on.
+    /// Lets another thread look at this driver and force its signals. While the watch asks for nothing, a tick only
+    /// checks one word. An earlier handle receives nothing new from now on.
     pub fn watch(&mut self) -> Watch {
         let signals = self.config.table.signals.len();
         let mut slots = self.initial_slots();
@@ -95,7 +95,7 @@ impl Driver {
         }
     }
 
-    /// Does what is wanted at the end of a tick.
+    /// Serves the requests at the end of a tick.
     #[cold]
     #[inline(never)]
     pub(super) fn serve_watch(&mut self, tick: Tick, code: Code, slots: &[Slot]) {
@@ -110,7 +110,7 @@ impl Driver {
         }
         self.simplify();
         if wanted.values() {
-            // The simulation's clock stands still during a tick, and others may be read.
+            // The simulation's clock stands still during a tick, and other clocks can be read.
             let now = self.clock.now();
             watched
                 .tap
@@ -119,7 +119,7 @@ impl Driver {
         self.watched = Some(watched);
     }
 
-    /// Takes over the faults that were ordered.
+    /// Takes over the ordered faults.
     fn obey(&mut self, watched: &mut Watched) {
         match &mut self.extras {
             None => self.extras = watched.spare.take(),
@@ -135,13 +135,13 @@ impl Driver {
         }
     }
 
-    /// Lets the tick pay for no faults when all of them are over.
+    /// Puts the extras away when all faults are over, so that the tick no longer pays for them.
     fn put_away(&mut self, watched: &mut Watched) {
         let is_idle = |extras: &Extras| {
             let faults = extras.faults.as_ref();
             faults.is_some_and(Faults::is_idle)
         };
-        // Extras that were the spare ones have nothing else than faults.
+        // Extras that were the spare ones contain only faults.
         if watched.spare.is_none() && self.extras.as_deref().is_some_and(is_idle) {
             watched.spare = self.extras.take();
         }

@@ -1,11 +1,10 @@
-//! FMI, the Functional Mock-up Interface, versions 2.0 and 3.0, co-simulation, both ways.
+//! FMI, the Functional Mock-up Interface, versions 2.0 and 3.0, co-simulation, in both directions.
 //!
-//! [`made`]: a driver.cfg as an FMU. [`made::export`] writes it, and [`made::Instance`] is what runs inside of it, without the
-//! functions in C around it, which the native library has.
+//! [`made`]: a driver.cfg as an FMU. [`made::export`] writes the FMU. [`made::Instance`] runs inside of it; the C
+//! functions around it are in the native library.
 //!
-//! [`foreign`]: an FMU of somebody else as the machine, or as the PLC. [`foreign::Unpacked`] is one that was found right,
-//! [`foreign::Join`] says which of its variables are which signals, and [`foreign::Machine`] runs it, in this process or in a
-//! helper's.
+//! [`foreign`]: a foreign FMU as the machine or as the PLC. [`foreign::Unpacked`] is a checked FMU, [`foreign::Join`]
+//! joins its variables with signals, and [`foreign::Machine`] runs it, in this process or in a helper process.
 
 pub mod foreign;
 pub mod made;

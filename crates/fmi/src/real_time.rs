@@ -1,23 +1,23 @@
-//! Simulation time beside the clock on the wall.
+//! Keeps simulation time in step with the wall clock.
 
 use tickbus_base::time::Nanos;
 
-/// How late a step may be and still be made up for; a later one begins the pace anew.
+/// The largest delay that later steps make up for; after a longer one the pace restarts.
 const LATE: Nanos = Nanos::from_millis(100);
 
-/// How fast simulation time may pass.
+/// Limits how fast simulation time passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RealTime {
-    /// Seconds of simulation in one of the clock on the wall; 0 for as many as can. Never negative.
+    /// Seconds of simulation per second of the wall clock; 0 for as fast as possible. Never negative.
     pub pace: f64,
-    /// The time at which the pace began: the simulation's, and the clock's.
+    /// The simulation time and the clock time at which the pace began.
     begun: Option<(Nanos, Nanos)>,
-    /// The time on the clock that stalls have taken.
+    /// The clock time lost to stalls.
     lost: Nanos,
 }
 
 impl RealTime {
-    /// A pace, which begins with the first step.
+    /// Creates a pace, which begins with the first step.
     pub const fn new(pace: f64) -> Self {
         Self {
             pace,
@@ -26,14 +26,14 @@ impl RealTime {
         }
     }
 
-    /// How far simulation time has fallen behind the clock: the sum of all stalls of more than 100 ms.
+    /// Returns how far simulation time has fallen behind the clock: the sum of all stalls of more than 100 ms.
     pub const fn lost(&self) -> Nanos {
         self.lost
     }
 
-    /// Until when to wait at `now` when the simulation has come to `time`; `None` for not at all.
+    /// Returns the time until which to wait, when at `now` the simulation has reached `time`; `None` for no wait.
     ///
-    /// After a stall, what was missed is not made up for in a burst: the other end has not stood still meanwhile.
+    /// After a stall, the missed time is not made up for in a burst: the other end did not stop meanwhile.
     pub fn due(&mut self, time: Nanos, now: Nanos) -> Option<Nanos> {
         if self.pace <= 0.0 {
             return None;
@@ -67,11 +67,11 @@ mod tests {
         let mut twice = RealTime::new(2.0);
         assert_eq!(twice.due(ms(10), ms(1000)), None);
         assert_eq!(twice.due(ms(20), ms(1001)), Some(ms(1005)));
-        // A little late: the next ones catch up.
+        // A little late: the next steps catch up.
         assert_eq!(twice.due(ms(30), ms(1012)), None);
         assert_eq!(twice.due(ms(50), ms(1013)), Some(ms(1020)));
         assert_eq!(twice.lost(), Nanos::ZERO);
-        // A stall: the pace begins here.
+        // A stall: the pace restarts here.
         assert_eq!(twice.due(ms(60), ms(2000)), None);
         assert_eq!(twice.due(ms(70), ms(2000)), Some(ms(2005)));
         assert_eq!(twice.lost(), ms(975));

@@ -1,4 +1,4 @@
-//! What both ways have in common: the versions, the types of variables, and their values.
+//! The parts that both directions share: the versions, the types of variables, and their values.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,10 +15,10 @@ pub enum Version {
 }
 
 impl Version {
-    /// Both.
+    /// Both versions.
     pub const ALL: [Self; 2] = [Self::Two, Self::Three];
 
-    /// Its name on the command line.
+    /// Returns the version's name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Two => "fmi2",
@@ -26,7 +26,7 @@ impl Version {
         }
     }
 
-    /// Its number, as a model description writes it.
+    /// Returns the version's number, as a model description writes it.
     pub const fn number(self) -> &'static str {
         match self {
             Self::Two => "2.0",
@@ -35,24 +35,24 @@ impl Version {
     }
 }
 
-/// The answer of a function of FMI.
+/// The status that a function of FMI returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(i32)]
 pub enum Status {
-    /// All is well.
+    /// Success.
     Ok = 0,
-    /// It went on, and something is to be told.
+    /// Success, with a message.
     Warning = 1,
     /// The step was not done.
     Discard = 2,
-    /// It failed, and this instance is at its end.
+    /// The call failed, and this instance has ended.
     Error = 3,
-    /// It failed, and all instances are at their end.
+    /// The call failed, and all instances have ended.
     Fatal = 4,
 }
 
 impl Status {
-    /// The status with this number; numbers that a version does not have are fatal.
+    /// Returns the status with this number; numbers that a version does not define are fatal.
     pub const fn of(number: i32) -> Self {
         match number {
             0 => Self::Ok,
@@ -94,7 +94,7 @@ pub enum ValueType {
 }
 
 impl ValueType {
-    /// Its name in FMI 3.0.
+    /// Returns the type's name in FMI 3.0.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Float32 => "Float32",
@@ -112,7 +112,7 @@ impl ValueType {
         }
     }
 
-    /// Its name in a version.
+    /// Returns the type's name in a version.
     pub const fn name_in(self, version: Version) -> &'static str {
         match (version, self) {
             (Version::Two, Self::Float64) => "Real",
@@ -121,7 +121,7 @@ impl ValueType {
         }
     }
 
-    /// Whether it is a floating point number, which alone may have a unit.
+    /// Returns true for a floating point number; only these can have a unit.
     pub const fn is_float(self) -> bool {
         matches!(self, Self::Float32 | Self::Float64)
     }
@@ -130,18 +130,18 @@ impl ValueType {
 /// The value of a variable that can be a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Value {
-    /// Of a floating point number.
+    /// The value of a floating point number.
     Real(f64),
-    /// Of a signed integer.
+    /// The value of a signed integer.
     Signed(i64),
-    /// Of an unsigned integer.
+    /// The value of an unsigned integer.
     Unsigned(u64),
-    /// Of a Boolean.
+    /// The value of a Boolean.
     Boolean(bool),
 }
 
 impl Value {
-    /// As a double; the nearest one of a large integer.
+    /// Returns the value as a double; a large integer is rounded to the nearest one.
     #[expect(clippy::cast_precision_loss, reason = "as documented")]
     pub const fn real(self) -> f64 {
         match self {
@@ -152,7 +152,7 @@ impl Value {
         }
     }
 
-    /// As a slot holds it.
+    /// Returns the value as a slot holds it.
     pub fn slot(self, kind: SlotKind) -> Slot {
         match (kind, self) {
             (SlotKind::Real, value) => Slot::from_real(value.real()),
@@ -169,7 +169,7 @@ impl Value {
         }
     }
 
-    /// What a slot holds.
+    /// Reads the value that a slot holds.
     pub const fn of(slot: Slot, kind: SlotKind) -> Self {
         match kind {
             SlotKind::Real => Self::Real(slot.real()),
@@ -179,18 +179,18 @@ impl Value {
     }
 }
 
-/// A number as the functions of FMI hand it over.
+/// A number type of the FMI functions.
 pub trait Number: Copy {
-    /// The type whose functions have it.
+    /// The FMI type whose functions use this number type.
     const TYPE: ValueType;
 
-    /// The nearest value of this type; 0 for what is no number.
+    /// Converts to the nearest value of this type; 0 for NaN.
     fn from_real(value: f64) -> Self;
 
-    /// The nearest value of this type.
+    /// Converts to the nearest value of this type.
     fn of(value: Value) -> Self;
 
-    /// This, whatever its type.
+    /// Returns this number as a [`Value`].
     fn value(self) -> Value;
 }
 

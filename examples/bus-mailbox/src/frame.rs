@@ -1,11 +1,11 @@
-//! What stands in a file: bytes in, bytes out, and no I/O.
+//! The content of a file: bytes in, bytes out, and no I/O.
 
 use std::fmt;
 
-/// The bytes of two numbers before the image.
+/// The size of the two numbers before the image, in bytes.
 const HEAD: usize = 16;
 
-/// A frame: the sender's image, and the number of the last frame that it has seen of the other end.
+/// A frame: the sender's image, and the number of the last frame that the sender has seen from the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Frame {
     /// Counts the sender's frames; 0 before the first.
@@ -14,7 +14,7 @@ pub struct Frame {
     pub seen: u64,
     /// The frames of all stations, in their order; empty before the first.
     pub image: Vec<u8>,
-    /// Whether the peer has seen it. This is not sent.
+    /// True once the peer has seen the frame. This is not sent.
     pub confirmed: bool,
 }
 
@@ -29,7 +29,7 @@ impl Default for Frame {
     }
 }
 
-/// Bytes that are no frame, and why.
+/// Bytes that are not a frame, and the reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoFrame {
     expected: usize,
@@ -47,7 +47,7 @@ impl fmt::Display for NoFrame {
 }
 
 impl Frame {
-    /// The bytes of the file.
+    /// Returns the bytes of the file.
     pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(HEAD + self.image.len());
         bytes.extend_from_slice(&self.sequence.to_be_bytes());
@@ -56,11 +56,11 @@ impl Frame {
         bytes
     }
 
-    /// Reads a file with an image of `expected` bytes, or with none yet.
+    /// Reads a file with an image of `expected` bytes, or without an image yet.
     ///
     /// # Errors
     ///
-    /// It has another length.
+    /// The file has another length.
     pub fn parse(bytes: &[u8], expected: usize) -> Result<Self, NoFrame> {
         let wrong = NoFrame {
             expected,

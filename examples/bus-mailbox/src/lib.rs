@@ -1,8 +1,8 @@
 //! An example of a bus: `kind = "mailbox"` carries the image in two files of a folder, one for each end.
 //!
-//! It shows what a bus needs, and how little: a [frame](Frame), free of I/O; the [options](Options) that a driver.cfg
-//! gives it; and the thread that carries frames between the port and the line. `src/main.rs` hands it to the `tickbus`
-//! command; nothing in tickbus knows this bus. `CONTRIBUTING.md` describes how a bus is added.
+//! The example shows how little a bus needs: a [frame](Frame) without I/O, the [options](Options) from a driver.cfg,
+//! and the thread that carries frames between the port and the line. `src/main.rs` adds the bus to the `tickbus`
+//! command; nothing in tickbus knows it. `CONTRIBUTING.md` describes how to add a bus.
 
 mod frame;
 mod options;
@@ -37,7 +37,7 @@ impl Mailbox {
         }
     }
 
-    /// Replaces the own file at once, so that the peer never reads half of one.
+    /// Replaces its own file atomically, so that the peer never reads half of one.
     fn write(&self, frame: &Frame) -> Result<(), BusError> {
         let beside = self.own.with_extension("new");
         fs::write(&beside, frame.bytes())
@@ -53,8 +53,8 @@ impl Mailbox {
         }
     }
 
-    /// The last sequence of an end that was killed: its successor counts on, or the peer would not know its frames
-    /// from those that it has seen.
+    /// Returns the last sequence of an end that was killed. Its successor continues from there; otherwise the peer
+    /// could not tell new frames from those that it has seen.
     fn left_behind(&self, image: usize) -> u64 {
         let frame = fs::read(&self.own)
             .ok()
@@ -71,7 +71,7 @@ impl Mailbox {
             sequence: self.left_behind(sends),
             ..Frame::default()
         };
-        // For the frames that the peer has not confirmed.
+        // Confirms the frames that the peer has not confirmed yet.
         let mut receipt = None;
         let mut pace = Pace::new(port.clock().now(), self.cycle);
         while !stop.is_stopped() {
@@ -85,7 +85,7 @@ impl Mailbox {
                             .map_err(|error| BusError::Protocol(error.to_string()))?;
                         take(port, now, &peers, &mut own, &mut receipt, &sizes);
                     }
-                    // The next one counts from 1 again.
+                    // The peer's next process counts from 1 again.
                     None => own.seen = 0,
                 }
                 if own.confirmed
@@ -107,7 +107,7 @@ impl Mailbox {
     }
 }
 
-/// Takes over the peer's frame, if it is another one than the last, and what it says of ours.
+/// Takes over the peer's frame, if it is a new one, and its confirmation of our frame.
 fn take(
     port: &mut Port,
     now: Nanos,
@@ -143,7 +143,7 @@ fn take(
 impl Free for Mailbox {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let ended = self.serve(port, stop);
-        // A file that is left behind would look like a peer that stands still.
+        // A file left behind would look like a stopped peer.
         let _ = fs::remove_file(&self.own);
         ended
     }

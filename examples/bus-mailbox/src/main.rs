@@ -1,4 +1,4 @@
-//! The `tickbus` command with one more bus, as a program of your own would have it.
+//! The `tickbus` command with one more bus: a model for a custom program.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! The options of the bus in a driver.cfg, and its kind, for a list of kinds.
+//! The options of the bus in a driver.cfg, and its kind, as an entry in a list of kinds.
 
 use std::path::PathBuf;
 
@@ -13,10 +13,10 @@ use super::Mailbox;
 /// The longest path of a folder, in characters.
 const PATH_LIMIT: usize = 1000;
 
-/// The keys of `[fieldbus]` that are the bus's own.
+/// The bus's own keys in `[fieldbus]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
-    /// The folder with the two files, which begins at that of the driver.cfg.
+    /// The folder with the two files; a relative path in the driver.cfg begins at the driver.cfg's folder.
     pub folder: PathBuf,
 }
 

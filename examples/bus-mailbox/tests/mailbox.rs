@@ -1,4 +1,5 @@
-//! The example of a bus passes the tests that every bus passes, and its command has the bus although nothing in tickbus knows it.
+//! The example of a bus passes the tests that every bus passes, and its command offers the bus although nothing in
+//! tickbus knows it.
 
 use std::path::Path;
 use std::process::Command;
@@ -13,7 +14,7 @@ use tickbus_driver_cfg::{Config, Kind, Kinds};
 
 static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_mailbox::Options>()]);
 
-/// A folder used by one test only.
+/// A folder that only one test uses.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -37,7 +38,7 @@ impl Bus for Folder {
         )
     }
 
-    /// A file of another image.
+    /// Writes a file with another image.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         fs::write(self.0.path().join("outputs"), [1; 30]).expect("written");
         Liar {
@@ -91,7 +92,7 @@ fn the_command_has_the_bus_beside_its_own() {
     }
 }
 
-/// The crates that would have to be forked to have the bus.
+/// Checks that the bus can be added without forking any of these crates.
 #[test]
 fn nothing_of_tickbus_names_the_bus() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -17,14 +17,14 @@ const TAKEN: i32 = 1;
 const FRESH: i32 = 2;
 const ROLE_CONTROLLER: u32 = 1;
 
-/// What a data exchange brought.
+/// The result of a data exchange.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Exchanged {
-    /// The station has the outputs of this very exchange.
+    /// True if the station has the outputs of this very exchange.
     pub(crate) is_sent: bool,
 }
 
-/// Why the bus cannot go on, in words.
+/// Says why the bus cannot continue.
 #[derive(Debug)]
 pub(crate) enum Failure {
     Link(String),
@@ -64,7 +64,7 @@ pub(crate) struct Bus {
 }
 
 thread_local! {
-    /// One thread makes all calls of a bus, so this is its last error.
+    /// One thread makes all calls of a bus, so this is the bus's last error.
     static ERROR: RefCell<CString> = RefCell::default();
 }
 
@@ -90,7 +90,7 @@ unsafe fn text<'a>(text: *const c_char) -> Result<&'a str, Failure> {
 
 /// # Safety
 ///
-/// As the header says of `tickbus_open`.
+/// As the header requires for `tickbus_open`.
 unsafe fn open(config: &Config, layout: &Layout) -> Result<Bus, Failure> {
     let (mut port, mut project) = (None, None);
     for index in 0..config.option_count as usize {
@@ -140,7 +140,7 @@ unsafe extern "C" fn tickbus_open(
     // SAFETY: the host's structs are valid during the call.
     match unsafe { open(&*config, &*layout) } {
         Ok(opened) => {
-            // SAFETY: the host gives a place for the pointer.
+            // SAFETY: the host passes a place for the pointer.
             unsafe { *bus = Box::into_raw(Box::new(opened)) };
             0
         }
@@ -155,9 +155,9 @@ unsafe extern "C" fn tickbus_exchange(
     output: *mut u8,
     timeout_ms: u32,
 ) -> i32 {
-    // SAFETY: it is a bus that was opened and is not closed, and no other thread uses it.
+    // SAFETY: the bus was opened and is not closed, and no other thread uses it.
     let bus = unsafe { &mut *bus };
-    // SAFETY: the host gives in_size bytes to read and out_size bytes to write, which do not overlap.
+    // SAFETY: the host passes in_size bytes to read and out_size bytes to write, which do not overlap.
     let (sends, receives) = unsafe {
         (
             std::slice::from_raw_parts(input, bus.in_size),
@@ -180,6 +180,6 @@ extern "C" fn tickbus_last_error(_bus: *mut Bus) -> *const c_char {
 
 #[unsafe(no_mangle)]
 unsafe extern "C" fn tickbus_close(bus: *mut Bus) {
-    // SAFETY: it was made by `tickbus_open`, and this is the last call with it.
+    // SAFETY: `tickbus_open` created the bus, and this is the last call with it.
     drop(unsafe { Box::from_raw(bus) });
 }

@@ -8,8 +8,8 @@
 //! options = { port = "/dev/pts/3", project = "simulated.toml" }
 //! ```
 //!
-//! The project names the station's GSD file and its modules. What they say is read by gsd-parser, so nothing of tickbus
-//! is on this side of the line.
+//! The project names the station's GSD file and its modules. gsd-parser reads both, so no code of tickbus is on this
+//! side of the line.
 #![cfg(unix)]
 
 mod abi;

@@ -10,7 +10,7 @@ use crate::abi::{Exchanged, Failure};
 use crate::dp_phy::Pty;
 use crate::project::Project;
 
-/// How long the master rests between two looks at the line.
+/// The pause between two looks at the line.
 const REST: std::time::Duration = std::time::Duration::from_micros(50);
 
 pub(crate) struct Master {
@@ -18,7 +18,7 @@ pub(crate) struct Master {
     fdl: FdlActiveStation,
     dp: DpMaster<'static>,
     station: PeripheralHandle,
-    /// A request may be under way whose outputs are those of an earlier exchange.
+    /// True if a request may be under way with the outputs of an earlier exchange.
     is_behind: bool,
 }
 
@@ -39,7 +39,7 @@ impl Master {
         let mut dp = DpMaster::new(vec![]);
         let options = PeripheralOptions {
             ident_number: device.ident,
-            // The plug-in lives as long as its process, and opens its line a few times at most.
+            // Leaking is fine: the plug-in lives as long as its process, and opens its line only a few times.
             user_parameters: Some(device.parameters.leak()),
             config: Some(device.config.leak()),
             max_tsdr: bus.slot_bits - 15,

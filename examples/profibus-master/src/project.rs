@@ -1,4 +1,4 @@
-//! What the PLC's project says of the line and its station.
+//! The PLC's project, as far as it describes the line and the station.
 
 use std::fs;
 use std::path::Path;
@@ -19,7 +19,7 @@ pub(crate) struct Bus {
     baud: u32,
     /// The master's address.
     pub(crate) master: u8,
-    /// How long it waits for an answer.
+    /// The time that the master waits for an answer, in bits.
     pub(crate) slot_bits: u16,
     pub(crate) watchdog_ms: u32,
 }
@@ -54,7 +54,7 @@ impl Project {
         Ok(project)
     }
 
-    /// The rate, with the shortest slot time that goes with it.
+    /// Returns the rate, and checks the slot time against the shortest one for that rate.
     pub(crate) fn baud(&self) -> Result<Baudrate, String> {
         let rates = [
             (9_600, Baudrate::B9600, 100),
@@ -73,7 +73,7 @@ impl Project {
         Ok(baud)
     }
 
-    /// Looks the station up in its GSD file, which lies beside the project.
+    /// Looks the station up in its GSD file, which is next to the project.
     pub(crate) fn device(&self, folder: &Path) -> Result<Device, String> {
         let file = folder.join(&self.station.gsd);
         let name = file.display();

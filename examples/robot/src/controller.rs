@@ -9,10 +9,10 @@ pub const CYCLE_MILLIS: i64 = 10;
 
 /// The gain of the position loops, in 1/s.
 const GAIN: f64 = 20.0;
-/// The highest speed that is commanded, in mm/s.
+/// The highest commanded speed, in mm/s.
 const LIMIT: f64 = 600.0;
 
-/// The speeds to be commanded at `time` to the axes at `position`, in mm/s.
+/// Returns the speeds to command at `time` to the axes at `position`, in mm/s.
 pub fn command(path: &Path, time: Nanos, position: Point) -> Point {
     let target = path.at(time);
     [0, 1].map(|axis| (GAIN * (target[axis] - position[axis])).clamp(-LIMIT, LIMIT))

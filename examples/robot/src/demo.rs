@@ -19,9 +19,9 @@ use tickbus_virtual_time::{Meeting, Outcome};
 
 /// The intervals of the model's OPC link, in milliseconds.
 const MODEL_UPDATES: [i64; 3] = [10, 50, 100];
-/// Those of the link on the wall clock.
+/// The intervals of the link on the wall clock, in milliseconds.
 const WALL_UPDATES: [i64; 2] = [10, 50];
-/// The one in the pictures.
+/// The interval shown in the pictures, in milliseconds.
 const SHOWN: i64 = 50;
 
 /// Runs everything, and returns the figures of the last line.
@@ -68,7 +68,7 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
     ))
 }
 
-/// Prints what came out, as the whole takes a while.
+/// Prints the result of an experiment at once, as all of them together take a while.
 fn told(experiment: Experiment) -> Experiment {
     let metrics = experiment.metrics;
     println!(
@@ -82,7 +82,7 @@ fn told(experiment: Experiment) -> Experiment {
     experiment
 }
 
-/// In lock-step, with clients in any order: `one` is told whether the PLC is first.
+/// Runs in lock-step, with the clients in random order: `one` receives true if the PLC is first.
 fn in_lock_step(
     name: &str,
     runs: u32,
@@ -107,7 +107,7 @@ fn in_process(plc_first: bool) -> Result<(Run, Outcome), String> {
     lock_step::in_process(plc_first).map_err(|ended| ended.to_string())
 }
 
-/// Plant and PLC are processes of their own.
+/// Runs plant and PLC as separate processes.
 fn in_processes(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), String> {
     let start = |name: &str, server: &Meeting| {
         let mut command = Command::new(std::env::current_exe()?);
@@ -142,7 +142,7 @@ fn in_processes(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), String> 
     Ok((run, outcome))
 }
 
-/// The positions that the plant has printed before its last line.
+/// Reads the positions that the plant printed before its last line.
 fn positions(printed: &[u8]) -> Option<Run> {
     let text = std::str::from_utf8(printed).ok()?;
     let position = |line: &str| {
@@ -159,7 +159,7 @@ fn model(update: i64, runs: u32) -> Experiment {
     Experiment::new(name, Kind::Model(update), runs.collect())
 }
 
-/// All runs at once, as they mostly wait.
+/// Makes all runs at once, since they mostly wait.
 fn on_wall_clock(update: i64, runs: u32) -> Experiment {
     let clock = Monotonic::shared();
     let runs = thread::scope(|scope| {

@@ -1,38 +1,38 @@
-//! What was run, how often, and what came out.
+//! Experiments: kind, runs and results.
 
 use crate::metrics::{Metrics, Run};
 
-/// E of a run in lock-step, in mm, computed by an independent program.
+/// E of a run in lock-step, in mm, as computed by an independent program.
 pub const LOCK_STEP_ERROR: f64 = 0.346_411_671_372_834_46;
 
-/// What is between the two sides.
+/// The connection between the two sides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A common virtual time.
     LockStep,
-    /// In a model, an OPC link that hands over at this interval, in milliseconds.
+    /// A modelled OPC link that hands values over at this interval, in milliseconds.
     Model(i64),
-    /// The same in fact, on the wall clock.
+    /// A real link on the wall clock, with the same kind of interval.
     WallClock(i64),
 }
 
 /// Several runs of one kind.
 #[derive(Clone, Debug)]
 pub struct Experiment {
-    /// Its name in the table.
+    /// The experiment's name in the table.
     pub name: String,
-    /// What is between the two sides.
+    /// The connection between the two sides.
     pub kind: Kind,
     /// The runs.
     pub runs: Vec<Run>,
-    /// The figures of the runs.
+    /// The measurements of the runs.
     pub metrics: Metrics,
     /// The trace hash of each run in lock-step.
     pub hashes: Vec<String>,
 }
 
 impl Experiment {
-    /// Measures runs that have no trace hash.
+    /// Creates an experiment from runs that have no trace hash, and measures them.
     pub fn new(name: impl Into<String>, kind: Kind, runs: Vec<Run>) -> Self {
         Self {
             name: name.into(),
@@ -44,11 +44,11 @@ impl Experiment {
     }
 }
 
-/// What must hold of the experiments together.
+/// Checks the conditions that the experiments must meet together.
 ///
 /// # Errors
 ///
-/// What does not.
+/// Returns the condition that is not met.
 pub fn verdict(experiments: &[Experiment]) -> Result<(), String> {
     let (lock_step, free): (Vec<_>, Vec<_>) =
         experiments.iter().partition(|of| of.kind == Kind::LockStep);
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
     use crate::path::CORNERS;
 
-    /// A run that is this far off at its end.
+    /// Returns a run that is this far off at its end.
     fn off(by: f64) -> Run {
         vec![CORNERS[0], [CORNERS[5][0] + by, CORNERS[5][1]]]
     }

@@ -1,8 +1,9 @@
-//! A model of a PLC and a simulation that nobody synchronises, the same for each seed.
+//! A model of a PLC and a simulation that nobody synchronises; the same seed gives the same run.
 //!
-//! The PLC runs on wall time. The simulation intends to compute 5 ms of its own time every 5 ms, but its computer also does
-//! other things: frames vary, and now and then one takes much longer. OPC hands over positions and commands at an interval
-//! and with a delay. So the simulation's time falls behind the PLC's, and neither side sees the other in time.
+//! The PLC runs on wall time. The simulation intends to compute 5 ms of its own time every 5 ms, but its computer also
+//! does other work: frame times vary, and now and then a frame takes much longer. OPC hands over positions and commands
+//! at an interval and with a delay. The simulation's time therefore falls behind the PLC's, and neither side sees the
+//! other in time.
 
 use std::collections::VecDeque;
 
@@ -16,26 +17,26 @@ use crate::random::Random;
 
 /// The intended time between two frames of the simulation, and the simulation time that a frame computes.
 pub const FRAME_MILLIS: i64 = 5;
-/// The standard deviation of a frame's wall time, as a part of the intended time.
+/// The standard deviation of a frame's wall time, as a fraction of the intended time.
 const JITTER: f64 = 0.3;
-/// The least wall time of a frame, as a part of the intended time: it computes something.
+/// The shortest wall time of a frame, as a fraction of the intended time: computing takes some time.
 const SHORTEST: f64 = 0.1;
-/// The probability that a frame is held up, and for how long, in ms.
+/// The probability that a frame is held up, and the shortest and longest hold-up, in ms.
 const HITCH: (f64, f64, f64) = (0.01, 20.0, 120.0);
-/// The delay of what OPC hands over, in ms.
+/// The shortest and longest delay of the OPC link, in ms.
 const DELAY: (f64, f64) = (2.0, 15.0);
 
-/// A span of milliseconds, rounded to nanoseconds.
+/// Converts a span of milliseconds, rounded to nanoseconds.
 #[expect(clippy::cast_possible_truncation, reason = "less than a second")]
 fn millis(span: f64) -> Nanos {
     Nanos((span * 1e6).round() as i64)
 }
 
-/// One direction of the OPC link: what is handed over, and when it arrives.
+/// One direction of the OPC link: the values under way, and their arrival times.
 #[derive(Debug, Default)]
 struct Direction {
     arrived: Point,
-    /// In the order of sending, which the link keeps.
+    /// In the order of sending, which the link preserves.
     under_way: VecDeque<(Nanos, Point)>,
 }
 
@@ -57,7 +58,7 @@ impl Direction {
     }
 }
 
-/// A run of `steps` milliseconds of simulation time, with an OPC link that hands over at every `update`.
+/// Runs `steps` milliseconds of simulation time, with an OPC link that hands over at every `update`.
 pub fn run(seed: u64, update: Nanos, steps: usize) -> Run {
     let mut random = Random::new(seed);
     let path = Path::default();
@@ -77,7 +78,7 @@ pub fn run(seed: u64, update: Nanos, steps: usize) -> Run {
             wall += random.between(HITCH.1, HITCH.2);
         }
         now += millis(wall);
-        // What happens until the frame is computed, in the order of time.
+        // The events until the frame is computed, in the order of time.
         while scan.min(exchange) <= now {
             if scan <= exchange {
                 commanded = command(&path, scan, positions.receive(scan));
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
     use crate::metrics::Metrics;
 
-    /// The seeds 1 to 10.
+    /// Measures the runs of the seeds 1 to 10.
     fn metrics(update_millis: i64) -> Metrics {
         let update = Nanos::from_millis(update_millis);
         let runs: Vec<Run> = (1..=10).map(|seed| run(seed, update, 4702)).collect();
@@ -111,9 +112,10 @@ mod tests {
         Metrics::of(&runs)
     }
 
-    /// Our own figures to the last digits, and roughly those of an independent model of the same description, which leaves
-    /// open the generator, the phase of OPC and whether its messages overtake each other. E and G agree within a fifth; D
-    /// within 30 %, as it is the largest of 45 pairs, and between sets of ten seeds varies by as much.
+    /// Compares with our own figures to the last digits, and roughly with those of an independent model of the same
+    /// description. The description leaves open the generator, the phase of OPC, and whether messages overtake each
+    /// other. E and G agree within a fifth. D agrees within 30 %: it is the largest of 45 pairs, and varies by as much
+    /// between sets of ten seeds.
     #[track_caller]
     fn assert_figures(update_millis: i64, own: [f64; 3], independent: [f64; 3]) {
         let metrics = metrics(update_millis);

@@ -1,11 +1,11 @@
-//! A servo robot with two axes and its PLC: what virtual time is worth, measured.
+//! A servo robot with two axes and its PLC: an experiment that measures the benefit of virtual time.
 //!
-//! The robot moves its tool along a path in the plane of x and z; the PLC closes the position loops, so the path
+//! The robot moves its tool along a path in the plane of x and z. The PLC closes the position loops, so the path
 //! depends on when each side sees what the other has done. The same machine and the same program run
 //!
 //! * in lock-step, as two [participants](tickbus_virtual_time::Participant) of a common virtual time ([`lock_step`]),
-//! * free-wheeling, in a model of a PLC on wall time that is linked with a simulation by OPC ([`free_wheeling`]),
-//! * free-wheeling in fact, on threads that sleep ([`wall_clock`]).
+//! * free-wheeling, in a model of a PLC on wall time that is linked to a simulation by OPC ([`free_wheeling`]),
+//! * really free-wheeling, on threads that sleep ([`wall_clock`]).
 //!
 //! [`page`] shows the paths side by side. `docs/virtual-time.md` explains the experiment.
 

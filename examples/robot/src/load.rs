@@ -1,10 +1,10 @@
-//! A loaded computer, on request.
+//! Loads the computer on request.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 
-/// Keeps all processors busy until dropped: a thread for each that does nothing, as fast as it can.
+/// Keeps all processors busy until dropped: one thread per processor spins without doing anything.
 #[derive(Debug)]
 pub struct Load {
     ends: Arc<AtomicBool>,
@@ -12,7 +12,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// Begins.
+    /// Starts the load.
     pub fn on_all_processors() -> Self {
         let ends = Arc::new(AtomicBool::new(false));
         let processors = thread::available_parallelism().map_or(1, usize::from);

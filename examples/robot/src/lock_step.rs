@@ -14,22 +14,22 @@ use tickbus_virtual_time::{
 use crate::metrics::Run;
 use crate::participants::{Machine, Program, STEP, STEPS};
 
-/// What the server is told: both must be there, and the run has an end.
+/// Returns the server's settings: both participants must be there, and the run has an end.
 pub fn settings() -> Settings {
     let names = ["plant", "plc"].map(str::to_owned).to_vec();
     Settings {
         steps: Some(STEPS as u64),
-        // So that a client that cannot be started ends the run.
+        // Limited, so that the run ends if a client cannot be started.
         join: Nanos::from_secs(60),
         ..Settings::new(STEP, StartCondition::Names(names))
     }
 }
 
-/// A run in this thread.
+/// Makes a run in this thread.
 ///
 /// # Errors
 ///
-/// Why there was none.
+/// Returns why there was no run.
 pub fn in_process(plc_first: bool) -> Result<(Run, Outcome), Ended> {
     let (mut machine, mut program) = (Machine::default(), Program::default());
     let mut participants: Vec<&mut dyn Participant> = vec![&mut machine, &mut program];
@@ -40,7 +40,7 @@ pub fn in_process(plc_first: bool) -> Result<(Run, Outcome), Ended> {
     Ok((machine.into_run(), outcome))
 }
 
-/// Takes part in a run where its server is.
+/// Takes part in a run at its server.
 ///
 /// # Errors
 ///
@@ -55,12 +55,12 @@ pub fn join(server: &Meeting, participant: &mut dyn Participant) -> Result<Outco
     }
 }
 
-/// A run with a server in this process, at port 0 on one that the system chooses: `clients` starts both where the server is,
-/// and returns when they are done.
+/// Makes a run with a server in this process; with port 0 the system chooses the port. `clients` starts both clients
+/// with the server's address, and returns when they are done.
 ///
 /// # Errors
 ///
-/// Why there was none.
+/// Returns why there was no run.
 pub fn served<T>(at: Meeting, clients: impl FnOnce(&Meeting) -> T) -> Result<(T, Outcome), Ended> {
     type Serve = Box<dyn FnOnce(Hosting<'_>) -> Result<Outcome, Ended> + Send>;
     let cannot = |error: io::Error| system(&format!("no server can be started: {error}"));

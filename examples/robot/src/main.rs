@@ -1,4 +1,4 @@
-//! The robot's experiment as a command: the demo, and plant and PLC as processes of their own.
+//! The robot's experiment as a command: the demo, and plant and PLC as separate processes.
 
 mod demo;
 

@@ -1,15 +1,15 @@
-//! What is measured of the runs: how far from the path, and how far from each other.
+//! Measures runs: the distance from the path, and the distance from each other.
 
 use crate::path::{CORNERS, Point, distance, distance_from};
 
 /// The positions of the tool in one run, one for each millisecond of simulation time.
 pub type Run = Vec<Point>;
 
-/// Only each tenth position is compared for the distance between two paths, as each is compared with all of the other
-/// path; at 300 mm/s these are 3 mm apart, on the straight line between which the others nearly lie.
+/// Only every tenth position is compared for the distance between two paths, since each is compared with the whole
+/// other path. At 300 mm/s these positions are 3 mm apart, and the others lie nearly on the straight line between them.
 const EVERY: usize = 10;
 
-/// The figures of several runs of one experiment, in mm.
+/// The measurements of several runs of one experiment, in mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metrics {
     /// E: the largest distance of a position from the commanded path, as the mean over the runs.
@@ -47,7 +47,7 @@ impl Metrics {
     }
 }
 
-/// E of one run: its largest distance from the commanded path, in mm.
+/// Returns E of one run: its largest distance from the commanded path, in mm.
 pub fn error(run: &[Point]) -> f64 {
     largest(run.iter().map(|&point| distance_from(&CORNERS, point)))
 }
@@ -64,7 +64,7 @@ fn deviation(a: &Run, b: &Run) -> f64 {
     of(&a, &b).max(of(&b, &a))
 }
 
-/// Each [`EVERY`]th position and the last.
+/// Returns every [`EVERY`]th position, and the last.
 pub(crate) fn thinned(run: &[Point]) -> Vec<Point> {
     let mut points: Vec<Point> = run.iter().step_by(EVERY).copied().collect();
     points.extend(run.last());

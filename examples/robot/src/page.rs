@@ -12,14 +12,14 @@ use crate::path::{CORNERS, Point};
 
 const OWN_STYLE: &str = include_str!("page.css");
 
-/// A picture of the page: its heading, the experiment that it shows, and what one sees.
+/// A picture of the page: its heading, its experiment, and a caption.
 #[derive(Clone, Copy, Debug)]
 pub struct Picture<'a> {
     /// The heading.
     pub heading: &'a str,
-    /// What it shows.
+    /// The experiment that the picture shows.
     pub of: &'a Experiment,
-    /// The sentence below it.
+    /// The sentence below the picture.
     pub caption: &'a str,
 }
 
@@ -127,7 +127,7 @@ impl Frame {
         )
     }
 
-    /// Lines at every 100 mm.
+    /// Returns lines at every 100 mm.
     fn grid(self) -> String {
         let mut data = String::new();
         for axis in [0, 1] {
@@ -170,10 +170,10 @@ fn figure(picture: Picture<'_>, frame: Frame) -> Markup {
     }
 }
 
-/// The place of a leg's number: inside of the path, beside the leg's middle.
+/// Returns the place of a leg's number: inside the path, beside the leg's middle.
 fn beside(ends: &[Point]) -> Point {
     let middle = [0, 1].map(|axis| f64::midpoint(ends[0][axis], ends[1][axis]));
-    // Towards the middle of the whole.
+    // Towards the middle of the whole path.
     let inwards = [250.0 - middle[0], 120.0 - middle[1]];
     let length = (inwards[0] * inwards[0] + inwards[1] * inwards[1]).sqrt();
     [
@@ -182,7 +182,7 @@ fn beside(ends: &[Point]) -> Point {
     ]
 }
 
-/// A polyline as SVG, with z upwards, in tenths of a millimetre.
+/// Returns a polyline as SVG, with z upwards, in tenths of a millimetre.
 fn line(points: &[Point]) -> String {
     let mut data = String::with_capacity(points.len() * 12);
     for (at, [x, z]) in points.iter().enumerate() {
@@ -244,7 +244,7 @@ fn meaning(pictures: &[Picture<'_>]) -> Markup {
     }
 }
 
-/// A length. In lock-step all digits are the same in every run, and an exact zero is said to be one.
+/// Formats a length. In lock-step all digits are the same in every run, and an exact zero is written as `0`.
 fn millimetres(of: Kind, value: f64) -> String {
     match of {
         Kind::LockStep if value == 0.0 => "0".to_owned(),

@@ -11,15 +11,15 @@ use crate::metrics::Run;
 use crate::path::{Path, Point};
 use crate::plant::{Plant, STEP_MILLIS};
 
-/// The number of steps of a run: until 0.5 s after the end of the path.
+/// The number of steps of a run, which ends 0.5 s after the end of the path.
 pub const STEPS: usize = 4702;
 
 /// The step of the virtual time.
 pub const STEP: Nanos = Nanos::from_millis(STEP_MILLIS);
 
-/// What the plant writes and the PLC reads: the position of the tool, in mm.
+/// The position of the tool, in mm: the plant writes it, and the PLC reads it.
 const POSITION: [&str; 2] = ["position_x", "position_z"];
-/// What the PLC writes and the plant reads: the commanded speeds, in mm/s.
+/// The commanded speeds, in mm/s: the PLC writes them, and the plant reads them.
 const COMMAND: [&str; 2] = ["speed_x", "speed_z"];
 
 fn declaration(name: &str, multiple: i64, writes: [&str; 2], reads: [&str; 2]) -> Declaration {
@@ -43,7 +43,7 @@ fn write(slots: &mut [u64], values: Point) {
     slots.copy_from_slice(&values.map(f64::to_bits));
 }
 
-/// The plant, which runs at every step, and its positions so far.
+/// The plant, which runs at every step, with its positions so far.
 #[derive(Clone, Debug)]
 pub struct Machine {
     plant: Plant,
@@ -60,7 +60,7 @@ impl Default for Machine {
 }
 
 impl Machine {
-    /// The positions after each step.
+    /// Returns the positions after each step.
     pub fn into_run(self) -> Run {
         self.run
     }
@@ -119,7 +119,7 @@ mod tests {
         assert!(last <= end && end < last + 1e-3);
     }
 
-    /// The barrier in ten lines: both read what was committed before the step.
+    /// The barrier in ten lines: both sides read what was committed before the step.
     #[test]
     fn both_on_the_snapshot_of_each_step_give_the_error_of_an_independent_program() {
         let (mut plant, mut plc) = (Machine::default(), Program::default());

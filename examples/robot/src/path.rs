@@ -5,7 +5,7 @@ use tickbus_base::time::Nanos;
 /// A point of the plane in mm: x, z.
 pub type Point = [f64; 2];
 
-/// The corners of the path, at each of which the tool stops.
+/// The corners of the path; the tool stops at each of them.
 pub const CORNERS: [Point; 6] = [
     [0.0, 0.0],
     [0.0, 200.0],
@@ -23,7 +23,7 @@ const ACCELERATION: f64 = 1500.0;
 /// A straight piece of the path, from stop to stop.
 #[derive(Clone, Copy, Debug)]
 struct Leg {
-    /// The time at which it begins, in seconds.
+    /// The time at which the leg begins, in seconds.
     begin: f64,
     from: Point,
     to: Point,
@@ -31,13 +31,13 @@ struct Leg {
 }
 
 impl Leg {
-    /// The time that the leg takes, in seconds. Every leg is long enough to reach [`SPEED`].
+    /// Returns the time that the leg takes, in seconds. Every leg is long enough to reach [`SPEED`].
     fn duration(&self) -> f64 {
         let ramp = SPEED / ACCELERATION;
         2.0 * ramp + (self.length - SPEED * ramp) / SPEED
     }
 
-    /// The distance travelled `time` seconds after the leg began.
+    /// Returns the distance travelled `time` seconds after the leg began.
     fn travelled(&self, time: f64) -> f64 {
         let (ramp, duration) = (SPEED / ACCELERATION, self.duration());
         if time <= 0.0 {
@@ -55,7 +55,7 @@ impl Leg {
     }
 }
 
-/// Where the tool should be at each time: legs with a trapezoidal profile of speed.
+/// The commanded position over time: legs with a trapezoidal speed profile.
 #[derive(Clone, Copy, Debug)]
 pub struct Path {
     legs: [Leg; CORNERS.len() - 1],
@@ -81,12 +81,12 @@ impl Default for Path {
 }
 
 impl Path {
-    /// The time from the first corner to the last, in seconds.
+    /// Returns the time from the first corner to the last, in seconds.
     pub fn duration(&self) -> f64 {
         self.duration
     }
 
-    /// The commanded position at `time`.
+    /// Returns the commanded position at `time`.
     pub fn at(&self, time: Nanos) -> Point {
         #[expect(clippy::cast_precision_loss, reason = "exact up to 104 days")]
         let time = time.0 as f64 / 1e9;
@@ -98,15 +98,15 @@ impl Path {
     }
 }
 
-/// The distance of two points in mm.
+/// Returns the distance of two points in mm.
 ///
-/// Not by `hypot`, whose last bit differs from library to library.
+/// Does not use `hypot`, whose last bit differs from library to library.
 pub fn distance(a: Point, b: Point) -> f64 {
     let (dx, dz) = (b[0] - a[0], b[1] - a[1]);
     (dx * dx + dz * dz).sqrt()
 }
 
-/// The distance of a point from the nearest point of a polyline, in mm; infinite if that has no points.
+/// Returns the distance of a point from the nearest point of a polyline, in mm; infinite if the line has no points.
 pub fn distance_from(line: &[Point], point: Point) -> f64 {
     let to_first = line.first().map_or(f64::INFINITY, |&p| distance(p, point));
     line.windows(2)
@@ -131,7 +131,8 @@ mod tests {
 
     #[test]
     fn the_path_lasts_as_long_as_its_legs() {
-        // 2 legs of 200 mm up and down, 2 slanted ones of sqrt(32500) mm, one of 200 mm; each 0.2 s longer than at full speed.
+        // 2 legs of 200 mm up and down, 2 slanted legs of sqrt(32500) mm, 1 leg of 200 mm; each takes 0.2 s longer than
+        // at full speed.
         let seconds = (600.0 + 2.0 * 32_500.0_f64.sqrt()) / 300.0 + 5.0 * 0.2;
         assert!((Path::default().duration() - seconds).abs() < 1e-12);
         assert!((seconds - 4.201_850).abs() < 1e-6);

@@ -4,12 +4,12 @@ use crate::path::{CORNERS, Point};
 
 /// The step of the simulation, in milliseconds.
 pub const STEP_MILLIS: i64 = 1;
-/// The same in seconds.
+/// The step of the simulation, in seconds.
 const STEP: f64 = 1e-3;
 
-/// The part of a difference in speed that an axis makes up for in one step: 1 − e^(−h/τ), for h = 1 ms and τ = 20 ms.
+/// The fraction of a speed difference that an axis makes up for in one step: 1 − e^(−h/τ), for h = 1 ms and τ = 20 ms.
 ///
-/// Written out, as the last bit of `exp` differs from library to library, and the path shall not.
+/// Written out, since the last bit of `exp` differs from library to library, and the path must not.
 const CATCH_UP: f64 = 0.048_770_575_499_285_984;
 
 /// The axes at one moment.
@@ -20,7 +20,7 @@ pub struct Plant {
 }
 
 impl Default for Plant {
-    /// At rest at the first corner.
+    /// Creates axes at rest at the first corner.
     fn default() -> Self {
         Self {
             position: CORNERS[0],
@@ -30,12 +30,12 @@ impl Default for Plant {
 }
 
 impl Plant {
-    /// The position of the tool in mm.
+    /// Returns the position of the tool in mm.
     pub fn position(&self) -> Point {
         self.position
     }
 
-    /// One step of 1 ms with the commanded speeds in mm/s.
+    /// Does one step of 1 ms with the commanded speeds in mm/s.
     pub fn step(&mut self, command: Point) {
         for (axis, command) in command.into_iter().enumerate() {
             self.speed[axis] += (command - self.speed[axis]) * CATCH_UP;
@@ -60,7 +60,7 @@ mod tests {
         for _ in 20..1000 {
             plant.step([100.0, 0.0]);
         }
-        // 1 s at full speed, less the lag, which is τ to half a step.
+        // 1 s at full speed, less the lag, which is τ to within half a step.
         assert!((plant.position()[0] - 100.0 * (1.0 - 0.02)).abs() < 0.06);
     }
 }

@@ -7,12 +7,12 @@ pub struct Random(u64);
 const TWO_TO_53: f64 = 9_007_199_254_740_992.0;
 
 impl Random {
-    /// The sequence of a seed.
+    /// Creates the sequence of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next number, evenly distributed from 0 to 1, without 1.
+    /// Returns the next number, evenly distributed from 0 (included) to 1 (excluded).
     pub fn unit(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mixed = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -22,13 +22,14 @@ impl Random {
         unit / TWO_TO_53
     }
 
-    /// The next number, evenly distributed between two.
+    /// Returns the next number, evenly distributed between two limits.
     pub fn between(&mut self, least: f64, most: f64) -> f64 {
         least + (most - least) * self.unit()
     }
 
-    /// The next number of a Gaussian distribution with mean 0 and standard deviation 1, to ±6: the sum of twelve even
-    /// ones, as the last bits of `ln` and `cos` differ from library to library.
+    /// Returns the next number of a Gaussian distribution with mean 0 and standard deviation 1, limited to ±6. The
+    /// number is a sum of twelve evenly distributed ones, since the last bits of `ln` and `cos` differ from library to
+    /// library.
     pub fn gaussian(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }

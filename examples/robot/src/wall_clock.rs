@@ -1,4 +1,4 @@
-//! Plant and PLC free-wheeling in fact: threads that sleep, and an OPC link between them that sleeps, too.
+//! Plant and PLC really free-wheeling: threads that sleep, and an OPC link between them that also sleeps.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -10,7 +10,7 @@ use crate::metrics::Run;
 use crate::path::{Path, Point};
 use crate::plant::Plant;
 
-/// What each side has written, and what the link has handed over to the other one.
+/// The values that each side has written, and those that the link has handed over to the other side.
 #[derive(Debug, Default)]
 struct Exchange {
     position: Point,
@@ -19,11 +19,11 @@ struct Exchange {
     command_seen: Point,
 }
 
-/// A run of `steps` milliseconds of simulation time, which takes about as long, with an OPC link that hands over at every
-/// `update`. No two runs are the same.
+/// Runs `steps` milliseconds of simulation time, which takes about as long in real time, with an OPC link that hands
+/// over at every `update`. No two runs are the same.
 pub fn run(clock: &dyn Clock, update: Nanos, steps: usize) -> Run {
     let exchange = Mutex::new(Exchange::default());
-    // The values are plain numbers, and so are right whatever panicked.
+    // The values are plain numbers, which stay valid whichever thread panicked.
     let locked = || exchange.lock().unwrap_or_else(PoisonError::into_inner);
     let stop = Stop::new();
     std::thread::scope(|scope| {
@@ -45,7 +45,7 @@ pub fn run(clock: &dyn Clock, update: Nanos, steps: usize) -> Run {
         let mut plant = Plant::default();
         let mut run = Run::with_capacity(steps);
         while run.len() < steps {
-            // A simulation waits for its next frame; what that took and the frame itself add up.
+            // A simulation waits for its next frame; its computing time adds to the frame time.
             clock.wait_until(clock.now() + Nanos::from_millis(FRAME_MILLIS), &stop);
             let command = locked().command_seen;
             for _ in 0..FRAME_MILLIS.unsigned_abs().min((steps - run.len()) as u64) {

@@ -1,4 +1,4 @@
-//! The robot in lock-step: every run the same, whoever is first and however busy the computer.
+//! The robot in lock-step: every run is the same, whichever client is first and however busy the computer.
 
 use std::sync::{Mutex, PoisonError};
 use std::thread;
@@ -14,10 +14,10 @@ use tickbus_virtual_time::{Ended, Meeting, Outcome};
 /// The trace hash of the run. A client in another language must give the same, as `java/sdsp` does.
 const HASH: &str = "9e758daaecadc30e";
 
-/// The load of one test is not that of the others.
+/// Runs one test at a time, so that the load of one does not affect the others.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// This many runs, told whether the PLC is first.
+/// Makes this many runs and compares them; `one` receives true if the PLC is first.
 #[track_caller]
 fn assert_all_equal(runs: u32, one: impl Fn(bool) -> Result<(Run, Outcome), Ended>) {
     let runs = (0..runs).map(|number| one(number % 3 == 0).expect("it runs"));
@@ -47,7 +47,7 @@ fn in_one_process_all_runs_are_equal() {
     assert_all_equal(10, lock_step::in_process);
 }
 
-/// A run with a thread for each client.
+/// Makes a run with a thread for each client.
 fn with_threads(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), Ended> {
     lock_step::served(at, |server| {
         let mut machine = Machine::default();

@@ -1,4 +1,4 @@
-//! `tickbus bridge mqtt FILE`: topics of an MQTT broker as the channels of a client of the dispatcher.
+//! `tickbus bridge mqtt FILE`: the topics of an MQTT broker as the channels of a client of the dispatcher.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `tickbus bridge serial DEVICE`: an ASCII driver at a serial line as a client of the dispatcher.
+//! `tickbus bridge serial DEVICE`: an ASCII driver on a serial line as a client of the dispatcher.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! A controller on its socket: values in, scans, values out.
+//! A controller and its connection to the dispatcher: values in, scans, values out.
 
 use std::io::{self, Read as _, Write as _};
 use std::net::TcpStream;
@@ -18,25 +18,26 @@ use tickbus_function_blocks::{Controller, WallTime};
 /// The key of the socket in the poll set.
 const SOCKET: usize = 0;
 
-/// What a controller works with.
+/// The parameters of a hosted controller.
 pub(super) struct Hosting<'h> {
     pub(super) address: &'h Address,
     pub(super) cycle: Nanos,
-    /// When it ends by itself.
+    /// The time at which the controller ends on its own.
     pub(super) end: Nanos,
     pub(super) clock: &'h dyn Clock,
     pub(super) stop: &'h Stop,
 }
 
-/// What it has done.
+/// Counts the controller's work.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Counts {
     pub(super) scans: u64,
-    /// How often the dispatcher has taken it.
+    /// The number of times that the dispatcher has accepted the controller.
     pub(super) joined: u64,
 }
 
-/// Runs until stopped, or until its end. While the dispatcher is away all inputs are off, as if their cables were pulled.
+/// Runs until stopped, or until the end time. While the dispatcher is away, all inputs are off, as if their cables were
+/// pulled.
 pub(super) fn run(
     controller: Controller,
     client: Client,
@@ -75,12 +76,12 @@ struct Host<'h> {
     dialler: Dialler,
     stream: Option<TcpStream>,
     interest: Interest,
-    /// The values that came with the last read; `None` ends those of a line.
+    /// The values of the last read; `None` ends the values of a line.
     arrived: Vec<Option<(Channel, Number)>>,
     news: News,
     counts: Counts,
     zone: TimeZone,
-    /// When a timer of the program is over.
+    /// The time when the program's next timer expires.
     due: Nanos,
 }
 
@@ -131,7 +132,7 @@ impl Host<'_> {
 
     fn read(&mut self, now: Nanos) -> Result<(), String> {
         let mut buffer = [0; 4096];
-        // A dispatcher that never pauses must not keep the program from its scans.
+        // A dispatcher that never pauses must not keep the program from scanning.
         for _ in 0..16 {
             let Some(stream) = &mut self.stream else {
                 break;
@@ -172,12 +173,12 @@ impl Host<'_> {
         for line in arrived.split(Option::is_none) {
             let values = || line.iter().flatten();
             if values().any(|(channel, value)| self.terminal.would_lose_an_edge(*channel, value)) {
-                // As if the scan had come in between.
+                // As if the scan had come between the two lines.
                 self.scan(now);
                 self.write(now)?;
             }
             for (channel, value) in values() {
-                // A line may have an input more than once.
+                // A line can contain an input more than once.
                 if self.terminal.would_lose_an_edge(*channel, value) {
                     self.scan(now);
                     self.write(now)?;
@@ -196,7 +197,7 @@ impl Host<'_> {
         self.counts.scans += 1;
         let (controller, client) = (&self.terminal.controller, &mut self.client);
         let mut set = |kind, number, value: f64| {
-            // A number beyond all that can be said is not said; the last one stays.
+            // A number that is too large to send is skipped; the last one stays.
             if let Some(value) = Number::of(value) {
                 client.set(Channel { kind, number }, value);
             }
@@ -272,12 +273,12 @@ impl Terminal {
         }
     }
 
-    /// What an input becomes.
+    /// Returns the new state of an input.
     fn is_on(&self, number: u16, value: &Number) -> bool {
         level(value.to_f64()).unwrap_or(self.inputs[usize::from(number) - 1])
     }
 
-    /// Whether this input would switch for the second time since the last scan.
+    /// Returns true if this input would switch for the second time since the last scan.
     fn would_lose_an_edge(&self, channel: Channel, value: &Number) -> bool {
         let Channel { kind, number } = channel;
         let place = usize::from(number).wrapping_sub(1);
@@ -314,7 +315,7 @@ impl Terminal {
     }
 }
 
-/// What was reported last, so that repetitions are not.
+/// The last reports, so that they are not repeated.
 #[derive(Default)]
 struct News {
     line: String,
@@ -340,7 +341,7 @@ impl News {
     }
 }
 
-/// The day of the week and the time of the day in a time zone.
+/// Returns the day of the week and the time of day in a time zone.
 fn wall_time(zone: &TimeZone) -> WallTime {
     let now = system_time();
     let seconds = i64::try_from(now.as_secs()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! The text with the CONNECT lines of a controller.
+//! Reads the text with the CONNECT lines of a controller.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, load_text};
 use tickbus_dispatcher::grammar::{self, Line};
 use tickbus_dispatcher::{Cable, Counts};
 
-/// Reads the connections of a client with these channels. Empty lines and lines that begin with `#` do not count.
+/// Reads the connections of a client with these channels. Empty lines and lines that begin with `#` are ignored.
 pub(super) fn load(path: &Path, counts: Counts) -> Result<Vec<Cable>, Mistakes> {
     parse(&path.display().to_string(), &load_text(path)?, counts)
 }

@@ -1,4 +1,4 @@
-//! `tickbus profibus advise FILE`: how fast this machine answers, and the slot time for that.
+//! `tickbus profibus advise FILE`: measures how fast this machine answers, and advises a slot time.
 
 use std::fs;
 use std::io::{self, Write as _};
@@ -14,10 +14,10 @@ use tickbus_bus_profibus::telegram::{Control, Frame};
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::{Config, Kinds};
 
-/// At this rate the wait before an answer, which is no part of what is measured, is short.
+/// At this rate the idle time before an answer, which does not count, is short.
 const BAUD: u32 = 500_000;
 
-/// How long an answer is waited for.
+/// The longest time to wait for an answer.
 const PATIENCE: Duration = Duration::from_millis(200);
 
 /// The pause between two requests.
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let line = PseudoTerminal::open().map(|(line, device)| {
         options.line.device = device.display().to_string();
         options.line.settings.baud = BAUD;
-        // The latest that the rate here allows.
+        // The latest answer that the rate used here allows.
         options.line.max_tsdr = u16::MAX;
         line
     });
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     Outcome::Done
 }
 
-/// What the driver of a port holds bytes back for, and a line about it.
+/// Returns how long the driver of a port holds bytes back, and a line about it.
 fn held_back(device: &Path) -> (Nanos, String) {
     let name = fs::canonicalize(device).ok();
     let name = name.as_deref().and_then(Path::file_name);
@@ -135,18 +135,18 @@ fn measure(
     .append(&mut request);
     let mut replies = TimeHistogram::new();
     let mut answer = [0; 64];
-    // It listens first, and the port may not be open yet.
+    // The station listens first, and the port may not be open yet.
     let mut vain = 0;
     while replies.count() < u64::from(count) {
-        // Before it: the answer may be there when the call returns.
+        // Taken before writing: the answer may have arrived when the call returns.
         let sent = clock.now();
         line.write_all(&request)?;
         if line.read_within(&mut answer, PATIENCE)? > 0 {
             replies.record(clock.now() - sent);
-            // An answer in pieces ends here.
+            // Reads the rest of an answer that arrives in pieces.
             while line.read_within(&mut answer, PAUSE)? > 0 {}
         } else {
-            // Once it has listened, no answer is one that came too late.
+            // Once the station has answered, a missing answer counts as one that came too late.
             if replies.count() > 0 {
                 replies.record(clock.now() - sent);
             }

@@ -1,4 +1,4 @@
-//! `tickbus profibus monitor DEVICE`: who talks to whom.
+//! `tickbus profibus monitor DEVICE`: shows who talks to whom.
 
 use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Read as _, Write as _};
@@ -11,11 +11,11 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
 use tickbus_fieldbus::serial;
 
-/// How often the table is printed.
+/// The interval at which the table is printed.
 const EVERY: Nanos = Nanos::from_secs(1);
 
-/// The link type of pcap files for formats of one's own. That of PROFIBUS, 257, is registered, but Wireshark opens no
-/// file with it.
+/// The link type of pcap files with a private format. PROFIBUS has a registered one, 257, but Wireshark cannot open
+/// files with it.
 const LINKTYPE_USER0: u32 = 147;
 
 /// Listen to a line: its stations, their states, and what goes wrong; never says a word itself.
@@ -58,7 +58,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// Where telegrams go.
+/// The destinations of telegrams.
 struct Keep {
     prints: bool,
     log: Option<BufWriter<File>>,
@@ -93,14 +93,14 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
     ctrlc::set_handler(handler).map_err(|error| format!("Ctrl-C cannot be caught: {error}"))?;
     match watch(arguments, &mut port, &mut keep, &stop) {
         Err(Ending::Port(error)) => Err(serial::gone(&device, error).to_string()),
-        // Nobody reads on: as after Ctrl-C.
+        // The reader is gone: end as after Ctrl-C.
         Err(Ending::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(Ending::Output(error)) => Err(format!("cannot write any more: {error}")),
         Ok(()) => Ok(()),
     }
 }
 
-/// Why it ends before its time.
+/// Says why the monitor ends early.
 enum Ending {
     Port(io::Error),
     Output(io::Error),
@@ -154,7 +154,7 @@ fn watch(
             keep.flush().map_err(Ending::Output)?;
         }
     }
-    // What came since.
+    // Changes since the last table.
     let table = monitor.table();
     if table != told {
         write!(io::stdout().lock(), "{table}").map_err(Ending::Output)?;
@@ -163,7 +163,7 @@ fn watch(
 }
 
 impl Keep {
-    /// The head of the pcap file: nanoseconds, version 2.4.
+    /// Writes the header of the pcap file: nanoseconds, version 2.4.
     fn begin(&mut self) -> io::Result<()> {
         let Some(pcap) = &mut self.pcap else {
             return Ok(());
@@ -199,7 +199,7 @@ impl Keep {
         };
         let now = system_time();
         let length = u32::try_from(heard.bytes.len()).unwrap_or(u32::MAX);
-        // Seconds in 32 bits, as the format has them.
+        // The format stores seconds in 32 bits.
         let seconds = u32::try_from(now.as_secs()).unwrap_or(u32::MAX);
         for word in [seconds, now.subsec_nanos(), length, length] {
             pcap.write_all(&word.to_le_bytes())?;

@@ -14,7 +14,7 @@ use tickbus_fieldbus::{LinkState, Role};
 use tickbus_gateway::{Gateway, GatewayOptions};
 use tickbus_virtual_time::Meeting;
 
-/// How often the state of the PLC's line is looked at until there is one.
+/// The interval at which the state of the PLC's line is checked until there is one.
 const LOOK: Nanos = Nanos::from_millis(10);
 
 /// Let a real PLC take part in a run, over its own bus.

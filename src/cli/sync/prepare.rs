@@ -1,4 +1,4 @@
-//! `tickbus sync prepare FILE...`: puts a PLC program on virtual time, and takes it off again.
+//! `tickbus sync prepare FILE...`: puts a PLC program on virtual time, or undoes that.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -59,7 +59,7 @@ pub(super) struct Arguments {
     no_clock: Vec<String>,
 }
 
-/// Reads an address of 32 bits, as it is to stand in the program.
+/// Parses an address of 32 bits, and returns it as the program needs it.
 fn address(text: &str) -> Result<String, String> {
     let capitals = text.to_ascii_uppercase();
     let rest = ["%ID", "%QD", "%MD"]
@@ -99,7 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     }
 }
 
-/// The files as they are to be, and remarks.
+/// The resulting files, and remarks.
 struct Made {
     files: Vec<Vec<u8>>,
     notes: Vec<String>,
@@ -111,7 +111,7 @@ fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
         return Err(wrong);
     }
     if arguments.undo {
-        // A program of several files has some in which nothing had to be changed.
+        // Some files of a program may need no change.
         let any = sources.iter().any(is_prepared);
         let mut notes = Vec::new();
         let (files, wrong) = split(sources.iter().map(|source| {
@@ -167,7 +167,7 @@ fn read(path: &Path) -> Result<Source, Mistakes> {
     }
 }
 
-/// Writes all files, or none if any of them would overwrite another one.
+/// Writes all files, or none if one of them would overwrite another file.
 fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>), Vec<Mistakes>> {
     let wrong = |path: &Path, what: &str, right: &str| {
         Mistakes::of_file(&path.display().to_string(), what, right)
@@ -223,12 +223,12 @@ fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>
     Ok((paths, made.notes))
 }
 
-/// Writes all files beside their places first, and renames them when all are complete.
+/// Writes all files next to their targets first, and renames them when all are complete.
 fn replace_all(paths: &[PathBuf], files: &[Vec<u8>]) -> Result<(), (PathBuf, io::Error)> {
     let mut parts: Vec<(PathBuf, PathBuf)> = Vec::new();
     let mut written = Ok(());
     for (path, bytes) in paths.iter().zip(files) {
-        // A link stays one: what it points to is replaced.
+        // A link stays a link: its target is replaced.
         let target = fs::canonicalize(path).unwrap_or_else(|_| path.clone());
         let mut part = target.as_os_str().to_owned();
         part.push(".part");
@@ -256,7 +256,7 @@ fn replace_all(paths: &[PathBuf], files: &[Vec<u8>]) -> Result<(), (PathBuf, io:
     written
 }
 
-/// Writes a file completely, with the rights of the one that it will replace.
+/// Writes a complete file, with the permissions of the file that it will replace.
 fn write_part(target: &Path, part: &Path, bytes: &[u8]) -> io::Result<()> {
     let old = fs::metadata(target).ok();
     if old.as_ref().is_some_and(fs::Metadata::is_dir) {

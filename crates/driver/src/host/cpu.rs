@@ -1,4 +1,4 @@
-//! A program with its process image, and one scan of it.
+//! A program with its process image, and one scan of the program.
 
 use std::sync::Arc;
 
@@ -20,36 +20,36 @@ use super::watched::{ScannedStation, WatchedScans};
 
 /// A program with the tick's end of its process image: a PLC without its bus.
 pub(super) struct Cpu {
-    /// The program, and further instances of it for the other stations.
+    /// The program of the first station, and a further instance for each other station.
     pub(super) units: Vec<Unit>,
     tick: TickEnd,
     max_age: Nanos,
-    /// The areas that it writes and reads.
+    /// The areas that the program writes and reads.
     pub(super) areas: (Area, Area),
     pub(super) scan_counters: Arc<ScanCounters>,
     /// The faults injected at this end, into the first station.
     pub(super) faults: Option<FrameFaults>,
     /// The recording of the first station.
     pub(super) tape: Option<ScanRecorder>,
-    /// Where another thread looks at it.
+    /// Lets another thread look at the program.
     pub(super) watched: Option<WatchedScans>,
 }
 
-/// The program of one station, and what it reads and writes.
+/// The program of one station, with its inputs and outputs.
 pub(super) struct Unit {
     pub(super) program: Box<dyn Program>,
     station: usize,
-    /// Where the edges of its outputs and inputs are counted.
+    /// The places where the edges of outputs and inputs are counted.
     counted: (Option<CountedArea>, Option<CountedArea>),
     pub(super) inputs: Inputs,
-    /// What a machine takes from a PLC that is not there; `None` at a PLC's end.
+    /// The values that a machine uses when its PLC is absent; `None` at a PLC's end.
     fail_safe: Option<FailSafe>,
     outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
     beats: FrameBeats,
-    /// What came for the present scan.
+    /// The arrival for the present scan.
     arrival: Option<Arrival>,
-    /// Whether the program was told that its peer is there.
+    /// True if the program saw its peer in the last scan.
     is_alive: bool,
 }
 
@@ -69,7 +69,7 @@ impl Unit {
                 scan_counters.place(station, writes),
                 scan_counters.place(station, reads),
             ),
-            // Until something comes: a peer that has said that it lives may have said nothing else yet.
+            // Valid until data arrive: a peer that has only shown that it is alive has sent no values yet.
             inputs: Inputs::new(fail_safe_frame(&config.table, station, reads)),
             fail_safe: (role == Role::Device).then(|| FailSafe::new(config, station, reads)),
             outputs_before: outputs.clone(),
@@ -80,7 +80,7 @@ impl Unit {
         }
     }
 
-    /// Takes over the inputs. A program is told when they are stale, and sees what came last.
+    /// Takes over the inputs. The program sees when they are stale, and then sees the last ones.
     fn read(
         &mut self,
         (now, max_age): (Nanos, Nanos),
@@ -99,7 +99,7 @@ impl Unit {
         });
     }
 
-    /// Lets `take` take over the inputs.
+    /// Lets `take` fetch the inputs.
     #[inline]
     pub(super) fn take(&mut self, take: impl FnOnce(&mut Inputs) -> Arrival) {
         let inputs = &mut self.inputs;
@@ -107,7 +107,7 @@ impl Unit {
         self.arrival = Some(take(inputs));
     }
 
-    /// Runs the program on them.
+    /// Runs the program on the inputs.
     #[inline]
     pub(super) fn run(&mut self, now: Nanos, in_time: bool, scan_counters: &ScanCounters) {
         let Self {
@@ -140,7 +140,7 @@ impl Unit {
         scan_counters.count(*written, outputs_before, outputs);
     }
 
-    /// Its inputs as the program saw them.
+    /// Returns the inputs as the program saw them.
     fn inputs(&self) -> &[u8] {
         match &self.fail_safe {
             Some(fail_safe) if !self.is_alive => &fail_safe.seen,
@@ -148,31 +148,31 @@ impl Unit {
         }
     }
 
-    /// Whether all of these were fail-safe values.
+    /// Returns true if all of these were fail-safe values.
     fn is_fail_safe(&self) -> bool {
         let is_whole = self.fail_safe.as_ref().is_some_and(|it| it.is_whole);
         is_whole && !self.is_alive
     }
 
-    /// Its outputs as the program left them.
+    /// Returns the outputs as the program left them.
     #[inline]
     pub(super) fn outputs(&self) -> &[u8] {
         &self.outputs
     }
 
-    /// Whether the program was told in its last scan that its peer is there.
+    /// Returns true if the program saw its peer in its last scan.
     #[inline]
     pub(super) fn is_alive(&self) -> bool {
         self.is_alive
     }
 
-    /// The age of its data.
+    /// Returns the age of the unit's data.
     #[inline]
     pub(super) fn age(&self) -> Nanos {
         self.arrival.map_or(Nanos::ZERO, |arrival| arrival.age)
     }
 
-    /// How its last scan went.
+    /// Returns the status of the last scan.
     fn code(&self) -> Code {
         match self.arrival {
             _ if !self.is_alive => Code::Stale,
@@ -182,13 +182,14 @@ impl Unit {
     }
 }
 
-/// The values that a machine takes from a PLC that is not there: those that the signals state. The others stay, as behind a plug.
+/// The values that a machine uses when its PLC is absent: the fail-safe values stated in the signal table. Other
+/// signals keep their last value, as on a pulled plug.
 struct FailSafe {
     stated: Vec<Signal>,
-    /// Whether all signals state one.
+    /// True if every signal states a value.
     is_whole: bool,
     frame: Box<[u8]>,
-    /// What the program sees.
+    /// The values that the program sees.
     seen: Box<[u8]>,
 }
 
@@ -222,7 +223,7 @@ fn frame(config: &Config, station: usize, area: Area) -> Box<[u8]> {
     vec![0; area_bytes(&config.table, station, area)].into()
 }
 
-/// The inputs as the program sees them, and as it saw them in the previous scan.
+/// The inputs that the program sees, and those of the previous scan.
 pub(super) struct Inputs {
     pub(super) bytes: Box<[u8]>,
     before: Box<[u8]>,
@@ -237,7 +238,7 @@ impl Inputs {
     }
 }
 
-/// Takes over the inputs, and their edges if they are recorded.
+/// Takes over the inputs, and their edges if a recording needs them.
 struct Taking<'a> {
     inputs: &'a mut Inputs,
     tape: Option<&'a mut ScanRecorder>,
@@ -256,9 +257,8 @@ impl Receiver for Taking<'_> {
 }
 
 impl Cpu {
-    /// Inputs, program, outputs: one scan at `now`. `in_time` is false when it comes so late that the peer
-    /// has received fail-safe values in the meantime: the program must then start over as after a broken
-    /// line.
+    /// Runs one scan at `now`: inputs, program, outputs. `in_time` is false when the scan is so late that the peer has
+    /// received fail-safe values in the meantime: the program must then start over as after a broken line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
         let (mut age, mut alive) = (Nanos::ZERO, true);
         if self.faults.is_some() {
@@ -282,7 +282,7 @@ impl Cpu {
         self.serve_watch(now);
     }
 
-    /// The same while faults are injected or were: they look at the stations together, before and after each part of the
+    /// Scans once faults have been injected: they look at all stations together, before and after each part of the
     /// scan.
     fn scan_with_faults(&mut self, now: Nanos, in_time: bool) {
         let Some(faults) = &mut self.faults else {
@@ -310,7 +310,7 @@ impl Cpu {
         }
     }
 
-    /// Hands the outputs of all stations over, as injected faults leave them, and records the scan.
+    /// Hands over the outputs of all stations, bent by injected faults, and records the scan.
     fn write(&mut self, now: Nanos) {
         let (units, faults) = (&self.units, &mut self.faults);
         self.tick.write(now, |station, frame| {
@@ -326,7 +326,7 @@ impl Cpu {
         }
     }
 
-    /// Does what another thread wants that looks at the image.
+    /// Serves the requests of another thread that looks at the image.
     fn serve_watch(&mut self, now: Nanos) {
         let Some(watched) = self.watched.as_mut().filter(|watched| watched.is_wanted()) else {
             return;
@@ -350,7 +350,7 @@ impl Cpu {
     }
 }
 
-/// The program, and an instance of it for each further station that it can serve.
+/// Returns the program, and an instance for each further station that it can serve.
 pub(super) fn units(
     program: Box<dyn Program>,
     (config, role): (&Config, Role),
@@ -365,7 +365,7 @@ pub(super) fn units(
         .collect()
 }
 
-/// Creates the program's half of a line: the CPU, the bus's end of its image, its counters. A program that can
+/// Creates the program's half of a line: the CPU with its counters, and the bus's end of its image. A program that can
 /// serve several stations serves all of them.
 pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
     let scan_counters = Arc::new(ScanCounters::new(&config.table));
@@ -389,7 +389,7 @@ mod tests {
     use std::sync::Mutex;
     use tickbus_plc::Program;
 
-    /// Records what each scan is told, at each station.
+    /// Records, per station, whether each scan saw its peer.
     struct Witness(Arc<Mutex<Vec<bool>>>);
 
     impl Program for Witness {
@@ -433,7 +433,7 @@ mod tests {
         let (mut cpu, mut bus) = half(program, &config, Role::Controller);
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
-            // The peer is faster than the delayed scan.
+            // The peer sends faster than the delayed scan runs.
             for station in 0..bus.stations() {
                 bus.received(station, now, &[1], true);
             }
@@ -448,7 +448,7 @@ mod tests {
 
     #[test]
     fn a_machine_takes_the_fail_safe_values_that_are_stated_when_its_plc_is_gone() {
-        /// Keeps what each scan sees.
+        /// Records what each scan sees.
         struct Seen(Arc<Mutex<Vec<Vec<u8>>>>);
 
         impl Program for Seen {
@@ -477,7 +477,7 @@ mod tests {
         let seen = Arc::default();
         let program = Box::new(Seen(Arc::clone(&seen)));
         let (mut cpu, mut bus) = half(program, &config, Role::Device);
-        // Its PLC lives, and has written nothing yet.
+        // The PLC is alive, but has written nothing yet.
         bus.touch(0, Nanos::from_millis(5));
         bus.hand_over();
         cpu.scan(Nanos::from_millis(5), true);

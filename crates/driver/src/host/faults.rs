@@ -6,7 +6,7 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::{Fault, FaultBoard, Faults, Slots, TickTime};
 use tickbus_image::signal::{Area, DataType, Plan, Signal, SignalTable, Slot};
 
-/// The faults of a program that works on frames, not on slots.
+/// The faults of a program, which works on frames and not on slots.
 #[derive(Debug)]
 pub(super) struct FrameFaults {
     pub(super) faults: Faults,
@@ -15,7 +15,7 @@ pub(super) struct FrameFaults {
     stations: Vec<StationFrames>,
     begun: Option<Nanos>,
     scans: u64,
-    /// The program has written outputs; until then its peer has the fail-safe values.
+    /// True once the program has written outputs; until then its peer has the fail-safe values.
     has_written: bool,
 }
 
@@ -26,14 +26,14 @@ struct StationFrames {
     reads: Plan,
     /// The true inputs.
     truth: Box<[u8]>,
-    /// Frames with the bent values, from which single signals are copied.
+    /// Frames with the bent values; single signals are copied from here.
     sent: Box<[u8]>,
     received: Box<[u8]>,
 }
 
 impl FrameFaults {
-    /// The faults of a program at the end that writes and reads these areas, none of them yet. `inputs` are the bytes that
-    /// it sees before its next scan, of the stations that it serves.
+    /// Creates an empty set of faults for a program at the end that writes and reads these areas. `inputs` are the
+    /// bytes that the program sees before its next scan, one slice per station that it serves.
     pub(super) fn new<'a>(
         table: &SignalTable,
         (writes, reads): (Area, Area),
@@ -64,7 +64,7 @@ impl FrameFaults {
         }
     }
 
-    /// With the faults of a driver.cfg; `None` without any.
+    /// Creates the set with the faults of a driver.cfg; returns `None` if there are no faults.
     pub(super) fn of_list<'a>(
         list: &[Fault],
         table: &SignalTable,
@@ -90,7 +90,7 @@ impl FrameFaults {
         Some(all)
     }
 
-    /// Begins a scan of these inputs and outputs: restores the true inputs.
+    /// Begins a scan with these inputs and outputs, and restores the true inputs.
     pub(super) fn begin_scan<'a>(
         &mut self,
         now: Nanos,
@@ -112,7 +112,7 @@ impl FrameFaults {
         self.faults.begin_tick(moment, &mut self.slots);
     }
 
-    /// The inputs were read: bends them.
+    /// Bends the inputs after they were read.
     pub(super) fn received<'a>(&mut self, frames: impl Iterator<Item = &'a mut [u8]>) {
         let mut frames: Vec<&mut [u8]> = frames.collect();
         for (station, inputs) in self.stations.iter_mut().zip(&frames) {
@@ -136,7 +136,7 @@ impl FrameFaults {
         }
     }
 
-    /// The outputs are about to be sent: prepares what is [bent](Self::bend_outputs).
+    /// Prepares the values for [`bend_outputs`](Self::bend_outputs), before the outputs are sent.
     pub(super) fn sending<'a>(&mut self, frames: impl Iterator<Item = &'a [u8]>) {
         if self.faults.active(true).next().is_none() {
             return;
@@ -150,7 +150,7 @@ impl FrameFaults {
         }
     }
 
-    /// Bends the outputs of a station without the program's knowledge.
+    /// Bends the outputs of a station; the program does not notice.
     pub(super) fn bend_outputs(&self, station: usize, outputs: &mut [u8]) {
         for signal in self.faults.active(true) {
             let signal = &self.signals[signal];
@@ -160,7 +160,7 @@ impl FrameFaults {
         }
     }
 
-    /// Everything is sent.
+    /// Runs after everything was sent.
     pub(super) fn sent(&mut self) {
         self.faults.sent(&mut self.slots);
     }

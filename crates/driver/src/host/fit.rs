@@ -1,4 +1,4 @@
-//! Whether a program and a signal table fit.
+//! Checks whether a program and a signal table fit.
 
 use crate::DriverError;
 use tickbus_base::Mistake;
@@ -50,7 +50,7 @@ pub(crate) fn check_fit(
     Ok(())
 }
 
-/// A program that does not exist, or does not fit this driver.cfg.
+/// Creates the error for a program that does not exist or does not fit this driver.cfg.
 pub(crate) fn program_error(config: &Config, source: plc::ProgramError) -> DriverError {
     let file = config.path.display().to_string();
     DriverError::Program { file, source }

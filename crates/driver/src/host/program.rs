@@ -1,4 +1,4 @@
-//! What is at the other end of a bus within this process, and its counters.
+//! The other end of a bus within this process, and its counters.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::replay::ReplayCounters;
 
 use super::{HostCounters, HostThread, ScanCounters};
 
-/// What is at the other end, within this process: a PLC program or a recording.
+/// The other end of a bus within this process: a PLC program or a recording.
 #[derive(Debug)]
 pub(crate) enum Program {
     Thread(Box<HostThread>),
@@ -16,7 +16,7 @@ pub(crate) enum Program {
     Replay(Arc<ReplayCounters>),
 }
 
-/// The counters of such a program, readable from any thread.
+/// The counters of the other end, readable from any thread.
 #[derive(Clone, Debug)]
 pub(crate) enum ProgramCounters {
     Thread(HostCounters),

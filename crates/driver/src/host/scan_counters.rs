@@ -7,16 +7,16 @@ use tickbus_base::time::{Nanos, SharedHistogram};
 use tickbus_image::copy_frame;
 use tickbus_image::signal::{Area, DataType, SignalTable};
 
-/// What the hosted program has seen and sent, to be compared with the other end. One thread counts, that of the scans;
-/// others only look.
+/// Counts what the hosted program has seen and sent, for comparison with the other end. Only the scan thread counts;
+/// other threads only read.
 #[derive(Debug)]
 pub(crate) struct ScanCounters {
     scans: AtomicU64,
-    /// Scans with stale data.
+    /// Number of scans with stale data.
     stale: AtomicU64,
-    /// Age of the data in the scans.
+    /// Age of the data at the scans.
     age: SharedHistogram,
-    /// In the order of the signal table.
+    /// The counted bits, in the order of the signal table.
     bits: Box<[Bit]>,
     frames: Box<[Frame]>,
 }
@@ -35,25 +35,25 @@ struct Frame {
     bytes: Box<[Octet]>,
 }
 
-/// The place of a counted area among all of them.
+/// The position of a counted area among all of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CountedArea(usize);
 
-/// Counts one in a counter that no other thread changes.
+/// Adds one to a counter that no other thread changes.
 #[inline]
 fn count_one(counter: &AtomicU64) {
     counter.store(counter.load(Ordering::Relaxed) + 1, Ordering::Relaxed);
 }
 
-/// Bytes that are looked at one by one sooner than compared.
+/// Up to this many bytes, looking at them one by one is faster than comparing first.
 const FEW: usize = 8;
 
-/// A byte that has BOOLs.
+/// A byte that contains BOOLs.
 #[derive(Debug)]
 struct Octet {
     byte: usize,
     mask: u8,
-    /// Positions in [`ScanCounters::bits`] of its bits 0 to 7; those outside the mask have none.
+    /// Positions of bits 0 to 7 in [`ScanCounters::bits`]; bits outside the mask have none.
     bits: [u32; 8],
 }
 
@@ -106,13 +106,13 @@ impl ScanCounters {
         }
     }
 
-    /// The place of an area of a station, if that has anything to count.
+    /// Returns the place of a station's area, if it has anything to count.
     pub(super) fn place(&self, station: usize, area: Area) -> Option<CountedArea> {
         let here = |frame: &Frame| (frame.station, frame.area) == (station, area);
         self.frames.iter().position(here).map(CountedArea)
     }
 
-    /// Keeps in `before` what [`count`](Self::count) will compare with, where there is anything to count.
+    /// Copies `now` into `before` for the next [`count`](Self::count), if there is anything to count.
     #[inline]
     pub(super) fn keep(of: Option<CountedArea>, before: &mut [u8], now: &[u8]) {
         if of.is_some() {
@@ -155,13 +155,13 @@ impl ScanCounters {
         }
     }
 
-    /// The number of scans so far, and of those with stale data.
+    /// Returns the number of scans so far, and how many of them had stale data.
     pub(crate) fn scans(&self) -> (u64, u64) {
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         (count(&self.scans), count(&self.stale))
     }
 
-    /// Adds the counts.
+    /// Adds the counts to the statistics.
     pub(crate) fn write(&self, statistics: &mut Statistics) {
         statistics.count("plc.scans", self.scans.load(Ordering::Relaxed));
         statistics.count("plc.stale", self.stale.load(Ordering::Relaxed));

@@ -12,41 +12,41 @@ use super::ScanCounters;
 use super::cpu::{Unit, units};
 use crate::frames::directions;
 
-/// The most scans that one exchange catches up on: 1,000 s of scans every 10 ms. A longer step is taken for a
-/// wrong time; scanning through it would block the tick for as long as that takes.
+/// The most scans that one exchange makes up for: 1,000 s of scans every 10 ms. A longer step is treated as a wrong
+/// time, since scanning through it would block the tick for too long.
 const MOST_SCANS: i64 = 100_000;
 
 /// A hosted program scanned by the tick, in simulation time.
 pub(crate) struct SteppedHost {
-    /// The program, and further instances of it for the other stations, each with its end of the line.
+    /// The program and its instances for further stations, each with its end of the line.
     stations: Vec<(Unit, Line)>,
     validity: Validity,
     max_age: Nanos,
     scan_counters: Arc<ScanCounters>,
     interval: Nanos,
-    /// When the next scan is due; `None` before the first exchange.
+    /// The time of the next scan; `None` before the first exchange.
     due: Option<Nanos>,
-    /// A time that was refused because it is too far ahead. The next one near it shows that it was meant.
+    /// A time that was refused because it is too far ahead. If the next time is near it, the jump was intended.
     refused: Option<Nanos>,
     delivered: Delivered,
 }
 
-/// The streams of one station. Machine and program are on one thread, and hand nothing over.
+/// The streams of one station. Machine and program share a thread, so nothing is handed over between threads.
 struct Line {
     inputs: DirectStream,
     outputs: DirectStream,
 }
 
-/// What the program was sent.
+/// The frames that the program received.
 #[derive(Default)]
 struct Delivered {
-    /// How many frames.
+    /// The number of frames.
     frames: u64,
-    /// When the machine was heard from.
+    /// The last time that the machine was heard.
     heard: Option<Nanos>,
-    /// Whether the machine's latest values are among them.
+    /// True if the machine's latest values have been delivered.
     is_latest: bool,
-    /// Whether no scan has seen the last frame yet.
+    /// True if no scan has seen the last frame yet.
     is_fresh: bool,
 }
 
@@ -75,7 +75,7 @@ impl SteppedHost {
         (host, scan_counters)
     }
 
-    /// Inputs, program, outputs: one scan at `now`.
+    /// Runs one scan at `now`: inputs, program, outputs.
     #[inline]
     fn scan(&mut self, now: Nanos) {
         let Delivered {
@@ -85,8 +85,8 @@ impl SteppedHost {
             is_fresh,
         } = &mut self.delivered;
         if *is_latest {
-            // Between two ticks only simulation time passes: the machine is there all along, however large the
-            // steps are.
+            // Between two ticks only simulation time passes: the machine is alive all along, however large the steps
+            // are.
             *heard = Some(now);
         }
         let arrival = Arrival {
@@ -132,7 +132,7 @@ impl Stepped for SteppedHost {
     fn send(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
         port.running("the hosted program is there");
         self.delivered.is_latest = false;
-        // An injected fault may swallow them.
+        // An injected fault can swallow the frames.
         let Some(mut frames) = port.take_all(now) else {
             return Ok(());
         };
@@ -164,7 +164,7 @@ impl Stepped for SteppedHost {
             return Ok(());
         }
         if refused.is_some_and(|before| before <= now && now - before <= most) {
-            // The simulation means it.
+            // The jump was intended.
             self.due = Some(now);
             return Ok(());
         }
@@ -179,12 +179,12 @@ impl Stepped for SteppedHost {
         port.running("the hosted program is there");
         let mut due = self.due.unwrap_or(now);
         let late = now - due;
-        // Counted rather than compared, since at the largest time the next scan would be due when the last
-        // one was.
+        // Counted, not compared: at the largest possible time the next scan would be due at the same time as the last
+        // one.
         let scans = if late < Nanos::ZERO {
             0
         } else if late < self.interval {
-            // Nearly always, and a division takes its time.
+            // The usual case; avoids a division.
             1
         } else {
             late.0 / self.interval.0 + 1

@@ -26,7 +26,7 @@ use super::cpu::{Cpu, half};
 use super::faults::FrameFaults;
 use super::watched::WatchedScans;
 
-/// The longest time that a scan may take before it counts as hung. A PLC's own watchdog trips far earlier.
+/// The longest time that a scan can take before it counts as hung. A real PLC's watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
 
 /// The start of the current scan.
@@ -34,7 +34,7 @@ const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
 struct Scanning(AtomicI64);
 
 impl Scanning {
-    /// No scan is running.
+    /// Marks that no scan is running.
     const NONE: i64 = i64::MIN;
 
     fn set(&self, since: Option<Nanos>) {
@@ -42,7 +42,7 @@ impl Scanning {
         self.0.store(since, Ordering::Relaxed);
     }
 
-    /// How long the current scan has taken, if that is too long.
+    /// Returns how long the current scan has taken, if that is too long.
     fn too_long(&self, now: Nanos) -> Option<Nanos> {
         let since = self.0.load(Ordering::Relaxed);
         let span = now - Nanos(since);
@@ -50,39 +50,39 @@ impl Scanning {
     }
 }
 
-/// A program, and how it is scanned.
+/// A program and its scan settings.
 pub(crate) struct ScanSetup {
     pub(crate) program: Box<dyn Program>,
     pub(crate) interval: Nanos,
-    /// Whether a late scan is a broken line, and fail-safe values take its place.
+    /// True if a late scan counts as a broken line, so that fail-safe values replace the outputs.
     pub(crate) has_watchdog: bool,
     /// The recording of its scans.
     pub(crate) tape: Option<ScanRecorder>,
 }
 
-/// What a program's thread publishes about itself.
+/// The counters and the state that a program's thread publishes.
 #[derive(Clone, Debug)]
 pub(crate) struct HostCounters {
     pub(crate) scan_counters: Arc<ScanCounters>,
     fault: Arc<Mutex<Option<String>>>,
     scanning: Arc<Scanning>,
-    /// Whether a scan that takes too long is a fault.
+    /// True if a scan that takes too long is a fault.
     can_hang: bool,
     report: Option<Arc<dyn Report>>,
     record: Option<Arc<record::RecorderCounters>>,
     /// The clock of the line.
     pub(crate) clock: Arc<dyn Clock>,
-    /// The clock by which a scan hangs.
+    /// The clock that measures hung scans.
     wall: Arc<dyn Clock>,
 }
 
-/// A program on its own thread, and the bus thread of its end of the line; dropping it stops both.
+/// A program on its own thread, with the bus thread of its end of the line; dropping this stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
     pub(crate) counters: HostCounters,
     pub(crate) status: LinkStatus,
     pub(crate) board: Arc<FaultBoard>,
-    /// Looks at the program's image, until somebody takes it.
+    /// Looks at the program's image, until someone takes it.
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<Thread>,
@@ -90,20 +90,20 @@ pub(crate) struct HostThread {
     bus: Option<BusThread>,
 }
 
-/// How a program is scanned.
+/// Says how a program is scanned.
 enum Scanned {
-    /// At a fixed interval of the clock, with a bus on a thread of its own.
+    /// Scans at a fixed interval of the clock; the bus has its own thread.
     Freely {
         bus: Box<dyn Free>,
         clock: Arc<dyn Clock>,
     },
-    /// In the steps of a bus that hands out the time.
+    /// Scans in the steps of a bus that hands out the time.
     InSteps { bus: Box<dyn Stepped>, stop: Stop },
 }
 
 impl HostThread {
-    /// Starts scanning the `hosted` program as the end with `role`, with `bus` between it and its peer. The
-    /// thread is called `name`.
+    /// Starts scanning the `hosted` program as the end with `role`; `bus` connects it to its peer. The thread is called
+    /// `name`.
     pub(crate) fn start(
         hosted: ScanSetup,
         name: &str,
@@ -117,8 +117,8 @@ impl HostThread {
         Self::start_scanned(hosted, name, (config, role), scanned, wall)
     }
 
-    /// The same in the steps of a bus that hands out the time, and that waits no longer once `stop` is stopped. A scan
-    /// that hangs is noticed by the clock `wall`.
+    /// As `start`, but scans in the steps of a bus that hands out the time, and that waits no longer once `stop` is
+    /// stopped. The clock `wall` detects a hung scan.
     pub(crate) fn start_in_steps(
         hosted: ScanSetup,
         name: &str,
@@ -143,8 +143,8 @@ impl HostThread {
         cpu.tape = hosted.tape;
         let record = cpu.tape.as_ref().map(ScanRecorder::counters);
         let status = LinkStatus::new(name, max_age);
-        // The faults in a driver.cfg are those of its own end, not of a program behind its bus; and who looks at a driver
-        // looks at its own end.
+        // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
+        // `Watch`.
         let is_own = role == config.role;
         let watchdog = watchdog(config, (is_own, role), interval);
         let watchdog = watchdog.filter(|_| hosted.has_watchdog);
@@ -215,7 +215,7 @@ impl HostThread {
         let spawned = Thread::spawn(&*counters.wall, name, move || {
             let result = catch_unwind(AssertUnwindSafe(&mut scans));
             scanning.set(None);
-            // What it holds may take its leave of the peer, which closing waits for.
+            // Dropping the bus can send a farewell to the peer, and closing waits for that.
             drop(scans);
             let text = match result {
                 Ok(Ok(())) => return,
@@ -241,7 +241,8 @@ impl HostThread {
     }
 }
 
-/// How long a program may pause between two scans: a CPU whose program has died must not keep its last outputs on the bus.
+/// Returns how long a program can pause between two scans: a CPU whose program has died must not keep its last outputs
+/// on the bus.
 fn watchdog(config: &Config, (is_own_end, role): (bool, Role), interval: Nanos) -> Option<Nanos> {
     let two_scans = interval + interval;
     match config.timing.watchdog.filter(|_| is_own_end) {
@@ -251,7 +252,7 @@ fn watchdog(config: &Config, (is_own_end, role): (bool, Role), interval: Nanos) 
     }
 }
 
-/// The times of a program's line, and what it leaves behind there.
+/// Returns the times of a program's line, and the values that the program leaves there.
 fn timing(config: &Config, is_own_end: bool) -> Timing {
     let mut timing = config.timing.clone();
     if !is_own_end {
@@ -261,7 +262,7 @@ fn timing(config: &Config, is_own_end: bool) -> Timing {
     timing
 }
 
-/// What belongs to the statistics of a program and its line.
+/// The sources of the statistics of a program and its line.
 #[derive(Clone, Debug)]
 pub(crate) struct HostFigures {
     pub(crate) counters: HostCounters,
@@ -278,7 +279,7 @@ impl HostFigures {
         }
     }
 
-    /// The statistics at this moment.
+    /// Returns the statistics at this moment.
     pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
         let mut statistics = Statistics::default();
         self.status.observe_call(now);
@@ -301,7 +302,7 @@ impl Figures for HostFigures {
     }
 }
 
-/// Gives the end that a driver.cfg describes its faults, and lets another thread look at it.
+/// Gives the end that a driver.cfg describes its faults, and lets another thread look at this end.
 fn prepare_own_end(
     cpu: &mut Cpu,
     config: &Config,
@@ -316,12 +317,12 @@ fn prepare_own_end(
     (config, handle)
 }
 
-/// What looks at it.
+/// Creates the watch of a program.
 fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
     Watch {
         role: config.role,
         config,
-        // A program works on frames: its faults know no slots that count edges.
+        // A program works on frames: its faults have no slots that count edges.
         slots: SlotMap::default(),
         handle,
         status: figures.status.clone(),
@@ -362,17 +363,17 @@ impl HostCounters {
 }
 
 impl HostThread {
-    /// What its statistics are made of.
+    /// Returns the sources of the program's statistics.
     pub(crate) fn figures(&self) -> HostFigures {
         HostFigures::of(&self.counters, &self.status, &self.board)
     }
 
-    /// Whether the program is scanned no more, for whatever reason.
+    /// Returns true if the program is no longer scanned, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
         !self.thread.as_ref().is_some_and(Thread::is_running)
     }
 
-    /// Stops scanning. Returns why the program did not end, if so: its thread is then left behind.
+    /// Stops scanning. If the program did not end, returns why; its thread is then left behind.
     pub(crate) fn end(&mut self) -> Option<String> {
         let thread = self.thread.take()?;
         self.stop.stop();
@@ -398,7 +399,7 @@ fn scan_until_stopped(
     stop: &Stop,
     scanning: &Scanning,
 ) {
-    // As in a PLC, a late scan is late, and missed ones are not made up for.
+    // As in a PLC: a late scan stays late, and missed scans are not made up for.
     let mut pace = Pace::new(clock.now(), interval);
     let mut last = None;
     while !stop.is_stopped() {
@@ -427,7 +428,7 @@ fn scan_in_steps(
     while !stop.is_stopped() {
         let now = time.now();
         let next = match bus.receive(now, port) {
-            // It was told to wait no longer.
+            // The bus was stopped.
             Err(_) if stop.is_stopped() => return Ok(()),
             received => received?,
         };

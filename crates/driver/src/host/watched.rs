@@ -1,4 +1,4 @@
-//! A program that another thread looks at: the scan's part.
+//! The scan's part in letting another thread look at a program.
 
 use std::sync::Arc;
 
@@ -15,13 +15,13 @@ use crate::view::{StationView, View};
 
 use super::faults::FrameFaults;
 
-/// What a scan needs to be looked at.
+/// The data that a scan needs to show itself to another thread.
 pub(super) struct WatchedScans {
     tap: Tap,
     config: Arc<Config>,
     role: Role,
     board: Arc<FaultBoard>,
-    /// Per station, what reads each area from its frames: the one that is written, and the one that is read.
+    /// Per station, the plans that read the values of the written and of the read area from its frames.
     plans: Vec<[Plan; 2]>,
 }
 
@@ -31,7 +31,7 @@ pub(super) struct ScannedStation<'a> {
     pub(super) status: Code,
     pub(super) inputs: &'a [u8],
     pub(super) outputs: &'a [u8],
-    /// Whether these inputs are fail-safe values.
+    /// True if these inputs are fail-safe values.
     pub(super) is_fail_safe: bool,
 }
 
@@ -63,7 +63,7 @@ impl WatchedScans {
         self.tap.take_wanted()
     }
 
-    /// Takes over the faults that were ordered; `inputs` are what the program sees of its stations.
+    /// Takes over the ordered faults; `inputs` are the values that the program sees of its stations.
     pub(super) fn obey<'a>(
         &mut self,
         faults: &mut Option<FrameFaults>,
@@ -76,7 +76,7 @@ impl WatchedScans {
         self.tap.obey(&mut faults.faults);
     }
 
-    /// Hands a copy over, after this many scans.
+    /// Hands over a copy; `scans` is the number of scans so far.
     pub(super) fn show<'a>(
         &mut self,
         (now, scans): (Nanos, u64),
@@ -92,7 +92,7 @@ impl WatchedScans {
                 let index = station.station;
                 let (age, is_valid) = (image.peer_age(index, now), image.is_valid(index));
                 *seen = StationView {
-                    // A scan that comes late is told that the line was down, and its data are good.
+                    // A late scan sees the line as down although its data are good.
                     status: if is_stale(age, max_age, is_valid) {
                         Code::Stale
                     } else {

@@ -1,4 +1,4 @@
-//! The list of differences found by a replay: a file beside the recording.
+//! The list of differences found by a replay: a file next to the recording.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
@@ -7,13 +7,13 @@ use std::path::{Path, PathBuf};
 use tickbus_image::signal::Slot;
 use tickbus_record::{FileClaim, Tick, ValueKind};
 
-/// The most differences listed; further ones are counted.
+/// The most differences listed; further ones are only counted.
 const MOST_LISTED: u64 = 100_000;
 
-/// How many of them are logged as well.
+/// The most differences that are logged as well.
 const MOST_LOGGED: u64 = 10;
 
-/// Up to this number, each is written to the file at once, so that it can be watched.
+/// Up to this number, each difference is written to the file at once, so that the file can be watched.
 const FLUSHED: u64 = 1_000;
 
 /// The list of differences.
@@ -22,13 +22,13 @@ pub(super) struct Differences {
     path: PathBuf,
     has_begun: bool,
     file: Option<BufWriter<File>>,
-    /// Dropped after the file.
+    /// Must be dropped after the file.
     place: Option<FileClaim>,
     listed: u64,
 }
 
 impl Differences {
-    /// The list for the recording at `path`, in `<path>.diff`.
+    /// Creates the list for the recording at `path`, in `<path>.diff`.
     pub(super) fn new(recording: &Path) -> Self {
         let mut path = recording.to_owned().into_os_string();
         path.push(".diff");
@@ -42,7 +42,7 @@ impl Differences {
         }
     }
 
-    /// A tick is compared: the first one begins the list, and overwrites that of an earlier replay.
+    /// Notes that a tick is compared. The first one begins the list and overwrites that of an earlier replay.
     pub(super) fn compared(&mut self) {
         if self.has_begun {
             return;
@@ -113,12 +113,12 @@ impl Differences {
         }
     }
 
-    /// Flushes the list to the file, as long as it is short.
+    /// Flushes the list to the file, while the list is short.
     pub(super) fn flush(&mut self) {
         if let Some(file) = &mut self.file
             && self.listed <= FLUSHED
         {
-            // An error here recurs at the next write, and is reported there.
+            // An error here recurs at the next write, which reports it.
             let _ = file.flush();
         }
     }
@@ -173,7 +173,7 @@ mod tests {
             listed_where("run.csv"),
             format!("listed in {}", place.display())
         );
-        // Nobody can write into this, whatever the user may.
+        // Nobody can write to this path, whatever the user's permissions.
         std::fs::create_dir(folder.path().join("other.csv.diff")).expect("a folder");
         assert_eq!(listed_where("other.csv"), "the first 10 are in the log");
     }

@@ -1,4 +1,4 @@
-//! One station of a replay: what it shows again of what it received, and what it is expected to send.
+//! One station of a replay: the received values that it shows again, and the values that it is expected to send.
 
 use crate::Code;
 use crate::SlotMap;
@@ -18,7 +18,7 @@ struct Latched {
     column: Option<usize>,
     /// The slot with its edge count.
     slot: Option<usize>,
-    /// Its edges in the current tick, and in all.
+    /// The edges in the current tick, and in total.
     count: u32,
     total: u32,
 }
@@ -33,31 +33,31 @@ struct Sent {
 pub(super) struct Station {
     receive: Plan,
     send: Plan,
-    /// The signals that it receives.
+    /// The signals that this station receives.
     received: Vec<usize>,
     latched: Vec<Latched>,
     sent: Vec<Sent>,
-    /// Its status in the last recorded tick.
+    /// The station's status in the last recorded tick.
     pub(super) status: i32,
-    /// The recorded ticks that fell on the current one, and whether any of them was fresh.
+    /// The number of recorded ticks that fell on the current tick, and whether any of them was fresh.
     ticks: usize,
     is_fresh: bool,
-    /// The last frame handed in, and the one being made.
+    /// The last frame delivered, and the one being built.
     fed: Box<[u8]>,
     frame: Box<[u8]>,
-    /// Shows the edges of several recorded ticks that fell on one, of which it has these counts.
+    /// Shows the edges of several recorded ticks that fell on one tick; `owed` has their counts.
     shaper: PulseShaper,
     owed: Box<[u32]>,
     /// The last frame that this end sent.
     seen: Box<[u8]>,
-    /// Makes the expected frame of recorded values, with pulses and hold times.
+    /// Builds the expected frame from recorded values, with pulses and hold times.
     expected: DirectStream,
     /// Slots for the comparison.
     slots: [Vec<Slot>; 2],
 }
 
 impl Station {
-    /// The stations of the driver that `config` describes; `edges` has, per signal, the column with its edge
+    /// Returns the stations of the driver that `config` describes; `edges` has, per signal, the column with its edge
     /// count.
     pub(super) fn all(config: &Config, edges: &[Option<usize>]) -> Vec<Self> {
         let (tx, rx) = config.role.areas();
@@ -73,7 +73,7 @@ impl Station {
                         .filter(move |(_, signal)| signal.station == index && signal.area == area)
                 };
                 let frame = |area: Area| vec![0; area_bytes(table, index, area)].into();
-                // The recorded levels were held already.
+                // The recorded levels have been held already.
                 let bits: Box<[LatchedBit]> = directions
                     .rx_latched
                     .iter()
@@ -118,7 +118,7 @@ impl Station {
             .collect()
     }
 
-    /// A tick begins, on which no recorded tick has fallen yet.
+    /// Begins a tick, on which no recorded tick has fallen yet.
     pub(super) fn begin(&mut self) {
         (self.ticks, self.is_fresh) = (0, false);
         for latched in &mut self.latched {
@@ -126,7 +126,7 @@ impl Station {
         }
     }
 
-    /// A recorded tick falls on the current one; `before` are the values until then.
+    /// Lets a recorded tick fall on the current one; `before` are the values until then.
     pub(super) fn advance(
         &mut self,
         status: i32,
@@ -141,7 +141,7 @@ impl Station {
             let signal = latched.bit.signal;
             let count = match (latched.column, columns[signal]) {
                 (Some(column), _) => whole(tick.values[column].real()),
-                // It was not latched when it was recorded.
+                // The signal was not latched in the recording.
                 (None, Some(column)) => {
                     let [was, is] = [before[signal], tick.values[column]].map(is_on);
                     u32::from(was != is && counts(latched.bit.latch, is))
@@ -153,7 +153,7 @@ impl Station {
         }
     }
 
-    /// The frame to hand in for these values, unless it brings nothing new.
+    /// Returns the frame to deliver for these values, unless the frame brings nothing new.
     pub(super) fn frame(&mut self, slots: &[Slot]) -> Option<&[u8]> {
         self.receive.encode(slots, &mut self.frame);
         if !self.is_fresh && self.frame == self.fed {
@@ -163,7 +163,7 @@ impl Station {
         Some(&self.fed)
     }
 
-    /// Shapes the levels in `slots`: where several recorded ticks fall on one, their edges are seen, too.
+    /// Shapes the levels in `slots`, so that the edges of several recorded ticks within one tick are visible, too.
     pub(super) fn shape(&mut self, now: Nanos, slots: &mut [Slot]) {
         if self.latched.is_empty() {
             return;
@@ -187,7 +187,7 @@ impl Station {
         self.shaper.confirm();
     }
 
-    /// The status to show in the current tick; `None` where the recording has nothing but that the exchange failed.
+    /// Returns the status to show in the current tick; `None` if the recording only says that the exchange failed.
     pub(super) fn code(&self) -> Option<Code> {
         match self.status {
             FRESH | UNCHANGED if self.is_fresh => Some(Code::Fresh),
@@ -197,7 +197,7 @@ impl Station {
         }
     }
 
-    /// Puts what this station received into `slots`, of which `values` has the values.
+    /// Puts the values that this station received into `slots`; `values` contains them.
     pub(super) fn show(&self, values: &[Slot], slots: &mut [Slot]) {
         for signal in &self.received {
             slots[*signal] = values[*signal];
@@ -209,20 +209,20 @@ impl Station {
         }
     }
 
-    /// Tells of every latched signal how many edges there were so far.
+    /// Calls `tell` with every latched signal and the number of its edges so far.
     pub(super) fn edges(&self, tell: &mut impl FnMut(usize, u32)) {
         for latched in &self.latched {
             tell(latched.bit.signal, latched.total);
         }
     }
 
-    /// Records the frame that this end sends.
+    /// Keeps the frame that this end sends.
     pub(super) fn sees(&mut self, frame: &[u8]) {
         self.seen.copy_from_slice(frame);
     }
 
-    /// Compares what this end sends with what is expected from the recorded `slots`, and calls back for every
-    /// signal that differs.
+    /// Compares the values that this end sends with those expected from the recorded `slots`, and calls `differs` for
+    /// every signal that differs.
     pub(super) fn compare(
         &mut self,
         now: Nanos,
@@ -237,7 +237,7 @@ impl Station {
             self.send.decode(&self.seen, seen);
             for Sent { signal, name, kind } in &self.sent {
                 let (expected, seen) = (expected[*signal], seen[*signal]);
-                // Of a scaled value that was on the line, the codec may make the next one.
+                // The codec may round a scaled value that was on the line to its neighbour.
                 let is_recorded = *kind != ValueKind::Bit && slots[*signal] == seen;
                 if expected != seen && !is_recorded {
                     differs(*signal, *kind, name, expected, seen);
@@ -247,7 +247,7 @@ impl Station {
     }
 }
 
-/// Whether an edge to this level counts.
+/// Returns true if an edge to this level counts.
 fn counts(latch: Latch, level: bool) -> bool {
     match latch {
         Latch::Rising => level,
@@ -260,7 +260,7 @@ fn is_on(slot: Slot) -> bool {
     slot.real() != 0.0
 }
 
-/// A recorded count.
+/// Converts a recorded count to an integer.
 fn whole(count: f64) -> u32 {
     #[expect(
         clippy::cast_possible_truncation,

@@ -1,4 +1,4 @@
-//! Runs at random over a line on which everything happens that can: recorded, and replayed value by value.
+//! Random runs over a line on which everything possible happens: recorded, and replayed value by value.
 
 use std::fmt::Write as _;
 
@@ -8,10 +8,10 @@ use crate::{Driver, Exchange};
 use tickbus_base::time::Manual;
 use tickbus_fieldbus::PlcState;
 
-/// Ticks of a run.
+/// The number of ticks in a run.
 const TICKS: usize = 1_500;
 
-/// Knuth's generator: the same numbers on every machine.
+/// Knuth's generator: produces the same numbers on every machine.
 #[derive(Clone)]
 struct Random(u64);
 
@@ -29,7 +29,7 @@ impl Random {
     }
 }
 
-/// A peer that sends, falls silent, stops its program, stands still, and whose line fails.
+/// A peer that sends, falls silent, stops its program or hangs, and whose line fails.
 struct Peer {
     random: Random,
     stations: [Mood; 2],
@@ -39,9 +39,9 @@ struct Peer {
 #[derive(Clone, Copy, PartialEq)]
 enum Mood {
     Runs,
-    /// It sends, but its signal of life stands still.
+    /// The peer sends, but its life sign does not change.
     Hangs,
-    /// It sends, and says that its data do not count.
+    /// The peer sends, but reports that its data are not valid.
     Stopped,
     Silent,
 }
@@ -50,7 +50,7 @@ impl Peer {
     fn frame(&mut self, len: usize, lives: bool) -> Vec<u8> {
         let mut frame: Vec<u8> = (0..len).map(|_| self.random.byte()).collect();
         if self.random.below(3) > 0 {
-            // Few edges, and all values as they are at rest.
+            // Few edges, and all values at rest.
             frame = vec![0; len];
             frame[0] = 1 << self.random.below(8);
         }
@@ -106,7 +106,7 @@ impl Stepped for Peer {
     }
 }
 
-/// A driver.cfg with latched signals of all kinds in `stations` stations, and numbers.
+/// Returns a driver.cfg with latched signals of all kinds in `stations` stations, and numbers.
 fn config(folder: &Path, stations: usize, fieldbus: &str, record: &str) -> Config {
     let mut text = format!(
         "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\n{fieldbus}\nmax_age = \"60ms\"\n\
@@ -148,7 +148,7 @@ fn config(folder: &Path, stations: usize, fieldbus: &str, record: &str) -> Confi
         .unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// The same ticks of a machine: exchanges, or halves. Returns what each showed.
+/// Runs the same ticks of a machine, as exchanges or as halves. Returns what each tick showed.
 fn run(driver: &mut Driver, seed: u64, halves: bool) -> Vec<(Exchange, Vec<Slot>)> {
     let mut random = Random(seed);
     let mut slots = driver.initial_slots();
@@ -186,7 +186,7 @@ fn run(driver: &mut Driver, seed: u64, halves: bool) -> Vec<(Exchange, Vec<Slot>
         .collect()
 }
 
-/// NaN equals NaN: a recording keeps no payload.
+/// Compares two values; NaN equals NaN, since a recording keeps no payload.
 fn same(was: Slot, is: Slot) -> bool {
     was == is || was.real().is_nan() && is.real().is_nan()
 }
@@ -255,14 +255,14 @@ fn a_replay_is_the_recording_in_every_tick_whatever_happened_on_the_line() {
                 (was.number, was.time, was.status),
                 (is.number, is.time, is.status)
             );
-            // Of a station whose exchange failed, only the failure of all is known where there is one.
+            // When an exchange failed, the recording may contain only the overall failure, not that of each station.
             assert!(
                 was.status < 0 || was.stations == is.stations,
                 "{was:?} {is:?}"
             );
         }
     }
-    // Of everything there was enough.
+    // Every case occurred often enough.
     assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
 

@@ -1,7 +1,7 @@
-//! The archive of an FMU, unpacked to a folder that goes away with it.
+//! The archive of an FMU, unpacked to a folder that is deleted when it is no longer needed.
 //!
-//! What it has is checked before a byte is written: nothing leaves the folder, nothing is a link, and it is not larger than a
-//! computer can bear.
+//! The contents are checked before a byte is written: no file leaves the folder, no file is a link, and the total size
+//! is limited.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -18,7 +18,7 @@ use super::description::Model;
 use crate::made::Platform;
 use crate::value::Version;
 
-/// The most bytes that an FMU may have when it is unpacked.
+/// The most bytes that an unpacked FMU can have.
 const MOST_BYTES: u64 = 1 << 30;
 
 /// The most bytes of a model description.
@@ -30,24 +30,24 @@ const MOST_FILES: usize = 20_000;
 /// The name of the model description.
 const DESCRIPTION: &str = "modelDescription.xml";
 
-/// An FMU that was found right, with the library for this platform.
+/// A checked FMU with the library for this platform.
 #[derive(Debug)]
 pub struct Unpacked {
-    /// Its path, as messages name it.
+    /// The FMU's path, as messages name it.
     pub file: String,
-    /// What its model description says.
+    /// The contents of the model description.
     pub model: Model,
     folder: TempDir,
     library: PathBuf,
 }
 
 impl Unpacked {
-    /// Opens the FMU at `path`: reads its model description and unpacks what it needs to run.
+    /// Opens the FMU at `path`: reads its model description and unpacks the files needed to run it.
     ///
     /// # Errors
     ///
-    /// What is wrong with the archive, with every mistake of the model description at its line and column; or it is not for
-    /// this platform.
+    /// Returns the problem with the archive, every mistake in the model description with its line and column, or that
+    /// the FMU is not for this platform.
     pub fn open(path: &Path) -> Result<Self, Mistakes> {
         let file = path.display().to_string();
         let refused = |mistake: Mistake| Mistakes::of(&file, mistake);
@@ -74,17 +74,17 @@ impl Unpacked {
         })
     }
 
-    /// The folder that it was unpacked to, which goes away with this.
+    /// Returns the folder with the unpacked files, which is deleted when this is dropped.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// The library with its functions.
+    /// Returns the library that contains the FMU's functions.
     pub fn library(&self) -> &Path {
         &self.library
     }
 
-    /// The folder of its resources, of which there need not be any.
+    /// Returns the folder of the FMU's resources, which may be empty.
     pub fn resources(&self) -> PathBuf {
         self.folder.path().join("resources")
     }
@@ -105,14 +105,14 @@ fn open(path: &Path) -> Result<ZipArchive<File>, Mistake> {
     ZipArchive::new(file).map_err(damaged)
 }
 
-/// Before a file's entry in the directory of an archive.
+/// Marks the beginning of a file's entry in the directory of an archive.
 const ENTRY: &[u8] = b"PK\x01\x02";
 
-/// What a run depends on.
+/// The files and folders that a run depends on.
 const VITAL: [&str; 3] = [DESCRIPTION, "binaries", "resources"];
 
-/// Refuses an archive that has two files of the very same name: of these `zip` shows the last alone, others the first. Some makers
-/// pack the same file twice, which harms nobody where a run does not depend on it.
+/// Refuses an archive with two files of the same name: `zip` shows only the last of them, other programs the first.
+/// Some tools pack the same file twice, which is harmless if a run does not depend on it.
 fn check_twins(path: &Path, archive: &ZipArchive<File>) -> Result<(), Mistake> {
     let mut files = BTreeMap::new();
     for (name, content) in listed(path, archive.central_directory_start()).map_err(damaged)? {
@@ -137,8 +137,8 @@ fn check_twins(path: &Path, archive: &ZipArchive<File>) -> Result<(), Mistake> {
     Err(hostile(what))
 }
 
-/// The entries in the directory of an archive, which begins at `start`: the name of each, and what stands for its content, checksum
-/// and length.
+/// Returns the entries in the directory of an archive, which begins at `start`: for each its name, and a fingerprint of
+/// its content, which is checksum and lengths.
 fn listed(path: &Path, start: u64) -> io::Result<Vec<(Vec<u8>, [u8; 12])>> {
     let mut directory = BufReader::new(File::open(path)?);
     directory.seek(SeekFrom::Start(start))?;
@@ -147,18 +147,18 @@ fn listed(path: &Path, start: u64) -> io::Result<Vec<(Vec<u8>, [u8; 12])>> {
         let mut entry = [0; 46];
         match directory.read_exact(&mut entry) {
             Ok(()) if entry.starts_with(ENTRY) => {}
-            // Behind the last one.
+            // After the last entry.
             Ok(()) => return Ok(all),
             Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(all),
             Err(error) => return Err(error),
         }
-        // The lengths of its name, of what is beside it, and of its comment.
+        // The lengths of the name, the extra field and the comment.
         let [name, beside, comment] =
             [28, 30, 32].map(|at| u16::from_le_bytes([entry[at], entry[at + 1]]));
         let mut own = vec![0; name.into()];
         directory.read_exact(&mut own)?;
         directory.seek_relative(i64::from(beside) + i64::from(comment))?;
-        // CRC-32, and the lengths packed and unpacked.
+        // The CRC-32, the packed length and the unpacked length.
         all.push((own, *entry[16..].first_chunk().expect("46 bytes")));
     }
 }
@@ -167,10 +167,10 @@ fn hostile(what: String) -> Mistake {
     Mistake::new(what, "do not use this FMU; ask whoever made it")
 }
 
-/// What an archive has: each name with its index.
+/// The entries of an archive: each name with its index.
 type Entries = BTreeMap<String, usize>;
 
-/// Refuses an archive that would harm.
+/// Refuses a harmful archive.
 fn check(archive: &mut ZipArchive<File>) -> Result<Entries, Mistake> {
     if archive.len() > MOST_FILES {
         return Err(hostile(format!(
@@ -207,17 +207,17 @@ fn check(archive: &mut ZipArchive<File>) -> Result<Entries, Mistake> {
     Ok(entries)
 }
 
-/// A name that is inside, without the "." that some programs put into it.
+/// Removes from a name inside the folder the "." that some programs add.
 fn plain(name: &str) -> String {
     let parts = name.split('/').filter(|part| !matches!(*part, "" | "."));
     parts.collect::<Vec<_>>().join("/")
 }
 
-/// Whether a name stays in the folder on every system.
+/// Returns true if a name stays inside the folder on every system.
 fn is_inside(name: &str) -> bool {
     let parts = Path::new(name).components();
     let plain = |part| matches!(part, Component::Normal(_) | Component::CurDir);
-    // "C:" is a drive on Windows, and a backslash separates there.
+    // "C:" is a drive on Windows, where a backslash is a separator as well.
     !name.is_empty() && !name.contains(['\\', ':', '\0']) && parts.into_iter().all(plain)
 }
 
@@ -246,7 +246,7 @@ fn description(archive: &mut ZipArchive<File>, entries: &Entries) -> Result<Stri
     })
 }
 
-/// The path of the library for this platform.
+/// Returns the path of the library for this platform.
 fn library(entries: &Entries, model: &Model) -> Result<PathBuf, Mistake> {
     let own = Platform::own();
     let folder = own.and_then(|own| own.folder(model.version));
@@ -285,8 +285,9 @@ fn library(entries: &Entries, model: &Model) -> Result<PathBuf, Mistake> {
     Err(Mistake::new(what, right))
 }
 
-/// Unpacks all but documentation and sources. By the standards an FMU is handed its resources alone, and yet some look from there
-/// for their model description. The sizes that the archive states were checked; those that it has are checked here.
+/// Unpacks everything except documentation and sources. By the standards an FMU is only given its resources, but some
+/// FMUs find their model description from there. The sizes stated in the archive were checked before; the real sizes
+/// are checked here.
 fn unpack(archive: &mut ZipArchive<File>, entries: &Entries, folder: &Path) -> Result<(), Mistake> {
     let mut room = MOST_BYTES;
     let unwritable = |name: &str, error: &io::Error| {
@@ -295,7 +296,7 @@ fn unpack(archive: &mut ZipArchive<File>, entries: &Entries, folder: &Path) -> R
             "make room in the folder for temporary files, which TMPDIR names; or get the FMU anew, it may be cut",
         )
     };
-    // Where it looks from, even without any.
+    // Some FMUs start their search in this folder, even if they have no resources.
     let resources = folder.join("resources");
     fs::create_dir_all(&resources).map_err(|error| unwritable("resources", &error))?;
     let idle = |name: &str| name.starts_with("documentation/") || name.starts_with("sources/");

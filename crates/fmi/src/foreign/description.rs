@@ -1,4 +1,4 @@
-//! `modelDescription.xml` of somebody else's FMU.
+//! Reads `modelDescription.xml` of a foreign FMU.
 
 use roxmltree::{Document, Node};
 
@@ -7,80 +7,80 @@ use tickbus_base::toml_text::{Collector, Mistakes, shown};
 
 use crate::value::{ValueType, Version};
 
-/// What a model description says, as far as a run needs it.
+/// The contents of a model description that a run needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Model {
     /// The version of FMI.
     pub version: Version,
-    /// Its name.
+    /// The model's name.
     pub name: String,
-    /// The name of its library.
+    /// The name of the FMU's library.
     pub identifier: String,
-    /// What its library wants to be told.
+    /// The token that the library expects.
     pub token: String,
-    /// The step that it proposes, in seconds.
+    /// The step that the FMU proposes, in seconds.
     pub step: Option<f64>,
-    /// The time at which it proposes to begin, in seconds.
+    /// The start time that the FMU proposes, in seconds.
     pub start: f64,
-    /// The relative tolerance that it proposes for its solver.
+    /// The relative tolerance that the FMU proposes for its solver.
     pub tolerance: Option<f64>,
-    /// Whether it needs the tool that has made it.
+    /// True if the FMU needs the tool that generated it.
     pub needs_tool: bool,
-    /// Its variables, in its own order.
+    /// The variables, in the order of the model description.
     pub variables: Vec<ForeignVariable>,
 }
 
-/// How the type of an array begins.
+/// The beginning of an array's type name.
 const ARRAY: &str = "array of ";
 
-/// What a variable is to the importing tool.
+/// The role of a variable for the importing tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Causality {
     /// The tool sets it before every step.
     Input,
     /// The tool reads it after every step.
     Output,
-    /// The tool may set it before the run.
+    /// The tool can set it before the run.
     Parameter,
-    /// Whatever else: it may be read.
+    /// Any other variable; the tool can read it.
     Local,
 }
 
 /// One variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForeignVariable {
-    /// Its name.
+    /// The variable's name.
     pub name: String,
-    /// What stands for it in the calls.
+    /// The value reference, which identifies the variable in calls.
     pub reference: u32,
-    /// Its type; `None` for one that cannot be a signal.
+    /// The variable's type; `None` if the variable cannot be a signal.
     pub value_type: Option<ValueType>,
-    /// The name of its type, and whether it is an array: for people.
+    /// The name of the type, with "array of" for an array; for people.
     pub type_name: String,
-    /// What it is to the importing tool.
+    /// The variable's role for the importing tool.
     pub causality: Causality,
-    /// Its unit, if it names one.
+    /// The unit, if the variable names one.
     pub unit: Option<String>,
-    /// Its other names.
+    /// The variable's other names.
     pub aliases: Vec<String>,
 }
 
 impl ForeignVariable {
-    /// Whether it has elements.
+    /// Returns true if the variable is an array.
     pub(super) fn is_array(&self) -> bool {
         self.type_name.starts_with(ARRAY)
     }
 }
 
 impl Model {
-    /// The variable with this name.
+    /// Returns the position of the variable with this name.
     pub fn position(&self, name: &str) -> Option<usize> {
         let is_alias = |one: &ForeignVariable| one.aliases.iter().any(|alias| alias == name);
         let mut variables = self.variables.iter();
         variables.position(|one| one.name == name || is_alias(one))
     }
 
-    /// A name that this is an element of: `y` of `y[1]`, if that is an array.
+    /// Returns the array that this name is an element of: `y` for `y[1]`, if `y` is an array.
     pub(super) fn array_of(&self, name: &str) -> Option<&ForeignVariable> {
         let (array, _) = name.split_once('[')?;
         let found = &self.variables[self.position(array)?];
@@ -91,7 +91,7 @@ impl Model {
     ///
     /// # Errors
     ///
-    /// With every mistake, at its line and column.
+    /// Returns every mistake, with its line and column.
     pub fn parse(file: &str, text: &str) -> Result<Self, Mistakes> {
         let document = Document::parse(text).map_err(|error| {
             let at = error.pos();
@@ -124,7 +124,7 @@ fn wrong(
     collector.report(node.range().start, what, right);
 }
 
-/// An attribute that has to be there.
+/// Returns a required attribute.
 fn required<'a>(collector: &Collector<'_>, node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     let value = node.attribute(name);
     if value.is_none() {
@@ -231,7 +231,7 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
     })
 }
 
-/// What both versions write in the same way.
+/// The parts that both versions write in the same way.
 fn common(
     node: Node<'_, '_>,
     collector: &Collector<'_>,

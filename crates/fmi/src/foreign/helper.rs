@@ -11,11 +11,11 @@ use super::slave::{Direct, Slave as _, Stepped};
 use super::talk::{Answer, Request};
 use crate::value::Value;
 
-/// Serves the host on stdin until it ends.
+/// Serves the host on stdin until the connection ends.
 ///
 /// # Errors
 ///
-/// This process was not started as a helper, or the host has gone.
+/// This process was not started as a helper, or the host is gone.
 pub fn serve() -> io::Result<()> {
     let line = io::stdin().as_fd().try_clone_to_owned()?;
     let mut line = UnixStream::from(line);
@@ -24,9 +24,9 @@ pub fn serve() -> io::Result<()> {
             "this command is for tickbus itself, which starts it for `tickbus run --isolated`",
         )
     })?;
-    // An FMU that reads from stdin finds nothing.
+    // An FMU that reads from stdin must find nothing.
     rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-    // One that hangs must not outlive its host.
+    // A helper with a hanging FMU must not outlive its host.
     #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let mut inbox = Inbox::new();
@@ -70,7 +70,7 @@ fn tell(line: &mut UnixStream, answer: &Answer) -> io::Result<()> {
     line.write_all(&answer.write())
 }
 
-/// The next message; `None` at the end of the line.
+/// Returns the next message; `None` at the end of the line.
 pub(super) fn next<M: Message>(line: &mut UnixStream, inbox: &mut Inbox) -> io::Result<Option<M>> {
     loop {
         if let Some(message) = inbox.take().map_err(io::Error::other)? {

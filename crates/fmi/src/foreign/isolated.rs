@@ -1,4 +1,4 @@
-//! An FMU in a helper process, which may crash and hang as it likes.
+//! An FMU in a helper process, where it can crash or hang without harm.
 
 use std::io::{self, ErrorKind, Write as _};
 use std::os::fd::{AsFd as _, OwnedFd};
@@ -14,13 +14,13 @@ use super::slave::{Failure, Setup, Slave, Stepped};
 use super::talk::{Answer, Request};
 use crate::value::Value;
 
-/// How long an FMU may take to begin, or for a step.
+/// The longest time that an FMU can take to begin, or for a step.
 const PATIENCE: Nanos = Nanos::from_secs(60);
 
-/// How long a helper may take to end after its line has.
+/// The longest time that a helper can take to end after its line has ended.
 const END: Nanos = Nanos::from_secs(2);
 
-/// An FMU in a process of its own.
+/// An FMU in a separate process.
 #[derive(Debug)]
 pub(super) struct Isolated {
     child: Child,
@@ -31,7 +31,7 @@ pub(super) struct Isolated {
 }
 
 impl Isolated {
-    /// Begins a run in a new helper, and reads the outputs as they are then.
+    /// Begins a run in a new helper, and reads the first outputs.
     pub(super) fn open(
         setup: &Setup,
         inputs: &[Value],
@@ -46,14 +46,14 @@ impl Isolated {
         let (line, theirs) = UnixStream::pair().map_err(cannot)?;
         line.set_read_timeout(Some(PATIENCE.to_duration()))
             .map_err(cannot)?;
-        // What an FMU prints goes to stderr: stdout is this command's.
+        // The FMU's output goes to stderr: stdout belongs to this command.
         let stderr: OwnedFd = io::stderr().as_fd().try_clone_to_owned().map_err(cannot)?;
         let child = std::env::current_exe().and_then(|program| {
             Command::new(program)
                 .arg("fmu-helper")
                 .stdin(OwnedFd::from(theirs))
                 .stdout(Stdio::from(stderr))
-                // Ctrl-C is for the host, which ends it.
+                // Ctrl-C is for the host, which ends the helper.
                 .process_group(0)
                 .spawn()
         });
@@ -78,7 +78,7 @@ impl Isolated {
         what: &str,
         outputs: &mut [Value],
     ) -> Result<Stepped, Failure> {
-        // If it has gone, that shows when its answer is read.
+        // If the helper is gone, reading its answer will show that.
         let _ = self.line.write_all(&request.write());
         match next(&mut self.line, &mut self.inbox) {
             Ok(Some(Answer::Outputs {
@@ -115,7 +115,8 @@ impl Isolated {
         Failure(format!("{}: {why}", self.file))
     }
 
-    /// How the helper has ended; `None` if it has not, though its line has: an FMU may close files that are not its own.
+    /// Returns how the helper ended, or `None` if it is still running although its line has ended: an FMU can close
+    /// files that are not its own.
     fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
         let clock = Monotonic::shared();
         let due = clock.now() + END;
@@ -128,7 +129,7 @@ impl Isolated {
         }
     }
 
-    /// The helper has ended by itself.
+    /// Describes a helper that ended on its own.
     fn gone(&mut self, what: &str) -> Failure {
         let how = match self.ended() {
             Ok(Some(status)) => ending(status),
@@ -139,7 +140,7 @@ impl Isolated {
     }
 }
 
-/// How a process has ended, as a part of a sentence.
+/// Describes how a process ended, as a part of a sentence.
 fn ending(status: ExitStatus) -> String {
     match (status.signal(), status.code()) {
         (Some(11), _) => "crashed (SIGSEGV, an access to memory that is not its own)".to_owned(),
@@ -187,10 +188,10 @@ impl Slave for Isolated {
 impl Drop for Isolated {
     fn drop(&mut self) {
         if !self.is_over {
-            // Why it cannot be ended is of no use any more.
+            // An error at the end is of no use any more.
             let _ = self.end();
         }
-        // It may hang, and has nothing to lose.
+        // The helper may hang, and has nothing to lose.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

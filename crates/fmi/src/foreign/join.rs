@@ -1,4 +1,4 @@
-//! Which variables of an FMU are which signals.
+//! Joins the variables of an FMU with signals.
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::nearest;
@@ -8,32 +8,32 @@ use super::description::{Causality, ForeignVariable, Model};
 use super::map::{Joined, Map};
 use crate::value::Value;
 
-/// Something that is joined with nothing: a line for people.
+/// A signal or variable that is not joined: a line for people.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unjoined(pub String);
 
-/// All that is joined.
+/// The result of joining.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Join {
-    /// What the FMU gets before each step.
+    /// The values that the FMU receives before each step.
     pub inputs: Vec<Joined>,
-    /// What it gives after each step.
+    /// The values that the FMU returns after each step.
     pub outputs: Vec<Joined>,
     /// Parameters and their values.
     pub parameters: Vec<(usize, Value)>,
-    /// Parameters that are texts.
+    /// Parameters of type text, and their values.
     pub texts: Vec<(usize, String)>,
-    /// What is left over: signals that nobody writes, inputs that keep their start values, outputs that nobody reads.
+    /// The rest: signals that nobody writes, inputs that keep their start values, outputs that nobody reads.
     pub left: Vec<Unjoined>,
 }
 
 impl Join {
-    /// Joins the signals of `config`, as the end that it is, with the variables of an FMU: by the map, and all others by their
+    /// Joins the signals of `config`, in its role, with the variables of an FMU: by the map, and all others by their
     /// names.
     ///
     /// # Errors
     ///
-    /// Nothing at all is joined.
+    /// Nothing could be joined.
     pub fn of(config: &Config, model: &Model, map: &Map) -> Result<Self, Mistake> {
         let (writes, _) = config.role.areas();
         let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
@@ -48,7 +48,7 @@ impl Join {
             let fits = |one: &&ForeignVariable| one.causality == wanted && one.value_type.is_some();
             let by_map = map.joined.iter().find(|joined| joined.signal == index);
             let same = model.position(&signal.name);
-            // An input of the FMU has one source, and the map goes first.
+            // An input of the FMU has one source, and the map has priority.
             let taken = map
                 .joined
                 .iter()
@@ -123,7 +123,7 @@ impl Join {
     }
 }
 
-/// What there is to say when no name meets another.
+/// Returns the message for the case that no names match.
 fn nothing_in_common(config: &Config, model: &Model) -> Mistake {
     let names = |wanted: Causality| {
         let names = model.variables.iter().filter(|one| one.causality == wanted);

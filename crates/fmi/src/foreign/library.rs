@@ -1,5 +1,5 @@
-//! The library of somebody else's FMU: its functions, and the calls of them. What can be done with an instance is safe to call in
-//! any order; whether the FMU bears it is its own affair, and a helper process keeps what it does to itself.
+//! The library of a foreign FMU: its functions, and the calls of them. The methods of an instance are safe to call in
+//! any order. Whether the FMU can cope with that order is up to the FMU; a helper process contains the damage.
 
 #![allow(unsafe_code, reason = "foreign functions are called")]
 
@@ -19,26 +19,26 @@ use functions::{Callbacks, Functions, GetThree, GetTwo, Handle, SetThree, SetTwo
 use journal::{Journal, log_of_three, log_of_two};
 
 unsafe extern "C" {
-    // What `fmi2CallbackFunctions` has to have.
+    // Functions that `fmi2CallbackFunctions` must contain.
     fn calloc(count: usize, size: usize) -> *mut c_void;
     fn free(memory: *mut c_void);
 }
 
-/// How a step has ended.
+/// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StepEnd {
     pub(super) status: Status,
-    /// Whether the FMU wants the run to end.
+    /// True if the FMU asks to end the run.
     pub(super) terminate: bool,
-    /// How far it got, in seconds, if it says so.
+    /// The time that the FMU reached, in seconds, if it reports one.
     pub(super) reached: Option<f64>,
 }
 
-/// An FMU, wherever it was unpacked to: its token, and the name of its library.
+/// Identifies an FMU, wherever it was unpacked: its token, and the name of its library.
 type Identity = (String, OsString);
 
-/// The FMUs that have answered "fatal" in this process. By the standards nothing of them may be called any more, in no instance;
-/// their libraries stay loaded, for to unload one runs its finalisers.
+/// The FMUs that have returned "fatal" in this process. The standards forbid any further call of them, in any instance.
+/// Their libraries stay loaded, since unloading a library runs its finalisers.
 static DEAD: Mutex<BTreeSet<Identity>> = Mutex::new(BTreeSet::new());
 
 fn dead() -> MutexGuard<'static, BTreeSet<Identity>> {
@@ -50,25 +50,25 @@ fn dead() -> MutexGuard<'static, BTreeSet<Identity>> {
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
-    /// Whether it has answered "fatal".
+    /// True once the FMU has returned "fatal".
     is_dead: bool,
     identity: Identity,
-    /// There until it is dropped.
+    /// `Some` until the instance is dropped.
     kept: Option<Kept>,
 }
 
-/// What has to stay as long as the FMU may use it.
+/// The parts that must exist as long as the FMU can use them.
 #[derive(Debug)]
 struct Kept {
-    /// Dropped before what follows, which its finalisers may still use: they may log.
+    /// Dropped before the fields below, which the library's finalisers may still use for logging.
     library: Library,
     journal: Journal,
-    /// Kept where it is: the FMU may keep its address.
+    /// Never moved: the FMU may keep its address.
     _callbacks: Option<Box<Callbacks>>,
 }
 
 impl Instance {
-    /// Loads the library and makes an instance. `file` is the FMU's name in messages.
+    /// Loads the library and creates an instance. `file` is the FMU's name in messages.
     pub(super) fn new(
         (file, name, token): (&str, &str, &str),
         version: Version,
@@ -103,7 +103,7 @@ impl Instance {
                     step_finished: null(),
                     env,
                 }));
-                // SAFETY: by the standard; all texts outlive the call, and the callbacks the instance.
+                // SAFETY: by the standard. All texts outlive the call, and the callbacks outlive the instance.
                 unsafe {
                     (two.instantiate)(
                         name.as_ptr(),
@@ -117,7 +117,7 @@ impl Instance {
                 }
             }
             Functions::Three(three) => {
-                // With a separator at its end, as the standard says.
+                // The standard requires a separator at the end.
                 let path = resources.join("");
                 let path = c_string(&path.to_string_lossy());
                 // SAFETY: as above.
@@ -156,7 +156,7 @@ impl Instance {
         Ok(instance)
     }
 
-    /// A sentence, with what the FMU has said in its last call.
+    /// Returns a sentence, extended by the FMU's message during its last call.
     pub(super) fn said(&self, what: &str) -> String {
         let kept = self.kept.as_ref();
         let last = kept.map_or_else(String::new, |kept| kept.journal.said());
@@ -167,7 +167,7 @@ impl Instance {
         }
     }
 
-    /// It is about to be called.
+    /// Notes that a call is about to begin.
     fn begin_call(&self) {
         if let Some(kept) = &self.kept {
             kept.journal.begin_call();
@@ -180,7 +180,7 @@ impl Instance {
         status
     }
 
-    /// Enters the initialisation, for a run that begins at `start` seconds, and ends at `stop` if that is known.
+    /// Enters the initialisation of a run that begins at `start` seconds and ends at `stop`, if that is known.
     pub(super) fn enter(
         &mut self,
         start: f64,
@@ -191,7 +191,7 @@ impl Instance {
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         let status = match &self.functions {
-            // SAFETY: the handle is of this library, and alive, here and below.
+            // SAFETY: the handle belongs to this library and is alive, here and below.
             Functions::Two(two) => unsafe {
                 let status = (two.setup)(
                     self.handle,
@@ -239,7 +239,7 @@ impl Instance {
         self.noted(status)
     }
 
-    /// One step.
+    /// Does one step.
     pub(super) fn step(&mut self, from: f64, length: f64) -> StepEnd {
         self.begin_call();
         let (mut terminate, mut reached) = (false, None);
@@ -259,7 +259,7 @@ impl Instance {
                         unsafe { (two.real_status)(self.handle, 2, &raw mut last) }
                     };
                     reached = (known == 0).then_some(last);
-                    // Then nothing may be called any more, whatever the step was.
+                    // After "fatal" no call is allowed any more, whatever the result of the step.
                     if known == Status::Fatal as c_int {
                         known
                     } else {
@@ -272,7 +272,8 @@ impl Instance {
             Functions::Three(three) => {
                 let (mut event, mut early, mut last) = (0_u8, 0_u8, from);
                 let mut ends = 0_u8;
-                // SAFETY: as in `enter`. What comes back need not be 0 or 1, as a `bool` of Rust has to be: it is read as a byte.
+                // SAFETY: as in `enter`. The FMU may return values other than 0 and 1, which a Rust `bool` must not
+                // have, so they are read as bytes.
                 let status = unsafe {
                     (three.step)(
                         self.handle,
@@ -336,7 +337,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// Its library has no function for that.
+    /// The library has no function for that.
     pub(super) fn set_text(&mut self, reference: u32, text: &str) -> Result<Status, String> {
         self.begin_call();
         let text = c_string(text);
@@ -349,7 +350,7 @@ impl Instance {
             Functions::Two(_) => {
                 // SAFETY: the type is that of the standard's header, here and below.
                 let function = unsafe { library.symbol::<SetTwo<*const c_char>>("fmi2SetString") };
-                // SAFETY: as in `enter`; the lists have one value, and outlive the call.
+                // SAFETY: as in `enter`; the lists have one value and outlive the call.
                 unsafe {
                     function.map_err(missing)?(self.handle, &raw const reference, 1, texts.as_ptr())
                 }
@@ -381,7 +382,7 @@ impl Instance {
         of: fn(Value) -> T,
     ) -> c_int {
         let values: Vec<T> = values.iter().map(|value| of(*value)).collect();
-        // SAFETY: as in `enter`; both lists have as many values as the call says, and outlive it.
+        // SAFETY: as in `enter`; both lists have as many values as the call states, and outlive the call.
         unsafe {
             function(
                 self.handle,
@@ -520,7 +521,7 @@ impl Drop for Instance {
     fn drop(&mut self) {
         if self.is_dead {
             dead().insert(std::mem::take(&mut self.identity));
-            // Threads of it may still run, and log.
+            // The FMU's threads may still run and log.
             std::mem::forget(self.kept.take());
             return;
         }
@@ -528,7 +529,7 @@ impl Drop for Instance {
             return;
         }
         self.begin_call();
-        // SAFETY: the handle is of this library, alive, and used no more.
+        // SAFETY: the handle belongs to this library, is alive, and is not used afterwards.
         unsafe {
             match &self.functions {
                 Functions::Two(two) => (two.free)(self.handle),
@@ -543,7 +544,7 @@ fn c_string(text: &str) -> CString {
     CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
-/// The URI of a folder, as FMI 2.0 wants it.
+/// Returns the URI of a folder in the form that FMI 2.0 requires.
 fn uri_of(folder: &Path) -> String {
     let path = folder.to_string_lossy().replace('\\', "/");
     let mut uri = String::from(if path.starts_with('/') {

@@ -1,4 +1,4 @@
-//! A foreign FMU at work: values between its variables and the slots of a driver.
+//! A running foreign FMU: carries values between its variables and the slots of a driver.
 
 use tickbus_base::time::Nanos;
 use tickbus_binding::SlotKind;
@@ -11,18 +11,18 @@ use super::slave::{Direct, Failure, Setup, Slave, Stepped};
 use crate::made::kind_of;
 use crate::value::{Value, Version};
 
-/// How an FMU is run.
+/// The settings for running an FMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MachineOptions {
-    /// In a helper process, which it may crash.
+    /// Runs the FMU in a helper process, which it can crash without harm.
     pub isolated: bool,
-    /// The relative tolerance for its solver, in place of the one that it proposes.
+    /// The relative tolerance for the FMU's solver, in place of the proposed one.
     pub tolerance: Option<f64>,
-    /// How long the run is, if that is known.
+    /// The length of the run, if known.
     pub duration: Option<Nanos>,
 }
 
-/// A signal's slot, and its way to the variable.
+/// A signal's slot, and its conversion to the variable.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     slot: usize,
@@ -44,7 +44,7 @@ impl Way {
         }
     }
 
-    /// What the signal says, as the variable has it. Integers pass as they are where nothing is to be computed.
+    /// Converts the signal's value to the variable's. Integers pass unchanged if there is nothing to compute.
     #[expect(clippy::float_cmp, reason = "exactly as written, or not at all")]
     fn variable(self, slots: &[Slot]) -> Value {
         let value = Value::of(slots[self.slot], self.kind);
@@ -69,7 +69,7 @@ impl Way {
     }
 }
 
-/// An FMU that runs.
+/// A running FMU.
 #[derive(Debug)]
 pub struct Machine {
     slave: Box<dyn Slave>,
@@ -81,11 +81,11 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Begins a run of the FMU: `slots` have the values before it, and get those that the FMU gives then.
+    /// Begins a run of the FMU. `slots` contains the values before the run, and receives the FMU's first values.
     ///
     /// # Errors
     ///
-    /// The FMU does not begin: why.
+    /// Returns why the FMU does not begin.
     pub fn open(
         fmu: &Unpacked,
         join: &Join,
@@ -138,12 +138,12 @@ impl Machine {
         Ok(machine)
     }
 
-    /// One step: takes what the PLC commands from `slots`, lets time pass from `from` on, and puts what the sensors show then
-    /// there. As the PLC, the other way round.
+    /// Does one step: takes the PLC's commands from `slots`, lets time pass from `from` on, and puts the sensors'
+    /// values into `slots`. If the FMU is the PLC, the directions are swapped.
     ///
     /// # Errors
     ///
-    /// The FMU does not go on: why.
+    /// Returns why the FMU does not continue.
     pub fn step(
         &mut self,
         from: Nanos,
@@ -171,7 +171,7 @@ impl Machine {
     ///
     /// # Errors
     ///
-    /// The FMU fails in doing so.
+    /// The FMU failed to end its run.
     pub fn end(mut self) -> Result<(), Failure> {
         self.slave.end()
     }

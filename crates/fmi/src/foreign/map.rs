@@ -1,4 +1,4 @@
-//! The map: which variable of an FMU is which signal, where their names differ; and what its parameters are.
+//! The map: joins variables of an FMU with signals where their names differ, and sets parameters.
 
 use std::path::Path;
 
@@ -14,13 +14,13 @@ use crate::value::{Number, Value, ValueType};
 /// A signal and its variable: signal = `scale` × variable + `offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Joined {
-    /// The signal, by its place in the table.
+    /// The signal's index in the table.
     pub signal: usize,
-    /// The variable, by its place in the model description.
+    /// The variable's index in the model description.
     pub variable: usize,
-    /// How many units of the signal one of the variable is. Not 0.
+    /// The number of signal units per unit of the variable. Not 0.
     pub scale: f64,
-    /// The signal where the variable is 0.
+    /// The signal's value where the variable is 0.
     pub offset: f64,
 }
 
@@ -29,9 +29,9 @@ pub struct Joined {
 pub struct Map {
     /// Signals and their variables.
     pub joined: Vec<Joined>,
-    /// Parameters, by their places in the model description, and their values.
+    /// Parameters, by their indices in the model description, and their values.
     pub parameters: Vec<(usize, Value)>,
-    /// Parameters that are texts.
+    /// Parameters of type text, and their values.
     pub texts: Vec<(usize, String)>,
 }
 
@@ -40,8 +40,8 @@ impl Map {
     ///
     /// # Errors
     ///
-    /// With every mistake in it: names that neither the FMU nor the driver.cfg has, with the nearest ones; variables that cannot
-    /// be signals; directions that do not meet.
+    /// Returns every mistake in the map: names that neither the FMU nor the driver.cfg has, with the nearest ones;
+    /// variables that cannot be signals; directions that do not match.
     pub fn load(path: &Path, model: &Model, config: &Config) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let mut collector = Collector::new(&path.display().to_string(), &text);
@@ -94,7 +94,7 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
     map
 }
 
-/// What a parameter is set to.
+/// The value that a parameter is set to.
 enum Set {
     Value(Value),
     Text(String),
@@ -157,7 +157,7 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
     Some((at, Set::Value(Value::Real(number))))
 }
 
-/// Whether this is the name of an element of an array, which is refused.
+/// Refuses the name of an array element; returns true if it was one.
 fn refused_element(name: &str, value: &TomlValue<'_>, model: &Model) -> bool {
     let array = model.array_of(name);
     if let Some(array) = array {
@@ -169,7 +169,7 @@ fn refused_element(name: &str, value: &TomlValue<'_>, model: &Model) -> bool {
     array.is_some()
 }
 
-/// Whether a type has this very number; floating point numbers have the nearest one.
+/// Returns true if a type can represent this number; a floating point type takes its nearest value.
 #[expect(clippy::float_cmp, reason = "exactly as written")]
 fn holds(kind: ValueType, number: f64) -> bool {
     fn nearest<T: Number>(number: f64) -> f64 {

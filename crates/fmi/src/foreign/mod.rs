@@ -1,4 +1,4 @@
-//! An FMU of somebody else, as the machine or as the PLC.
+//! A foreign FMU, as the machine or as the PLC.
 
 mod archive;
 mod description;

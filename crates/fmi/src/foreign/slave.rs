@@ -7,47 +7,47 @@ use serde::{Deserialize, Serialize};
 use super::library::Instance;
 use crate::value::{Status, Value, ValueType, Version};
 
-/// What a run of an FMU begins with.
+/// The settings with which a run of an FMU begins.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Setup {
-    /// The FMU, as messages name it.
+    /// The FMU's name in messages.
     pub file: String,
-    /// The name of the instance.
+    /// The instance's name.
     pub name: String,
-    /// What the library wants to be told.
+    /// The token that the library expects.
     pub token: String,
-    /// Whether it is of FMI 3.0, and not 2.0.
+    /// True for FMI 3.0, false for 2.0.
     pub is_three: bool,
-    /// Its library.
+    /// The path of the library.
     pub library: PathBuf,
-    /// Its resources.
+    /// The path of the resources.
     pub resources: PathBuf,
     /// The time at which the run begins, in seconds.
     pub start: f64,
-    /// The relative tolerance for its solver, if it is to have one.
+    /// The relative tolerance for the solver, if one is set.
     pub tolerance: Option<f64>,
-    /// The time at which the run ends, in seconds, if that is known.
+    /// The time at which the run ends, in seconds, if known.
     pub stop: Option<f64>,
-    /// What is set before the run: type, value reference, value.
+    /// The values to set before the run: type, value reference, value.
     pub parameters: Vec<(ValueType, u32, Value)>,
-    /// Texts that are set before the run: value reference, text.
+    /// The texts to set before the run: value reference, text.
     pub texts: Vec<(u32, String)>,
-    /// What is set before every step.
+    /// The variables to set before every step.
     pub inputs: Vec<(ValueType, u32)>,
-    /// What is read after every step.
+    /// The variables to read after every step.
     pub outputs: Vec<(ValueType, u32)>,
 }
 
-/// What a step came to.
+/// The result of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Stepped {
-    /// It was done.
+    /// The step was done.
     Done,
-    /// It was done, and the FMU wants the run to end here.
+    /// The step was done, and the FMU asks to end the run here.
     Ended,
 }
 
-/// Why an FMU does not go on: one line.
+/// Says in one line why an FMU does not continue.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{0}")]
 pub struct Failure(pub String);
@@ -58,7 +58,7 @@ pub(super) trait Slave: std::fmt::Debug {
     ///
     /// # Errors
     ///
-    /// The FMU does not go on.
+    /// The FMU does not continue.
     fn step(
         &mut self,
         inputs: &[Value],
@@ -71,16 +71,16 @@ pub(super) trait Slave: std::fmt::Debug {
     ///
     /// # Errors
     ///
-    /// The FMU fails in doing so.
+    /// The FMU failed to end its run.
     fn end(&mut self) -> Result<(), Failure>;
 }
 
-/// Variables of one type, in one call.
+/// Variables of one type, handled in one call.
 #[derive(Debug)]
 struct Group {
     kind: ValueType,
     references: Vec<u32>,
-    /// Their places among all inputs or outputs.
+    /// The indices of the variables among all inputs or outputs.
     at: Vec<usize>,
     values: Vec<Value>,
 }
@@ -113,12 +113,12 @@ pub(super) struct Direct {
     file: String,
     inputs: Vec<Group>,
     outputs: Vec<Group>,
-    /// It has failed, or has ended.
+    /// True if the FMU has failed, or has ended.
     is_over: bool,
 }
 
 impl Direct {
-    /// Begins a run, and reads the outputs as they are then.
+    /// Begins a run, and reads the first outputs.
     pub(super) fn open(
         setup: &Setup,
         inputs: &[Value],
@@ -164,7 +164,7 @@ impl Direct {
         Failure(format!("{}: {}", self.file, self.instance.said(what)))
     }
 
-    /// Goes on after a good answer.
+    /// Checks a status; continues after a good one.
     fn check(&mut self, status: Status, what: &str) -> Result<(), Failure> {
         match status {
             Status::Ok | Status::Warning => Ok(()),
@@ -213,7 +213,7 @@ impl Slave for Direct {
     ) -> Result<Stepped, Failure> {
         self.set(inputs)?;
         let end = self.instance.step(from, length);
-        // FMI 2.0 asks for its end so, which is no failure.
+        // FMI 2.0 requests the end of a run this way, which is no failure.
         let has_ended =
             end.terminate && matches!(end.status, Status::Ok | Status::Warning | Status::Discard);
         if !has_ended {
@@ -247,7 +247,7 @@ impl Slave for Direct {
 
 impl Drop for Direct {
     fn drop(&mut self) {
-        // Why it cannot be ended is of no use any more.
+        // An error at the end is of no use any more.
         let _ = self.end();
     }
 }

@@ -1,4 +1,4 @@
-//! What host and helper say to each other, in the frames of isolated plug-ins.
+//! The messages between host and helper, in the frames of isolated plug-ins.
 
 use serde::{Deserialize, Serialize};
 use tickbus_bus_plugin::Message;
@@ -6,10 +6,10 @@ use tickbus_bus_plugin::Message;
 use super::slave::{Failure, Setup, Stepped};
 use crate::value::Value;
 
-/// The most bytes of a message: a hundred thousand variables and their names' worth.
+/// The most bytes of a message: enough for a hundred thousand variables and their names.
 const MOST: usize = 64 << 20;
 
-/// From the host.
+/// A message from the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Request {
     /// Load the library and begin a run. Sent first.
@@ -17,7 +17,7 @@ pub(super) enum Request {
         setup: Box<Setup>,
         inputs: Vec<Value>,
     },
-    /// One step.
+    /// Do one step.
     Step {
         inputs: Vec<Value>,
         from: f64,
@@ -27,17 +27,17 @@ pub(super) enum Request {
     End,
 }
 
-/// From the helper.
+/// A message from the helper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Answer {
-    /// The run has begun, or the step is done: the outputs.
+    /// The run has begun, or the step is done; carries the outputs.
     Outputs {
         outputs: Vec<Value>,
         stepped: Stepped,
     },
     /// The run has ended.
     Ended,
-    /// The FMU does not go on.
+    /// The FMU does not continue.
     Failed(Failure),
 }
 

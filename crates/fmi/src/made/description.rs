@@ -1,7 +1,7 @@
-//! `modelDescription.xml` of the FMU that a driver.cfg becomes.
+//! Writes `modelDescription.xml` of the FMU made from a driver.cfg.
 //!
-//! By the sheet of both standards: the order of the elements is theirs, inputs and outputs are discrete, and outputs depend on
-//! nothing within a step, since a step alone exchanges.
+//! The text follows the schemas of both standards, which define the order of the elements. Inputs and outputs are
+//! discrete. Outputs depend on nothing within a step, since values are exchanged only by a step.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -14,10 +14,10 @@ use tickbus_driver_cfg::Config;
 use super::variables::{Exposed, Start, Use, Variable};
 use crate::value::{Value, ValueType, Version};
 
-/// The step that is proposed where the driver.cfg names no cycle.
+/// The proposed step if the driver.cfg names no cycle.
 const STEP: Nanos = Nanos::from_millis(10);
 
-/// How long the proposed run takes, in seconds.
+/// The length of the proposed run, in seconds.
 const STOP: u32 = 10;
 
 /// The categories of log lines: name and description.
@@ -27,7 +27,8 @@ pub(super) const CATEGORIES: [(&str, &str); 3] = [
     ("logEvents", "Every change of the line"),
 ];
 
-/// The name of the library, without its ending, and the prefix of its functions in C: the driver's name as C can write it.
+/// Returns the name of the library without its ending, which is also the prefix of its C functions: the driver's name
+/// in characters that C allows.
 pub(super) fn identifier(config: &Config) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let name: String = config.name.chars().take(64).map(plain).collect();
@@ -37,7 +38,7 @@ pub(super) fn identifier(config: &Config) -> String {
     name
 }
 
-/// The text of the model description; `token` is that of the driver.cfg beside it.
+/// Returns the text of the model description; `token` is the token of the driver.cfg packed with it.
 pub fn model_description(config: &Config, version: Version, token: &str) -> String {
     let exposed = Exposed::of(config, version);
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
@@ -98,7 +99,7 @@ fn units(text: &mut String, exposed: &Exposed) {
     text.push_str("  <UnitDefinitions>\n");
     for unit in units {
         let _ = match unit {
-            // What importing tools may convert it by.
+            // The base unit, by which importing tools can convert.
             "s" => writeln!(text, "    <Unit name=\"s\"><BaseUnit s=\"1\"/></Unit>"),
             unit => writeln!(text, "    <Unit name=\"{}\"/>", escape(unit)),
         };
@@ -106,7 +107,7 @@ fn units(text: &mut String, exposed: &Exposed) {
     text.push_str("  </UnitDefinitions>\n");
 }
 
-/// Causality, variability, and `initial`.
+/// Returns causality, variability, and `initial`.
 fn usage(variable: &Variable) -> &'static str {
     let is_float = variable.value_type.is_float();
     match variable.usage {

@@ -1,4 +1,4 @@
-//! The files that go into an FMU beside its driver.cfg.
+//! The files that are packed into an FMU with its driver.cfg.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -6,17 +6,17 @@ use tickbus_base::Mistake;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::NamedFile;
 
-/// What a driver.cfg names: what goes with it, and what its users should know.
+/// The files that a driver.cfg names, and notes about them for the FMU's users.
 #[derive(Debug, Default)]
 pub(super) struct Named {
-    /// The files that go with it, relative to its folder.
+    /// The files to pack, relative to the driver.cfg's folder.
     pub(super) files: Vec<PathBuf>,
-    /// Files that stay where they are.
+    /// Notes about files that are not packed.
     pub(super) notes: Vec<String>,
 }
 
-/// The files that `config` names. Those in its folder, or below, go with it; what is named by an absolute path stays, and
-/// has to be there wherever the FMU runs.
+/// Finds the files that `config` names. Files in its folder or below are packed. Files with an absolute path are not,
+/// and must exist wherever the FMU runs.
 pub(super) fn named(config: &Config, faults: Option<&Path>) -> Result<Named, Mistake> {
     let mut named = Named::default();
     let faults = faults.map(|file| NamedFile::Plain(file.to_owned()));

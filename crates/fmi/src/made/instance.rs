@@ -1,4 +1,4 @@
-//! What runs inside of the FMU: a driver, and the values of its variables.
+//! The inside of the FMU: a driver, and the values of its variables.
 
 use std::ffi::CString;
 use std::path::Path;
@@ -15,17 +15,18 @@ use super::variables::{Cell, Exposed, Place, Variable, default_pace, initial_slo
 use crate::real_time::RealTime;
 use crate::value::{Number, Value, ValueType, Version};
 
-/// How far the beginning of a step may be from the end of the last one, in seconds; beyond that, what doubles are rounded to.
+/// The largest distance between the end of a step and the beginning of the next, in seconds, apart from the rounding
+/// of doubles.
 const TOLERANCE: f64 = 1e-9;
 
-/// Where an instance stands.
+/// The state of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Phase {
-    /// It was made, or reset: everything can be set.
+    /// Created or reset: everything can be set.
     Before,
-    /// Its driver is open.
+    /// The driver is open.
     Running,
-    /// It has ended, or has failed.
+    /// Ended or failed.
     Over,
 }
 
@@ -41,7 +42,7 @@ pub struct Instance {
     driver: Option<Driver>,
     /// The end of the last step, in seconds.
     time: f64,
-    /// Where the driver's time is 0, in seconds: it has none before.
+    /// The simulation time at which the driver's time is 0, in seconds: the driver's time is never negative.
     origin: f64,
     real_time: RealTime,
     address: CString,
@@ -51,12 +52,12 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// An instance of the FMU whose resources are in `folder`; its model description has the token `given`. Its driver.cfg
-    /// may name these `kinds` of bus. No bus is open yet.
+    /// Creates an instance of the FMU whose resources are in `folder`; its model description has the token `given`. Its
+    /// driver.cfg can name these `kinds` of bus. No bus is open yet.
     ///
     /// # Errors
     ///
-    /// There is no driver.cfg, it is another one than that of the export, or it is wrong: with every mistake in it.
+    /// There is no driver.cfg, it is not the exported one, or it is wrong: returns every mistake in it.
     pub fn new(
         version: Version,
         folder: &Path,
@@ -101,12 +102,12 @@ impl Instance {
         Ok(new)
     }
 
-    /// The name of its driver.
+    /// Returns the driver's name.
     pub fn name(&self) -> &str {
         &self.config.name
     }
 
-    /// Ends the run and gives every variable its start value.
+    /// Ends the run and resets every variable to its start value.
     pub fn reset(&mut self) {
         self.terminate();
         self.slots = initial_slots(&self.config);
@@ -121,11 +122,11 @@ impl Instance {
         self.record = CString::new(file.unwrap_or_default()).unwrap_or_default();
     }
 
-    /// The simulation will begin at `start` seconds.
+    /// Sets the time at which the simulation will begin, in seconds.
     ///
     /// # Errors
     ///
-    /// The run has begun already, or this is no time.
+    /// The run has begun already, or `start` is not a valid time.
     pub fn begin_at(&mut self, start: f64) -> Result<(), String> {
         if self.phase != Phase::Before {
             return Err("the run has begun already; reset the instance first".to_owned());
@@ -138,16 +139,16 @@ impl Instance {
         Ok(())
     }
 
-    /// Opens the bus. A free one comes up in the background, and is not waited for.
+    /// Opens the bus. A free bus connects in the background; opening does not wait for that.
     ///
     /// # Errors
     ///
-    /// It is open, or cannot be opened: why.
+    /// The bus is already open, or cannot be opened; returns why.
     pub fn open(&mut self) -> Result<(), String> {
         if self.phase != Phase::Before {
             return Err("the run has begun already; reset the instance first".to_owned());
         }
-        // Whatever happens now, nothing can be set any more.
+        // Parameters are read-only from here on.
         self.phase = Phase::Over;
         let mut config = self.config.clone();
         if let Ok(address) = self.address.to_str()
@@ -160,7 +161,7 @@ impl Instance {
         if file.is_empty() {
             config.record = None;
         } else {
-            // Not beside driver.cfg: the FMU is unpacked to a folder that goes away.
+            // Not next to driver.cfg: the FMU is unpacked to a temporary folder.
             let file = std::path::absolute(file).map_err(|why| format!("record: {why}"))?;
             let to = record::Options::to(&file);
             let to = to.map_err(|mistake| format!("record: {mistake}"))?;
@@ -175,7 +176,7 @@ impl Instance {
         Ok(())
     }
 
-    /// One step, from `from` to `from` + `length` seconds: sends the inputs, and receives the outputs as they are at its end.
+    /// Does one step, from `from` to `from` + `length` seconds: sends the inputs, and receives the outputs at its end.
     ///
     /// # Errors
     ///
@@ -209,18 +210,18 @@ impl Instance {
         Ok(())
     }
 
-    /// Whether the bus has come to an end of its own, such as that of a run on virtual time: the last step was not done, and
-    /// none will be.
+    /// Returns true if the bus has ended on its own, for example because a run on virtual time is over: the last step
+    /// was not done, and no further one will be.
     pub fn is_over(&self) -> bool {
         self.driver.as_ref().is_some_and(Driver::is_over)
     }
 
-    /// The end of the last step that was done, in seconds.
+    /// Returns the end of the last completed step, in seconds.
     pub const fn time(&self) -> f64 {
         self.time
     }
 
-    /// Waits until the clock on the wall is where the simulation is.
+    /// Waits until the wall clock has reached the simulation time.
     fn wait(&mut self, time: Nanos) {
         let was_late = self.real_time.lost() > Nanos::ZERO;
         let due = self.real_time.due(time, self.clock.now());
@@ -252,7 +253,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// One does not exist, is of another type, or cannot be set now; those before it are set.
+    /// A variable does not exist, is of another type, or cannot be set now; the variables before it are set.
     #[inline]
     pub fn set<T: Number>(
         &mut self,
@@ -273,7 +274,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Sets a variable that is no input.
+    /// Sets a variable that is not an input.
     fn set_other(&mut self, reference: u32, given: ValueType, value: Value) -> Result<(), String> {
         let place = self.number(reference, given)?;
         match place {
@@ -291,7 +292,7 @@ impl Instance {
                 "the pace is {}; write 1 for real time, or 0 for as fast as possible",
                 value.real()
             )),
-            // They have their start values, and nothing was exchanged yet.
+            // These variables have their start values, and nothing has been exchanged yet.
             Place::Status | Place::Age | Place::Sequence if self.phase == Phase::Before => Ok(()),
             _ => Err(self.read_only(reference)),
         }
@@ -301,7 +302,7 @@ impl Instance {
     ///
     /// # Errors
     ///
-    /// One does not exist, or is of another type.
+    /// A variable does not exist, or is of another type.
     #[inline]
     pub fn get<T: Number>(
         &self,
@@ -354,7 +355,7 @@ impl Instance {
         Ok(())
     }
 
-    /// Gets a text, which stays until it is set again or the instance ends.
+    /// Returns a text, which stays valid until it is set again or the instance ends.
     ///
     /// # Errors
     ///
@@ -366,8 +367,8 @@ impl Instance {
         })
     }
 
-    /// As [`checked`](Self::checked), for numbers. In FMI 2.0 some tools get and set every variable as a Real, and that is answered,
-    /// too: nothing is lost.
+    /// As [`checked`](Self::checked), for numbers. In FMI 2.0 some tools get and set every variable as a Real; that is
+    /// accepted, since nothing is lost.
     fn number(&self, reference: u32, asked: ValueType) -> Result<Place, String> {
         let is_text = |one: &Variable| one.value_type == ValueType::String;
         match (Place::of(reference), self.exposed.variable(reference)) {
@@ -382,7 +383,7 @@ impl Instance {
         }
     }
 
-    /// What a reference stands for, if that is of this type.
+    /// Returns the place that a value reference stands for, if it is of this type.
     fn checked(&self, reference: u32, asked: ValueType) -> Result<Place, String> {
         let variable = self.exposed.variable(reference);
         match (Place::of(reference), variable) {
@@ -421,7 +422,7 @@ impl Drop for Instance {
     }
 }
 
-/// The nearest nanosecond, of seconds from 0 on; 292 years at most.
+/// Rounds seconds, which are not negative, to the nearest nanosecond; 292 years at most.
 #[inline]
 #[expect(
     clippy::cast_possible_truncation,
@@ -431,7 +432,7 @@ impl Drop for Instance {
 fn nanos(seconds: f64) -> Nanos {
     let exact = seconds * 1e9;
     let whole = exact as i64;
-    // What `round` does, which is a call of the C library where the processor need not have the instruction.
+    // Same result as `round`, which calls the C library on processors that may lack the instruction.
     Nanos(whole.saturating_add(i64::from(exact - whole as f64 >= 0.5)))
 }
 

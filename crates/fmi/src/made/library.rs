@@ -1,4 +1,4 @@
-//! The native libraries that go into an FMU: one for each platform.
+//! The native libraries that are packed into an FMU, one for each platform.
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::io::Read as _;
@@ -9,25 +9,25 @@ use zip::ZipArchive;
 
 use crate::value::Version;
 
-/// The name of a function that the library of an FMU must have, and that libraries of earlier versions lack. In two parts, so
-/// that programs that look for it do not have it themselves.
+/// The name of a function that an FMU's library must have and that libraries of earlier versions do not. In two parts,
+/// so that programs searching for the name do not contain it themselves.
 const FUNCTION: [&str; 2] = ["fmi3Activate", "ModelPartition"];
 
-/// The folder of a jar in which the libraries are.
+/// The folder with the libraries in a jar.
 const IN_JAR: &str = "tickbus/native/";
 
 /// An operating system with a processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Platform {
-    /// By its name in FMI 3.0.
+    /// The platform's name in FMI 3.0.
     pub tuple: &'static str,
-    /// By its name in FMI 2.0, if that has one.
+    /// The platform's name in FMI 2.0, if it has one.
     pub two: Option<&'static str>,
-    /// The ending of libraries.
+    /// The file name extension of libraries.
     pub ending: &'static str,
 }
 
-/// The platforms: by the beginning of the file, and the number of the processor.
+/// The supported platforms.
 const PLATFORMS: [Platform; 6] = [
     platform("x86_64-linux", Some("linux64"), "so"),
     platform("aarch64-linux", None, "so"),
@@ -46,7 +46,7 @@ const fn platform(
 }
 
 impl Platform {
-    /// That of a library: by its own head.
+    /// Returns the platform of a library, found in the library's own header.
     pub fn of(library: &[u8]) -> Option<Self> {
         let word = |at: usize| {
             let bytes = library.get(at..at + 2)?;
@@ -77,7 +77,7 @@ impl Platform {
         PLATFORMS.into_iter().find(|one| one.tuple == tuple)
     }
 
-    /// The one that this program was built for.
+    /// Returns the platform that this program was built for.
     pub fn own() -> Option<Self> {
         let system = match std::env::consts::OS {
             "macos" => "darwin",
@@ -87,7 +87,7 @@ impl Platform {
         PLATFORMS.into_iter().find(|one| one.tuple == tuple)
     }
 
-    /// Its folder in an FMU of a version.
+    /// Returns the platform's folder in an FMU of this version.
     pub const fn folder(self, version: Version) -> Option<&'static str> {
         match version {
             Version::Two => self.two,
@@ -99,11 +99,11 @@ impl Platform {
 /// A native library of tickbus for one platform.
 #[derive(Clone, Debug)]
 pub struct NativeLibrary {
-    /// Where it runs.
+    /// The platform that the library runs on.
     pub platform: Platform,
-    /// Its bytes.
+    /// The library's bytes.
     pub bytes: Vec<u8>,
-    /// Where it came from, for people.
+    /// The library's source, for people.
     pub origin: String,
 }
 
@@ -132,11 +132,12 @@ impl NativeLibrary {
     }
 }
 
-/// The libraries for an FMU: those that are `named`, or else the one in the folder `beside` the command, or all in a jar there.
+/// Finds the libraries for an FMU: those in `named`; if there are none, the library in the folder `beside` the command,
+/// or all libraries in a jar there.
 ///
 /// # Errors
 ///
-/// There is none: every place that was looked at, and what to do.
+/// No library was found: returns every place searched, and what to do.
 pub fn find_libraries(
     named: &[PathBuf],
     beside: Option<&Path>,
@@ -196,7 +197,7 @@ fn read(file: &Path) -> Result<NativeLibrary, Mistake> {
     NativeLibrary::of(bytes, origin)
 }
 
-/// The jars in a folder, in the order of their names.
+/// Returns the jars in a folder, sorted by name.
 fn jars(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
@@ -207,7 +208,7 @@ fn jars(folder: &Path) -> Vec<PathBuf> {
     jars
 }
 
-/// The libraries in a jar, which may be another one than tickbus'.
+/// Returns the libraries in a jar, which need not be a jar of tickbus.
 fn in_jar(jar: &Path) -> Result<Vec<NativeLibrary>, Mistake> {
     let unreadable = |error: String| {
         Mistake::new(
@@ -246,7 +247,7 @@ mod tests {
 
     use super::*;
 
-    /// The head of a library in ELF for this processor, with the name of a function of FMI.
+    /// Builds the header of an ELF library for this processor, with the name of an FMI function.
     fn elf(machine: u8, function: &str) -> Vec<u8> {
         let mut bytes = b"\x7fELF\x02\x01\x01".to_vec();
         bytes.resize(18, 0);
@@ -265,7 +266,7 @@ mod tests {
         zip.finish().expect("room");
     }
 
-    /// Which libraries are found in a folder: their platforms, and where they came from.
+    /// Returns the libraries found in a folder: their platforms and their sources.
     fn found(folder: &Path) -> Result<Vec<(&'static str, String)>, String> {
         let found = find_libraries(&[], Some(folder)).map_err(|mistake| mistake.to_string())?;
         let place = format!("{}/", folder.display());
@@ -282,7 +283,7 @@ mod tests {
         let missing = format!("no {}", folder.join(&file).display());
         assert!(why.contains(&missing) && why.contains("--library"), "{why}");
 
-        // A jar of somebody else's comes first, and has none.
+        // A foreign jar comes first, and contains no library.
         jar(&folder.join("another.jar"), &[("x/Y.class", b"class")]);
         let why = found(folder).expect_err("there is still nothing");
         assert!(
@@ -314,7 +315,7 @@ mod tests {
             ]
         );
 
-        // The one beside the command is the one of this build.
+        // The library next to the command is the one of this build.
         fs::write(folder.join(&file), &arm).expect("a file");
         assert_eq!(
             found(folder).expect("one library"),

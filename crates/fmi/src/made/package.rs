@@ -1,4 +1,4 @@
-//! The FMU as a file: an archive with model description, libraries, and driver.cfg.
+//! The FMU as a file: an archive with the model description, the libraries, and driver.cfg.
 
 use std::io::{Cursor, Write as _};
 use std::path::Path;
@@ -16,26 +16,26 @@ use super::library::NativeLibrary;
 use super::resources::token;
 use crate::value::Version;
 
-/// What an export has made.
+/// The result of an export.
 #[derive(Debug)]
 pub struct Package {
     /// The bytes of the FMU.
     pub bytes: Vec<u8>,
-    /// How many variables it has.
+    /// The number of variables.
     pub variables: usize,
-    /// By their names in its version.
+    /// The platforms, by their names in the FMU's version.
     pub platforms: Vec<&'static str>,
-    /// What its users should know, one line each.
+    /// Notes for the FMU's users, one line each.
     pub notes: Vec<String>,
 }
 
-/// Makes an FMU of the driver.cfg at `path`, which may name these `kinds` of bus, and the files that it names in its folder;
-/// the same files make the same bytes.
+/// Makes an FMU of the driver.cfg at `path`, which can name these `kinds` of bus, and of the files that it names in its
+/// folder. The same files give the same bytes.
 ///
 /// # Errors
 ///
-/// With every mistake in the driver.cfg; or a file that it names cannot be packed; or the version has no name for the platform
-/// of any library.
+/// Returns every mistake in the driver.cfg; or a file that it names cannot be packed; or the version has no name for
+/// the platform of any library.
 pub fn export(
     path: &Path,
     version: Version,
@@ -51,7 +51,7 @@ pub fn export(
             "check the file",
         ))
     })?;
-    // Loading has read it, and has it no more.
+    // Loading has read this path and no longer keeps it.
     let faults = Config::parse(&file, &String::from_utf8_lossy(&driver_cfg), kinds)?.fault_file;
     let faults = faults.map(|file| match file.strip_prefix(config.folder()) {
         Ok(inside) => inside.to_owned(),
@@ -123,7 +123,7 @@ pub fn export(
     })
 }
 
-/// What somebody who runs the FMU elsewhere must have.
+/// The requirements for running the FMU on another computer.
 const DEPENDENCIES: &str = "\
 The library needs nothing but the C library of the system: on Linux glibc, at least that of the computer on which it was built.
 Bus cards need the drivers of their vendors, isolated plug-ins the tickbus command on the PATH.
@@ -161,12 +161,12 @@ fn notes_on(config: &Config) -> Vec<String> {
     notes
 }
 
-/// The archive while it is written.
+/// The archive while it is being written.
 struct Archive(ZipWriter<Cursor<Vec<u8>>>);
 
 impl Archive {
     fn add(&mut self, name: &str, bytes: &[u8]) -> Result<(), Mistake> {
-        // With the times of the files, two exports of the same would differ.
+        // With the times of the files, two exports of the same files would differ.
         let options = SimpleFileOptions::default().unix_permissions(0o644);
         let started = self.0.start_file(name, options);
         started.map_err(|error| unwritable(&error))?;

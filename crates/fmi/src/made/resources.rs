@@ -1,12 +1,12 @@
-//! The folder of an unpacked FMU's resources, and the token by which model description and driver.cfg know each other.
+//! The folder of an unpacked FMU's resources, and the token that links the model description to its driver.cfg.
 
 use std::hash::Hasher as _;
 use std::path::{Path, PathBuf};
 
 use siphasher::sip128::{Hasher128 as _, SipHasher13};
 
-/// The token of an FMU with this driver.cfg. One whose driver.cfg was changed after the export does not fit its model
-/// description any more, and is told apart by it.
+/// Returns the token of an FMU with this driver.cfg. If the driver.cfg is changed after the export, the token no longer
+/// matches the model description, which reveals the change.
 pub fn token(driver_cfg: &[u8]) -> String {
     let mut hasher = SipHasher13::new();
     hasher.write(env!("CARGO_PKG_VERSION").as_bytes());
@@ -22,8 +22,8 @@ pub fn token(driver_cfg: &[u8]) -> String {
     )
 }
 
-/// The folder in which the driver.cfg is: the one that the importing tool has named, or, from there, the one of the
-/// library's own FMU.
+/// Returns the folder that contains the driver.cfg: the folder named by the importing tool, or the one in the library's
+/// own FMU.
 pub fn folder_of(named: Option<&Path>, library: Option<&Path>) -> Option<PathBuf> {
     // FMU/binaries/PLATFORM/library
     let own = library.and_then(|file| file.ancestors().nth(3));
@@ -39,8 +39,8 @@ pub fn folder_of(named: Option<&Path>, library: Option<&Path>) -> Option<PathBuf
     first
 }
 
-/// The folder that a URI of FMI 2.0 names: `file:///a%20b`, `file:/a`, `file://localhost/a`; a plain path, which some tools
-/// hand in, is one, too.
+/// Returns the folder that a URI of FMI 2.0 names: `file:///a%20b`, `file:/a`, `file://localhost/a`. A plain path,
+/// which some tools pass, is accepted, too.
 pub fn folder_of_uri(uri: &str) -> PathBuf {
     let Some(rest) = uri.strip_prefix("file:") else {
         return uri.into();
@@ -58,7 +58,7 @@ pub fn folder_of_uri(uri: &str) -> PathBuf {
     path.into()
 }
 
-/// A text with its `%20`.
+/// Decodes a text with escapes such as `%20`.
 fn decoded(text: &str) -> String {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();

@@ -1,4 +1,4 @@
-//! The variables of the FMU that a driver.cfg becomes.
+//! The variables of the FMU made from a driver.cfg.
 
 use std::ops::DerefMut as _;
 
@@ -9,47 +9,47 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
 use crate::value::{Value, ValueType, Version};
 
-/// The value reference of the first slot; those before it are not signals.
+/// The value reference of the first slot; references below it are not signals.
 const FIRST_SLOT: u32 = 16;
 
-/// What a variable stands for.
+/// The meaning of a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The simulation's time.
     Time,
-    /// How many seconds of simulation pass in one of the clock on the wall; 0 for as many as can.
+    /// The seconds of simulation per second of the wall clock; 0 for as fast as possible.
     Pace,
-    /// The address of the line, in place of that in the driver.cfg.
+    /// The address of the line, which replaces that in the driver.cfg.
     Address,
     /// The file of the recording.
     Record,
-    /// How fresh the data are: 0 fresh, 1 unchanged, 2 stale.
+    /// The status of the data: 0 fresh, 1 unchanged, 2 stale.
     Status,
-    /// Their age in seconds.
+    /// The age of the data in seconds.
     Age,
-    /// How many bus cycles have come.
+    /// The number of bus cycles that have arrived.
     Sequence,
     /// A slot of the driver: a signal, or the count of its edges.
     Slot(usize),
 }
 
-/// How the importing tool uses a variable.
+/// Says how the importing tool uses a variable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Use {
-    /// It is the time.
+    /// The tool uses it as the time.
     Independent,
-    /// It is set before the run.
+    /// The tool sets it before the run.
     Parameter,
-    /// It is set before every step.
+    /// The tool sets it before every step.
     Input,
-    /// It is read after every step.
+    /// The tool reads it after every step.
     Output,
 }
 
 /// The value of a variable before the first step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Start {
-    /// None: the time has one of its own.
+    /// None: the time has its own start value.
     None,
     /// A number.
     Number(Value),
@@ -60,30 +60,30 @@ pub enum Start {
 /// One variable.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
-    /// Its name, of which there is one.
+    /// The variable's unique name.
     pub name: String,
-    /// What stands for it in the calls.
+    /// The value reference, which identifies the variable in calls.
     pub reference: u32,
-    /// Its type in the FMU's version.
+    /// The variable's type in the FMU's version.
     pub value_type: ValueType,
-    /// How it is used.
+    /// The variable's use.
     pub usage: Use,
-    /// Its unit, on floating point numbers only.
+    /// The unit, for floating point numbers only.
     pub unit: Option<String>,
-    /// Its value before the first step.
+    /// The value before the first step.
     pub start: Start,
-    /// A line for people.
+    /// The description, one line for people.
     pub description: String,
 }
 
-/// One slot, as the functions of FMI see it.
+/// One slot, as seen by the functions of FMI.
 #[derive(Clone, Copy, Debug)]
 pub struct Cell {
-    /// Its type.
+    /// The variable's type.
     pub value_type: ValueType,
-    /// What the slot holds.
+    /// The kind of value in the slot.
     pub kind: SlotKind,
-    /// Whether the importing tool sets it.
+    /// True if the importing tool sets the slot.
     pub is_input: bool,
 }
 
@@ -92,12 +92,12 @@ pub struct Cell {
 pub struct Exposed {
     /// The variables.
     pub variables: Vec<Variable>,
-    /// What the slots are, one by one.
+    /// The slots, in order.
     pub cells: Vec<Cell>,
 }
 
 impl Place {
-    /// What a value reference stands for.
+    /// Returns the meaning of a value reference.
     #[inline]
     pub fn of(reference: u32) -> Option<Self> {
         Some(match reference {
@@ -127,13 +127,13 @@ impl Place {
     }
 }
 
-/// The age of data in seconds, as a variable shows it.
+/// Returns the age of data in seconds, as a variable shows it.
 #[expect(clippy::cast_precision_loss, reason = "for people")]
 pub(super) fn seconds(found: &Exchange) -> f64 {
     found.age.0 as f64 * 1e-9
 }
 
-/// The type of a counter, which FMI 2.0 has no unsigned one for.
+/// Returns the type of a counter; FMI 2.0 has no unsigned one.
 const fn counter(version: Version) -> ValueType {
     match version {
         Version::Two => ValueType::Float64,
@@ -141,7 +141,7 @@ const fn counter(version: Version) -> ValueType {
     }
 }
 
-/// The type of a signal in a version: the one that holds all its values.
+/// Returns the type of a signal in a version: the type that can represent all its values.
 pub(super) fn type_of(signal: &Signal, version: Version) -> ValueType {
     if signal.scale.is_some() {
         return ValueType::Float64;
@@ -165,7 +165,7 @@ pub(super) fn type_of(signal: &Signal, version: Version) -> ValueType {
     }
 }
 
-/// What the slot of a signal holds.
+/// Returns the kind of value in the slot of a signal.
 pub fn kind_of(signal: &Signal) -> SlotKind {
     match signal.data_type {
         _ if !signal.is_integer_slot() => SlotKind::Real,
@@ -174,9 +174,9 @@ pub fn kind_of(signal: &Signal) -> SlotKind {
     }
 }
 
-/// The name of a variable that is no signal: `name`, unless a signal has it.
+/// Returns the name of a variable that is not a signal: `name`, unless a signal has that name.
 fn free_name(name: &str, table: &SignalTable) -> String {
-    // Names that begin so are reserved.
+    // Names with this prefix are reserved.
     match table.position(name) {
         None => name.to_owned(),
         Some(_) => format!("bus.{name}"),
@@ -184,7 +184,7 @@ fn free_name(name: &str, table: &SignalTable) -> String {
 }
 
 impl Exposed {
-    /// The variables of `config` in a version.
+    /// Returns the variables of `config` in a version.
     pub fn of(config: &Config, version: Version) -> Self {
         let (table, (writes, _)) = (&config.table, config.role.areas());
         let map = SlotMap::new(table, config.role);
@@ -247,7 +247,7 @@ impl Exposed {
         Self { variables, cells }
     }
 
-    /// The variable that a reference stands for.
+    /// Returns the variable that a value reference stands for.
     pub fn variable(&self, reference: u32) -> Option<&Variable> {
         self.variables
             .iter()
@@ -255,7 +255,7 @@ impl Exposed {
     }
 }
 
-/// The variables that are not signals.
+/// Returns the variables that are not signals.
 fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
     let variable =
         |name: &str, place: Place, value_type, usage, start, description: &str| Variable {
@@ -276,7 +276,7 @@ fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
     let record = config.record.as_ref();
     let record = record.map(|record| record.file.to_string_lossy().into_owned());
     let mut all = Vec::new();
-    // FMI 2.0 can do without, and a library of some of its tools complains of it.
+    // FMI 2.0 does not need this variable, and a library used by some of its tools rejects it.
     if version == Version::Three {
         let time = variable(
             "time",
@@ -345,23 +345,24 @@ fn own_variables(config: &Config, version: Version) -> Vec<Variable> {
     all
 }
 
-/// Whether the bus has an address that can be replaced.
+/// Returns true if the bus has an address that can be replaced.
 fn has_address(config: &Config) -> bool {
-    // Whether a text is a right address is another question.
+    // The empty text need not be a valid address.
     config.bus.clone().deref_mut().set_address("").is_some()
 }
 
-/// Whether the bus runs in the steps of the simulation.
+/// Returns true if the bus runs in the steps of the simulation.
 pub fn is_stepped(config: &Config) -> bool {
     config.bus.is_stepped()
 }
 
-/// A bus that runs by itself is a PLC in real time, behind which a simulation that hurries sees few of its cycles.
+/// Returns the default pace. A free-running bus is a PLC in real time: a simulation that runs faster would see only a
+/// few of its cycles.
 pub(super) fn default_pace(config: &Config) -> f64 {
     if is_stepped(config) { 0.0 } else { 1.0 }
 }
 
-/// The slots before the first step.
+/// Returns the slots before the first step.
 pub(super) fn initial_slots(config: &Config) -> Vec<Slot> {
     let map = SlotMap::new(&config.table, config.role);
     let mut slots = vec![Slot::default(); map.count];

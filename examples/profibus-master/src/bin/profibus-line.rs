@@ -1,4 +1,4 @@
-//! A serial line without hardware, for the demo: prints the names of its two ends, and lasts until stdin ends.
+//! A serial line without hardware, for the demo: prints the names of its two ends, and runs until stdin ends.
 
 #[cfg(unix)]
 #[path = "../../../../tests/peers/pty.rs"]
@@ -8,7 +8,7 @@ mod pty;
 fn main() {
     let line = pty::Line::new();
     println!("{} {}", line.end(0).display(), line.end(1).display());
-    // Whoever started it holds the other end of stdin, and closes it at the latest by ending.
+    // The parent process holds the other end of stdin, and closes it at the latest when it ends.
     let _ = std::io::copy(&mut std::io::stdin(), &mut std::io::sink());
 }
 

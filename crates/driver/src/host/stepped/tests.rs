@@ -1,4 +1,4 @@
-//! The program scanned by the tick, against one behind an image and a port of its own, as a program on another thread is.
+//! Compares the program scanned by the tick with one behind its own image and port, as on another thread.
 
 use std::fmt::Write as _;
 
@@ -11,7 +11,7 @@ use tickbus_fieldbus::LinkStatus;
 use tickbus_image::signal::Slot;
 use tickbus_plc::Scan;
 
-/// Shows at its outputs what each scan was told.
+/// Shows at its outputs what each scan saw.
 struct Witness {
     scans: u8,
 }
@@ -35,7 +35,7 @@ impl Program for Witness {
 
     fn scan(&mut self, scan: &mut Scan<'_>) {
         self.scans = self.scans.wrapping_add(1);
-        // Its pulses are shorter than most ticks.
+        // The pulses are shorter than most ticks.
         scan.outputs[0] = scan.inputs[0] ^ self.scans & self.scans >> 3;
         scan.outputs[1] = scan.inputs[1];
         scan.outputs[2] = u8::from(scan.alive);
@@ -43,7 +43,7 @@ impl Program for Witness {
     }
 }
 
-/// The program behind an image and a port.
+/// The same program behind an image and a port.
 struct Reference {
     cpu: Cpu,
     port: Port,
@@ -68,7 +68,7 @@ impl Reference {
     }
 }
 
-/// Carries the frames that `from` sends over to `to`; false if an injected fault swallows them.
+/// Carries the frames from `from` to `to`. Returns false if an injected fault swallows them.
 fn carry(from: &mut Port, to: &mut Port, now: Nanos) -> bool {
     let Some(mut frames) = from.take_all(now) else {
         return false;
@@ -108,7 +108,7 @@ impl Stepped for Reference {
     }
 }
 
-/// Two stations, latched signals of all kinds, a heartbeat that sticks for a while, and lines that break.
+/// Two stations, latched signals of all kinds, a heartbeat that gets stuck for a while, and lines that break.
 fn config() -> Config {
     let mut text = "[driver]\nid = 1\nname = \"x\"\n\
                     [fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\nprogram = \"mirror\"\nmax_age = \"40ms\"\n\
@@ -200,7 +200,7 @@ fn a_program_on_the_tick_sees_and_shows_what_one_behind_an_image_does() {
             .wrapping_add(1_442_695_040_888_963_407);
         let draw =
             |shift: u32, below: u64| usize::try_from((random >> shift) % below).expect("small");
-        // From four ticks a scan to a tick that takes longer than data count for.
+        // From four ticks per scan to a tick that takes longer than data stay valid.
         let steps = [500, 500, 1_000, 2_000, 3_100, 16_000, 500, 50_000];
         now += Nanos(1_000 * steps[draw(20, 8)]);
         let (station, bit, level) = (draw(26, 2), draw(28, 8), [0.0, 1.0][draw(32, 2)]);

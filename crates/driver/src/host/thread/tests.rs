@@ -9,7 +9,7 @@ use crate::Host;
 
 use super::*;
 
-/// A program whose scan tells that it has begun, and ends when the test says so.
+/// A program whose scan signals its start, and ends when the test allows it.
 struct Slow {
     can_hang: bool,
     begun: Sender<()>,
@@ -40,7 +40,7 @@ impl Program for Slow {
     }
 }
 
-/// What is told of a scan that takes 4 s.
+/// Returns the fault reported for a scan that takes 4 s.
 fn fault_of(can_hang: bool) -> Option<String> {
     let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"slow\"\n\
                 [[signal]]\nname = \"run\"\naddress = \"%QB0\"\n";

@@ -1,4 +1,4 @@
-//! The functions of an FMU's library, by both standards' headers.
+//! The functions of an FMU's library, as declared in the headers of both standards.
 
 #![allow(unsafe_code, reason = "foreign functions are found by their names")]
 
@@ -89,8 +89,9 @@ macro_rules! functions {
                 Ok(Self {$(
                     $field: {
                         let name = concat!($prefix, $function);
-                        // SAFETY: the types are those of the standard's headers, which a library that has these names follows.
-                        // The pointer is used only as long as the library, which is beside it in `Instance`.
+                        // SAFETY: the types are those of the standard's headers, and a library with these names follows
+                        // the headers. The pointer is used only as long as the library exists, which is next to it in
+                        // `Instance`.
                         let found = unsafe { library.symbol::<$own>(name) };
                         found.map_err(|_| {
                             format!("its library has no function {name}; export it again, or tell its maker")

@@ -1,4 +1,4 @@
-//! What an FMU says: the loggers of both versions.
+//! The messages of an FMU: the loggers of both versions.
 
 #![allow(unsafe_code, reason = "an FMU hands in its texts as pointers")]
 
@@ -14,8 +14,8 @@ use tickbus_base::os::is_told;
 use super::functions::Handle;
 use crate::value::Status;
 
-/// The journals of all instances that may still log, by the addresses that their FMUs were given. An FMU hands anything in as its
-/// environment, so that an address is compared with these, and never followed.
+/// The journals of all instances that can still log, by the addresses that their FMUs received. An FMU can pass any
+/// pointer as its environment, so the address is compared with these and never dereferenced.
 static LIVING: Mutex<BTreeMap<usize, Arc<Entry>>> = Mutex::new(BTreeMap::new());
 
 fn living() -> MutexGuard<'static, BTreeMap<usize, Arc<Entry>>> {
@@ -23,16 +23,16 @@ fn living() -> MutexGuard<'static, BTreeMap<usize, Arc<Entry>>> {
 }
 
 thread_local! {
-    /// The address of the journal of the FMU that this thread has called last.
+    /// The address of the journal of the FMU that this thread called last.
     static CALLED: Cell<usize> = const { Cell::new(0) };
 }
 
-/// What an FMU has said.
+/// The messages of an FMU.
 #[derive(Debug, Default)]
 struct Entry {
     file: String,
     lines: AtomicU64,
-    /// What it has said since its last call began.
+    /// The last message since the FMU's last call began.
     last: Mutex<String>,
 }
 
@@ -56,12 +56,12 @@ impl Entry {
     }
 }
 
-/// The journal of one instance. Messages reach it until it is dropped.
+/// The journal of one instance, which receives messages until it is dropped.
 #[derive(Debug)]
 pub(super) struct Journal(Arc<Entry>);
 
 impl Journal {
-    /// That of the FMU which messages call `file`.
+    /// Creates the journal of the FMU that messages call `file`.
     pub(super) fn of(file: &str) -> Self {
         let journal = Self(Arc::new(Entry {
             file: file.to_owned(),
@@ -71,18 +71,18 @@ impl Journal {
         journal
     }
 
-    /// What the FMU is to hand in with each message.
+    /// Returns the pointer that the FMU must pass with each message.
     pub(super) fn env(&self) -> Handle {
         Arc::as_ptr(&self.0).cast_mut().cast()
     }
 
-    /// The FMU is about to be called: what it has said before is not about this call.
+    /// Notes that the FMU is about to be called: earlier messages are not about this call.
     pub(super) fn begin_call(&self) {
         CALLED.set(self.env().addr());
         self.0.last().clear();
     }
 
-    /// What it has said last in the present call, of what is not right; empty for nothing.
+    /// Returns the last warning or error of the present call; empty if there was none.
     pub(super) fn said(&self) -> String {
         self.0.last().clone()
     }
@@ -94,21 +94,21 @@ impl Drop for Journal {
     }
 }
 
-/// A text of the FMU's, for the length of a call.
+/// Reads a text of the FMU, valid for the length of a call.
 ///
 /// # Safety
 ///
-/// Null, or a C string that stays while it is used.
+/// Null, or a C string that exists as long as it is used.
 unsafe fn words<'a>(text: *const c_char) -> Cow<'a, str> {
     if text.is_null() {
         return "".into();
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: promised by the caller.
     unsafe { CStr::from_ptr(text) }.to_string_lossy()
 }
 
-/// Takes a message of the instance with this environment. Some FMUs hand in another one: then the FMU is meant that this thread
-/// calls. A message of neither is dropped.
+/// Takes a message of the instance with this environment. Some FMUs pass another environment: the message then goes to
+/// the FMU that this thread is calling. A message that fits neither is dropped.
 fn take(env: Handle, status: c_int, text: &str) {
     let journal = {
         let living = living();
@@ -127,15 +127,15 @@ pub(super) unsafe extern "C" fn log_of_three(
     _: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: the message is the FMU's C string.
+    // SAFETY: the message is a C string from the FMU.
     take(env, status, &unsafe { words(message) });
 }
 
 #[cfg(all(target_arch = "x86_64", unix))]
 pub(super) use formatted::log_of_two;
 
-/// The logger of FMI 2.0, which has any number of further arguments. Rust cannot write such a function; the convention of System V
-/// for x86-64 is simple enough to collect them in a few instructions.
+/// The logger of FMI 2.0, which accepts any number of further arguments. Rust cannot express such a function. The
+/// System V convention for x86-64 is simple enough to collect the arguments in a few instructions.
 #[cfg(all(target_arch = "x86_64", unix))]
 mod formatted {
     use std::arch::naked_asm;
@@ -144,7 +144,7 @@ mod formatted {
     use super::{take, words};
     use crate::foreign::library::functions::Handle;
 
-    /// The most bytes of a message; what is longer is cut.
+    /// The most bytes of a message; longer ones are cut.
     const MOST: usize = 4096;
 
     /// `va_list`, as the thunk below fills it.
@@ -165,7 +165,8 @@ mod formatted {
         ) -> c_int;
     }
 
-    /// Saves the registers that carry further arguments, makes a `va_list` of them and the stack, and calls [`take_formatted`].
+    /// Saves the registers that carry further arguments, builds a `va_list` from them and the stack, and calls
+    /// [`take_formatted`].
     #[unsafe(naked)]
     pub(in super::super) unsafe extern "C" fn log_of_two(
         env: Handle,
@@ -176,10 +177,10 @@ mod formatted {
         first: *const c_char,
     ) {
         naked_asm!(
-            // At rsp: the va_list, 24 bytes; at rsp + 32: the registers, 6 of 8 and 8 of 16 bytes, the latter at multiples of 16; at
-            // rsp + 216: the return address; behind it: what was passed on the stack.
+            // At rsp: the va_list, 24 bytes. At rsp + 32: the registers, 6 of 8 bytes and 8 of 16 bytes, the latter at
+            // multiples of 16. At rsp + 216: the return address, followed by the arguments passed on the stack.
             "sub rsp, 216",
-            // Five of the six general registers have the named parameters.
+            // Five of the six general registers contain the named parameters.
             "mov [rsp + 72], r9",
             "test al, al",
             "je 2f",
@@ -216,17 +217,17 @@ mod formatted {
     ) {
         let mut text: [c_char; MOST] = [0; MOST];
         if !format.is_null() {
-            // SAFETY: it writes at most MOST bytes with a zero at the end. The format is the FMU's, and the arguments are those that
-            // the FMU passed with it.
+            // SAFETY: the function writes at most MOST bytes and ends them with a zero. The format is the FMU's, and
+            // the arguments are those that the FMU passed with it.
             unsafe { vsnprintf(text.as_mut_ptr(), MOST, format, arguments) };
         }
-        // SAFETY: it ends with a zero.
+        // SAFETY: the text ends with a zero.
         take(env, status, &unsafe { words(text.as_ptr()) });
     }
 }
 
-/// The logger of FMI 2.0, which has any number of further arguments. Rust cannot write such a function; where the
-/// first of them is passed as that of a plain function is, it is taken for the one format that consists of it.
+/// The logger of FMI 2.0, which accepts any number of further arguments. Rust cannot express such a function. Where the
+/// first of these arguments is passed like that of a plain function, it is read for the one format that consists of it.
 #[cfg(not(all(target_arch = "x86_64", unix)))]
 pub(super) unsafe extern "C" fn log_of_two(
     env: Handle,
@@ -236,13 +237,13 @@ pub(super) unsafe extern "C" fn log_of_two(
     format: *const c_char,
     first: *const c_char,
 ) {
-    // SAFETY: the format is the FMU's C string.
+    // SAFETY: the format is a C string from the FMU.
     let format = unsafe { words(format) };
-    // On Apple's arm64 further arguments are on the stack.
+    // Apple's arm64 passes further arguments on the stack.
     let has_first = !cfg!(all(target_vendor = "apple", target_arch = "aarch64"));
     if has_first && matches!(format.trim_end(), "%s") {
-        // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 Windows and of arm64
-        // Linux pass it where they pass the sixth parameter of a plain function.
+        // SAFETY: by its format, the first further argument is a C string. The calling conventions of x86-64 Windows
+        // and arm64 Linux pass it in the place of a plain function's sixth parameter.
         take(env, status, &unsafe { words(first) });
     } else {
         take(env, status, &format);

@@ -11,10 +11,8 @@
 #[path = "peers/commands.rs"]
 mod commands;
 #[allow(dead_code, reason = "each test uses a part of it")]
-#[path = "peers/modbus_plc.rs"]
+#[path = "../crates/bus-modbus/tests/modbus/plc.rs"]
 mod modbus_plc;
-#[allow(unused_macros, reason = "each test uses a part of it")]
-mod peers;
 
 use std::io::Read as _;
 use std::net::TcpListener;
@@ -23,7 +21,6 @@ use std::sync::{Arc, mpsc};
 
 use commands::Running;
 use modbus_plc::{Habit, Plc};
-use peers::Alone;
 use rustix::process::Signal;
 use tickbus::driver::Host;
 use tickbus::driver_cfg::Config;
@@ -31,6 +28,7 @@ use tickbus::plc::{Program, Scan};
 use tickbus::time::{Clock, Monotonic, Nanos};
 use tickbus_conformance as conformance;
 
+use conformance::peers::Alone;
 use conformance::rig::{End, eventually, logged, statistic};
 
 /// A controller that switches a motor, register 10 of `plc`, depending on register 0.
@@ -117,7 +115,7 @@ fn a_controller_that_sees_nothing_stops_the_motor_unless_it_shall_hold_it() {
             _ => Habit::Answers,
         });
         let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
-        let mut cell = Alone::open(&text);
+        let mut cell = Alone::open(&text, &tickbus::KINDS);
         cell.end.set("motor", 1.0);
         cell.until("the motor runs", |_| motor(&plc) == 1);
         REFUSES.store(true, Ordering::Relaxed);
@@ -137,7 +135,7 @@ fn a_controller_that_stops_has_a_watchdog_unless_it_is_switched_off() {
     for (further, left) in [("", 7), ("watchdog = \"off\"", 1)] {
         let plc = Plc::start(|_, _| Habit::Answers);
         let text = controller(&plc, &format!("max_age = \"300ms\"\n{further}"));
-        let mut cell = Alone::open(&text);
+        let mut cell = Alone::open(&text, &tickbus::KINDS);
         cell.end.set("motor", 1.0);
         cell.until("the motor runs", |_| motor(&plc) == 1);
         let stopped = cell.now();

@@ -7,6 +7,7 @@
     reason = "tests: a name is the sentence that it proves, and the values are small whole numbers"
 )]
 
+pub mod peers;
 pub mod resources;
 pub mod rig;
 pub mod standin;

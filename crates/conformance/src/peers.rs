@@ -1,5 +1,4 @@
 //! Shared by tests with foreign ends: unique addresses, and ways to open and close connections.
-#![allow(dead_code, reason = "each test uses a part of it")]
 
 use std::io::{ErrorKind, Read};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
@@ -8,9 +7,11 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use tickbus::time::{Manual, Nanos};
+use tickbus_base::time::{Manual, Nanos};
 
-use crate::conformance::rig::{End, await_that, pass};
+use tickbus_driver_cfg::Kinds;
+
+use crate::rig::{End, await_that, pass};
 
 /// An address on this machine that no other test uses.
 pub fn own_address() -> SocketAddr {
@@ -80,9 +81,10 @@ pub struct Alone {
 }
 
 impl Alone {
-    pub fn open(text: &str) -> Self {
+    /// Opens the end of a driver.cfg with this text, which may name these `kinds` of bus.
+    pub fn open(text: &str, kinds: &'static Kinds) -> Self {
         let clock = Manual::new();
-        let end = End::open(text, &clock, &tickbus::KINDS);
+        let end = End::open(text, &clock, kinds);
         Self { clock, end }
     }
 
@@ -132,7 +134,7 @@ impl Alone {
 
     /// The time on the clock.
     pub fn now(&self) -> Nanos {
-        use tickbus::time::Clock as _;
+        use tickbus_base::time::Clock as _;
         self.clock.now()
     }
 }

@@ -7,8 +7,6 @@
     reason = "tests; the values are small whole numbers, and the peers of TCP are used in part"
 )]
 
-mod peers;
-
 use std::io::Write;
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -17,9 +15,14 @@ use std::thread::JoinHandle;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
+use conformance::peers::{leave, own_address};
 use conformance::rig::{Bus, End, Liar, await_that, logged, pass, statistic};
-use peers::{leave, own_address};
-use tickbus::time::Manual;
+use tickbus_base::time::Manual;
+use tickbus_bus_opcua::{ClientOptions, ServerOptions};
+use tickbus_driver_cfg::{Kind, Kinds};
+
+/// The kinds of this crate.
+static KINDS: Kinds = Kinds::new(&[Kind::of::<ServerOptions>(), Kind::of::<ClientOptions>()]);
 
 conformance!(device_serves, crate::OpcUa::new("device"));
 conformance!(device_is_client, crate::OpcUa::new("controller"));
@@ -41,8 +44,8 @@ impl OpcUa {
 }
 
 impl Bus for OpcUa {
-    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
-        &tickbus::KINDS
+    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
+        &KINDS
     }
 
     fn fieldbus(&self, role: &str) -> String {
@@ -155,7 +158,7 @@ fn a_station_of_which_nothing_is_read_is_fresh_while_its_server_is_there() {
              max_age = \"300ms\"\nreconnect = [\"10ms\"]\n{STATIONS}",
             bus.fieldbus(role)
         );
-        End::open(&text, &clock, &tickbus::KINDS)
+        End::open(&text, &clock, &KINDS)
     };
     let (mut device, mut controller) = (open("device"), open("controller"));
     let stale = |device: &End| {
@@ -200,7 +203,7 @@ fn a_second_writer_is_counted_or_refused_until_the_first_one_has_left() {
             End::open(
                 &conformance::rig::config(&bus, role, further),
                 &clock,
-                &tickbus::KINDS,
+                &KINDS,
             )
         };
         let (mut device, mut first) = (open("device", further), open("controller", ""));

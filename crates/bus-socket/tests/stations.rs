@@ -7,9 +7,6 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[allow(unused_macros, reason = "each test uses a part of it")]
-mod peers;
-
 use std::fmt::Write as _;
 use std::fs::File;
 use std::io::{Read as _, Write as _};
@@ -17,11 +14,15 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::fd::AsRawFd as _;
 use tickbus_conformance as conformance;
 
+use conformance::peers::{Alone, client, is_closed, leave};
 use conformance::resources;
 use conformance::rig::{await_that, logged};
-use peers::{Alone, client, is_closed, leave};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-use tickbus::fieldbus::{Cause, LinkState};
+use tickbus_driver_cfg::{Kind, Kinds};
+use tickbus_fieldbus::{Cause, LinkState};
+
+/// The kind of this crate.
+static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_socket::Options>()]);
 
 /// A device that listens for the peers of its two stations.
 fn device() -> (Alone, [SocketAddr; 2]) {
@@ -42,7 +43,7 @@ fn device() -> (Alone, [SocketAddr; 2]) {
             );
         }
     }
-    let alone = Alone::open(&text);
+    let alone = Alone::open(&text, &KINDS);
     let mut addresses = Vec::new();
     await_that("it listens for both", || {
         let statistics = alone.end.driver.statistics();

@@ -6,15 +6,11 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[path = "peers/modbus.rs"]
-mod modbus;
-#[path = "peers/modbus_plc.rs"]
-mod modbus_plc;
-mod peers;
+mod ends;
+mod plc;
 #[cfg(unix)]
-#[path = "peers/pty.rs"]
+#[path = "../../../../tests/peers/pty.rs"]
 mod pty;
-#[path = "modbus/rtu.rs"]
 mod rtu;
 
 use std::io::{Read as _, Write as _};
@@ -24,14 +20,19 @@ use tickbus_base::os::raise_open_files;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
+use conformance::peers::{Alone, client, is_closed, leave};
 use conformance::rig::{MAX_AGE, await_that, logged, pass};
-use modbus::{Tcp, request};
-use modbus_plc::{Habit, Plc};
-use peers::{Alone, client, is_closed, leave};
+use ends::{Tcp, request};
+use plc::{Habit, Plc};
 use socket2::SockRef;
-use tickbus::driver::Code;
-use tickbus::fieldbus::LinkState;
-use tickbus::time::Nanos;
+use tickbus_base::time::Nanos;
+use tickbus_bus_modbus::{ClientOptions, ServerOptions};
+use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
+use tickbus_fieldbus::LinkState;
+
+/// The kinds of this crate.
+static KINDS: Kinds = Kinds::new(&[Kind::of::<ServerOptions>(), Kind::of::<ClientOptions>()]);
 
 conformance!(device_serves, crate::Tcp::device_serves());
 conformance!(controller_serves, crate::Tcp::controller_serves());
@@ -40,7 +41,10 @@ conformance!(device_serves_rtu, crate::Tcp::device_serves_rtu());
 /// A Device that listens on a port chosen by the system, with the signals of the suite: `speed` is holding
 /// register 1.
 fn device(further: &str) -> (Alone, TcpStream) {
-    let mut device = Alone::open(&conformance::rig::config(&AnyPort, "device", further));
+    let mut device = Alone::open(
+        &conformance::rig::config(&AnyPort, "device", further),
+        &KINDS,
+    );
     device.end.tick();
     let stream = client(device.address());
     (device, stream)
@@ -49,15 +53,15 @@ fn device(further: &str) -> (Alone, TcpStream) {
 struct AnyPort;
 
 impl conformance::rig::Bus for AnyPort {
-    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
-        &tickbus::KINDS
+    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
+        &KINDS
     }
 
     fn fieldbus(&self, _role: &str) -> String {
         "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"".to_owned()
     }
 
-    fn liar(&self, _: &std::sync::Arc<tickbus::time::Manual>) -> conformance::rig::Liar {
+    fn liar(&self, _: &std::sync::Arc<tickbus_base::time::Manual>) -> conformance::rig::Liar {
         unreachable!("it is no bus of the suite")
     }
 
@@ -127,7 +131,7 @@ fn changes_are_events_or_every_write_is() {
         // A coil of another signal, and a byte without signals.
         ask(&mut stream, 1, &[5, 0, 9, 0xFF, 0]);
         device.until_speed(6);
-        let mut events = [tickbus::image::Event::default(); 16];
+        let mut events = [tickbus_image::Event::default(); 16];
         let count = device.end.driver.poll_events(&mut events);
         let speeds = events[..count].iter().filter(|event| event.signal == 1);
         let speeds: Vec<f64> = speeds.map(|event| event.value.real()).collect();
@@ -198,7 +202,7 @@ fn writes_that_are_held_back_are_events_with_their_own_values() {
     device.clock.advance(Nanos::from_millis(20));
     ask(&mut stream, 3, &[6, 0, 2, 0, 9]);
     device.until("all is there", |end| end.get("echo") == 9.0);
-    let mut events = [tickbus::image::Event::default(); 16];
+    let mut events = [tickbus_image::Event::default(); 16];
     let count = device.end.driver.poll_events(&mut events);
     let seen = events[..count].iter();
     let seen: Vec<_> = seen
@@ -395,10 +399,13 @@ fn the_line_runs_while_a_client_talks_and_is_stale_when_none_does() {
 /// A machine that polls `plc`, and may write to it although it does not report its identity.
 fn asks(plc: &Plc, further: &str) -> Alone {
     let address = plc.address;
-    Alone::open(&format!(
-        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"{address}\"\n\
+    Alone::open(
+        &format!(
+            "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-client\"\naddress = \"{address}\"\n\
          cycle = \"1ms\"\nmax_age = \"300ms\"\nreconnect = [\"10ms\"]\n{further}"
-    ))
+        ),
+        &KINDS,
+    )
 }
 
 const AT: &str = r#"
@@ -452,7 +459,7 @@ address = "%IX4.2"
 
 #[test]
 fn single_signals_lie_where_the_plc_has_them_and_nothing_else_in_it_is_written() {
-    let single: modbus_plc::Habits = |_, function| match function {
+    let single: plc::Habits = |_, function| match function {
         15 | 16 => Habit::Refuses(1),
         _ => Habit::Answers,
     };
@@ -527,7 +534,7 @@ fn a_plc_that_ignores_or_hangs_up_on_the_question_who_it_is_is_read_and_written(
             } else {
                 Habit::Answers
             }
-        }) as modbus_plc::Habits,
+        }) as plc::Habits,
         |_, function| {
             if function == 43 {
                 Habit::HangsUp
@@ -575,7 +582,7 @@ fn a_unit_in_fault_is_fail_safe_alone_and_the_other_is_read_on() {
             } else {
                 Habit::Answers
             }
-        }) as modbus_plc::Habits,
+        }) as plc::Habits,
         |unit, _| {
             if unit == 7 {
                 Habit::Ignores
@@ -599,10 +606,13 @@ fn a_unit_in_fault_is_fail_safe_alone_and_the_other_is_read_on() {
 
 #[test]
 fn a_client_that_leaves_takes_the_values_of_its_unit_alone() {
-    let mut device = Alone::open(&format!(
-        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-server\"\n\
+    let mut device = Alone::open(
+        &format!(
+            "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"modbus-server\"\n\
          address = \"127.0.0.1:0\"\ncycle = \"1ms\"\nmax_age = \"300ms\"\n{TWO_UNITS}"
-    ));
+        ),
+        &KINDS,
+    );
     let write = |stream: &mut TcpStream, unit, value| {
         let pdu = [6, 0, 0, 0, value];
         stream
@@ -660,7 +670,7 @@ fn a_writer_of_any_number_of_single_places_is_the_only_one_at_each_of_them() {
     let text = "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-server\"\n\
         address = \"127.0.0.1:0\"\nmax_age = \"20s\"\nwriters = 1\noutput_bytes = 25\n\
         [[signal]]\nname = \"run\"\naddress = \"%QX0.0\"\n";
-    let device = Alone::open(text);
+    let device = Alone::open(text, &KINDS);
     let (mut first, mut second) = (client(device.address()), client(device.address()));
     let coil = |at: u16, value| {
         let [high, low] = at.to_be_bytes();

@@ -6,11 +6,7 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod peers;
-#[path = "peers/s7.rs"]
-mod s7_peers;
-
-#[path = "s7/state.rs"]
+mod ends;
 mod state;
 
 use std::net::{Ipv4Addr, SocketAddr};
@@ -18,11 +14,16 @@ use std::sync::{Arc, Mutex};
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
+use conformance::peers::{Alone, is_closed};
 use conformance::rig::{await_that, config, logged, pass};
-use peers::{Alone, is_closed};
-use s7_peers::{CONFIRM, CONNECT, Client, Cpu, Pair, address, command, job, packet, request};
-use tickbus::driver::Code;
-use tickbus::image::Event;
+use ends::{CONFIRM, CONNECT, Client, Cpu, Pair, address, command, job, packet, request};
+use tickbus_bus_s7::{ClientOptions, ServerOptions};
+use tickbus_driver::Code;
+use tickbus_driver_cfg::{Kind, Kinds};
+use tickbus_image::Event;
+
+/// The kinds of this crate.
+static KINDS: Kinds = Kinds::new(&[Kind::of::<ServerOptions>(), Kind::of::<ClientOptions>()]);
 
 conformance!(device_serves, crate::Pair::new("device", ""));
 conformance!(device_dials, crate::Pair::new("controller", ""));
@@ -41,7 +42,7 @@ fn server(further: &str) -> (Alone, SocketAddr) {
         address: (Ipv4Addr::LOCALHOST, 0).into(),
         ..Pair::new("device", "")
     };
-    let alone = Alone::open(&config(&pair, "device", further));
+    let alone = Alone::open(&config(&pair, "device", further), &KINDS);
     let address = alone.address();
     (alone, address)
 }
@@ -228,7 +229,7 @@ fn every_station_has_a_slot_and_blocks_of_its_own() {
         [[signal]]\nname = \"a\"\nstation = \"charger\"\naddress = \"%QB0\"\n\
         [[signal]]\nname = \"b\"\nstation = \"lathe\"\naddress = \"%QB0\"\n\
         [[signal]]\nname = \"c\"\nstation = \"none\"\naddress = \"%QB0\"\n";
-    let mut device = Alone::open(text);
+    let mut device = Alone::open(text, &KINDS);
     let at = device.address();
     for (slot, value) in [(1, 11), (2, 12)] {
         let mut client = Client::in_slot(at, slot);
@@ -393,12 +394,12 @@ fn two_hundred_clients_are_served_and_one_more_is_turned_away() {
 fn a_client_of_ours_writes_nothing_into_a_cpu_that_was_not_named() {
     logged::expect("nothing is written into the PLC");
     let pair = Pair::new("device", "");
-    let mut device = Alone::open(&config(&pair, "device", ""));
+    let mut device = Alone::open(&config(&pair, "device", ""), &KINDS);
     let text = config(&pair, "controller", "");
     let mut plc = conformance::rig::End::open(
         &text.replace("write_to = \"tickbus device\"", "write_to = \"6ES7 315\""),
         &device.clock,
-        &tickbus::KINDS,
+        &KINDS,
     );
     plc.set("speed", 5.0);
     device.end.set("position", 3.0);
@@ -426,7 +427,7 @@ fn a_cpu_that_hangs_up_when_it_is_asked_who_it_is_is_read_all_the_same() {
         address: listener.local_addr().expect("it is bound"),
         ..Pair::new("controller", "")
     };
-    let mut device = Alone::open(&config(&pair, "device", ""));
+    let mut device = Alone::open(&config(&pair, "device", ""), &KINDS);
     let cpu = std::thread::spawn(move || {
         let mut connections = 0;
         loop {
@@ -472,10 +473,13 @@ fn the_stations_of_a_client_lie_where_their_tables_say() {
     let blocks = "db = [{ number = 1, area = \"%Q\", station = \"one\" }, { number = 2, area = \"%Q\", \
         station = \"two\" }, { number = 3, area = \"%I\", station = \"one\" }, { number = 4, area = \"%I\", \
         station = \"three\", offset = 2 }]";
-    let mut device = Alone::open(&format!(
-        "{head}kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n{blocks}\n\
+    let mut device = Alone::open(
+        &format!(
+            "{head}kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n{blocks}\n\
          [[station]]\nname = \"one\"\n[[station]]\nname = \"two\"\n[[station]]\nname = \"three\"\n{signals}"
-    ));
+        ),
+        &KINDS,
+    );
     let at = device.address();
     let mut plc = conformance::rig::End::open(
         &format!(
@@ -487,7 +491,7 @@ fn the_stations_of_a_client_lie_where_their_tables_say() {
             signals.replace("%ID4", "%ID2")
         ),
         &device.clock,
-        &tickbus::KINDS,
+        &KINDS,
     );
     plc.set("a", 0x0102.into());
     plc.set("b", 3.0);
@@ -517,7 +521,7 @@ fn nothing_is_written_but_the_bits_that_signals_cover() {
          [[signal]]\nname = \"far\"\naddress = \"%IW8\"\ntype = \"INT\"\n\
          [[signal]]\nname = \"echo\"\naddress = \"%QW4\"\ntype = \"INT\"\n"
     );
-    let mut machine = conformance::rig::End::open(&text, &device.clock, &tickbus::KINDS);
+    let mut machine = conformance::rig::End::open(&text, &device.clock, &KINDS);
     machine.set("level", 0x0102.into());
     machine.set("open", 1.0);
     machine.set("shut", 1.0);
@@ -555,7 +559,7 @@ fn a_signal_is_read_where_its_line_says_and_else_in_its_area() {
          [[signal]]\nname = \"low\"\naddress = \"%IX102.7\"\n\
          [[signal]]\nname = \"copy\"\naddress = \"%IW4\"\ntype = \"INT\"\n"
     );
-    let mut plc = conformance::rig::End::open(&text, &device.clock, &tickbus::KINDS);
+    let mut plc = conformance::rig::End::open(&text, &device.clock, &KINDS);
     device.end.set("position", 515.0);
     device.end.set("copy", 7.0);
     device.until("the values arrive", |_| {
@@ -576,13 +580,16 @@ fn machine_with(cpu: Cpu, right: &str, address: &str) -> (Alone, Arc<Mutex<Cpu>>
     let at = listener.local_addr().expect("it is bound");
     let cpu = Arc::new(Mutex::new(cpu));
     Cpu::serve(listener, Arc::clone(&cpu));
-    let machine = Alone::open(&format!(
-        "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\ncycle = \"1ms\"\n\
+    let machine = Alone::open(
+        &format!(
+            "[driver]\nid = 1\nname = \"machine\"\n[fieldbus]\nkind = \"s7-client\"\naddress = \"{at}\"\ncycle = \"1ms\"\n\
          max_age = \"300ms\"\nreconnect = [\"10ms\"]\n\
          [[station]]\nname = \"left\"\noutput = \"DB5\"\n[[station]]\nname = \"right\"\n{right}\n\
          [[signal]]\nname = \"l\"\nstation = \"left\"\naddress = \"%QB0\"\nfail_safe = 99\n\
          [[signal]]\nname = \"r\"\nstation = \"right\"\naddress = \"{address}\"\nfail_safe = 99\n"
-    ));
+        ),
+        &KINDS,
+    );
     (machine, cpu)
 }
 
@@ -596,7 +603,7 @@ fn the_age_of_a_slot_is_its_own() {
         max_age = \"300ms\"\n[[station]]\nname = \"one\"\nslot = 1\n[[station]]\nname = \"two\"\nslot = 2\n\
         [[signal]]\nname = \"a\"\nstation = \"one\"\naddress = \"%QB0\"\nfail_safe = 99\n\
         [[signal]]\nname = \"b\"\nstation = \"two\"\naddress = \"%QB0\"\nfail_safe = 99\n";
-    let mut device = Alone::open(text);
+    let mut device = Alone::open(text, &KINDS);
     let at = device.address();
     let mut one = Client::in_slot(at, 1);
     let mut two = Client::in_slot(at, 2);

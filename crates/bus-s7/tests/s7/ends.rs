@@ -8,10 +8,10 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use tickbus::time::Manual;
+use tickbus_base::time::Manual;
 
-use crate::conformance::rig::{Bus, Liar, logged};
-use crate::peers::{leave, own_address};
+use tickbus_conformance::peers::{leave, own_address};
+use tickbus_conformance::rig::{Bus, Liar, logged};
 
 /// A server and a client of ours, at an address used by one test only.
 pub struct Pair {
@@ -43,8 +43,8 @@ impl Pair {
 }
 
 impl Bus for Pair {
-    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
-        &tickbus::KINDS
+    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
+        &crate::KINDS
     }
 
     fn fieldbus(&self, role: &str) -> String {

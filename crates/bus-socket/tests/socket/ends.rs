@@ -4,10 +4,10 @@ use std::io::Write;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use tickbus::time::Manual;
+use tickbus_base::time::Manual;
 
-use crate::conformance::rig::{Bus, Liar, config};
-use crate::peers::{Alone, Ending, leave, own_address};
+use tickbus_conformance::peers::{Alone, Ending, leave, own_address};
+use tickbus_conformance::rig::{Bus, Liar, config};
 
 /// The size of a record of the conformance suite's signals, in both directions.
 pub const RECORD: usize = 6;
@@ -32,8 +32,8 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
-    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
-        &tickbus::KINDS
+    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
+        &crate::KINDS
     }
 
     fn fieldbus(&self, role: &str) -> String {
@@ -122,7 +122,7 @@ pub fn device(further: &str) -> (Alone, SocketAddr) {
         device: "",
         controller: "",
     };
-    let alone = Alone::open(&config(&bus, "device", further));
+    let alone = Alone::open(&config(&bus, "device", further), &crate::KINDS);
     let address = alone.address();
     (alone, address)
 }

@@ -3,9 +3,9 @@
 use std::io::{Read as _, Write as _};
 use std::time::Duration;
 
+use super::conformance::peers::{Alone, client, is_closed};
 use super::conformance::rig::{await_that, config, pass};
-use super::modbus::rtu_request;
-use super::peers::{Alone, client, is_closed};
+use super::ends::rtu_request;
 #[cfg(unix)]
 use super::{AnyPort, pty};
 
@@ -17,6 +17,7 @@ fn rtu_over_tcp_is_served_as_on_a_serial_line() {
          framing = \"rtu\"\n[[station]]\nname = \"a\"\nunit = 3\n[[station]]\nname = \"b\"\nunit = 7\n\
          [[signal]]\nname = \"press\"\nstation = \"a\"\naddress = \"%QW0\"\n\
          [[signal]]\nname = \"oven\"\nstation = \"b\"\naddress = \"%QW0\"\n",
+        &crate::KINDS,
     );
     device.end.tick();
     let mut honest = client(device.address());
@@ -76,7 +77,10 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
     let slow = "unit = 1\necho = true\nbaud = 50\nsilence = \"1ms\"";
     let config = config(&AnyPort, "device", slow);
     let serial = format!("device = \"{}\"", line.end(0).display());
-    let mut device = Alone::open(&config.replace("address = \"127.0.0.1:0\"", &serial));
+    let mut device = Alone::open(
+        &config.replace("address = \"127.0.0.1:0\"", &serial),
+        &crate::KINDS,
+    );
     device.until("it listens", |end| {
         end.driver.statistics().contains("\ndevice=")
     });

@@ -5,11 +5,11 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use tickbus::fieldbus::modbus::rtu;
-use tickbus::time::Manual;
+use tickbus_base::time::Manual;
+use tickbus_bus_modbus::rtu;
 
-use crate::conformance::rig::{Bus, Liar, logged};
-use crate::peers::{Ending, leave, own_address};
+use tickbus_conformance::peers::{Ending, leave, own_address};
+use tickbus_conformance::rig::{Bus, Liar, logged};
 
 /// Modbus TCP, or RTU over TCP, at an address used by one test only.
 pub struct Tcp {
@@ -48,8 +48,8 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
-    fn kinds(&self) -> &'static tickbus::driver_cfg::Kinds {
-        &tickbus::KINDS
+    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
+        &crate::KINDS
     }
 
     fn fieldbus(&self, role: &str) -> String {

@@ -25,7 +25,7 @@ pub fn read_device(value: &Value<'_>) -> Option<String> {
 ///
 /// # Errors
 ///
-/// It does not exist, is not a serial port, or does not support the settings.
+/// The port does not exist, is not a serial port, or does not support the settings.
 #[cfg(unix)]
 pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
     SerialPort::open(Path::new(device), settings).map_err(|error| {
@@ -49,12 +49,11 @@ pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusErr
     })
 }
 
-/// Opens the port as [`open`] does, so that it marks characters that were damaged on the line, for
-/// [`Marks`](tickbus_base::os::Marks).
+/// As [`open`], but the port marks characters that were damaged on the line, for [`Marks`](tickbus_base::os::Marks).
 ///
 /// # Errors
 ///
-/// As of [`open`].
+/// As [`open`].
 #[cfg(unix)]
 pub fn open_marking(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
     let port = open(device, settings)?;
@@ -62,7 +61,7 @@ pub fn open_marking(device: &str, settings: SerialSettings) -> Result<SerialPort
     Ok(port)
 }
 
-/// The serial port `device` is gone.
+/// The error when the serial port `device` is gone.
 pub fn gone(device: &str, why: impl fmt::Display) -> BusError {
     BusError::Link(format!(
         "the serial port {device} is gone ({why}); see whether it is still plugged in"

@@ -1,4 +1,4 @@
-//! Signals, as a simulator has to know them.
+//! The description of a signal for a simulator.
 
 use tickbus_driver::{Driver, SlotMap};
 use tickbus_driver_cfg::Config;
@@ -20,25 +20,25 @@ pub enum SlotKind {
 /// A signal.
 #[derive(Clone, Debug)]
 pub struct SignalDescription<'d> {
-    /// Its name.
+    /// The signal's name.
     pub name: &'d str,
-    /// Its address in IEC form.
+    /// The signal's address in IEC form.
     pub address: String,
-    /// Its IEC data type.
+    /// The signal's IEC data type.
     pub data_type: &'static str,
-    /// Its unit; empty for none.
+    /// The signal's unit; empty for none.
     pub unit: &'d str,
-    /// Its station; empty if driver.cfg names none.
+    /// The signal's station; empty if driver.cfg names none.
     pub station: &'d str,
-    /// Whether this end writes it.
+    /// True if this end writes the signal.
     pub is_written: bool,
-    /// What its slot holds.
+    /// The type of the slot's value.
     pub kind: SlotKind,
-    /// Its slot.
+    /// The signal's slot.
     pub slot: usize,
-    /// The slot in which its edges are counted.
+    /// The slot that counts the signal's edges, if any.
     pub edges: Option<usize>,
-    /// What its slot holds for a value that is not a number.
+    /// The signal's fail-safe value, which also replaces a value that is not a number.
     pub fail_safe: Slot,
 }
 

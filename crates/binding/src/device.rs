@@ -28,7 +28,7 @@ pub struct Device<K> {
 }
 
 impl<K> Device<K> {
-    /// A driver and its buffer, whose slots get their initial values.
+    /// Joins a driver and its buffer, and sets the slots to their initial values.
     pub fn new(driver: Driver, mut shared: Shared<K>) -> Self {
         shared.slots().copy_from_slice(&driver.initial_slots());
         Self {
@@ -81,7 +81,7 @@ impl<K> Device<K> {
         done.code
     }
 
-    /// The data of the statistics; they are formatted after the driver is released.
+    /// The data of the statistics; the caller formats them after releasing the driver.
     pub fn snapshot(&self) -> Snapshot {
         let mut snapshot = self.driver.snapshot();
         let counted = [Word::Saturated, Word::NotANumber].map(|word| self.shared.read(word));
@@ -89,12 +89,12 @@ impl<K> Device<K> {
         snapshot
     }
 
-    /// What a simulator has to know of a signal, by its index.
+    /// Calls `tell` with the description of the signal with this index.
     pub fn describe<R>(&self, signal: usize, tell: impl FnOnce(&SignalDescription<'_>) -> R) -> R {
         tell(&SignalDescription::of(&self.driver, signal))
     }
 
-    /// What the driver was opened with.
+    /// The configuration that the driver was opened with.
     pub fn config(&self) -> Arc<Config> {
         Arc::clone(self.driver.config())
     }
@@ -103,7 +103,7 @@ impl<K> Device<K> {
     ///
     /// # Errors
     ///
-    /// `BAD_ARGUMENT` if there are too many.
+    /// `BAD_ARGUMENT` if too many faults wait or are active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
         inject(&mut self.driver, fault)
     }
@@ -113,7 +113,7 @@ impl<K> Device<K> {
         self.driver.end_fault(id)
     }
 
-    /// Where the injected faults publish their state.
+    /// The board on which the injected faults publish their state.
     pub fn board(&self) -> Arc<FaultBoard> {
         Arc::clone(self.driver.board())
     }
@@ -135,8 +135,8 @@ impl<K> Device<K> {
         count
     }
 
-    /// Closes the driver; a tick that was begun and not answered is recorded with what was written last. Returns what it
-    /// shared, which nobody uses any more.
+    /// Closes the driver. A tick that was begun and not answered is recorded with the values written last. Returns the
+    /// shared buffer, which is no longer in use.
     pub fn close(mut self) -> Shared<K> {
         self.driver.end_tick(self.shared.slots());
         self.driver.close();

@@ -8,7 +8,7 @@ use tickbus_fieldbus::faults::{Fault, FaultBoard, FaultStatus, read_one};
 
 use crate::refusal::Refusal;
 
-/// A fault as in driver.cfg: the keys of a `[[fault]]` table.
+/// Reads a fault as in driver.cfg: the keys of a `[[fault]]` table.
 ///
 /// # Errors
 ///
@@ -21,7 +21,7 @@ pub fn read_fault(text: &str, config: &Config) -> Result<Fault, Refusal> {
 ///
 /// # Errors
 ///
-/// `BAD_ARGUMENT` if there are too many.
+/// `BAD_ARGUMENT` if too many faults wait or are active.
 pub fn inject(driver: &mut Driver, fault: &Fault) -> Result<u32, Refusal> {
     driver.inject_read(fault).map_err(not_injected)
 }

@@ -1,11 +1,10 @@
 //! The table of open drivers: checked ids instead of pointers.
 //!
-//! A handle is an index into a table, and a generation that distinguishes the current tenant of the
-//! place from all previous ones. Any number either denotes a tenant that is open now, or is answered with a
-//! status code.
+//! A handle is an index into a table, and a generation that distinguishes the current tenant of the place from all
+//! previous ones. A number that denotes no open tenant is answered with a status code.
 //!
-//! One thread at a time has a tenant. A tick never waits for another tick. All other calls are visits: a visit waits for the
-//! tick that is in its way, and the end of a tick lets a waiting visit in.
+//! One thread at a time uses a tenant. A tick never waits for another tick. All other calls are visits: a visit waits
+//! until a running tick ends, and the end of a tick lets a waiting visit in.
 
 #![allow(
     unsafe_code,
@@ -26,39 +25,40 @@ use crate::refusal::Refusal;
 /// How many drivers can be open in one process at once.
 pub const MAX_DRIVERS: usize = BLOCK * (1 + MORE_BLOCKS);
 
-/// Places in a block. The first block is always there, the others are made when they are needed, and stay.
+/// Places in a block. The first block always exists; the others are allocated when needed, and are never freed.
 const BLOCK: usize = 64;
 const MORE_BLOCKS: usize = 63;
 
-/// A handle's low bits are the index, the rest the generation.
+/// The low bits of a handle are the index, the others the generation.
 const INDEX_BITS: u32 = 12;
 const _: () = assert!(MAX_DRIVERS <= 1 << INDEX_BITS);
 
 /// A place's word: its generation, and in the low bits one of the states below.
 const STATE_BITS: u32 = 3;
 const STATE: u64 = (1 << STATE_BITS) - 1;
-/// There is no tenant.
+/// No tenant.
 const FREE: u64 = 0;
-/// There is a tenant, not in use at the moment.
+/// A tenant that no call is using.
 const OPEN: u64 = 1;
 /// A tick is using the tenant.
 const TICKING: u64 = 2;
 /// Another call is using the tenant.
 const VISITED: u64 = 3;
-/// The tenant has panicked, and waits to be closed.
+/// The tenant has panicked, and can only be closed.
 const FAILED: u64 = 4;
 
-/// How long a visit waits for a tick, and a tick for a visit: on a busy machine the other thread may have no processor for long.
+/// How long a visit waits for a tick, and a tick for a visit. On a busy machine the other thread may get no processor
+/// for a long time.
 const PATIENCE: Nanos = Nanos::from_secs(2);
-/// In how many rounds a visit looks at the place at least, before it gives up.
+/// The minimum number of rounds in which a visit checks the place before it gives up.
 const LEAST_ROUNDS: u32 = 20;
 /// How long a visit only yields between two rounds; afterwards it also sleeps.
 const AWAKE: Nanos = Nanos::from_millis(100);
-/// How long it then sleeps, once in [`LEAST_ROUNDS`].
+/// How long a visit then sleeps, once in [`LEAST_ROUNDS`] rounds.
 const NAP: Nanos = Nanos::from_millis(1);
-/// In a round, how often to look at the place before the processor is given to another thread: some microseconds.
+/// How often a round checks the place before the thread yields its processor: some microseconds.
 const SPINS: u32 = 200;
-/// How many names of drivers a refusal has.
+/// The maximum number of driver names in a refusal.
 const NAMES: usize = 8;
 
 const fn word(generation: u64, state: u64) -> u64 {
@@ -69,9 +69,10 @@ const fn word(generation: u64, state: u64) -> u64 {
 #[repr(align(128))]
 struct HandleEntry<T> {
     word: AtomicU64,
-    /// Whether a visit waits for the end of a tick. A hint: a wish that is lost is made again.
+    /// True while a visit waits for the end of a tick. Only a hint: a waiting visit sets a lost flag again.
     wanted: AtomicBool,
-    /// Only accessed by the thread that has moved the word to [`TICKING`] or [`VISITED`], until it moves it on.
+    /// Accessed only by the thread that has moved the word to [`TICKING`] or [`VISITED`], until that thread moves the
+    /// word on.
     content: UnsafeCell<Content<T>>,
 }
 
@@ -88,10 +89,10 @@ pub struct Handles<T, const N: usize = BLOCK> {
     more: [OnceLock<Box<[HandleEntry<T>]>>; MORE_BLOCKS],
 }
 
-// SAFETY: the one part that is not Sync by itself is `content`. It is reached through `Claim` alone,
-// which exists only between a successful compare-and-exchange to TICKING or VISITED (acquire) and the store that
-// ends it (release), so one thread at a time has it, and sees all that the one before it did. A tenant
-// may thus be used and dropped by another thread than the one that made it, hence `T: Send`.
+// SAFETY: `content` is the one part that is not Sync already. Only a `Claim` gives access to it. A claim exists from a
+// successful compare-and-exchange to TICKING or VISITED (acquire) until the store that ends it (release), so one thread
+// at a time has it, and sees everything that the previous one did. A thread may thus use and drop a tenant that another
+// thread made, hence `T: Send`.
 unsafe impl<T: Send, const N: usize> Sync for Handles<T, N> {}
 
 impl<T, const N: usize> Default for Handles<T, N> {
@@ -113,7 +114,7 @@ impl<T, const N: usize> Handles<T, N> {
     ///
     /// # Errors
     ///
-    /// `TOO_MANY_DRIVERS`, with names of those that are open: all places are taken.
+    /// `TOO_MANY_DRIVERS`, with the names of open drivers, if all places are taken.
     pub fn reserve(&self) -> Result<Reservation<'_, T>, Refusal> {
         for index in 0..N * (1 + MORE_BLOCKS) {
             let place = match index.checked_sub(N) {
@@ -131,7 +132,7 @@ impl<T, const N: usize> Handles<T, N> {
         Err(Refusal::new(Code::TooManyDrivers, self.crowd()))
     }
 
-    /// Why there is no place left.
+    /// The reason why no place is left.
     fn crowd(&self) -> String {
         let most = N * (1 + MORE_BLOCKS);
         let mut names = Vec::new();
@@ -153,19 +154,20 @@ impl<T, const N: usize> Handles<T, N> {
         format!("{most} drivers are open, and that is the most: {names}{more}")
     }
 
-    /// All places that were made.
+    /// All places that are allocated.
     fn places(&self) -> impl Iterator<Item = &HandleEntry<T>> {
         let more = self.more.iter().filter_map(OnceLock::get);
         self.first.iter().chain(more.flatten())
     }
 
-    /// A tick: calls `work` with the tenant, which no other thread can access in the meantime. Then lets a visit in that waits.
+    /// A tick: calls `work` with the tenant, which no other thread can access in the meantime. Then lets a waiting
+    /// visit in.
     ///
     /// A panic in `work` marks the tenant as failed; from then on it returns INTERNAL until closed.
     ///
     /// # Errors
     ///
-    /// The handle was never open, is closed, in a tick of another thread, or its tenant has failed.
+    /// The handle was never open or is closed; another thread ticks the tenant; or the tenant has failed.
     #[inline]
     pub fn tick<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
         let (place, generation) = self.place(handle).ok_or(Code::NotOpen)?;
@@ -181,12 +183,12 @@ impl<T, const N: usize> Handles<T, N> {
         done
     }
 
-    /// Any other call: as [`tick`](Self::tick), and waits for a tick that is in its way, at most 2 s.
+    /// Any other call: as [`tick`](Self::tick), but first waits until a running tick ends, for at most 2 s.
     ///
     /// # Errors
     ///
-    /// The handle was never open, is closed, in use by other threads for all this time, or its tenant has failed; then with the
-    /// message of the panic.
+    /// The handle was never open or is closed; other threads use the tenant for all this time; or the tenant has
+    /// failed, and the refusal has the message of its panic.
     pub fn visit<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Refusal> {
         let claim = self.enter(handle, OPEN, PATIENCE);
         claim
@@ -194,7 +196,7 @@ impl<T, const N: usize> Handles<T, N> {
             .map_err(|code| self.reason(handle, code))
     }
 
-    /// Why the tenant of this handle was refused with `code`.
+    /// The reason why the tenant of this handle was refused with `code`.
     pub fn reason(&self, handle: i64, code: Code) -> Refusal {
         match self.panic_of(handle) {
             Some(text) => Refusal::new(code, format!("panic: {text}")),
@@ -202,12 +204,12 @@ impl<T, const N: usize> Handles<T, N> {
         }
     }
 
-    /// Ends a tenancy: `close` is called with the tenant, failed or not. The place is free and the handle
-    /// closed from then on, however long `close` takes. Waits for a tick that is in its way, at most 2 s.
+    /// Ends a tenancy: calls `close` with the tenant, failed or not. The place is free and the handle is closed before
+    /// `close` begins, however long that takes. Waits until a running tick ends, for at most 2 s.
     ///
     /// # Errors
     ///
-    /// The handle was never open, is closed already, or in use by other threads for all this time.
+    /// The handle was never open or is closed already, or other threads use the tenant for all this time.
     pub fn close<R>(&self, handle: i64, close: impl FnOnce(T) -> R) -> Result<R, Code> {
         self.close_within(PATIENCE, handle, close)
     }
@@ -225,7 +227,7 @@ impl<T, const N: usize> Handles<T, N> {
         claim.vacate().map(close).ok_or(Code::Internal)
     }
 
-    /// Ends all tenancies, as at the end of the process. Leaves alone what another thread does not end to use.
+    /// Ends all tenancies, as at the end of the process. Skips a tenant that another thread does not release in time.
     pub fn close_all(&self, mut close: impl FnMut(T)) {
         for place in self.places() {
             let found = place.word.load(Ordering::Relaxed);
@@ -251,7 +253,7 @@ impl<T, const N: usize> Handles<T, N> {
         Some(claim.content().panic.clone())
     }
 
-    /// The place of a handle, if there is one, and the generation that its tenant must have.
+    /// The place of a handle, if any, and the generation that its tenant must have.
     #[inline]
     fn place(&self, handle: i64) -> Option<(&HandleEntry<T>, u64)> {
         // A negative handle becomes a generation that no place will ever reach.
@@ -289,7 +291,7 @@ impl<T> HandleEntry<T> {
         }
     }
 
-    /// Claims a place in the state `from` for a visit, and waits for another thread that has it.
+    /// Claims a place in the state `from` for a visit, and waits while another thread has the place.
     fn wait(&self, generation: u64, from: u64, patience: Nanos) -> Result<Claim<'_, T>, Code> {
         let (found, claimed) = (word(generation, from), word(generation, VISITED));
         let take = || Claim::take(self, found, claimed, from);
@@ -311,7 +313,7 @@ impl<T> HandleEntry<T> {
                     refused => return Err(refused),
                 }
             }
-            // On a busy machine the time may have passed without a processor for this thread.
+            // On a busy machine the time may have passed while this thread had no processor.
             if waited > patience && round >= LEAST_ROUNDS {
                 break;
             }
@@ -324,7 +326,7 @@ impl<T> HandleEntry<T> {
         Err(Code::Busy)
     }
 
-    /// Claims a place for a tick, after the visit that is in its way.
+    /// Claims a place for a tick once the running visit has ended.
     #[cold]
     fn after_visit(&self, generation: u64) -> Result<Claim<'_, T>, Code> {
         let (open, claimed) = (word(generation, OPEN), word(generation, TICKING));
@@ -348,7 +350,7 @@ impl<T> HandleEntry<T> {
         }
     }
 
-    /// Once, after a tick: lets a visit in that waits, unless it has no processor.
+    /// Gives a waiting visit one chance to enter after a tick. A visit that has no processor at the time misses it.
     #[cold]
     fn let_in(&self, generation: u64) {
         self.wanted.store(false, Ordering::Relaxed);
@@ -361,7 +363,7 @@ impl<T> HandleEntry<T> {
         std::thread::yield_now();
     }
 
-    /// Why a claim with this generation failed.
+    /// The code for a failed claim with this generation.
     #[cold]
     fn refusal(&self, generation: u64) -> Code {
         let found = self.word.load(Ordering::Relaxed);
@@ -382,7 +384,7 @@ impl<T> HandleEntry<T> {
 /// Exclusive use of a place; ends when dropped.
 struct Claim<'a, T> {
     place: &'a HandleEntry<T>,
-    /// The word with which the place is left.
+    /// The word that the claim stores in the place when it ends.
     end: u64,
 }
 
@@ -394,7 +396,7 @@ impl<'a, T> Claim<'a, T> {
             .word
             .compare_exchange(found, claimed, Ordering::Acquire, Ordering::Relaxed)
             .is_ok()
-            // Made only on success: dropping a claim moves the word.
+            // The claim is made only on success, since dropping a claim moves the word.
             .then_some(claimed & !STATE | end)
             .map(|end| Self { place, end })
     }
@@ -410,7 +412,7 @@ impl<'a, T> Claim<'a, T> {
         self.end = self.end & !STATE | state;
     }
 
-    /// Calls `work` with the tenant, and ends.
+    /// Calls `work` with the tenant, and ends the claim.
     #[inline]
     fn run<R>(mut self, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
         let Some(tenant) = self.content().tenant.as_mut() else {
@@ -442,14 +444,14 @@ impl<T> Drop for Claim<'_, T> {
     }
 }
 
-/// A place waiting for its tenant; free again if this is dropped before.
+/// A place that waits for its tenant. The place is free again if the reservation is dropped unfilled.
 pub struct Reservation<'a, T> {
     claim: Claim<'a, T>,
     index: usize,
 }
 
 impl<T> Reservation<'_, T> {
-    /// Adds the tenant under a name for people, and returns its handle, which is positive.
+    /// Adds the tenant under a name for messages, and returns its handle, which is positive.
     pub fn fill(mut self, name: &str, tenant: T) -> i64 {
         let content = self.claim.content();
         content.tenant = Some(tenant);

@@ -1,8 +1,7 @@
-//! What the bindings to other languages share: everything that Java, C and Python do with an open
-//! driver, without any of them.
+//! The common part of the bindings to other languages: everything that Java, C and Python do with an open driver.
 //!
-//! [`Handles`] is the table of open drivers: checked numbers instead of pointers. A [`Device`] is one of them, with the
-//! [`Shared`] buffer of slots through which its values go.
+//! [`Handles`] is the table of open drivers: checked numbers instead of pointers. A [`Device`] is an open driver with
+//! the [`Shared`] buffer of slots that carries the values.
 
 mod description;
 mod device;

@@ -8,18 +8,18 @@ use tickbus_driver_cfg::{Config, Kinds};
 
 use crate::refusal::Refusal;
 
-/// The file name in mistakes in the tables handed in by the simulator.
+/// The file name that is reported for mistakes in the tables that the simulator handed in.
 const TABLES: &str = "tables instead of driver.cfg's";
 
 /// How long closing waits for the log to reach stderr.
 const LOG_FLUSH_LIMIT: Nanos = Nanos::from_millis(100);
 
-/// Opens the driver that the file describes, with `tables` in place of its own; empty for none. Both may name these
-/// `kinds` of bus.
+/// Opens the driver that the file describes, with `tables` in place of its own; an empty text replaces nothing. Both
+/// may name only these `kinds` of bus.
 ///
 /// # Errors
 ///
-/// `BAD_CONFIG` with every mistake of the file, or why the bus cannot be opened.
+/// `BAD_CONFIG` with every mistake in the file, or with the reason why the bus cannot be opened.
 pub fn open(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Driver, Refusal> {
     Ok(Driver::open(
         load(path, tables, kinds)?,
@@ -27,12 +27,12 @@ pub fn open(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Driver, 
     )?)
 }
 
-/// Reads the file that describes a driver, with `tables` in place of its own; empty for none. Both may name these
-/// `kinds` of bus.
+/// Reads the file that describes a driver, with `tables` in place of its own; an empty text replaces nothing. Both may
+/// name only these `kinds` of bus.
 ///
 /// # Errors
 ///
-/// `BAD_CONFIG` with every mistake of the file.
+/// `BAD_CONFIG` with every mistake in the file.
 pub fn load(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Config, Refusal> {
     let config = Config::load(path, kinds).and_then(|config| config.overlaid(TABLES, tables));
     config.map_err(|mistakes| {
@@ -43,7 +43,8 @@ pub fn load(path: &Path, tables: &str, kinds: &'static Kinds) -> Result<Config, 
     })
 }
 
-/// Closes a driver by `close`, and lets its last messages reach stderr: the process may end right after this.
+/// Calls `close` to close a driver, and waits until its last log messages have reached stderr: the process may end
+/// right after this.
 pub fn closing<R>(close: impl FnOnce() -> R) -> R {
     let closed = close();
     tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);

@@ -1,4 +1,4 @@
-//! Why a call of another language failed.
+//! The reasons why calls from another language failed.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -7,7 +7,8 @@ use tickbus_driver::{Code, DriverError, Snapshot};
 
 use crate::panics::panic_message;
 
-/// A status code, and what happened. Shows as one text: the code's name and number, what happened, and in a second line what to do.
+/// A status code, and what happened. Displayed as one text: the code's name and number, what happened, and in a second
+/// line what to do.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refusal {
     /// The code that the caller gets.
@@ -16,18 +17,18 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    /// With the status table's own description.
+    /// A refusal with the status table's description.
     pub fn plain(code: Code) -> Self {
         Self::new(code, code.text())
     }
 
-    /// With a description of its own; the remedy is the status table's.
+    /// A refusal with a separate description; the remedy is the status table's.
     pub fn new(code: Code, what: impl std::fmt::Display) -> Self {
         let what = what.to_string();
         Self { code, what }
     }
 
-    /// Of a tick that failed: with the line's own reason, which the statistics have, if it is the line that failed.
+    /// The refusal of a tick that failed. If the line failed, the description is the line's reason from the statistics.
     pub fn of_tick(code: Code, snapshot: &Snapshot) -> Self {
         if code != Code::BusFailed {
             return Self::plain(code);
@@ -40,11 +41,11 @@ impl Refusal {
         }
     }
 
-    /// What `work` returns; a panic in it is refused as `INTERNAL`.
+    /// Returns the result of `work`; a panic in `work` becomes the refusal `INTERNAL`.
     ///
     /// # Errors
     ///
-    /// Those of `work`.
+    /// The errors of `work`.
     pub fn instead_of_panic<R>(work: impl FnOnce() -> Result<R, Self>) -> Result<R, Self> {
         catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
             let text = format!("panic: {}", panic_message(payload));

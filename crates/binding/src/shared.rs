@@ -1,9 +1,10 @@
 //! The buffer that the simulator and the driver share: a header, then the slots.
 //!
-//! Words of 8 bytes in native byte order. Word 0 version of this layout, 1 status, 2 sequence, 3 age
-//! in nanoseconds, 4 simulation time in nanoseconds (the simulator writes it; [`NO_TIME`] until then), 5 granted time in
-//! nanoseconds, 6 ticks so far, 7 number of slots, 8 values that the simulator saturated while it converted them, 9 those
-//! that were not a number, 10 a spare slot for a signal that does not exist; the slots begin at word 11.
+//! Words have 8 bytes in native byte order. Word 0 is the version of this layout, 1 the status, 2 the sequence, 3 the
+//! age in nanoseconds, 4 the simulation time in nanoseconds (written by the simulator; [`NO_TIME`] until then), 5 the
+//! granted time in nanoseconds, 6 the number of ticks so far, 7 the number of slots, 8 the number of values that the
+//! simulator saturated while it converted them, 9 the number of those that were not a number, 10 a spare slot for a
+//! signal that does not exist. The slots begin at word 11.
 
 #![allow(unsafe_code, reason = "the memory belongs to the other language")]
 
@@ -15,7 +16,7 @@ use tickbus_image::signal::Slot;
 /// Version of the layout; the other side compares it with its own.
 const VERSION: u64 = 2;
 
-/// The simulation time as long as none was given.
+/// The simulation time until the simulator writes one.
 pub const NO_TIME: u64 = i64::MIN.cast_unsigned();
 
 /// Words before the first slot.
@@ -36,17 +37,17 @@ pub enum Word {
     Sequence = 2,
     /// The age of the data in nanoseconds.
     Age = 3,
-    /// The simulation time in nanoseconds, by the simulator.
+    /// The simulation time in nanoseconds, written by the simulator.
     SimulationTime = 4,
-    /// How far the simulation may go, in nanoseconds.
+    /// The time up to which the simulation may run, in nanoseconds.
     Granted = 5,
     /// How many ticks there were.
     Ticks = 6,
     /// How many slots follow.
     SlotCount = 7,
-    /// How many values were beyond their 64-bit integer, by the simulator.
+    /// How many values exceeded their 64-bit integer; counted by the simulator.
     Saturated = 8,
-    /// How many were not a number, and had to become an integer, by the simulator.
+    /// How many values were not a number and had to become an integer; counted by the simulator.
     NotANumber = 9,
 }
 
@@ -57,7 +58,7 @@ pub struct Shared<K> {
     _keep: K,
 }
 
-// SAFETY: the memory is not bound to a thread, and `Shared` is the only way to it on this side.
+// SAFETY: the memory is not bound to a thread, and on this side only `Shared` gives access to it.
 unsafe impl<K: Send> Send for Shared<K> {}
 
 impl<K> Shared<K> {
@@ -66,14 +67,13 @@ impl<K> Shared<K> {
         (HEADER + slots) * size_of::<u64>()
     }
 
-    /// Takes over `memory` and writes the header; all else is zero. `None` if it is not aligned for
-    /// 8-byte words.
+    /// Takes over `memory` and writes the header; all else is zero. `None` if `memory` is not aligned for 8-byte words.
     ///
     /// # Safety
     ///
-    /// `memory` must be valid for reads and writes of `bytes(slots)` bytes for as long as `keep`
-    /// lives, and hold initialised bytes. While a method of this value runs, nobody else may write
-    /// there; while [`slots`](Self::slots) is borrowed, nobody else may touch the slots.
+    /// `memory` must be valid for reads and writes of `bytes(slots)` bytes for as long as `keep` lives, and hold
+    /// initialised bytes. While a method of this value runs, no other code may write there; while
+    /// [`slots`](Self::slots) is borrowed, no other code may access the slots.
     pub unsafe fn new(memory: NonNull<u8>, slots: usize, keep: K) -> Option<Self> {
         let words = memory.cast::<u64>();
         if !words.is_aligned() {
@@ -97,10 +97,10 @@ impl<K> Shared<K> {
     /// The slots, to which this side has exclusive access while they are borrowed.
     #[inline]
     pub fn slots(&mut self) -> &mut [Slot] {
-        // SAFETY: `new` was promised HEADER + slots words, aligned and initialised, that live as long
-        // as `self`; a `Slot` is a transparent u64. The simulator moves slots only before and after the
-        // exchange that borrows them, on the thread that makes the call: Java's `tickbus.Signal` and
-        // `include/tickbus.h` demand that of their callers.
+        // SAFETY: `new` was promised HEADER + slots words, aligned and initialised, that live as long as `self`; a
+        // `Slot` is a transparent u64. The simulator moves slots only before and after the exchange that borrows them,
+        // on the thread that makes the call: Java's `tickbus.Signal` and `include/tickbus.h` require that of their
+        // callers.
         unsafe {
             std::slice::from_raw_parts_mut(self.words.add(HEADER).as_ptr().cast(), self.slots)
         }

@@ -1,4 +1,4 @@
-//! What every bus must do, written once and instantiated per bus by [`conformance!`].
+//! The tests that every bus must pass, written once and instantiated per bus by [`conformance!`].
 
 #![allow(
     missing_docs,
@@ -57,17 +57,17 @@ pub fn exchanges_whole_images_only(bus: &impl Bus) {
     });
 }
 
-/// What one end has seen of a pulse.
+/// The pulse edges that one end has seen.
 #[derive(Default)]
 struct Pulse {
-    /// The edges counted.
+    /// The number of edges so far.
     edges: f64,
     was_high: bool,
     is_over: bool,
 }
 
 impl Pulse {
-    /// Looks at a signal after a tick.
+    /// Checks a signal after a tick.
     fn watch(&mut self, end: &End, signal: &str) {
         let is_high = end.get(signal) == 1.0;
         self.edges += end.edges(signal);
@@ -172,7 +172,7 @@ pub fn answers_within_the_tick(bus: &impl Bus) {
     assert_eq!(device.get("speed"), -1.0, "the fail-safe value");
 }
 
-/// A controller that closes switches off what it has switched on, and says so in time.
+/// A closing controller switches its outputs off, and sends the fail-safe values in time.
 pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
     let clock = Monotonic::shared();
     let open = |role| {
@@ -190,7 +190,7 @@ pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
     controller.driver.close();
     let mut events = vec![tickbus_image::Event::default(); 64];
     let mut last = [f64::NAN; 2];
-    // Events come from what has arrived, not from a line that is stale.
+    // Only received frames make events; a stale line makes none.
     eventually("the machine has the fail-safe values", || {
         let count = device.driver.poll_events(&mut events);
         for event in &events[..count] {
@@ -202,7 +202,7 @@ pub fn leaves_the_fail_safe_values_behind(bus: &impl Bus) {
     });
 }
 
-/// A controller whose machine shows no sign of life switches off what it has switched on, until there is one again.
+/// A controller whose machine shows no sign of life sends fail-safe values until the machine is alive again.
 pub fn sends_fail_safe_values_while_it_is_blind(bus: &impl Bus) {
     let alive = "alive = { signal = \"position\", within = \"100ms\" }";
     let clock = Manual::new();
@@ -245,7 +245,8 @@ pub fn keeps_events_in_order(bus: &impl Bus) {
     assert_eq!(rig.device.statistic("events_lost"), "0");
 }
 
-/// Silence from the peer: stale, fail-safe values; and recovery, all by the injected clock.
+/// A silent peer makes the line stale and the values fail-safe; the line recovers. All of it runs on the injected
+/// clock.
 pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     let clock = Manual::new();
     let mut device = End::open(&config(bus, "device", ""), &clock, bus.kinds());
@@ -283,8 +284,8 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
         link.state != LinkState::Running && link.cause != Cause::Running && !link.reason.is_empty()
     });
 
-    // Not always once: the clock of the test does not wait for a thread that has bytes to read and no processor, so on a
-    // busy machine a line may be silent for too long and run anew while its peer is there.
+    // The line may run more than once. The clock of the test does not wait for a thread that has bytes to read but no
+    // processor. On a busy machine a line may thus be silent for too long, and run again, although its peer is there.
     let runs = |device: &End| device.statistic("link.running").parse::<u32>();
     let before = runs(&device).expect("a count");
     assert_ne!(before, 0, "it ran");
@@ -300,8 +301,8 @@ pub fn is_stale_without_its_peer_and_recovers(bus: &impl Bus) {
     assert!(after > before, "it runs anew: {after} after {before}");
 }
 
-/// The peer violates the protocol: the line reports how, none of its data are used, and an honest peer is
-/// served afterwards.
+/// The peer violates the protocol: the line reports the violation, uses none of the peer's data, and serves an honest
+/// peer afterwards.
 pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
     let clock = Manual::new();
     let liar = bus.liar(&clock);
@@ -317,7 +318,7 @@ pub fn sees_through_a_peer_that_lies(bus: &impl Bus) {
     Rig::around(bus, clock, device);
 }
 
-/// The simulation stops ticking: the PLC gets the fail-safe values, and the true ones when it ticks again.
+/// When the simulation stops ticking, the PLC gets the fail-safe values; when it ticks again, the true ones.
 pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
     let mut rig = Rig::with(bus, "watchdog = \"50ms\"");
     rig.connect();
@@ -338,7 +339,7 @@ pub fn the_watchdog_bites_when_the_simulation_stops(bus: &impl Bus) {
     });
 }
 
-/// Peers die and return, again and again: each is served, and no resources accumulate.
+/// Peers die and return 200 times: each is served, and no resources accumulate.
 ///
 /// Resources are counted, so this runs in a separate process: `test` is the calling test's name.
 pub fn survives_200_peers(bus: &impl Bus, test: &str) {
@@ -376,7 +377,7 @@ pub fn survives_200_peers(bus: &impl Bus, test: &str) {
     assert_eq!(before, Some(after), "something piles up");
 }
 
-/// Closing in the midst of traffic does not wait for any deadline or peer.
+/// Closing during traffic waits for no deadline and no peer.
 pub fn closes_while_busy(bus: &impl Bus) {
     for first in ["device", "controller"] {
         let mut rig = Rig::new(bus);
@@ -409,7 +410,7 @@ pub fn closes_while_busy(bus: &impl Bus) {
     }
 }
 
-/// Mistakes in the bus's own table are reported at their line, with the remedy.
+/// Mistakes in the bus's own table are reported with their line and the remedy.
 pub fn refuses_bad_configuration(bus: &impl Bus) {
     let wrong = bus.wrong();
     assert!(!wrong.is_empty());
@@ -448,7 +449,7 @@ pub fn keeps_several_instances_apart(bus: &impl Bus, other: &impl Bus) {
     }
 }
 
-/// Each end detects by a signal of the other one whether that works: the PLC by a heartbeat of the
+/// Each end uses a signal of the other end to detect whether that end works. The PLC watches a heartbeat of the
 /// simulation.
 pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     let within = "within = \"100ms\"";
@@ -482,7 +483,8 @@ pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     });
     assert_eq!(rig.device.get("speed"), -1.0, "its fail-safe value");
     assert!(rig.device.statistic("reason").contains("\"speed\""));
-    // Not at once: where a program in between has its own time, the heartbeat may be late by more than 100 ms of this clock.
+    // The data need not become fresh at once: if a program in between has its own time, the heartbeat may be late by
+    // more than 100 ms of this clock.
     rig.until("the heartbeat goes on", |rig| {
         rig.controller.tick();
         rig.device.tick();
@@ -502,7 +504,7 @@ pub fn is_stale_while_a_signal_that_has_to_change_does_not(bus: &impl Bus) {
     });
 }
 
-/// Closing ends every thread even though the clock stands still.
+/// Closing ends every thread even if the clock does not advance.
 pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
     let clock = Manual::new();
     let config =
@@ -510,7 +512,7 @@ pub fn closes_while_its_peer_is_silent(bus: &impl Bus) {
     Driver::open(config, clock).expect("opens").close();
 }
 
-/// Instantiates the suite: a name, and an expression that makes a bus used by nothing else.
+/// Instantiates the suite, given a name and an expression that makes a new bus.
 #[macro_export]
 macro_rules! conformance {
     ($name:ident, $bus:expr) => {

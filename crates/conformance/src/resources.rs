@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Bytes that are allocated at this moment.
+/// The number of bytes allocated at this moment.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
@@ -14,7 +14,7 @@ struct Counting;
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// SAFETY: all calls are passed on to the system's allocator unchanged.
+// SAFETY: all calls are forwarded to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LIVE.fetch_add(layout.size(), Ordering::Relaxed);
@@ -29,7 +29,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// What a process holds.
+/// The resources that a process holds.
 #[derive(Clone, Copy, Debug)]
 pub struct Resources {
     threads: usize,
@@ -49,7 +49,7 @@ impl PartialEq for Resources {
 }
 
 impl Resources {
-    /// What the process holds at this moment.
+    /// The resources of the process at this moment.
     pub fn now() -> Self {
         let count = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);
         let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
@@ -64,7 +64,7 @@ impl Resources {
         }
     }
 
-    /// What the process holds once that is stable, while `pass` lets time pass.
+    /// The resources of the process once they are stable; `pass` lets time pass.
     pub fn settled(mut pass: impl FnMut()) -> Self {
         let limit = Instant::now() + Duration::from_secs(10);
         let mut last = Self::now();
@@ -81,8 +81,8 @@ impl Resources {
     }
 }
 
-/// Whether this process runs only the test called `test` (its module path). If not, the test has been run in
-/// a separate process, and has passed.
+/// Returns true if this process runs only the test called `test` (its module path). If false, the test has run in a
+/// separate process, and has passed.
 pub fn alone(test: &str) -> bool {
     const MARK: &str = "TICKBUS_TEST_ALONE";
     if std::env::var_os(MARK).is_some() {

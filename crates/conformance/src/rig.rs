@@ -56,13 +56,13 @@ pub struct End {
 }
 
 impl End {
-    /// Opens the driver of a driver.cfg with this text, which may name these `kinds` of bus.
+    /// Opens the driver of a driver.cfg with this text, which may name only these `kinds` of bus.
     pub fn open<C: Clock + 'static>(text: &str, clock: &Arc<C>, kinds: &'static Kinds) -> Self {
         let config = Config::parse("driver.cfg", text, kinds).unwrap_or_else(|why| panic!("{why}"));
         Self::of(config, clock)
     }
 
-    /// The same of a driver.cfg that was read already.
+    /// As [`open`](Self::open), for a driver.cfg that was read already.
     pub fn of<C: Clock + 'static>(config: Config, clock: &Arc<C>) -> Self {
         let logged = logged::Watch::new();
         let driver = Driver::open(config, Arc::clone(clock) as _).expect("opens");
@@ -101,7 +101,7 @@ impl End {
         self.driver.exchange(None, &mut self.slots)
     }
 
-    /// The two halves of a tick, for a model between them.
+    /// The first half of a tick; a model may run before the second half.
     pub fn receive(&mut self) -> Exchange {
         self.driver.receive(None, &mut self.slots)
     }
@@ -116,7 +116,7 @@ impl End {
         found.unwrap_or_else(|| panic!("no {key} in {}", self.driver.statistics()))
     }
 
-    /// Where it listens.
+    /// The address on which the driver listens.
     #[track_caller]
     pub fn address(&self) -> SocketAddr {
         address(&self.driver)
@@ -128,23 +128,23 @@ impl End {
     }
 }
 
-/// What the statistics of a driver say under `key`.
+/// The value of `key` in the statistics of a driver.
 pub fn statistic(driver: &Driver, key: &str) -> Option<String> {
     let text = driver.statistics();
     let mut lines = text.lines();
     lines.find_map(|line| line.strip_prefix(&format!("{key}=")).map(str::to_owned))
 }
 
-/// Where a driver listens, once it does.
+/// The address on which a driver listens; waits until it does.
 #[track_caller]
 pub fn address(driver: &Driver) -> SocketAddr {
     let address = eventually("it listens", || statistic(driver, "address"));
     address.parse().expect("an address")
 }
 
-/// A bus, with everything the suite needs to know about it.
+/// A bus, with the data that the suite needs.
 pub trait Bus {
-    /// The kinds of bus that its driver.cfg may name: its own.
+    /// The kinds of bus that the driver.cfg may name: this kind.
     fn kinds(&self) -> &'static Kinds;
 
     /// The `[fieldbus]` table of the end with `role`, without `role` and timing.
@@ -153,7 +153,7 @@ pub trait Bus {
     /// Starts a peer that violates the protocol, for a Device that is about to open.
     fn liar(&self, clock: &Arc<Manual>) -> Liar;
 
-    /// Wrong `[fieldbus]` tables, each with a word of the complaint.
+    /// Wrong `[fieldbus]` tables, each with a word of the error message.
     fn wrong(&self) -> Vec<(&'static str, &'static str)>;
 
     /// `[[fault]]` sections of both ends.
@@ -162,10 +162,10 @@ pub trait Bus {
     }
 }
 
-/// A peer that lies; dropping it ends it.
+/// A peer that violates the protocol; dropping the value ends the peer.
 pub struct Liar {
     pub peer: Box<dyn std::any::Any>,
-    /// What the Device reports about it: the cause, and words of the reason.
+    /// The cause that the Device reports, and words of the reason.
     pub cause: &'static str,
     pub words: &'static str,
 }
@@ -195,7 +195,7 @@ impl Rig {
         Self::with(bus, "")
     }
 
-    /// With further lines in the `[fieldbus]` table of both ends.
+    /// A rig with further lines in the `[fieldbus]` table of both ends.
     pub fn with(bus: &impl Bus, extra: &str) -> Self {
         let clock = Manual::new();
         let device = End::open(&config(bus, "device", extra), &clock, bus.kinds());
@@ -207,7 +207,7 @@ impl Rig {
         }
     }
 
-    /// A device that is open already, and a controller that connects to it.
+    /// A rig of a device that is open already, and a controller that connects to the device.
     #[track_caller]
     pub fn around(bus: &impl Bus, clock: Arc<Manual>, device: End) -> Self {
         let controller = End::open(&config(bus, "controller", ""), &clock, bus.kinds());
@@ -226,7 +226,7 @@ impl Rig {
         (self.clock, self.device)
     }
 
-    /// Lets the controller send a speed, and cycles pass until it arrives.
+    /// Lets the controller send a speed, and lets cycles pass until the speed arrives.
     #[track_caller]
     pub fn send_speed(&mut self, speed: f64) {
         self.controller.set("speed", speed);
@@ -267,8 +267,8 @@ impl Rig {
     }
 }
 
-/// Lets one bus cycle pass for `ends` ends that have a bus thread each: the clock does not advance past a
-/// thread, unless that waits for something else.
+/// Lets one bus cycle pass for `ends` ends that have a bus thread each. The clock waits for each thread, unless the
+/// thread waits for something else.
 pub fn pass(clock: &Manual, ends: usize) {
     clock.advance(CYCLE);
     let limit = Instant::now() + Duration::from_millis(20);
@@ -278,13 +278,13 @@ pub fn pass(clock: &Manual, ends: usize) {
     }
 }
 
-/// The pauses between looks at what another thread does: short ones at first; then a wait that lasts leaves the processor
-/// to those who work.
+/// The pauses between checks of another thread's progress: short at first; in a long wait they leave the processor to
+/// the working threads.
 #[derive(Debug, Default)]
 pub struct Looks(u32);
 
 impl Looks {
-    /// The pause after a look in vain.
+    /// Pauses after a check that found nothing.
     pub fn pause(&mut self) {
         self.0 += 1;
         if self.0 < 20 {
@@ -295,7 +295,7 @@ impl Looks {
     }
 }
 
-/// After this a wait for something that takes milliseconds is in vain.
+/// The limit of a wait for something that takes milliseconds.
 const VAIN: Duration = Duration::from_secs(20);
 
 /// Polls until `done` holds, yielding the processor to the bus threads.
@@ -312,11 +312,11 @@ pub fn await_that(what: &str, mut done: impl FnMut() -> bool) {
     }
 }
 
-/// How long [`patiently`] waits: programs may start slowly, such as a JVM on a busy machine.
+/// How long [`patiently`] waits: a program may start slowly, such as a JVM on a busy machine.
 pub const PATIENCE: Duration = Duration::from_secs(60);
 
-/// Polls every millisecond until `done` gives something, or in vain: for real time, and for what another process does
-/// without an event that this one could wait for.
+/// Polls every millisecond until `done` returns a value or the time is up. For real time, and for actions of another
+/// process that cause no event here.
 pub fn patiently<T>(mut done: impl FnMut() -> Option<T>) -> Option<T> {
     let limit = Instant::now() + PATIENCE;
     loop {
@@ -328,7 +328,7 @@ pub fn patiently<T>(mut done: impl FnMut() -> Option<T>) -> Option<T> {
     }
 }
 
-/// The same; in vain is a failure, which says `what` it waited for.
+/// As [`patiently`], but panics with `what` when the time is up.
 #[track_caller]
 pub fn eventually<T>(what: &str, done: impl FnMut() -> Option<T>) -> T {
     patiently(done).unwrap_or_else(|| panic!("waited {PATIENCE:?} in vain until {what}"))

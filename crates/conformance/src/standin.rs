@@ -1,5 +1,5 @@
-//! Stand-ins for vendors' libraries: shared libraries that are built from C, record their calls, and do what a script
-//! says. `tests/plugins/standin.h` is their other half.
+//! Stand-ins for vendors' libraries: shared libraries that are built from C, record their calls, and follow a script.
+//! Their C part is `tests/plugins/standin.h`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,7 +16,7 @@ use crate::rig::{Bus, CYCLE, End, Liar, SIGNALS, await_that};
 /// The libraries built so far, by source and switches.
 static BUILT: Mutex<BTreeMap<String, Vec<u8>>> = Mutex::new(BTreeMap::new());
 
-/// A stand-in of one's own, in a folder of its own.
+/// One stand-in, in a temporary folder.
 pub struct StandIn {
     folder: TempDir,
     library: PathBuf,
@@ -57,27 +57,27 @@ impl StandIn {
         self.library.display()
     }
 
-    /// A file beside it.
+    /// The path of a file beside the library.
     pub fn file(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// Lets it do what these lines say from now on.
+    /// Makes the library follow these lines from now on.
     pub fn script(&self, lines: &str) {
-        // The library never reads half a script.
+        // Renaming the file keeps the library from reading half a script.
         let (new, script) = (self.file("new"), self.file("script"));
         fs::write(&new, lines).expect("the script is written");
         fs::rename(new, script).expect("the script is there");
     }
 
-    /// The calls so far; the same one again counts once.
+    /// The calls so far; consecutive equal calls count once.
     pub fn calls(&self) -> Vec<String> {
         let calls = fs::read_to_string(self.file("calls")).unwrap_or_default();
         calls.lines().map(str::to_owned).collect()
     }
 }
 
-/// A script that ends when it is dropped.
+/// A script that ends when this value is dropped.
 struct Lie(Arc<StandIn>);
 
 impl Drop for Lie {
@@ -86,7 +86,7 @@ impl Drop for Lie {
     }
 }
 
-/// A driver that follows this script, which returns what no driver returns: the line says these `words`.
+/// A driver with this script, which returns results that no real driver returns. The line's reason has these `words`.
 pub fn liar(library: &Arc<StandIn>, script: &str, words: &'static str) -> Liar {
     library.script(script);
     Liar {
@@ -96,8 +96,8 @@ pub fn liar(library: &Arc<StandIn>, script: &str, words: &'static str) -> Liar {
     }
 }
 
-/// Opens the end with `role`, with `extra` lines in its `[fieldbus]` table. A line that fails first shows that for a
-/// while.
+/// Opens the end with `role`, with `extra` lines in its `[fieldbus]` table. A line that fails at first shows the
+/// failure for a while.
 pub fn open(bus: &impl Bus, role: &str, extra: &str, clock: &Arc<Manual>) -> End {
     let text = format!(
         "[driver]\nid = 1\nname = \"{role}\"\n[fieldbus]\n{}\nrole = \"{role}\"\ncycle = \"1ms\"\n\
@@ -121,7 +121,8 @@ pub fn until(end: &mut End, clock: &Arc<Manual>, state: &str, cause: &str) -> St
     reason
 }
 
-/// Lets time pass in leaps until the call `what` counts as hung. Others may for a moment, as they take some time.
+/// Lets time pass in leaps until the call `what` counts as hung. Other calls may count as hung for a moment, since they
+/// take some time.
 #[track_caller]
 pub fn until_it_hangs(end: &End, clock: &Arc<Manual>, what: &str) {
     let right = format!("{what} has not returned for ");

@@ -1,4 +1,4 @@
-//! The kinds of bus in the view of the exports.
+//! The kinds of bus that the exports distinguish.
 
 use tickbus_bus_modbus as modbus;
 use tickbus_bus_opcua as opcua;
@@ -6,7 +6,7 @@ use tickbus_bus_s7 as s7;
 use tickbus_bus_socket as socket;
 use tickbus_driver_cfg::{Options, loopback};
 
-/// The kinds of bus, as the PLC's half of a line depends on them.
+/// The kinds of bus for which the PLC's half of a line differs.
 ///
 /// Every export matches on all variants, so a kind that an export forgets does not compile.
 #[derive(Clone, Copy, Debug)]
@@ -27,14 +27,14 @@ pub(crate) enum Exported<'a> {
     OpcuaClient,
     /// `kind = "opcua-server"`.
     OpcuaServer(&'a opcua::ServerOptions),
-    /// A bus for whose other end no PLC editor has a program: users write that by hand.
+    /// A bus for which tickbus exports no PLC program: users write that by hand.
     ByHand,
 }
 
 impl<'a> Exported<'a> {
     /// The variant for a bus with these options.
     pub(crate) fn of(options: &'a Options) -> Self {
-        // Each variant names the type that it asks for.
+        // Each variant names the type to downcast to.
         let found = options
             .downcast_ref::<loopback::Options>()
             .map(|_| Self::Loopback);

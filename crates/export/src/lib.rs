@@ -1,8 +1,8 @@
 //! The PLC's half of a driver.cfg: sources in the languages of PLC editors.
 //!
-//! [`export`] is a pure function of the configuration: the same file gives the same texts, and no file is
-//! touched. The exported files state their directions and, as long as it is true, that they were never
-//! compiled by the editor for which they are made.
+//! [`export`] is a pure function of the configuration: the same file gives the same texts, and touches no other file.
+//! The exported files state how to use them. If the editor in question has never compiled such a file, the files state
+//! that as well.
 
 mod exported;
 mod names;
@@ -19,7 +19,7 @@ use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 
-/// The editors that sources are made for.
+/// The editors for which sources are made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
     /// TIA Portal: SCL for an S7-1500.
@@ -44,7 +44,7 @@ impl Target {
         Self::OpenPlc,
     ];
 
-    /// Its name on the command line.
+    /// The editor's name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::S71500 => "s7-1500",
@@ -59,9 +59,9 @@ impl Target {
 /// One file of an export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct File {
-    /// Its name, without a folder.
+    /// The file's name, without a folder.
     pub name: String,
-    /// Its contents.
+    /// The file's contents.
     pub text: String,
 }
 
@@ -70,7 +70,7 @@ pub struct File {
 pub struct Export {
     /// The files, in the order in which the editor has to read them.
     pub files: Vec<File>,
-    /// What the user should know before using them, one line each.
+    /// Notes for the user to read before using the files, one line each.
     pub notes: Vec<String>,
 }
 
@@ -78,7 +78,7 @@ pub struct Export {
 ///
 /// # Errors
 ///
-/// When the file itself describes the PLC's end, or an image that does not fit into the PLC.
+/// The driver.cfg describes the PLC's end, or an image that does not fit into the PLC.
 pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     let file = config.path.display().to_string();
     if config.role == Role::Controller {

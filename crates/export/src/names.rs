@@ -67,8 +67,7 @@ pub(super) struct Names {
 }
 
 impl Names {
-    /// A legal name similar to `text` that was not given before: the same texts in the same order give the
-    /// same names.
+    /// A legal name similar to `text` that was not given before. The same texts in the same order give the same names.
     pub(super) fn give(&mut self, text: &str) -> String {
         let name = legal(text);
         let mut wanted = name.clone();
@@ -140,7 +139,7 @@ pub(super) fn legal(text: &str) -> String {
     name
 }
 
-/// Whether a name, in upper case, is reserved by any of the languages.
+/// Returns true if any of the languages reserves a name, in upper case.
 fn is_kept(name: &str) -> bool {
     let is_typed = |word: &str| TYPED.binary_search(&word).is_ok();
     let is_in = |words: &[&str]| words.binary_search(&name).is_ok();

@@ -1,8 +1,8 @@
 //! `PLCopen` XML, TC6 version 2, which CODESYS and TwinCAT can import.
 //!
-//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, which both
-//! editors write and read; our files are valid in it and, with the namespace changed, in 2.01. The schema has
-//! no place for a list of global variables outside a configuration: both editors keep it in `addData`.
+//! The elements are those of the schema `tc6_xml_v201.xsd`. The namespace is that of version 2.00, which both editors
+//! write and read. Our files are valid in that version and, with the namespace changed, in 2.01. The schema has no
+//! place for a list of global variables outside a configuration: both editors keep such a list in `addData`.
 
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesText, Event};
@@ -17,7 +17,7 @@ const ATTRIBUTES: &str = "http://www.3s-software.com/plcopenxml/attributes";
 #[derive(Clone, Debug)]
 pub(super) struct Project {
     pub(super) name: String,
-    /// Its purpose and origin.
+    /// The purpose and origin of the project.
     pub(super) comment: String,
     pub(super) units: Vec<Unit>,
     /// The name of the list of global variables, and the variables.
@@ -32,7 +32,7 @@ pub(super) struct Unit {
     pub(super) returns: Option<&'static str>,
     pub(super) inputs: Vec<Variable>,
     pub(super) locals: Vec<Variable>,
-    /// Its statements.
+    /// The statements of the unit.
     pub(super) lines: Vec<String>,
     pub(super) comment: String,
 }
@@ -70,7 +70,7 @@ pub(super) fn variable(name: &str, kind: Kind) -> Variable {
 type Xml = Writer<Vec<u8>>;
 
 impl Project {
-    /// The file as text. It does not depend on the clock: equal projects give equal texts.
+    /// The file as text. The text does not depend on the clock: equal projects give equal texts.
     pub(super) fn text(&self) -> String {
         let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
         self.write(&mut xml).expect("memory takes all");

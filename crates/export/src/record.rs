@@ -8,7 +8,7 @@ use tickbus_image::signal::{Address, Area, ByteOrder, DataType, Signal, SignalTa
 #[derive(Debug)]
 pub(super) struct Record<'a> {
     pub(super) bytes: usize,
-    /// In the order of their bytes.
+    /// The signals in the order of their bytes.
     pub(super) places: Vec<PlacedSignal<'a>>,
 }
 
@@ -16,11 +16,11 @@ pub(super) struct Record<'a> {
 #[derive(Clone, Debug)]
 pub(super) struct PlacedSignal<'a> {
     pub(super) signal: &'a Signal,
-    /// The name of its station; empty if there is only one.
+    /// The name of the signal's station; empty for a single station.
     pub(super) station: &'a str,
-    /// Its first byte, counted from the start of the record.
+    /// The signal's first byte, counted from the start of the record.
     pub(super) byte: usize,
-    /// Its unique legal name.
+    /// The signal's unique legal name.
     pub(super) name: String,
 }
 
@@ -37,12 +37,12 @@ impl PlacedSignal<'_> {
         self.signal.data_type.size_bytes()
     }
 
-    /// The offset just beyond its last byte.
+    /// The offset just beyond the signal's last byte.
     pub(super) fn end(&self) -> usize {
         self.byte + self.size()
     }
 
-    /// Its address in the PLC, in bytes.
+    /// The signal's address in the PLC, in bytes.
     pub(super) fn address(&self) -> Address {
         Address {
             byte: self.byte,
@@ -50,7 +50,7 @@ impl PlacedSignal<'_> {
         }
     }
 
-    /// What a comment says about it in addition to name and type: address, name, station, unit, scale.
+    /// The facts for a comment, beside name and type in the PLC: address, name, station, unit, scale.
     pub(super) fn remark(&self) -> String {
         let mut text = format!("{} \"{}\"", self.address(), self.signal.name);
         if !self.station.is_empty() {
@@ -130,7 +130,7 @@ impl<'a> Record<'a> {
         Self { bytes, places }
     }
 
-    /// The offset of each station's image, for a comment; nothing for a single station.
+    /// The offset of each station's image, for a comment; empty for a single station.
     pub(super) fn stations(table: &SignalTable) -> Vec<String> {
         Self::stations_aligned(table, 1)
     }

@@ -24,7 +24,7 @@ pub(super) fn spelling(data_type: DataType) -> &'static str {
     }
 }
 
-/// An address in Siemens' notation, `%I0.3` for `%IX0.3` of IEC 61131-3; it counts bytes.
+/// An address in Siemens' notation, `%I0.3` for `%IX0.3` of IEC 61131-3; the number counts bytes.
 pub(super) fn address(place: &PlacedSignal<'_>) -> String {
     let address = place.address();
     match address.width {

@@ -1,4 +1,4 @@
-//! `alive` and `heartbeat` of `[fieldbus]`: signals by which each end knows that the other one is alive.
+//! `alive` and `heartbeat` of `[fieldbus]`: signals by which each end detects that the other end is alive.
 
 use std::ops::Range;
 
@@ -7,20 +7,20 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
-/// The shortest time within which a signal can be required to change: anything shorter is within the jitter
-/// of an operating system.
+/// The shortest time within which a signal can be required to change: shorter times are within the jitter of an
+/// operating system.
 const LEAST_WITHIN: Nanos = Nanos::from_millis(10);
 
 /// The shortest interval of a heartbeat.
 const LEAST_EVERY: Nanos = Nanos::from_millis(1);
 
-/// How many beats of a heartbeat may be missed before the watching end regards the data as frozen.
+/// How many beats may be missed before the watching end regards the data as frozen.
 const MISSED: i64 = 5;
 
-/// A signal that has to keep changing for the data of its station to be valid.
+/// A signal that must keep changing for the data of its station to be valid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Alive {
-    /// Its index in the signal table; the end that the driver.cfg describes reads it.
+    /// The signal's index in the signal table; the end that the driver.cfg describes reads the signal.
     pub signal: usize,
     /// The longest time without a change; positive.
     pub within: Nanos,
@@ -29,7 +29,7 @@ pub struct Alive {
 /// A signal that the driver counts up while the simulation ticks; a BOOL toggles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Heartbeat {
-    /// Its index in the signal table: an unscaled BOOL or integer, written by the end that the driver.cfg
+    /// The signal's index in the signal table: an unscaled BOOL or integer, written by the end that the driver.cfg
     /// describes.
     pub signal: usize,
     /// Time from one beat to the next; positive.
@@ -39,22 +39,22 @@ pub struct Heartbeat {
 /// The life signs that a driver.cfg configures.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LifeSigns {
-    /// `alive`.
+    /// The signals of `alive`.
     pub alive: Vec<Alive>,
-    /// `heartbeat`.
+    /// The signals of `heartbeat`.
     pub heartbeat: Vec<Heartbeat>,
 }
 
 /// A signal that is watched for changes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Watch {
-    /// Its name in messages.
+    /// The signal's name in messages.
     pub name: String,
-    /// Its station.
+    /// The signal's station.
     pub station: usize,
-    /// Its bytes in the received frame.
+    /// The signal's bytes in the received frame.
     pub bytes: Range<usize>,
-    /// Its bits in each of these bytes.
+    /// The signal's bits in each of these bytes.
     pub mask: u8,
     /// The longest time without a change.
     pub within: Nanos,
@@ -72,8 +72,9 @@ impl LifeSigns {
         beats.filter(move |beat| table.signals[beat.signal].area == writes)
     }
 
-    /// The signals that the end with `role` watches: at the end that the driver.cfg describes those in
-    /// `alive`; at the other end the heartbeats of the former, which may miss five beats and `max_age`.
+    /// The signals that the end with `role` watches. The end that the driver.cfg describes watches the signals in
+    /// `alive`. The other end watches the heartbeats of that end, which may pause for `max_age` or five beats,
+    /// whichever is longer.
     pub fn watches(&self, table: &SignalTable, role: Role, max_age: Nanos) -> Vec<Watch> {
         let (_, reads) = role.areas();
         let beats = self.heartbeat.iter();
@@ -103,7 +104,7 @@ impl Watch {
     }
 }
 
-/// `alive` and `heartbeat` as written in the file; they can only be read after the signals.
+/// `alive` and `heartbeat` as written in the file; both can be read only after the signals.
 #[derive(Debug, Default)]
 pub struct Written<'a> {
     alive: Option<Value<'a>>,
@@ -119,8 +120,8 @@ impl<'a> Written<'a> {
         }
     }
 
-    /// Reads them for the end that the file describes, which has `role`; `cycle` is that of its bus, if it
-    /// has one of its own. Reports signals that do not exist or that the wrong end writes.
+    /// Reads both keys for the end that the file describes, which has `role`; `cycle` is the bus cycle, if the bus has
+    /// its own. Reports signals that do not exist or that the wrong end writes.
     pub fn read(
         &self,
         signals: &SignalTable,

@@ -58,17 +58,18 @@ impl<'a> At<'a> {
         self.value.wrong(what, right);
     }
 
-    /// As [`wrong`](Self::wrong), for a mistake that something else has found.
+    /// As [`wrong`](Self::wrong), for a mistake that other code has found.
     pub fn refuse(&self, mistake: Mistake) {
         self.value.refuse(mistake);
     }
 }
 
-/// The signals of area `writes` that are written where a signal of the other area is read, each with that one, where
-/// `[fieldbus.at]` has placed one of the two. `places` says what a signal lies in, and in which bits of it.
+/// The pairs of signals at the same place: a signal of area `writes` is written where a signal of the other area is
+/// read, and `[fieldbus.at]` has placed at least one of the two. `places` returns the objects that hold a signal, and
+/// the signal's bits in each.
 ///
-/// That is no mistake by itself: a handshake that the PLC takes back is written and read. But a simulation that
-/// reads its own value believes that it is the PLC's.
+/// Such a pair can be intended: a handshake that the PLC resets is both written and read. But a simulation that reads
+/// its own value takes it for the PLC's.
 pub fn both_ways<Object: PartialEq>(
     table: &SignalTable,
     writes: Area,

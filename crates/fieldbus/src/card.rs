@@ -1,4 +1,4 @@
-//! Bus cards behind the libraries of their vendors: what they have in common.
+//! The common part of bus cards that are accessed through their vendors' libraries.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,22 +19,22 @@ const LOAD: Nanos = Nanos::from_secs(10);
 /// How much longer than its own time-out a call may take.
 const CALL: Nanos = Nanos::from_secs(1);
 
-/// What a driver.cfg says of any card.
+/// The options that a driver.cfg has for any card.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardOptions {
     /// The library's file as written; `None` for the vendor's.
     pub library: Option<PathBuf>,
-    /// The first byte that this end writes in what the card sends.
+    /// The first byte that this end writes in the data that the card sends.
     pub write_offset: u16,
-    /// The first byte that it reads in what the card receives.
+    /// The first byte that this end reads in the data that the card receives.
     pub read_offset: u16,
-    /// Whether the card watches that this end lives.
+    /// True if the card watches this end for life signs.
     pub watchdog: bool,
 }
 
 impl CardOptions {
-    /// Reads `library`, `write_offset`, `read_offset` and `card_watchdog`. A `vendor` without a library for this system
-    /// needs the first.
+    /// Reads `library`, `write_offset`, `read_offset` and `card_watchdog`. If `vendor` has no library for this system,
+    /// `library` is required.
     pub fn read(table: &mut Table<'_>, vendor: Option<&str>) -> Option<Self> {
         const RIGHT: &str = "name the file of the vendor's library";
         let library = match vendor {
@@ -62,7 +62,7 @@ impl CardOptions {
         })
     }
 
-    /// Parts of the line's summary: what differs from the defaults.
+    /// Parts of the line's summary: the options that differ from the defaults.
     pub fn summary(&self) -> Vec<String> {
         let library = self.library.iter();
         let mut parts: Vec<String> = library
@@ -75,11 +75,11 @@ impl CardOptions {
         parts
     }
 
-    /// The library to load: `vendor`, which the system searches for, unless the driver.cfg names another one.
+    /// The library to load: the one that the driver.cfg names, or else `vendor`, which the system searches for.
     ///
     /// # Errors
     ///
-    /// The file that it names with its folder does not exist.
+    /// The driver.cfg names a file with its folder, and that file does not exist.
     pub fn library(&self, vendor: &str, folder: &Path) -> Result<PathBuf, OpenError> {
         let Some(named) = &self.library else {
             return Ok(PathBuf::from(vendor));
@@ -112,16 +112,16 @@ fn sizes(role: Role, table: &SignalTable) -> [usize; 2] {
     })
 }
 
-/// What is to be made of an error code.
+/// The meaning of an error code for the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The card works, but not its bus; data were moved all the same.
+    /// The card works, but not its bus; data were moved anyway.
     NoPeer,
-    /// Not this time; the next cycle tries again.
+    /// This exchange failed; the next cycle tries again.
     Again,
-    /// Something may be repaired: the line fails, and is opened again.
+    /// A repair may help: the line fails, and is reopened.
     Broken,
-    /// The driver.cfg, or the card's configuration, has to be changed.
+    /// The driver.cfg, or the card's configuration, must be changed.
     Refused,
 }
 
@@ -130,16 +130,16 @@ pub enum Verdict {
 pub struct Meaning {
     /// The code.
     pub code: u32,
-    /// Its name in the vendor's header.
+    /// The code's name in the vendor's header.
     pub name: &'static str,
-    /// What is to be made of it.
+    /// The consequence for the line.
     pub verdict: Verdict,
-    /// What happened; what to do.
+    /// The problem and the remedy.
     pub words: &'static str,
 }
 
 impl Meaning {
-    /// The words for a code that only a mistake in tickbus can lead to.
+    /// The words for a code that only a mistake in tickbus can cause.
     pub const REPORT: &str =
         "the driver refuses how tickbus calls it; report this with the driver's version";
 
@@ -162,14 +162,14 @@ impl Meaning {
 /// A function of the library that returned an error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failing {
-    /// What is to be made of it.
+    /// The consequence for the line.
     pub verdict: Verdict,
     /// The function, the code, its name and its words.
     pub text: String,
 }
 
 impl Failing {
-    /// `function` returned a code, which is `shown` so, and has this meaning, if any is known.
+    /// The error that `function` returned, with the code as `shown`, and the code's meaning, if known.
     pub fn new(function: &str, shown: &str, meaning: Option<&Meaning>) -> Self {
         match meaning {
             Some(Meaning {
@@ -190,7 +190,7 @@ impl Failing {
         }
     }
 
-    /// The error of a line that cannot go on because of it.
+    /// The error of a line that this code ends.
     pub fn error(self) -> BusError {
         match self.verdict {
             Verdict::Refused => BusError::Refused(self.text),
@@ -199,7 +199,7 @@ impl Failing {
     }
 }
 
-/// What a card made of an exchange.
+/// The result of an exchange with a card.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Moved {
     /// Data were moved in these directions, if the bus communicates.
@@ -208,10 +208,10 @@ pub enum Moved {
         out: bool,
         /// From the card.
         back: bool,
-        /// What is tried again in the next cycle.
+        /// The error code, if any, for which the next cycle tries again.
         again: Option<&'static Meaning>,
     },
-    /// The bus does not communicate: why, and what to do.
+    /// The bus does not communicate: the reason, and the remedy.
     NoPeer(&'static str),
 }
 
@@ -221,7 +221,7 @@ pub trait Card {
     ///
     /// # Errors
     ///
-    /// The card has to be opened again.
+    /// The card must be reopened.
     fn exchange(&mut self, now: Nanos, output: &[u8], input: &mut [u8]) -> Result<Moved, BusError>;
 
     /// The state of the card, if it has changed.
@@ -230,9 +230,9 @@ pub trait Card {
     }
 }
 
-/// A library's way to its cards.
+/// The calls of a vendor's library.
 pub trait Vendor: Send {
-    /// The counters: of calls that came back too late, of exchanges without a bus, and of such as are tried again.
+    /// The counters of calls that returned too late, of exchanges without a bus, and of exchanges to be tried again.
     const COUNTERS: [&'static str; 3];
 
     /// A loaded library.
@@ -242,14 +242,14 @@ pub trait Vendor: Send {
     ///
     /// # Errors
     ///
-    /// It is not there, or lacks a function.
+    /// The library does not exist, or a function is missing in it.
     fn load(&self, path: &Path) -> Result<Self::Library, Mistake>;
 
-    /// Opens the card, for so many bytes to write and to read, and tells `port` which card it is.
+    /// Opens the card for these numbers of bytes to write and to read, and reports the card's identity to `port`.
     ///
     /// # Errors
     ///
-    /// A call failed; everything is closed again.
+    /// A call failed; everything that was opened is closed again.
     fn open<'l>(
         &self,
         library: &'l Self::Library,
@@ -272,7 +272,7 @@ pub struct CardBus<V: Vendor> {
     sizes: [usize; 2],
     cycles: Cycles,
     calls: [Arc<str>; 5],
-    /// Stays loaded between attempts: many libraries cannot be loaded twice in a process.
+    /// The library stays loaded between attempts: many libraries cannot be loaded twice in a process.
     library: Option<V::Library>,
 }
 
@@ -333,7 +333,7 @@ impl<V: Vendor> CardBus<V> {
         let ended = self.cycles.serve(&mut line, port, stop);
         port.calling(close, close_limit, || drop(line));
         if stop.is_stopped() {
-            // Here, while calls are watched: unloading also runs code of the library.
+            // The library is unloaded here, while calls are watched, because unloading also runs code of the library.
             let library = self.library.take();
             port.calling(unload, close_limit, || drop(library));
         }
@@ -348,12 +348,12 @@ impl<V: Vendor> Free for CardBus<V> {
     }
 
     fn last_cycles(&self) -> u32 {
-        // The card sends in its own cycle what one exchange hands over, and is closed after the next one.
+        // In its own cycle, the card sends the data of one exchange. The card is closed after the next exchange.
         2
     }
 
     fn close_timeout(&self) -> Nanos {
-        // What is in progress uses its time first; then the card is closed, and the library unloaded.
+        // The call in progress takes its time first; then the card is closed, and the library unloaded.
         let [open, close] = self.vendor.limits();
         (LOAD + open).max(self.cycles.timeout + CALL) + close.times(2) + CALL
     }
@@ -393,7 +393,7 @@ impl Exchange for Line<'_> {
                 Ok(Exchanged::Data {
                     is_taken: out,
                     is_fresh: back,
-                    // A card that takes data and hands none over says nothing of the PLC.
+                    // A card that takes data but delivers none proves nothing about the PLC.
                     is_alive: back || out && self.reads.is_empty(),
                 })
             }

@@ -1,5 +1,5 @@
-//! Events derived from frames: every change of a signal between two received frames, and every write if the
-//! bus knows what was written.
+//! Events derived from frames: every change of a signal between two received frames, and every write if the bus knows
+//! which bits were written.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ pub struct ChangeEvents {
     plan: Plan,
     /// The indices of the station's signals in the signal table, and the bits of each in the frame.
     signals: Box<[(usize, Range<usize>)]>,
-    /// The bits written by the peer since the last frame, whether or not they changed.
+    /// The bits written by the peer since the last frame, changed or not.
     written: Vec<Range<usize>>,
     /// All slots of the table for the previous and for the current frame.
     before: Box<[Slot]>,
@@ -21,7 +21,7 @@ pub struct ChangeEvents {
 }
 
 impl ChangeEvents {
-    /// Watches what is received in `area` of the station with index `station`.
+    /// Watches the frames received in `area` of the station with index `station`.
     pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
         let signals = table.signals.iter().enumerate();
         let signals = signals
@@ -40,12 +40,12 @@ impl ChangeEvents {
         }
     }
 
-    /// Records that the next frame writes these bits: their signals are reported whether they change or not.
+    /// Records that the next frame writes these bits: their signals are reported even if they do not change.
     pub fn written(&mut self, bits: Range<usize>) {
         self.written.push(bits);
     }
 
-    /// Discards what was [written](Self::written): its frame was lost.
+    /// Discards the [written](Self::written) bits, because their frame was lost.
     pub fn forget(&mut self) {
         self.written.clear();
     }

@@ -4,14 +4,14 @@ use tickbus_base::time::{Nanos, Pace, Stop};
 
 use super::{BusError, Port, Receipt};
 
-/// A call that returns later than this after its time-out counts as slow: a busy system delays any thread by
-/// as much.
+/// A call that returns later than this after its time-out counts as slow: a busy system may delay any thread up to this
+/// long.
 const LATENESS: Nanos = Nanos::from_millis(10);
 
-/// What came of an exchange.
+/// The outcome of an exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Exchanged {
-    /// Data were moved, or not.
+    /// The exchange moved data, or not.
     Data {
         /// The peer has the bytes of this exchange.
         is_taken: bool,
@@ -20,9 +20,9 @@ pub enum Exchanged {
         /// The peer gave any sign of life.
         is_alive: bool,
     },
-    /// The library works, and says that nobody is there at the other end of its bus: its words, and what to do.
+    /// The library works, and reports that no peer is present on its bus: the library's words, and the remedy.
     NoPeer(&'static str),
-    /// It was stopped while it waited.
+    /// The exchange was stopped while it waited.
     Stopped,
 }
 
@@ -35,8 +35,8 @@ pub trait Exchange {
     ///
     /// # Errors
     ///
-    /// The line is broken; or, with [`BusError::Left`], the peer took its leave, and the line stays open for the
-    /// next one.
+    /// The line is broken; or, with [`BusError::Left`], the peer left properly, and the line stays open for the next
+    /// one.
     fn exchange(&mut self, port: &Port, stop: &Stop) -> Result<Exchanged, BusError>;
 
     /// The bytes received by the last exchange, if it was fresh.
@@ -46,7 +46,7 @@ pub trait Exchange {
 /// How exchanges are paced.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycles {
-    /// From one exchange to the next.
+    /// The time from one exchange to the next.
     pub cycle: Nanos,
     /// The time-out of an exchange.
     pub timeout: Nanos,
@@ -73,7 +73,7 @@ impl Cycles {
         let mut pace = Pace::new(port.clock().now(), self.cycle);
         while !stop.is_stopped() {
             let now = port.clock().now();
-            // A call sends and receives at once: if sending is suppressed, there is no call.
+            // A call sends and receives at once: if nothing is to be sent, no call is made.
             if pace.take(now)
                 && let Some(receipt) = fill(line.input(), now, port)
             {

@@ -1,11 +1,11 @@
-//! Whether a frame differs enough from another one to be worth sending.
+//! Decides if a frame differs enough from another one to be worth sending.
 
 use tickbus_image::signal::{Area, Plan, Signal, SignalTable, Slot};
 
 /// Compares the frames that one station sends, using the dead bands of its signals.
 ///
-/// A signal with a dead band has changed when its value differs by more than that from the value it is
-/// compared with; one without has changed when any of its bits has.
+/// A signal with a dead band has changed if its value differs by more than that band from the compared value. A signal
+/// without one has changed if any of its bits has.
 #[derive(Debug)]
 pub struct DeadBands {
     /// A mask of the bits that are compared exactly: all that no dead band covers.
@@ -32,7 +32,7 @@ enum Kind {
 }
 
 impl DeadBands {
-    /// Compares what is sent in `area` of the station with index `station`.
+    /// Compares the frames sent in `area` of the station with index `station`.
     pub fn new(table: &SignalTable, station: usize, area: Area) -> Self {
         let of_frame = |signal: &&Signal| {
             signal.station == station && signal.area == area && signal.dead_band > 0.0
@@ -67,11 +67,11 @@ impl DeadBands {
         }
     }
 
-    /// Whether any signal has changed from frame `before` to frame `now`.
+    /// Returns true if any signal has changed from frame `before` to frame `now`.
     ///
     /// # Panics
     ///
-    /// When a frame does not have the station's size.
+    /// If a frame does not have the station's size.
     pub fn differ(&mut self, before: &[u8], now: &[u8]) -> bool {
         if before == now {
             return false;
@@ -179,7 +179,7 @@ mod tests {
         assert!(!bands.differ(&at(1.0), &at(1.5)));
         assert!(!bands.differ(&at(1.0), &at(0.5)));
         assert!(bands.differ(&at(1.0), &at(1.5 + f32::EPSILON)));
-        // A dead band of zero means none: the bits are compared, and minus zero has other bits.
+        // A dead band of zero means no dead band: the bits are compared, and minus zero has different bits.
         let bare = |value: f32| frame(4, &value.to_be_bytes());
         assert!(bands.differ(&bare(0.0), &bare(-0.0)));
     }

@@ -1,9 +1,9 @@
 //! The errors of all buses.
 
-/// Why a bus cannot go on; the variant tells who is at fault.
+/// The reason why a bus cannot continue; the variant shows who is at fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
-    /// The line is broken, or was never up; trying again may help.
+    /// The line is broken, or was never up; a retry may help.
     #[error("the link failed: {0}")]
     Link(String),
     /// The peer closed the connection properly.

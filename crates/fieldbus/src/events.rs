@@ -1,13 +1,14 @@
-//! Which changes by the peer are reported one by one.
+//! The peer's changes that are reported one by one.
 
-/// What `events` in `[fieldbus]` asks for, in addition to the image.
+/// The events that `events` in `[fieldbus]` requests, in addition to the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Events {
-    /// Nothing.
+    /// No events.
     #[default]
     None,
-    /// Every change of a signal that is received.
+    /// Every change of a received signal.
     Changes,
-    /// Every write of such a signal, changed or not; for buses that [learn of writes](crate::BusKind::LEARNS_OF_WRITES).
+    /// Every write of a received signal, changed or not; for buses that [learn of
+    /// writes](crate::BusKind::LEARNS_OF_WRITES).
     Writes,
 }

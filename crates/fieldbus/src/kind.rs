@@ -1,5 +1,5 @@
-//! A kind of bus, as a list of kinds knows it: the options that a driver.cfg gives it, and all that others ask of a bus
-//! before it runs.
+//! A kind of bus, as a list of kinds has it: the options from a driver.cfg, and all questions that other code asks a
+//! bus before it runs.
 
 use std::any::Any;
 use std::fmt;
@@ -14,7 +14,7 @@ use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{At, Bus, Events, Role};
 
-/// What a bus is told about its driver when it opens.
+/// The facts about its driver that a bus gets when it opens.
 #[derive(Clone, Copy, Debug)]
 pub struct BusSetup<'a> {
     /// The driver's name.
@@ -23,48 +23,48 @@ pub struct BusSetup<'a> {
     pub id: i32,
     /// The folder of its driver.cfg, to which paths are relative.
     pub folder: &'a Path,
-    /// Which end of the bus it is.
+    /// The end of the bus that the driver is.
     pub role: Role,
-    /// Its stations and signals.
+    /// The driver's stations and signals.
     pub table: &'a SignalTable,
-    /// Its axes, whose signals are in the table.
+    /// The driver's axes, whose signals are in the table.
     pub axes: &'a [Axis],
     /// The bus cycle, if stated.
     pub cycle: Option<Nanos>,
     /// Data older than this are stale.
     pub max_age: Nanos,
-    /// What is reported as events.
+    /// The changes that are reported as events.
     pub events: Events,
-    /// The driver's clock, for what a stepped bus waits for in real time.
+    /// The driver's clock, for a stepped bus that waits in real time.
     pub clock: &'a Arc<dyn Clock>,
-    /// The program that runs at this end by itself; `None` for a simulation, which ticks.
+    /// The program that runs alone at this end; `None` for a simulation, which ticks.
     pub hosted: Option<Hosted<'a>>,
 }
 
-/// A PLC program that is hosted at an end of a bus by itself.
+/// A PLC program that is hosted alone at an end of a bus.
 #[derive(Clone, Copy, Debug)]
 pub struct Hosted<'a> {
-    /// The interval of its scans.
+    /// The interval of the program's scans.
     pub interval: Nanos,
-    /// Ends it, also while its bus waits.
+    /// Ends the program, even while its bus waits.
     pub stop: &'a Stop,
 }
 
-/// Why a bus does not open.
+/// The reason why a bus does not open.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum OpenError {
     /// The driver.cfg must be changed.
     Config(Mistake),
-    /// This system, or this build, does not have what the driver.cfg asks for.
+    /// This system, or this build, has no support for something that the driver.cfg requires.
     Unsupported(String),
 }
 
 /// A file or folder that a driver.cfg names, as written there: relative to its folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum NamedFile {
-    /// One that may go where the driver.cfg goes.
+    /// A file that may be copied along with the driver.cfg.
     Plain(PathBuf),
-    /// Keys or passwords, which stay where they are.
+    /// Keys or passwords, which are not copied.
     Secret(PathBuf),
     /// The driver.cfg itself, which has a password under this key.
     InClear(&'static str),
@@ -90,7 +90,7 @@ impl<T: BusOptions + Clone + PartialEq + fmt::Debug + Send + Sync + 'static> Any
 }
 
 impl dyn BusOptions {
-    /// These options as those of one kind, for code that is about this kind; `None` if they are of another.
+    /// These options as those of one kind, for code about this kind; `None` for options of another kind.
     pub fn downcast_ref<K: BusOptions>(&self) -> Option<&K> {
         (self as &dyn Any).downcast_ref()
     }
@@ -101,23 +101,23 @@ impl dyn BusOptions {
     }
 }
 
-/// The options of one bus: what is asked of it while a driver.cfg is read, checked, exported and opened.
+/// The options of one bus, with the methods for reading, checking, exporting and opening a driver.cfg.
 ///
-/// Methods with a body are for buses that differ there. Code that is not about one bus calls these methods, and does not ask
-/// which bus it has.
+/// Methods with a default body are for the buses that differ in this point. Code that is not about one bus calls these
+/// methods, and does not check which bus it has.
 pub trait BusOptions: AnyOptions {
-    /// What the line is and does, for `tickbus check`: parts of a sentence, to be joined with commas.
+    /// A description of the line for `tickbus check`: parts of a sentence, to be joined with commas.
     fn summary(&self, role: Role, table: &SignalTable) -> Vec<String>;
 
-    /// The files that the options name, which a driver.cfg needs wherever it goes; of a vendor's driver, which the system finds
-    /// by its name, nothing.
+    /// The files that the options name, which a copy of the driver.cfg needs as well. A vendor's driver that the system
+    /// finds by its name is not among them.
     fn files(&self) -> Vec<NamedFile>;
 
-    /// Makes the bus. It connects to nothing yet.
+    /// Makes the bus, which does not connect yet.
     ///
     /// # Errors
     ///
-    /// The driver.cfg asks for something that does not exist, or is not in this build.
+    /// The driver.cfg requires something that does not exist, or is not in this build.
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError>;
 
     /// The default bus cycle; `None` for a bus whose peer sets the cycle.
@@ -130,7 +130,7 @@ pub trait BusOptions: AnyOptions {
         None
     }
 
-    /// Whether both ends of the bus are in one process.
+    /// Returns true if both ends of the bus are in one process.
     fn is_in_process(&self) -> bool {
         false
     }
@@ -145,24 +145,24 @@ pub trait BusOptions: AnyOptions {
         false
     }
 
-    /// Replaces the address from the driver.cfg by one from a command line; `None` if the bus has no address.
-    /// An error says what is wrong with the text.
+    /// Replaces the address from the driver.cfg by one from a command line; `None` if the bus has no address. The error
+    /// describes the mistake in the text.
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         let _ = address;
         None
     }
 
-    /// Reads the keys that the bus has in the next of `count` `[[station]]` tables.
+    /// Reads the keys of the bus in the next of `count` `[[station]]` tables.
     fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
         let _ = (count, table);
     }
 
-    /// Whether signals can have addresses of the device's own, in `[fieldbus.at]`.
+    /// Returns true if signals can have device addresses, in `[fieldbus.at]`.
     fn has_addresses(&self) -> bool {
         false
     }
 
-    /// Whether stations report to their master what is wrong with them, which an injected fault can be.
+    /// Returns true if stations report their problems to their master; an injected fault can be such a problem.
     fn has_diagnosis(&self) -> bool {
         false
     }
@@ -173,36 +173,36 @@ pub trait BusOptions: AnyOptions {
         let _ = (lines, table);
     }
 
-    /// Reports what does not fit the driver's stations, signals and axes.
+    /// Reports options that do not fit the driver's stations, signals and axes.
     fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
         let _ = (table, axes, collector);
     }
 
-    /// Reads the files that the options name, relative to `folder`, and reports what is wrong in them and what they lack;
-    /// for a driver.cfg that has no other mistakes.
+    /// Reads the files that the options name, relative to `folder`, and reports mistakes and missing parts in them; for
+    /// a driver.cfg that has no other mistakes.
     fn check_files(&self, folder: &Path, table: &SignalTable, collector: &Collector<'_>) {
         let _ = (folder, table, collector);
     }
 
-    /// What those files say of the bus, for `tickbus check`: lines, each with its head.
+    /// The facts about the bus from those files, for `tickbus check`: lines, each with its head.
     fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
         let _ = (folder, table);
         Vec::new()
     }
 
-    /// The place of a signal of `table` in the bus's own notation; empty where it is its address.
+    /// The place of a signal of `table` in the bus's own notation; empty if the signal's address is the place.
     fn place(&self, signal: &Signal, table: &SignalTable) -> String {
         let _ = (signal, table);
         String::new()
     }
 
-    /// What a polling bus requests in each cycle, one line per request; empty for others.
+    /// The requests of a polling bus in each cycle, one line per request; empty for other buses.
     fn requests(&self, table: &SignalTable) -> Vec<String> {
         let _ = table;
         Vec::new()
     }
 
-    /// The signals that are written where another one is read, each with that one, by their positions in the table.
+    /// The pairs of a signal that is written and one that is read at the same place, by their positions in the table.
     fn both_ways(&self, table: &SignalTable) -> Vec<(usize, usize)> {
         let _ = table;
         Vec::new()
@@ -211,14 +211,15 @@ pub trait BusOptions: AnyOptions {
 
 /// A kind of bus that a driver.cfg can name.
 pub trait BusKind: BusOptions + Sized {
-    /// Its name, as in `kind = "modbus-server"`.
+    /// The kind's name, as in `kind = "modbus-server"`.
     const NAME: &'static str;
 
-    /// Whether it learns of each write of its peer, so that a driver.cfg may ask for [these](Events::Writes).
+    /// True if the bus learns of each write of its peer, so that a driver.cfg can request [writes as
+    /// events](Events::Writes).
     const LEARNS_OF_WRITES: bool = false;
 
-    /// Reads its keys in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` says that
-    /// [another address](BusOptions::set_address) will follow.
+    /// Reads the keys of this kind in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` means
+    /// that [another address](BusOptions::set_address) will follow.
     ///
     /// Keys that no reader has taken are reported afterwards.
     fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self>;

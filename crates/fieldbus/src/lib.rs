@@ -1,4 +1,4 @@
-//! The bus traits, and one room per bus.
+//! The bus traits, and the parts that buses share.
 
 mod alive;
 mod at;

@@ -20,11 +20,11 @@ pub enum LinkState {
     Closed,
     /// Connecting to the peer, or waiting for it.
     Opening,
-    /// The peer is there.
+    /// The peer is present.
     Running,
-    /// The peer was there, but no valid data have come from it for longer than `max_age`.
+    /// The peer was present, but no valid data have come from it for longer than `max_age`.
     Stale,
-    /// The line broke; it is tried again after a pause.
+    /// The line broke; the bus retries after a pause.
     Failed,
 }
 
@@ -50,10 +50,10 @@ impl LinkState {
     }
 }
 
-/// Why a line is in its state, as a code for programs; the reason in words is for people.
+/// The cause of a line's state, as a code for programs; the reason in words is for people.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Cause {
-    /// It was not opened yet.
+    /// The line was not opened yet.
     NotOpened,
     /// Connecting, or waiting for the peer.
     Waiting,
@@ -73,7 +73,7 @@ pub enum Cause {
     Defect,
     /// A call into a library does not return.
     Hung,
-    /// It was closed.
+    /// The line was closed.
     Closed,
     /// An injected fault holds the line down.
     Injected,
@@ -139,11 +139,11 @@ impl From<&BusError> for Cause {
 pub struct Link {
     /// The state of the line.
     pub state: LinkState,
-    /// Its cause, for programs.
+    /// The cause, for programs.
     pub cause: Cause,
-    /// Its reason, for people; one line.
+    /// The reason in words, for people; one line.
     pub reason: String,
-    /// When it entered this state.
+    /// When the line entered this state.
     pub since: Nanos,
 }
 
@@ -169,21 +169,21 @@ struct Shared {
 #[derive(Debug)]
 struct Record {
     link: Link,
-    /// The reason of the last running state, to be restored when it runs again.
+    /// The reason of the last running state, to be restored when the line runs again.
     running: String,
     call: Option<Call>,
     /// The active line faults, as text.
     injected: String,
-    /// Why received data are invalid; `None` while they are valid.
+    /// The cause and reason for invalid data; `None` while all are valid.
     doubt: Option<(Cause, String)>,
     /// The state that a hanging call interrupted.
     before_hang: Option<Link>,
-    /// How often each state was entered, and each cause occurred.
+    /// How often each state was entered, and how often each cause occurred.
     entered: [u64; LinkState::ALL.len()],
     caused: [u64; Cause::ALL.len()],
     facts: BTreeMap<Key, String>,
     counts: BTreeMap<&'static str, u64>,
-    /// What was logged.
+    /// The counts of logged messages.
     log: Rarely,
 }
 
@@ -196,7 +196,7 @@ struct Call {
 }
 
 impl Record {
-    /// Whether the call has exceeded its limit.
+    /// Returns true if the call has exceeded its limit.
     fn is_hung(&self, now: Nanos) -> bool {
         self.call
             .as_ref()
@@ -205,14 +205,14 @@ impl Record {
 }
 
 impl LinkStatus {
-    /// The state of the line of the driver called `driver`, closed at first. Data older than `max_age` make
-    /// it stale.
+    /// The state of the line of the driver called `driver`, closed at first. Data older than `max_age` make the line
+    /// stale.
     pub fn new(driver: &str, max_age: Nanos) -> Self {
         Self::of_stations(driver, max_age, Vec::new())
     }
 
-    /// As [`new`](Self::new), for a driver with `stations` of these names: if there are several, a silent one
-    /// is reported by its name.
+    /// As [`new`](Self::new), for a driver with `stations` of these names: if there are several, a silent station is
+    /// reported by its name.
     pub fn of_stations(driver: &str, max_age: Nanos, stations: Vec<String>) -> Self {
         let link = Link {
             state: LinkState::Closed,
@@ -243,7 +243,7 @@ impl LinkStatus {
         }))
     }
 
-    /// The driver whose line it is.
+    /// The name of the line's driver.
     pub fn driver(&self) -> &str {
         &self.0.driver
     }
@@ -264,14 +264,14 @@ impl LinkStatus {
     #[inline]
     pub fn state(&self) -> LinkState {
         let state = usize::from(self.0.state.load(Ordering::Relaxed));
-        // It is always one of them.
+        // The code is always one of the states.
         LinkState::ALL
             .get(state)
             .copied()
             .unwrap_or(LinkState::Failed)
     }
 
-    /// Whether the peer is there, as it was entered last: the line is running or stale.
+    /// Returns true if the line is running or stale, that is, the peer is present as far as last entered.
     #[inline]
     pub fn is_up(&self) -> bool {
         const RUNNING: u8 = LinkState::Running as u8;
@@ -279,7 +279,7 @@ impl LinkStatus {
         matches!(self.0.state.load(Ordering::Relaxed), RUNNING | STALE)
     }
 
-    /// What a running line says of itself; empty before it ran for the first time.
+    /// The reason of the last running state; empty before the line ran for the first time.
     pub fn running_reason(&self) -> String {
         self.lock().running.clone()
     }
@@ -289,7 +289,7 @@ impl LinkStatus {
         self.lock().entered[LinkState::Running as usize]
     }
 
-    /// Whether the line has failed, and has never come up. A line that waits for its first peer has not failed.
+    /// Returns true if the line has failed, and has never come up. A line that waits for its first peer has not failed.
     pub fn has_only_failed(&self) -> bool {
         let entered = &self.lock().entered;
         entered[LinkState::Running as usize] == 0 && entered[LinkState::Failed as usize] > 0
@@ -305,7 +305,7 @@ impl LinkStatus {
         self.0.enter(self.lock(), now, state, cause, reason);
     }
 
-    /// The peer is there. A line that is running or stale keeps its state.
+    /// The peer is present. A line that is running or stale keeps its state.
     pub fn running(&self, now: Nanos, reason: &str) {
         if self.is_up() {
             return;
@@ -323,9 +323,9 @@ impl LinkStatus {
         up.into_iter().chain(doubt).for_each(Message::write);
     }
 
-    /// Declares received data invalid, with a cause and a reason, or valid again (`None`). A running line is
-    /// stale in the meantime; any other line will be when it comes up. `ages` are those of the stations'
-    /// data: silence takes precedence over a frozen signal, as without data nothing can change.
+    /// Declares received data invalid, with a cause and a reason, or valid again (`None`). While data are invalid, a
+    /// running line is stale; any other line becomes stale when it comes up. `ages` are the ages of the stations' data.
+    /// Silence takes precedence over a frozen signal, since without data nothing can change.
     pub fn doubt(
         &self,
         now: Nanos,
@@ -376,7 +376,7 @@ impl LinkStatus {
         self.look_again(now, stale, ages);
     }
 
-    /// Does what follows from `stale` stations' data being too old.
+    /// Updates the state when the data of `stale` stations are too old.
     #[cold]
     fn look_again(&self, now: Nanos, stale: usize, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
@@ -388,7 +388,7 @@ impl LinkStatus {
                 let reason = self.0.silence(&record, shown, ages);
                 self.0.silent(record, now, stale, &reason);
             }
-            // A frozen signal whose data are then too old becomes silence.
+            // A frozen signal becomes silence when its data are too old.
             LinkState::Stale
                 if stale > 0 && record.link.cause == Cause::Frozen && shown > limit =>
             {
@@ -413,8 +413,8 @@ impl LinkStatus {
         }
     }
 
-    /// Checks whether a library call has exceeded its limit. For other threads: the bus itself cannot check
-    /// while it is in the call.
+    /// Checks if a library call has exceeded its limit. Called by other threads: the bus cannot check while it is in
+    /// the call.
     pub fn observe_call(&self, now: Nanos) {
         let mut record = self.lock();
         if let Some(call) = &record.call
@@ -490,7 +490,7 @@ impl LinkStatus {
         }
     }
 
-    /// A bus cycle took `span`. One thread at a time tells: the one that runs the bus.
+    /// Records a bus cycle of length `span`. Only the thread that runs the bus calls this.
     #[inline]
     pub fn cycle(&self, span: Nanos) {
         self.0.cycle.record(span);
@@ -542,7 +542,7 @@ impl Message {
 }
 
 impl Shared {
-    /// Enters a state. Logs after releasing the record: no thread may wait for a slow reader of the log.
+    /// Enters a state. Logs after releasing the record, so that no thread waits for a slow reader of the log.
     fn enter(
         &self,
         mut record: MutexGuard<'_, Record>,
@@ -575,7 +575,7 @@ impl Shared {
     ) -> Option<Message> {
         let reason = one_line(reason);
         if (record.link.state, record.link.cause) == (state, cause) {
-            // A state whose reason only changed its wording, such as its duration, is not entered anew.
+            // A state whose reason only changed its wording, such as its duration, is not entered again.
             record.link.reason = reason;
             return None;
         }

@@ -1,8 +1,8 @@
 //! A bus's view of its driver.
 //!
-//! The order of calls is in the types: a driver gives the [`Port`] its faults and watchers before the bus gets
-//! it; a bus [takes](Port::take) the [`Frames`] of a cycle, and only these give the [`Receipt`] by which
-//! [`sent`](Port::sent) learns what the peer has.
+//! The types enforce the order of calls. A driver gives the [`Port`] its faults and watchers before the bus gets the
+//! port. A bus [takes](Port::take) the [`Frames`] of a cycle, and only these give the [`Receipt`] that informs
+//! [`sent`](Port::sent) which frames the peer has.
 
 mod calls;
 mod ending;
@@ -69,32 +69,33 @@ impl Port {
         }
     }
 
-    /// The same with the faults on `board` on its line.
+    /// The same port with the faults on `board` on its line.
     #[must_use]
     pub fn with_faults(mut self, board: Arc<FaultBoard>) -> Self {
         self.faults = FaultLayer::new(board, self.image.stations());
         self
     }
 
-    /// The same with the stations' names, in the order of the signal table, for reasons and statistics.
+    /// The same port with the stations' names, in the order of the signal table, for reasons and statistics.
     #[must_use]
     pub fn with_names<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
         self.image.validity.name_stations(names.into_iter());
         self
     }
 
-    /// The same with data that are valid only as long as these signals keep changing.
+    /// The same port with data that are valid only as long as these signals keep changing.
     #[must_use]
     pub fn with_life_signs(mut self, watches: Vec<Watch>) -> Self {
         self.image.validity.watch(watches);
         self
     }
 
-    /// The same with every change between received frames reported as an event; `changes` has one watcher per station.
+    /// The same port, which reports every change between received frames as an event; `changes` has one watcher per
+    /// station.
     ///
     /// # Panics
     ///
-    /// When it has another number of them.
+    /// If `changes` has a different number of watchers.
     #[must_use]
     pub fn with_changes(mut self, changes: Vec<ChangeEvents>) -> Self {
         assert_eq!(changes.len(), self.stations(), "one watcher per station");
@@ -102,7 +103,7 @@ impl Port {
         self
     }
 
-    /// Which end of the line this is.
+    /// The end of the line that this port serves.
     pub fn role(&self) -> Role {
         self.role
     }
@@ -123,14 +124,14 @@ impl Port {
         self.image.stations()
     }
 
-    /// Sizes in bytes of the frames that a station sends and receives.
+    /// The sizes in bytes of the frames that a station sends and receives.
     pub fn sizes(&self, station: usize) -> (usize, usize) {
         let image = &self.image.image;
         (image.tx_len(station), image.rx_len(station))
     }
 
-    /// Whether the line can carry anything at `now`. While it cannot, nothing that the peer says is to be answered, and
-    /// what is handed in is lost.
+    /// Returns true if the line can carry anything at `now`. While it cannot, the bus must not answer the peer, and
+    /// data handed in are lost.
     #[inline]
     pub fn is_up(&mut self, now: Nanos) -> bool {
         self.look_for_end();
@@ -138,8 +139,8 @@ impl Port {
         !self.faults.is_down()
     }
 
-    /// The frames that these stations send in a cycle at `now`. `None`: nothing is to be sent in this cycle, because
-    /// the line is not [up](Self::is_up) or loses them.
+    /// The frames that these stations send in a cycle at `now`. `None` if nothing is to be sent in this cycle, because
+    /// the line is not [up](Self::is_up) or loses the frames.
     #[inline]
     pub fn take(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
         if !self.is_up(now) {
@@ -157,7 +158,7 @@ impl Port {
         })
     }
 
-    /// This end believes that it has sent these frames.
+    /// Marks these frames as sent, although an injected fault loses them.
     #[cold]
     fn lose(&mut self, stations: Range<usize>, now: Nanos) {
         for station in stations {
@@ -166,8 +167,8 @@ impl Port {
         }
     }
 
-    /// The frames of these stations at `now`, to see whether there is anything to send, or for a peer that reads
-    /// whenever it likes; `None` while the line is not [up](Self::is_up).
+    /// The frames of these stations at `now`, to check if there is anything to send, or for a peer that reads at any
+    /// time; `None` while the line is not [up](Self::is_up).
     pub fn look(&mut self, stations: Range<usize>, now: Nanos) -> Option<Frames<'_>> {
         if !self.is_up(now) {
             return None;
@@ -189,14 +190,14 @@ impl Port {
     #[inline]
     fn outgoing(&mut self, station: usize, now: Nanos) -> &[u8] {
         if station == 0 {
-            // Faults were attended to when the frames were taken.
+            // Taking the frames has updated the faults.
             self.image.observe(now);
         }
         self.faults.outgoing(station, now, &mut self.image)
     }
 
-    /// The peer has received this, or will unless the line breaks: for a stream this is when the system has accepted all
-    /// of it. Data in transit when a line breaks are lost, pulses included.
+    /// The peer has received the frames of this receipt, or will unless the line breaks. For a stream this is so once
+    /// the system has accepted all bytes. Data in transit when a line breaks are lost, pulses included.
     #[inline]
     pub fn sent(&mut self, receipt: &Receipt) {
         self.had(receipt);
@@ -206,42 +207,43 @@ impl Port {
         }
     }
 
-    /// The bus begins to read from a line that is new at `now`, by a loop that promises to [look](Self::look_at_line) at it
-    /// until [`next_look`](Self::next_look) even if nothing comes.
+    /// The bus begins to read from a line that is new at `now`. The bus promises to [look](Self::look_at_line) at the
+    /// line by [`next_look`](Self::next_look), even if nothing arrives.
     ///
-    /// On a clock that does not [advance by itself](Clock::passes_alone) nothing is promised: there, time does not pass while
-    /// the process stands still.
+    /// A clock that does not [advance automatically](Clock::passes_alone) needs no promise: its time does not pass
+    /// while the process is suspended.
     pub fn begin_to_look(&mut self, now: Nanos) {
         if self.clock.passes_alone() {
             self.looks.begin(now);
         }
     }
 
-    /// The bus looks at `now`, and then hands in what it has found. If the look comes long after it was promised, since the
-    /// process was suspended or the processors were busy, that may have waited all the time: it counts as having come
-    /// right after the look before.
+    /// The bus looks at the line at `now`, and then hands in the data found. If the look is much later than promised,
+    /// because the process was suspended or the processors were busy, the data may have waited all that time: they
+    /// count as having arrived right after the previous look.
     pub fn look_at_line(&mut self, now: Nanos) {
         self.looks.look(now);
     }
 
-    /// This look leaves some of what waits to the next one.
+    /// This look leaves some of the waiting data to the next one.
     pub fn look_leaves_some(&mut self) {
         self.looks.leaves_some();
     }
 
-    /// What the bus hands in next has come at `at`, for a bus that knows that and does not [look](Self::look_at_line).
+    /// The data that the bus hands in next arrived at `at`. For a bus that knows this time and does not
+    /// [look](Self::look_at_line).
     pub fn came_at(&mut self, at: Nanos) {
         self.looks.came(at);
     }
 
-    /// When the bus has to look at its line even if nothing comes; [`Nanos::MAX`] for never.
+    /// The time by which the bus must look at its line even if nothing arrives; [`Nanos::MAX`] for never.
     pub fn next_look(&self) -> Nanos {
         self.looks.next()
     }
 
-    /// Hands in what belongs together: the frames of all stations that one message of the peer carries, its signs of
-    /// life. A tick sees all that `hand_in` hands in, or nothing of it. An injected fault that begins or ends meanwhile
-    /// changes nothing of it.
+    /// Hands in data that belong together: the frames of all stations in one message of the peer, and signs of life. A
+    /// tick sees everything that `hand_in` hands in, or nothing of it. An injected fault that begins or ends meanwhile
+    /// does not affect these data.
     pub fn together<R>(&mut self, hand_in: impl FnOnce(&mut Self) -> R) -> R {
         let is_part = std::mem::replace(&mut self.image.is_held, true);
         if !is_part {
@@ -253,12 +255,12 @@ impl Port {
         result
     }
 
-    /// Hands in a whole frame that arrived at `now`. Frames of several stations that arrived in one message are handed in
-    /// [together](Self::together).
+    /// Hands in a whole frame that arrived at `now`. Frames of several stations that arrived in one message must be
+    /// handed in [together](Self::together).
     ///
     /// # Panics
     ///
-    /// When the frame does not have the station's size.
+    /// If the frame does not have the station's size.
     #[inline]
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
         self.faults.attend(now, &mut self.image);
@@ -267,12 +269,12 @@ impl Port {
             .received(station, arrival, bytes, &mut self.image);
     }
 
-    /// As [`received`](Self::received), of a frame of which the peer wrote only these ranges of bits (bit n of byte k is
-    /// 8k + n). If events are enabled, each signal within them is reported, even if its value is unchanged.
+    /// As [`received`](Self::received), for a frame of which the peer wrote only these ranges of bits (bit n of byte k
+    /// is 8k + n). If events are enabled, each signal within these ranges is reported, even if its value is unchanged.
     ///
     /// # Panics
     ///
-    /// When the frame does not have the station's size.
+    /// If the frame does not have the station's size.
     pub fn received_parts(
         &mut self,
         station: usize,
@@ -280,7 +282,7 @@ impl Port {
         bytes: &[u8],
         written: impl IntoIterator<Item = Range<usize>>,
     ) {
-        // Frames held back earlier are handed in first: these writes do not belong to them.
+        // Frames held back earlier are handed in first, since these writes do not belong to them.
         self.faults.attend(now, &mut self.image);
         self.image.written(station, written);
         self.received(station, now, bytes);
@@ -294,9 +296,9 @@ impl Port {
         self.faults.touch(station, arrival, &mut self.image);
     }
 
-    /// The PLC of `station` reports that it runs its program, or that it does not: then the station is stale
-    /// at once, however recent its data are. It becomes fresh with the first data after the PLC reports that
-    /// it runs. Call it as often as the PLC reports; the last report stays valid when the line breaks.
+    /// The PLC of `station` reports that it runs its program, or that it does not. In the latter case the station is
+    /// stale at once, however recent its data are. The station becomes fresh with the first data after the PLC reports
+    /// that it runs. Call this as often as the PLC reports; the last report stays valid when the line breaks.
     pub fn plc_state(&mut self, station: usize, now: Nanos, state: PlcState) {
         self.image.plc_state(station, now, state);
     }
@@ -306,47 +308,46 @@ impl Port {
         self.faults.event(event, &mut self.image);
     }
 
-    /// The peer of `station` exchanges no data any more, and this is why: as [`plc_state`](Self::plc_state) with
-    /// [`PlcState::Stop`], with a cause and a reason of the bus's own.
+    /// The peer of `station` exchanges no data any more, for this reason: as [`plc_state`](Self::plc_state) with
+    /// [`PlcState::Stop`], but with a cause and a reason from the bus.
     pub fn station_left(&mut self, station: usize, now: Nanos, cause: Cause, why: &str) {
         self.image.station_left(station, now, cause, why);
     }
 
-    /// Whether injected faults of the line are active, or frames that they held back have yet to arrive: what is handed
-    /// in is then not what the tick gets.
+    /// Returns true if injected line faults are active, or if frames that they held back have yet to arrive: the data
+    /// handed in are then not the data that the tick gets.
     #[inline]
     pub fn is_distorted(&mut self, now: Nanos) -> bool {
         self.faults.attend(now, &mut self.image);
         self.faults.is_distorting()
     }
 
-    /// Whether the line can carry anything to and from this station at `now`.
+    /// Returns true if the line can carry anything to and from this station at `now`.
     pub fn is_station_up(&mut self, station: usize, now: Nanos) -> bool {
         self.faults.attend(now, &mut self.image);
         !self.faults.is_cut(station)
     }
 
-    /// Lets the next [`take_diagnoses`](Self::take_diagnoses) report what it reported before, for stations that begin
-    /// anew.
+    /// Makes the next [`take_diagnoses`](Self::take_diagnoses) repeat its last report, for stations that restart.
     pub fn report_diagnoses_anew(&mut self) {
         self.faults.report_diagnoses_anew();
     }
 
-    /// What the stations report to their master by injected faults, if that has changed since the last call; for buses
-    /// that [have a diagnosis](super::BusOptions::has_diagnosis).
+    /// The reports of the stations to their master, from injected faults, if they have changed since the last call; for
+    /// buses that [have a diagnosis](super::BusOptions::has_diagnosis).
     pub fn take_diagnoses(&mut self, now: Nanos) -> Option<&[Diagnosis]> {
         self.faults.attend(now, &mut self.image);
         self.faults.take_diagnoses()
     }
 
-    /// When the port itself has to act next, by a call of [`observe`](Self::observe); [`Nanos::MAX`] for
+    /// The time of the port's next own action, for which the bus calls [`observe`](Self::observe); [`Nanos::MAX`] for
     /// never.
     pub fn due(&self) -> Nanos {
         self.faults.due().min(self.image.validity.due())
     }
 
-    /// Checks whether the line has become stale, or is no longer stale. The frames of the first station do
-    /// this as well; this is for buses that rarely send.
+    /// Checks if the line has become stale, or is no longer stale. The frames of the first station do this as well;
+    /// this call is for buses that rarely send.
     pub fn observe(&mut self, now: Nanos) {
         self.faults.attend(now, &mut self.image);
         self.image.observe(now);
@@ -371,12 +372,12 @@ impl Port {
         oldest.map_or(Nanos::MAX, |age| now + (limit - age) + Nanos(1))
     }
 
-    /// The time since the last tick of the simulation; [`Nanos::MAX`] if there was none.
+    /// The time since the last tick of the simulation; [`Nanos::MAX`] before the first tick.
     pub fn tick_age(&self, now: Nanos) -> Nanos {
         self.image.image.tick_age(now)
     }
 
-    /// How long the simulation may pause before fail-safe bytes are sent; `None` for any time.
+    /// How long the simulation may pause before fail-safe bytes are sent; `None` for no limit.
     pub fn watchdog(&self) -> Option<Nanos> {
         self.image.watchdog
     }
@@ -389,18 +390,17 @@ impl Port {
         self.enter(LinkState::Opening, Cause::Waiting, reason);
     }
 
-    /// The peer was lost because of `error`, and the bus continues without a pause, as `next` says.
+    /// The peer was lost because of `error`, and the bus continues without a pause, as `next` describes.
     pub fn lost(&mut self, error: &BusError, next: &str) {
         self.image.last_cycle = None;
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
     }
 
-    /// The peer is there. The port itself checks that it sends: a line that is silent for too long becomes
-    /// stale.
+    /// The peer is present. The port checks that the peer sends: a line that is silent for too long becomes stale.
     #[inline]
     pub fn running(&mut self, reason: &str) {
-        // Said in every cycle of some buses.
+        // Some buses call this in every cycle.
         if !self.faults.any() && self.image.status.is_up() {
             return;
         }

@@ -1,4 +1,4 @@
-//! Log messages that a peer can cause: counted, and logged less and less often.
+//! Log messages that a peer can cause: every one is counted, and they are logged less and less often.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -15,12 +15,12 @@ pub struct Rarely {
     untold: u64,
 }
 
-/// The number of a message within its topic, appended to its text.
+/// The number of a message within its topic, appended to the text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Times(u64);
 
 impl Rarely {
-    /// Counts a message; `None` if it is not to be logged.
+    /// Counts a message; returns `None` if it is not to be logged.
     pub fn count(&mut self, topic: Topic) -> Option<Times> {
         let times = self.times.entry(topic).or_default();
         *times += 1;

@@ -1,20 +1,21 @@
-//! The requests that keep the values young that their client wrote before.
+//! Requests that renew the age of values that their client wrote before.
 
 use tickbus_base::time::Nanos;
 
-/// Decides if requests of one client that write nothing keep the values of a station young. They do once the client has written.
-/// After a silence of more than `max_age` they do when the client has written again, or has asked for `max_age`. A client that was
-/// held up may read before it writes, and its values from before are old; a client that writes only changes has nothing to write.
+/// Decides if requests of one client that write nothing renew the age of a station's values. Such requests count once
+/// the client has written. After a silence of more than `max_age`, they count again once the client has written, or has
+/// sent requests for `max_age`: a client that was held up may read before it writes, and its earlier values are old; a
+/// client that writes only changes may have nothing to write.
 #[derive(Clone, Copy, Debug)]
 pub struct Renewal {
-    /// When it asked last.
+    /// The time of the client's last request.
     asked: Nanos,
-    /// From when on such requests count; `None` until it has written.
+    /// The time from which such requests count; `None` until the client has written.
     counts_from: Option<Nanos>,
 }
 
 impl Renewal {
-    /// Of a client that has just connected: it has written nothing.
+    /// The state for a client that has just connected, and has written nothing.
     pub const fn of_new_client() -> Self {
         Self {
             asked: Nanos(i64::MIN),
@@ -22,7 +23,7 @@ impl Renewal {
         }
     }
 
-    /// Of the only client that a line can have, which may have written before the line was opened.
+    /// The state for the only client that a line can have, which may have written before the line was opened.
     pub const fn of_only_client() -> Self {
         Self {
             asked: Nanos(i64::MIN),
@@ -38,7 +39,8 @@ impl Renewal {
         };
     }
 
-    /// The client asks at `now`, and writes nothing: returns true if that keeps values young that are stale after `max_age`.
+    /// The client sends a request at `now` that writes nothing. Returns true if this renews values that become stale
+    /// after `max_age`.
     pub fn counts(&mut self, now: Nanos, max_age: Nanos) -> bool {
         let before = std::mem::replace(&mut self.asked, now);
         let Some(from) = &mut self.counts_from else {

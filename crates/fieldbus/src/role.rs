@@ -1,8 +1,8 @@
-//! Which end of the line a driver is.
+//! The end of the line that a driver is.
 
 use tickbus_image::signal::Area;
 
-/// Which end of the line a driver is.
+/// The end of the line that a driver is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Role {
     /// The machine: writes `%I`, reads `%Q`.
@@ -16,7 +16,7 @@ impl Role {
     /// Both roles.
     pub const ALL: [Self; 2] = [Self::Device, Self::Controller];
 
-    /// The areas that it writes and reads.
+    /// The areas that this end writes and reads.
     pub const fn areas(self) -> (Area, Area) {
         match self {
             Self::Device => (Area::Input, Area::Output),
@@ -24,7 +24,7 @@ impl Role {
         }
     }
 
-    /// Its name in a driver.cfg: `device` or `controller`.
+    /// The role's name in a driver.cfg: `device` or `controller`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Device => "device",

@@ -27,18 +27,18 @@ pub fn read_device(value: &Value<'_>) -> Option<String> {
 ///
 /// # Errors
 ///
-/// It does not exist, is not a serial port, or does not support the settings.
+/// The port does not exist, is not a serial port, or does not support the settings.
 #[cfg(unix)]
 pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
     SerialPort::open(Path::new(device), settings).map_err(|error| no_port(device, settings, &error))
 }
 
-/// Opens the port as [`open`] does, so that it marks characters that were damaged on the line, for
-/// [`Marks`](tickbus_base::os::Marks). The port is that of the clock's simulation, if it has one.
+/// As [`open`], but the port marks characters that were damaged on the line, for [`Marks`](tickbus_base::os::Marks), and the port
+/// is that of the clock's simulation, if there is one.
 ///
 /// # Errors
 ///
-/// As of [`open`].
+/// As [`open`].
 #[cfg(unix)]
 pub fn open_marking(
     device: &str,
@@ -70,7 +70,7 @@ fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> BusErro
     ))
 }
 
-/// The serial port `device` is gone.
+/// The error when the serial port `device` is gone.
 pub fn gone(device: &str, why: impl fmt::Display) -> BusError {
     BusError::Link(format!(
         "the serial port {device} is gone ({why}); see whether it is still plugged in"

@@ -1,4 +1,4 @@
-//! Whether the received data of a station are valid: a PLC in STOP still answers.
+//! The validity of a station's received data: a PLC in STOP still answers.
 
 use std::fmt::Write as _;
 
@@ -9,15 +9,15 @@ use tickbus_base::time::Nanos;
 /// The operating state reported by a PLC.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum PlcState {
-    /// It executes its program.
+    /// The PLC executes its program.
     Run,
-    /// It does not, whatever it calls that: STOP, HALT, program mode, start-up. Its outputs are not the
-    /// program's.
+    /// The PLC does not execute its program, whatever the name of the state: STOP, HALT, program mode, start-up. The
+    /// outputs are not the program's.
     Stop,
 }
 
 impl PlcState {
-    /// Its name in the statistics.
+    /// The state's name in the statistics.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Run => "run",
@@ -35,24 +35,24 @@ pub struct Validity {
 
 #[derive(Debug, Default)]
 struct Station {
-    /// Its name in the driver.cfg; empty if there is only one.
+    /// The station's name in the driver.cfg; empty for a single station.
     name: String,
     plc: Option<PlcState>,
-    /// Why its peer is gone, if the bus has said so.
+    /// The reason why the station's peer is gone, if the bus has reported it.
     left: Option<(Cause, String)>,
-    /// Its PLC has stopped, and nothing has arrived since it last reported running.
+    /// True if the station's PLC has stopped, and nothing has arrived since it last reported running.
     is_stopped: bool,
 }
 
-/// A signal that has to keep changing.
+/// A signal that must keep changing.
 #[derive(Debug)]
 struct Watched {
     watch: Watch,
-    /// Its last bytes.
+    /// The signal's last bytes.
     last: Vec<u8>,
-    /// When they last changed, or arrived for the first time.
+    /// When the bytes last changed, or arrived for the first time.
     changed: Option<Nanos>,
-    /// They have not changed for too long.
+    /// True if the bytes have not changed for too long.
     is_frozen: bool,
 }
 
@@ -63,7 +63,7 @@ impl Watched {
         Some(changed + self.watch.within + Nanos(1))
     }
 
-    /// Checks a frame that arrived at `now`; returns whether the validity of the station changes.
+    /// Checks a frame that arrived at `now`; returns true if the validity of the station changes.
     fn arrived(&mut self, now: Nanos, frame: &[u8]) -> bool {
         let mask = self.watch.mask;
         let bytes = &frame[self.watch.bytes.clone()];
@@ -77,7 +77,7 @@ impl Watched {
         std::mem::take(&mut self.is_frozen)
     }
 
-    /// Checks the time; returns whether the signal has just been found frozen.
+    /// Checks the time; returns true if the signal has just been found frozen.
     fn look(&mut self, now: Nanos) -> bool {
         let freezes = self.due().is_some_and(|due| due <= now);
         self.is_frozen |= freezes;
@@ -86,7 +86,7 @@ impl Watched {
 }
 
 impl Validity {
-    /// Of a driver with this many stations, all of whose data are valid.
+    /// The validity for a driver with this many stations; all data are valid at first.
     pub fn new(stations: usize) -> Self {
         let stations = (0..stations).map(|number| Station {
             name: match stations {
@@ -121,7 +121,7 @@ impl Validity {
         }
     }
 
-    /// Records the state that a station's PLC reports; returns whether it is new.
+    /// Records the state that a station's PLC reports; returns true if the state is new.
     pub(super) fn plc_state(&mut self, station: usize, state: PlcState) -> bool {
         let station = &mut self.stations[station];
         let is_news = station.plc.replace(state) != Some(state);
@@ -130,12 +130,12 @@ impl Validity {
         is_news
     }
 
-    /// Why the peer of a station that [has stopped](Self::plc_state) is gone.
+    /// Records the reason why the peer of a station that [has stopped](Self::plc_state) is gone.
     pub(super) fn station_left(&mut self, station: usize, cause: Cause, why: &str) {
         self.stations[station].left = Some((cause, why.to_owned()));
     }
 
-    /// A whole frame of `station` arrived at `now`. Returns whether the validity of its data changes.
+    /// A whole frame of `station` arrived at `now`. Returns true if the validity of its data changes.
     #[inline]
     pub fn arrived(&mut self, station: usize, now: Nanos, frame: &[u8]) -> bool {
         let mut changes = false;
@@ -147,7 +147,7 @@ impl Validity {
         changes | self.heard(station)
     }
 
-    /// `station` gave a sign of life. Returns whether the validity of its data changes.
+    /// `station` gave a sign of life. Returns true if the validity of its data changes.
     #[inline]
     pub(super) fn heard(&mut self, station: usize) -> bool {
         let station = &mut self.stations[station];
@@ -156,7 +156,7 @@ impl Validity {
         revives
     }
 
-    /// Checks the time; returns a station, if any, of which a signal has just been found frozen.
+    /// Checks the time; returns a station, if any, with a signal that has just been found frozen.
     #[inline]
     pub(super) fn look(&mut self, now: Nanos) -> Option<usize> {
         self.watched.iter_mut().find_map(|watched| {
@@ -171,7 +171,7 @@ impl Validity {
         due.min().unwrap_or(Nanos::MAX)
     }
 
-    /// Whether the data of `station` are valid.
+    /// Returns true if the data of `station` are valid.
     pub fn is_valid(&self, station: usize) -> bool {
         let is_frozen = |watched: &Watched| watched.watch.station == station && watched.is_frozen;
         !self.stations[station].is_stopped && !self.watched.iter().any(is_frozen)
@@ -197,7 +197,7 @@ impl Validity {
         facts
     }
 
-    /// Why received data are invalid, for programs and for people; `None` if all are valid.
+    /// The cause and the reason in words for invalid data; `None` if all are valid.
     pub(super) fn doubt(&self) -> Option<(Cause, String)> {
         let stopped: Vec<&Station> = self.stations.iter().filter(|s| s.is_stopped).collect();
         let Some((first, others)) = stopped.split_first() else {
@@ -420,7 +420,7 @@ mod tests {
                 port.observe(at(now));
                 status.link().cause
             };
-            // The second round must not be misled by what the first one leaves behind.
+            // The state that the first round leaves must not mislead the second one.
             for round in [0, 1000] {
                 port.received(0, at(round), &[u8::from(round > 0)]);
                 assert_eq!(cause(&mut port, round + 1), Cause::Running);
@@ -432,7 +432,7 @@ mod tests {
                         "{within} {silent}"
                     );
                 }
-                // It arrives again, unchanged.
+                // The signal arrives again, unchanged.
                 port.received(0, at(round + 310), &[u8::from(round > 0)]);
                 assert_eq!(cause(&mut port, round + 310), Cause::Frozen, "{within}");
             }

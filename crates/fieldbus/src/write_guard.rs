@@ -1,4 +1,4 @@
-//! The guard in front of a PLC's memory: only a PLC that was named is written to.
+//! The guard of a PLC's memory: tickbus writes only to a PLC that the driver.cfg names.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use tickbus_base::os::one_line;
 
 /// Keeps a bus that connects to a PLC from writing to the wrong one.
 ///
-/// A driver.cfg names the PLC by the identity that it reports, as `write_to`. Until that identity was
+/// A driver.cfg names the PLC in `write_to`, by the identity that the PLC reports. Until that identity was
 /// [met](Self::meet), the bus only reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WriteGuard {
@@ -27,18 +27,18 @@ impl WriteGuard {
         }
     }
 
-    /// Whether a PLC is named.
+    /// Returns true if a PLC is named.
     pub const fn names_one(&self) -> bool {
         self.write_to.is_some()
     }
 
-    /// Whether the current PLC may be written to.
+    /// Returns true if the bus may write to the current PLC.
     pub const fn may_write(&self) -> bool {
         self.may_write
     }
 
-    /// The PLC of these stations reports `identity`, or the bus identifies it by that. Returns whether it may be written to; if
-    /// not, statistics and log say so, and what would permit it.
+    /// The PLC of these stations reports `identity`, or the bus identifies the PLC by it. Returns true if the bus may
+    /// write to this PLC. If not, statistics and log report this, and the setting that would permit it.
     pub fn meet(&mut self, port: &mut Port, stations: Range<usize>, identity: &str) -> bool {
         let identity = &*one_line(identity);
         self.may_write = self.write_to.as_deref() == Some(identity);

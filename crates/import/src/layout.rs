@@ -5,7 +5,7 @@ use tickbus_base::Mistake;
 use tickbus_image::signal::{AREA_LIMIT, Address, Area, Width};
 
 /// Removes the addresses of values wider than bits, in each area where addresses overlap: in the PLC each size has its
-/// own memory. Returns whether there were any.
+/// own memory. Returns true if there were any.
 pub(super) fn part(tags: &mut [Tag]) -> bool {
     let mut is_parted = false;
     for area in [Area::Input, Area::Output] {

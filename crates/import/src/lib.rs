@@ -41,8 +41,8 @@ const LONGEST: usize = 64 << 20;
 /// How to read a table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ImportOptions {
-    /// The unit of the numbers in addresses; `None` for that of the program that wrote the list, or bytes if it is
-    /// unknown.
+    /// The unit of the numbers in addresses. `None` means the unit of the program that wrote the list, or bytes if the
+    /// program is unknown.
     pub addressing: Option<Addressing>,
     /// Skip lines with mistakes instead of refusing the table.
     pub lenient: bool,
@@ -57,7 +57,7 @@ pub struct Imported {
     pub text: String,
     /// The number of signals.
     pub signals: usize,
-    /// The number of signals whose addresses import assigned, since the list has none in the process image.
+    /// The number of signals whose addresses import assigned, because the list has none in the process image.
     pub assigned: usize,
     /// The reading of the addresses, where there is a choice.
     pub notes: Vec<String>,
@@ -95,11 +95,11 @@ impl Told {
     }
 }
 
-/// Reads the `bytes` of a file; mistakes call it `file`. The driver.cfg that it becomes may name these `kinds` of bus.
+/// Reads the `bytes` of a file; mistakes call it `file`. The resulting driver.cfg may name only these `kinds` of bus.
 ///
 /// # Errors
 ///
-/// With every mistake in the table, unless lines with mistakes are skipped; or when nothing is left.
+/// With every mistake in the table, unless lines with mistakes are skipped; also if no signal is left.
 pub fn import(
     file: &str,
     bytes: &[u8],
@@ -286,7 +286,7 @@ fn world_of(
     let world = if origin == Origin::Logix {
         World::Modules
     } else if origin == Origin::OpenPlc {
-        // These addresses with levels look like a client's.
+        // Such addresses with levels look like those of a client.
         World::Image(image)
     } else {
         let lists = sheets.iter().zip(columns);

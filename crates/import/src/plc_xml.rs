@@ -79,7 +79,7 @@ pub(super) fn read(file: &str, text: &str, skipped: &Collector<'_>) -> Result<Pr
     Ok(Project { sheet, origin })
 }
 
-/// The program that wrote PLCopen XML. OpenPLC and Beremiz write another version than the others.
+/// The program that wrote PLCopen XML. OpenPLC and Beremiz write a different version from the others.
 fn plcopen_origin(root: Node<'_, '_>) -> Origin {
     let namespace = root.tag_name().namespace().unwrap_or_default();
     let product = child(root, "fileHeader").and_then(|header| header.attribute("productName"));

@@ -1,4 +1,4 @@
-//! The tags of a table, each checked on its own and against preceding ones.
+//! The tags of a table. Each is checked alone and against the preceding ones.
 
 use std::collections::HashMap;
 
@@ -73,8 +73,8 @@ pub(super) struct Taken {
     bits: [[Vec<u32>; 2]; SIZES],
 }
 
-/// The client that the addresses belong to, or `None` for a process image. An address that may belong to
-/// either decides nothing; if any address is certainly in the image, all are.
+/// The client that the addresses belong to, or `None` for a process image. An address that fits both decides nothing.
+/// If any address is certainly in the image, all are.
 pub(super) fn client<'a>(addresses: impl Iterator<Item = &'a str>) -> Option<Client> {
     let (mut counts, mut of_image, mut typed) = ([0_usize; 2], false, false);
     for address in addresses {
@@ -270,7 +270,7 @@ impl Row<'_> {
         None
     }
 
-    /// An input or output whose place another part of the PLC's project determines.
+    /// An input or output with a place that another part of the PLC's project determines.
     fn unplaced(&self, cell: &Cell) -> Option<Found> {
         let Some((area, width)) = without_place(&cell.text) else {
             self.skipped.report(
@@ -445,7 +445,7 @@ impl Row<'_> {
         Some(())
     }
 
-    /// The type stated by an address, unless its column says otherwise.
+    /// The type stated by an address, unless the type column states another one.
     fn agreed(&self, stated: DataType, address: &Cell, client: Client) -> Option<DataType> {
         // Text that is no type is a comment.
         let column = self.cell(self.columns.kind);
@@ -453,7 +453,7 @@ impl Row<'_> {
         let Some((cell, other)) = known.filter(|(_, other)| *other != stated) else {
             return Some(stated);
         };
-        // In KEPServer's addresses the type is little more than a size.
+        // In KEPServer's addresses the type hardly states more than a size.
         let is_float = |kind| matches!(kind, DataType::Real | DataType::Lreal);
         let is_size = client == Client::S7 && self.columns.scale.is_some();
         if is_size && other.width() == stated.width() && is_float(other) == is_float(stated) {
@@ -472,7 +472,7 @@ impl Row<'_> {
 
     /// The type of a text in the terms of IEC 61131-3 or of KEPServer.
     fn known_type(&self, text: &str) -> Option<DataType> {
-        // Both have BYTE and WORD; with KEPServer's headings they are KEPServer's.
+        // Both have BYTE and WORD; under KEPServer's headings the KEPServer types apply.
         let (iec, kepserver) = (text.parse().ok(), kepserver_type(text));
         if self.columns.scale.is_some() {
             kepserver.or(iec)

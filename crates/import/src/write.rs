@@ -57,7 +57,7 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
     out
 }
 
-/// The remark about addresses that the PLC does not have.
+/// The remark about addresses that do not exist in the PLC.
 const ASSIGNED: &str = "# Signals with another address in their remark have that one in the PLC, and here one that import assigned, in order:\n\
                         # let the PLC's program or its I/O configuration copy between the two.\n";
 

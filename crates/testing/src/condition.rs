@@ -9,7 +9,7 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
 use super::watch::{Watch, real};
 
-/// A condition on one signal: those that faults have, and further ones only for tests.
+/// A condition on one signal: any condition that a fault can have, or one that only tests have.
 ///
 /// | text | holds when |
 /// |---|---|
@@ -28,19 +28,19 @@ pub struct Condition {
 /// A condition, without its signal.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Demand {
-    /// It is not 0.
+    /// The value is not 0.
     On,
-    /// It is 0.
+    /// The value is 0.
     Off,
     /// The comparison in the text is true.
     Compares(faults::Condition, String),
-    /// It differs from the first number by at most the second.
+    /// The value differs from the first number by at most the second.
     Near(f64, f64),
-    /// It is a 64-bit integer with these bits; the number is its nearest double.
+    /// The value is a 64-bit integer with these bits; the number is the nearest double.
     Is(Slot, f64),
-    /// It has changed from 0 to another value since the wait began.
+    /// The value has changed from 0 to another one since the wait began.
     Rises,
-    /// It has changed to 0 since the wait began.
+    /// The value has changed to 0 since the wait began.
     Falls,
 }
 
@@ -49,7 +49,7 @@ impl Condition {
     ///
     /// # Errors
     ///
-    /// What is wrong, and what would be right: the signal or the number to compare with is invalid.
+    /// The signal or the number to compare with is invalid; the message has the remedy.
     pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Mistake> {
         let text = text.trim();
         if let Some(signal) = table.position(text) {
@@ -96,7 +96,8 @@ impl Condition {
         Ok(Self { signal, demand })
     }
 
-    /// Whether it holds for a signal with this history and these slots; edges count from the bookmark on.
+    /// Returns true if the condition holds for a signal with this history and these slots; edges count from the
+    /// bookmark on.
     pub(super) fn holds(&self, watch: &Watch, slots: &[Slot], since: Bookmark) -> bool {
         match &self.demand {
             Demand::On => watch.value() != 0.0,
@@ -109,14 +110,14 @@ impl Condition {
         }
     }
 
-    /// Whether it is about an edge rather than a level.
+    /// Returns true if the condition is about an edge, not a level.
     pub(super) const fn is_edge(&self) -> bool {
         matches!(self.demand, Demand::Rises | Demand::Falls)
     }
 }
 
 impl Demand {
-    /// The signal has the value of this slot, within the resolution of its type.
+    /// The condition that the signal has the value of this slot, within the resolution of its type.
     pub(super) fn equal(slot: Slot, signal: &Signal) -> Self {
         let number = real(slot, signal);
         match signal.data_type {

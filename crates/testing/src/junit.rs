@@ -8,7 +8,7 @@ use std::time::Duration;
 pub struct Group {
     /// The file.
     pub name: String,
-    /// Its tests.
+    /// The tests of the file.
     pub cases: Vec<Case>,
 }
 
@@ -17,11 +17,11 @@ pub struct Group {
 pub struct Case {
     /// The test's name.
     pub name: String,
-    /// The line of the file where it begins.
+    /// The line of the file at which the test begins.
     pub line: usize,
-    /// How long it took, in wall time.
+    /// The duration of the test, in wall time.
     pub took: Duration,
-    /// Its result.
+    /// The result of the test.
     pub verdict: Verdict,
     /// Further information for the report's output.
     pub output: String,
@@ -30,11 +30,11 @@ pub struct Case {
 /// The result of one test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It passed.
+    /// The test passed.
     Passed,
-    /// An expectation failed: as one line, and in full.
+    /// An expectation failed: the failure as one line, and in full.
     Failed(String, String),
-    /// It could not be run: as one line, and in full.
+    /// The test could not be run: the reason as one line, and in full.
     Wrong(String, String),
 }
 
@@ -112,7 +112,7 @@ fn escaped(text: &str) -> String {
             '<' => out.push_str("&lt;"),
             '>' => out.push_str("&gt;"),
             '"' => out.push_str("&quot;"),
-            // In an attribute they would be read as blanks.
+            // An XML reader would turn these into blanks in an attribute.
             '\n' | '\t' | '\r' => {
                 let _ = write!(out, "&#{};", u32::from(c));
             }

@@ -1,4 +1,4 @@
-//! The machine's stub: rules that answer what the PLC commands.
+//! The machine's stub: rules that respond to the PLC's commands.
 
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::Slot;
@@ -16,13 +16,13 @@ pub(super) struct Stub<'a> {
 #[derive(Debug)]
 struct Armed<'a> {
     rule: &'a Rule,
-    /// Per condition of the rule, the edges that have been used up.
+    /// The edges already used up, per condition of the rule.
     since: Vec<Bookmark>,
-    /// Whether the condition held in the previous tick.
+    /// True if the condition held in the previous tick.
     held: bool,
     /// When the rule takes effect; `None` once it has, or while its condition does not hold.
     due: Option<Nanos>,
-    /// Whether it has taken effect and its condition still holds.
+    /// True if the rule has taken effect and its condition still holds.
     done: bool,
 }
 
@@ -40,7 +40,7 @@ impl<'a> Stub<'a> {
         }
     }
 
-    /// One tick of `step` that ends at `now`: checks what the PLC commanded, and sets the sensors.
+    /// One tick of `step` that ends at `now`: checks the PLC's commands, and sets the sensors.
     pub(super) fn step(&mut self, now: Nanos, step: Nanos, watches: &[Watch], slots: &mut [Slot]) {
         for armed in &mut self.rules {
             armed.step(now, step, watches, slots);
@@ -55,7 +55,7 @@ impl Armed<'_> {
         let holds = all.all(|(one, since)| one.holds(&watches[one.signal], slots, *since));
         let edge = rule.when.iter().any(Condition::is_edge);
         if edge {
-            // An edge is over at once, but its effect still takes place.
+            // An edge lasts no time, but its effect still takes place.
             self.since.clear();
             self.since.extend(bookmarks(rule, watches));
             if holds {

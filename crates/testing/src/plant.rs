@@ -10,26 +10,26 @@ use tickbus_image::signal::{SignalTable, Slot};
 
 use super::test::TextPosition;
 
-/// An FMU, and which of its variables are which signals.
+/// An FMU, and the assignment of its variables to signals.
 #[derive(Clone, Debug)]
 pub(super) struct Plant {
     /// Unpacked once for all tests of a file.
     fmu: Arc<Unpacked>,
     join: Join,
     options: MachineOptions,
-    /// Its position in the test file.
+    /// The FMU's position in the test file.
     pub(super) place: TextPosition,
 }
 
 impl Plant {
-    /// Begins a run of it; `slots` get what its sensors show then.
+    /// Starts a run of the FMU; sets `slots` to the initial sensor values.
     pub(super) fn start(&self, table: &SignalTable, slots: &mut [Slot]) -> Result<Machine, String> {
         let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
         machine.map_err(|failure| failure.to_string())
     }
 }
 
-/// The keys of `[machine]` that tell of an FMU, as written.
+/// The keys of `[machine]` for an FMU, as written.
 pub(super) struct FmuKeys<'a> {
     fmu: Option<Value<'a>>,
     map: Option<Value<'a>>,
@@ -45,7 +45,7 @@ impl<'a> FmuKeys<'a> {
         }
     }
 
-    /// Reads them, and the files that they name; the mistakes in those come second.
+    /// Reads the keys, and the files that they name. The second result has the mistakes in those files.
     pub(super) fn read(self, config: &Config, folder: &Path) -> (Option<Plant>, Option<Mistakes>) {
         let Some(value) = &self.fmu else {
             for (key, value) in [("map", &self.map), ("isolated", &self.isolated)] {

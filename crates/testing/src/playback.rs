@@ -1,4 +1,4 @@
-//! A recording in place of the machine: its sensors show what they showed when it was recorded.
+//! A recording in place of the machine: the sensors show their recorded values.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub(super) struct MachineRecording {
     sent: Vec<(usize, usize)>,
     /// Column and signal of each value that the PLC must send as recorded.
     compared: Vec<(usize, usize)>,
-    /// Its position in the test file.
+    /// The recording's position in the test file.
     pub(super) place: TextPosition,
 }
 
@@ -77,7 +77,7 @@ impl MachineRecording {
         Ok(())
     }
 
-    /// The name of its file, for messages.
+    /// The name of the recording's file, for messages.
     pub(super) fn name(&self) -> String {
         self.file.display().to_string()
     }
@@ -126,7 +126,7 @@ pub(super) struct Playback<'a> {
     next: Tick,
     more: bool,
     present: Tick,
-    /// Whether a recorded tick was applied in this tick.
+    /// True if a recorded tick was applied in this tick.
     taken: bool,
     offset: Option<Nanos>,
 }
@@ -150,7 +150,7 @@ impl<'a> Playback<'a> {
         })
     }
 
-    /// One tick that ends at `now`: sets the sensors. The first recorded tick is applied in the first one.
+    /// One tick that ends at `now`: sets the sensors. The first call applies the first recorded tick.
     pub(super) fn step(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), RecordingError> {
         let offset = *self.offset.get_or_insert(now - self.next.time);
         self.taken = false;
@@ -167,7 +167,7 @@ impl<'a> Playback<'a> {
         Ok(())
     }
 
-    /// The first signal that the PLC sends differently.
+    /// The first signal for which the PLC's value differs from the recording.
     pub(super) fn difference(&self, slots: &[Slot], signals: &[Signal]) -> Option<Difference> {
         if !self.taken {
             return None;

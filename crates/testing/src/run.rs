@@ -22,7 +22,7 @@ pub struct Ran {
     pub ticks: u64,
     /// Simulation time that has passed.
     pub time: Nanos,
-    /// Why it failed, if it did.
+    /// The failure, if the test failed.
     pub failure: Option<Failure>,
 }
 
@@ -34,19 +34,19 @@ impl Ran {
     }
 }
 
-/// Why a test failed.
+/// The failure of a test.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// Where in the test file.
+    /// The position in the test file.
     pub place: TextPosition,
-    /// The time, what was expected and what was seen, as one line.
+    /// The time, the expectation and the actual value, as one line.
     pub what: String,
     /// Further information, such as the last changes of the signal, one per line.
     pub more: Vec<String>,
 }
 
 impl Suite {
-    /// Runs one of its tests from the start; with a path, it is recorded to that file.
+    /// Runs one of the file's tests from the start; with a path, records the run to that file.
     ///
     /// # Errors
     ///
@@ -54,7 +54,7 @@ impl Suite {
     pub fn run(&self, test: &Test, record: Option<&Path>) -> Result<Ran, DriverError> {
         let bench = &self.bench;
         let mut config = bench.config.clone();
-        // Recordings configured in the driver.cfg are the plant's.
+        // A recording configured in the driver.cfg is for the plant, not for tests.
         config.record = record
             .map(record::Options::to)
             .transpose()
@@ -62,7 +62,7 @@ impl Suite {
         let table = &bench.config.table;
         let playback = bench.tape.as_ref().map(|tape| Playback::start(tape, table));
         let playback = playback.transpose()?;
-        // A stepped bus uses simulation time, and no other clock.
+        // A stepped bus uses only simulation time.
         let driver = Driver::open(config, Manual::new())?;
         let mut slots = driver.initial_slots();
         for (signal, value) in bench.initial.iter().chain(&test.initial) {
@@ -122,7 +122,7 @@ struct Watched {
     since: Bookmark,
 }
 
-/// A condition that has to hold, or must not hold, at every tick.
+/// A condition that must hold, or must not hold, at every tick.
 #[derive(Clone, Debug)]
 struct Standing {
     watched: Watched,
@@ -348,7 +348,7 @@ impl Stand<'_> {
             never,
             from,
         } = standing;
-        // A required edge is awaited; it cannot be there at every tick.
+        // A required edge is awaited, since an edge cannot occur at every tick.
         if self.holds(watched) != *never {
             return Ok(());
         }

@@ -18,13 +18,13 @@ use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition};
 /// The longest time that may pass in one step: ten minutes on a fast machine.
 const MOST_TICKS: i128 = 1_000_000_000;
 
-/// How long a button is pressed: about as long as a finger does it, and longer than any scan.
+/// How long a button is pressed: about as long as by a finger, and longer than any scan.
 const PRESS: Nanos = Nanos::from_millis(200);
 
 /// The longest name of a test, in characters.
 const NAME_LIMIT: usize = 200;
 
-/// What reading the other sections depends on.
+/// The facts that reading the other sections depends on.
 pub(super) struct Reader<'a> {
     pub(super) table: &'a SignalTable,
     pub(super) role: Role,
@@ -40,7 +40,7 @@ pub(super) struct Machine {
     pub(super) rules: Vec<Rule>,
     pub(super) tape: Option<MachineRecording>,
     pub(super) fmu: Option<Plant>,
-    /// Mistakes in files that it names.
+    /// Mistakes in files that the section names.
     pub(super) elsewhere: Option<Mistakes>,
 }
 
@@ -403,7 +403,7 @@ impl Reader<'_> {
         };
         let fault = |value: Value<'_>| {
             let section = value.table("fault", RIGHT)?;
-            // If it cannot be read, its mistakes were reported.
+            // The mistakes of an unreadable section were reported.
             let fault = faults::read_sections(vec![section], Some(self.table.into())).pop()?;
             Some((fault, value.place()))
         };
@@ -449,7 +449,7 @@ impl Reader<'_> {
         }
     }
 
-    /// `"Phase" = 3` among expectations.
+    /// Reads `"Phase" = 3` among expectations.
     fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let Some(signal) = self.table.position(name) else {
             value.refuse(unknown(name, self.table));

@@ -22,14 +22,14 @@ const STEP: Nanos = Nanos::from_millis(1);
 /// One test file, read and checked.
 #[derive(Clone, Debug)]
 pub struct Suite {
-    /// Its path, as messages name it.
+    /// The file's path, as messages name it.
     pub file: String,
-    /// Its tests. Never empty.
+    /// The file's tests. Never empty.
     pub tests: Vec<Test>,
     pub(super) bench: Bench,
 }
 
-/// What the tests of a file have in common.
+/// The parts that all tests of a file share.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
     pub(super) config: Config,
@@ -41,11 +41,11 @@ pub(super) struct Bench {
 }
 
 impl Suite {
-    /// Reads the test file at `path`, and the driver.cfg that it names, which may name these `kinds` of bus.
+    /// Reads the test file at `path`, and the driver.cfg that it names, which may name only these `kinds` of bus.
     ///
     /// # Errors
     ///
-    /// With every mistake in the test file; if it has none but its driver.cfg does, with those.
+    /// With every mistake in the test file; if there are none, with those in its driver.cfg.
     pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let folder = path.parent().unwrap_or_else(|| Path::new(""));
@@ -174,7 +174,7 @@ fn load_config(
     }
 }
 
-/// Puts the PLC program at the other end of the line, and the line into simulation time.
+/// Puts the PLC program at the other end of the line, and runs the line in simulation time.
 fn on_simulation_time(
     mut config: Config,
     value: &Value<'_>,

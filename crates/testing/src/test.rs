@@ -1,4 +1,4 @@
-//! Tests as they were read: their steps, and the rules of the machine.
+//! Tests as read from a file: their steps, and the rules of the machine.
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::Fault;
@@ -12,15 +12,15 @@ pub type TextPosition = (usize, usize);
 /// One test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Test {
-    /// Its name, unique in its file.
+    /// The test's name, unique in its file.
     pub name: String,
-    /// Where it begins.
+    /// The position at which the test begins.
     pub place: TextPosition,
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) steps: Vec<Step>,
 }
 
-/// One step: sets some signals, lets time pass, expects something; in this order.
+/// One step: sets signals, lets time pass, and checks expectations, in this order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) place: TextPosition,
@@ -32,7 +32,7 @@ pub(super) struct Step {
     pub(super) end: Vec<(String, TextPosition)>,
     pub(super) passage: Option<Passage>,
     pub(super) expect: Vec<(Condition, TextPosition)>,
-    /// For how many ticks the expectations must hold.
+    /// The number of ticks for which the expectations must hold.
     pub(super) during: u64,
     pub(super) always: Vec<(Condition, TextPosition)>,
     pub(super) never: Vec<(Condition, TextPosition)>,

@@ -33,7 +33,7 @@ pub(super) fn real(slot: Slot, signal: &Signal) -> f64 {
     }
 }
 
-/// A value of `signal` formatted for people: `on`, `12.5 mm`.
+/// A value of `signal` as readable text: `on`, `12.5 mm`.
 pub(super) fn text_of(value: f64, signal: &Signal) -> String {
     if signal.data_type == DataType::Bool {
         return (if value == 0.0 { "off" } else { "on" }).to_owned();
@@ -44,12 +44,12 @@ pub(super) fn text_of(value: f64, signal: &Signal) -> String {
     }
 }
 
-/// A point in simulation time formatted for people.
+/// A point in simulation time as readable text.
 pub(super) fn moment(tick: u64, step: Nanos) -> String {
     format!("tick {tick} ({})", seconds(tick, step))
 }
 
-/// A number of ticks formatted for people.
+/// A number of ticks as readable text.
 pub(super) fn span(ticks: u64, step: Nanos) -> String {
     let plural = if ticks == 1 { "tick" } else { "ticks" };
     format!("{ticks} {plural} ({})", seconds(ticks, step))

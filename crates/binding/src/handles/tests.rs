@@ -196,7 +196,7 @@ fn the_end_of_a_tick_yields_once_to_a_wish() {
     let handle = open(&handles, 1);
     let wanted = &handles.first[0].wanted;
     wanted.store(true, Ordering::Relaxed);
-    // Nobody comes: the tick goes on, and the wish has to be made again.
+    // No visit comes: the tick returns, and a visit has to set the flag again.
     assert_eq!(handles.tick(handle, |tenant| *tenant), Ok(1));
     assert!(!wanted.load(Ordering::Relaxed));
 }

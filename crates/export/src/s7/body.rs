@@ -1,30 +1,30 @@
-//! The body of a block, as every bus makes one.
+//! The body of a block; every bus makes one.
 
 use tickbus_base::time::Nanos;
 
 /// A body: its declarations and statements.
 #[derive(Default)]
 pub(super) struct Body {
-    /// Its description, for the head.
+    /// The description of the block, for the head.
     pub(super) what: String,
     /// Lines between `VAR` and `END_VAR`.
     pub(super) variables: Vec<String>,
     /// Lines between `VAR_TEMP` and `END_VAR`.
     pub(super) temporary: Vec<String>,
     pub(super) code: Vec<String>,
-    /// It counts received images in `Received`.
+    /// True if the block counts received images in `Received`.
     pub(super) receives: bool,
-    /// It counts sent images in `Sent`.
+    /// True if the block counts sent images in `Sent`.
     pub(super) sends: bool,
-    /// An expression that is TRUE in each call in which something was received from the simulation; empty if
-    /// the block cannot know.
+    /// An expression that is TRUE in each call that received something from the simulation; empty if the block cannot
+    /// know.
     pub(super) heard: String,
-    /// The driver has heartbeat signals, by which the PLC sees that the simulation ticks.
+    /// True if the driver has heartbeat signals, which show the PLC that the simulation ticks.
     pub(super) has_heartbeat: bool,
 }
 
 impl Body {
-    /// The declarations of the control block's members that some statement sets, in addition to `Simulated`.
+    /// The declarations of those members of the control block, beside `Simulated`, that a statement sets.
     pub(super) fn status(&self) -> Vec<&'static str> {
         let members = [
             (

@@ -56,7 +56,7 @@ fn function(
     line(text, &format!("FUNCTION \"{name}\" : Void"));
     line(text, "{ S7_Optimized_Access := 'TRUE' }");
     line(text, "VERSION : 0.1");
-    // 64-bit values cannot be addressed in %I and %Q: they are copied as two halves.
+    // %I and %Q cannot address 64-bit values, so these are copied as two halves.
     let is_long = |place: &PlacedSignal<'_>| {
         place.data_type().width() == Width::Long
             && matches!(Path::of(place, plan.cpu), Path::Value(_))
@@ -145,7 +145,7 @@ fn take(text: &mut String, place: &PlacedSignal<'_>, plan: &Plan<'_>) {
     }
 }
 
-/// Whether the driver's `alive` requires this signal to change while the PLC's program runs.
+/// Returns true if the driver's `alive` requires this signal to change while the PLC's program runs.
 fn is_watched(place: &PlacedSignal<'_>, plan: &Plan<'_>) -> bool {
     let signals = &plan.config.table.signals;
     let mut alive = plan.config.life_signs.alive.iter();

@@ -31,8 +31,8 @@ pub(super) fn body(plan: &Plan<'_>, notes: &mut Vec<String>) -> Body {
     body
 }
 
-/// Declares and sets `Alive`: by the heartbeats in the driver.cfg if there are any, else by what the bus has
-/// received.
+/// Declares and sets `Alive`: from the heartbeats in the driver.cfg if there are any, otherwise from the data that the
+/// bus has received.
 fn watch(plan: &Plan<'_>, body: &mut Body) {
     let Config {
         life_signs,

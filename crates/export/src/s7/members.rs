@@ -14,10 +14,10 @@ use tickbus_image::signal::{ByteOrder, DataType, Width};
 pub(super) struct Member {
     pub(super) name: String,
     pub(super) kind: Kind,
-    /// Its first byte and bit, from the start of the structure.
+    /// The member's first byte and bit, from the start of the structure.
     pub(super) byte: usize,
     pub(super) bit: u8,
-    /// Its comment.
+    /// The member's comment.
     pub(super) remark: String,
 }
 
@@ -30,8 +30,8 @@ pub(super) enum Kind {
     Bytes(usize),
 }
 
-/// Whether a single member of the signal's own type can hold its value: the CPU has the type, the byte order
-/// is that of S7, and the place is one where S7 puts such a value. Other values are arrays of bytes.
+/// Returns true if a single member of the signal's own type can hold the value: the CPU has the type, the byte order is
+/// that of S7, and S7 would put such a value at this place. Other values are arrays of bytes.
 fn is_native(place: &PlacedSignal<'_>, cpu: Cpu) -> bool {
     place.size() == 1
         || (place.signal.order == ByteOrder::Abcd

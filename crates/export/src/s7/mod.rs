@@ -40,13 +40,13 @@ impl Cpu {
         }
     }
 
-    /// Whether 64-bit values can be in %I, %Q and blocks with standard access. An S7-1200 has no `LWord`,
-    /// `LInt` and `ULInt` at all, and its `LReal` cannot be addressed.
+    /// Returns true if 64-bit values can be in %I, %Q and blocks with standard access. An S7-1200 has no `LWord`,
+    /// `LInt` and `ULInt`, and cannot address an `LReal`.
     const fn has_long(self) -> bool {
         matches!(self, Self::S71500)
     }
 
-    /// The most bytes of one GET and one PUT. An S7-1200 fails above these (system manual V4.2.3, PUT and GET
+    /// The most bytes of one GET and one PUT. An S7-1200 fails above these numbers (system manual V4.2.3, PUT and GET
     /// with `ADDR_1` only). An S7-1500 negotiates a larger PDU: 400 bytes fit into one of 480.
     const fn get_and_put(self) -> (usize, usize) {
         match self {
@@ -69,9 +69,9 @@ struct Plan<'a> {
 /// One direction as a structure.
 struct Image<'a> {
     record: Record<'a>,
-    /// Name of its type.
+    /// The name of the structure's type.
     type_name: String,
-    /// Name of its data block.
+    /// The name of the structure's data block.
     block: String,
     members: Vec<Member>,
 }
@@ -144,7 +144,7 @@ fn long_values(plan: &Plan<'_>) -> Option<String> {
     })
 }
 
-/// The head of a source. It starts with a byte order mark, by which TIA Portal recognises UTF-8.
+/// The head of a source. The byte order mark at the start makes TIA Portal recognise UTF-8.
 fn source(plan: &Plan<'_>, what: &str) -> String {
     let mut text = String::from("\u{feff}");
     for head in head_lines(plan, what) {

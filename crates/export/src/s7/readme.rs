@@ -1,8 +1,8 @@
-//! What to do with the files in TIA Portal, step by step.
+//! The README of the files: the steps to take in TIA Portal.
 
 use super::{Plan, head_lines, line, link, tags};
 
-/// The README.
+/// The text of the README.
 pub(super) fn text(plan: &Plan<'_>, notes: &[String]) -> String {
     let prefix = &plan.prefix;
     let mut text = String::new();

@@ -9,7 +9,7 @@ use tickbus_bus_s7::item::Object;
 use tickbus_bus_s7::{ClientOptions, ServerOptions, Start, Variable};
 use tickbus_image::signal::Area;
 
-/// The simulation is a CPU: its I and Q are the images.
+/// The simulation is a CPU: the areas I and Q of that CPU are the images.
 pub(super) fn puts_and_gets(
     plan: &Plan<'_>,
     options: &ServerOptions,
@@ -106,8 +106,8 @@ impl<'a> Jobs<'a> {
         format!("{block}_{number}")
     }
 
-    /// Declares and makes the calls. Their data are declared as bytes over the image: PUT and GET require the
-    /// same length and type at both ends.
+    /// Writes the declarations and the calls. The data of the calls are declared as bytes over the image: PUT and GET
+    /// require the same length and type at both ends.
     fn write(&self, plan: &Plan<'_>, variables: &mut Vec<String>, code: &mut Vec<String>) {
         if self.parts.is_empty() {
             return;

@@ -120,7 +120,7 @@ pub(super) fn body(plan: &Plan<'_>, options: &Options, notes: &mut Vec<String>) 
         code,
         receives: received > 0,
         sends: sent > 0,
-        // That TCP has accepted a record says nothing about the other end.
+        // TCP accepting a record proves nothing about the other end.
         heard: if received > 0 {
             "#Receive.DONE".to_owned()
         } else {

@@ -13,7 +13,7 @@ use crate::siemens::{address, spelling};
 use crate::symbols::comment;
 use tickbus_image::signal::{Area, DataType, Signal, Width};
 
-/// Whether a signal is at a place from `[fieldbus.at]`, rather than at its address.
+/// Returns true if `[fieldbus.at]` gives the place of a signal, and not the signal's address.
 pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
     match Exported::of(&plan.config.bus) {
         Exported::S7Client(options) => options.variables.contains_key(&signal.name),
@@ -28,7 +28,7 @@ pub(super) fn is_elsewhere(plan: &Plan<'_>, signal: &Signal) -> bool {
     }
 }
 
-/// The file. Signals with such a place already have tags in the PLC's program.
+/// The file. Signals with a place from `[fieldbus.at]` already have tags in the PLC's program.
 pub(super) fn file(plan: &Plan<'_>) -> File {
     let mut text = String::new();
     for (image, area) in [(&plan.inputs, Area::Input), (&plan.outputs, Area::Output)] {

@@ -10,7 +10,7 @@ use tickbus_image::signal::{DataType, Signal};
 /// How many beats may be missed.
 const MISSED: i64 = 5;
 
-/// The variable that tells whether the simulation is alive.
+/// The variable that is TRUE while the simulation is alive.
 pub(super) const ALIVE: &str = "Alive";
 
 /// A program's code for life signs.
@@ -36,9 +36,9 @@ pub(super) fn declared(config: &Config) -> impl Iterator<Item = String> {
 }
 
 impl Life {
-    /// `kind` is the type of a signal's variable, and `variable` how the program writes it; `alive` and
-    /// `simulated` are the variables of these names; `is_known` says that `alive` is already set according to
-    /// whether anything is received.
+    /// `kind` is the type of a signal's variable, and `variable` the program's notation for that variable. `alive` and
+    /// `simulated` are the variables of these names. `is_known` is true if other statements already set `alive`
+    /// according to the received data.
     pub(super) fn of(
         config: &Config,
         records: &[Record<'_>; 2],
@@ -93,7 +93,7 @@ impl Life {
         life
     }
 
-    /// Whether the simulation has a heartbeat here.
+    /// Returns true if the simulation has a heartbeat here.
     pub(super) fn is_beating(&self) -> bool {
         !self.before.is_empty()
     }

@@ -1,7 +1,7 @@
 //! Structured Text: for CODESYS and TwinCAT, and for `OpenPLC` and others that compile with `iec2c`.
 //!
-//! Both have the records as 16-bit registers, as Modbus transfers them, and copy between these and one
-//! variable per signal.
+//! The sources hold the records as 16-bit registers, as Modbus transfers them, and copy between these and one variable
+//! per signal.
 
 pub(super) mod codesys;
 mod life;

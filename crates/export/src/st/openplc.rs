@@ -29,7 +29,7 @@ const TASK: &str = "every_scan";
 ///
 /// # Errors
 ///
-/// On a bus that `OpenPLC` does not support at this end, or with an image that is too large for it.
+/// `OpenPLC` does not support the bus at this end, or the image is too large for `OpenPLC`.
 pub(crate) fn export(config: &Config) -> Result<Export, Mistakes> {
     let mut notes = Vec::new();
     let text = match Exported::of(&config.bus) {
@@ -78,8 +78,8 @@ fn refusal(config: &Config, why: &str) -> Mistakes {
     )
 }
 
-/// The names of the program and its instance. The program's name must differ from the variables of all
-/// libraries: from its declaration on it is a keyword.
+/// The names of the program and its instance. The program's name must differ from the variables of all libraries: after
+/// its declaration the name is a keyword.
 fn program(config: &Config) -> [String; 2] {
     let prefix = block_prefix(&config.name);
     ["program", "instance"].map(|what| legal(&format!("{prefix}_{what}")))

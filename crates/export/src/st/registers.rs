@@ -13,8 +13,8 @@ pub(super) type Register<'r> = &'r dyn Fn(usize) -> String;
 pub(super) const REAL_OF: &str = "tickbus_real";
 pub(super) const BITS_OF: &str = "tickbus_bits";
 
-/// The type of a signal's variable. A 64-bit float cannot be made from bits without pointers: its variable
-/// has the bits.
+/// The type of a signal's variable. A 64-bit float cannot be made from bits without pointers: the variable holds the
+/// bits.
 pub(super) fn kind(place: &PlacedSignal<'_>) -> DataType {
     match place.data_type() {
         DataType::Lreal => DataType::Lword,

@@ -1,4 +1,4 @@
-//! Splits an image into Modbus telegrams: which registers are in which request.
+//! Splits an image into Modbus telegrams: the registers of each request.
 
 use tickbus_bus_modbus::ServerOptions;
 use tickbus_driver_cfg::Config;
@@ -7,12 +7,12 @@ use tickbus_image::signal::Area;
 /// The most registers of one read telegram, and of one write telegram.
 const TELEGRAM: [usize; 2] = [125, 123];
 
-/// What one request in each direction transfers of one station, inputs first.
+/// The registers of one station that one request in each direction transfers, inputs first.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Telegrams {
     /// The unit.
     pub(super) unit: u8,
-    /// Its first registers in the tables of the unit.
+    /// The first registers in the tables of the unit.
     pub(super) first: [usize; 2],
     /// The same registers in the record of all stations, where each starts at its own register.
     pub(super) record: [usize; 2],

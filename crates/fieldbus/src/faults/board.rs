@@ -1,4 +1,4 @@
-//! What the tick and the bus tell each other about faults, and tell any other thread that asks.
+//! The board by which the tick, the bus and other threads share the state of faults.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -8,17 +8,17 @@ use super::{FaultStatus, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 
-/// What the tick, the bus and other threads share about a driver's faults.
+/// The state of a driver's faults, shared by the tick, the bus and other threads.
 #[derive(Debug, Default)]
 pub struct FaultBoard {
-    /// Incremented by every change; zero as long as there has never been a fault.
+    /// Incremented by every change; zero until the first fault.
     news: AtomicU64,
     cells: Mutex<Vec<Arc<Cell>>>,
     /// The number of the fault that was injected last.
     last: AtomicU32,
     /// Line faults on their way to the bus.
     mailbox: Mutex<Vec<LineFault>>,
-    /// Beginnings of faults that are no longer on the list.
+    /// The number of beginnings of faults that are no longer on the list.
     forgotten: AtomicU64,
     pub(super) dropped: AtomicU64,
     pub(super) duplicated: AtomicU64,
@@ -26,14 +26,14 @@ pub struct FaultBoard {
 }
 
 impl FaultBoard {
-    /// A number that every change increments; zero as long as there has never been a fault.
+    /// A number that every change increments; zero until the first fault.
     #[inline]
     pub fn news(&self) -> u64 {
         self.news.load(Ordering::Acquire)
     }
 
-    /// Adds what `make` makes with the number of a new fault; gives that and, if the list was full, the number of the
-    /// oldest fault that is over, which is on it no more.
+    /// Calls `make` with the number of a new fault, and adds the resulting cell. Returns the cell and, if the list was
+    /// full, the number of the oldest fault that is over, which is no longer on the list.
     ///
     /// # Errors
     ///
@@ -79,9 +79,9 @@ impl FaultBoard {
         std::mem::take(&mut *self.mailbox())
     }
 
-    /// Writes to the log what has begun and ended since the last time.
+    /// Logs the faults that have begun or ended since the last call.
     pub fn tell(&self, driver: &str) {
-        // Logged after the lock is released: no thread may wait for a slow reader of the log.
+        // The messages are logged after the lock is released, so that no thread waits for a slow reader of the log.
         let news: Vec<String> = self
             .cells()
             .iter()
@@ -92,12 +92,12 @@ impl FaultBoard {
         }
     }
 
-    /// All faults in order of injection; those that ended long ago may be missing.
+    /// All faults in order of injection; faults that ended long ago may be missing.
     pub fn list(&self) -> Vec<FaultStatus> {
         self.cells().iter().map(|cell| cell.seen()).collect()
     }
 
-    /// Adds the state of all faults; nothing if there was never a fault.
+    /// Adds the state of all faults; adds nothing if there was never a fault.
     pub fn write(&self, statistics: &mut Statistics) {
         if self.news() == 0 {
             return;

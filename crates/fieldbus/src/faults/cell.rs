@@ -10,18 +10,18 @@ use tickbus_base::time::Nanos;
 /// The state of a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// It has not begun, or may begin again.
+    /// The fault has not begun, or may begin again.
     Waiting,
-    /// It has its effect.
+    /// The fault is in effect.
     Active,
-    /// It is over for good.
+    /// The fault is over for good.
     Over,
 }
 
 impl Phase {
     const ALL: [Self; 3] = [Self::Waiting, Self::Active, Self::Over];
 
-    /// Its name, in lower case.
+    /// The phase's name, in lower case.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Waiting => "waiting",
@@ -31,22 +31,22 @@ impl Phase {
     }
 }
 
-/// One fault as others see it.
+/// The published state of one fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FaultStatus {
-    /// Its number, from 1, in order of injection.
+    /// The fault's number, from 1, in order of injection.
     pub id: u32,
-    /// Its name.
+    /// The fault's name.
     pub name: String,
-    /// Its kind, as a driver.cfg names it.
+    /// The fault's kind, as a driver.cfg names it.
     pub kind: &'static str,
-    /// What it does, as text.
+    /// The fault's effect, as text.
     pub what: String,
-    /// Its state.
+    /// The fault's state.
     pub phase: Phase,
-    /// How often it has begun.
+    /// How often the fault has begun.
     pub begun: u64,
-    /// When it last began or ended, as time since the first tick.
+    /// When the fault last began or ended, as time since the first tick.
     pub since: Nanos,
     /// The number of that tick.
     pub tick: u64,
@@ -63,7 +63,8 @@ pub(super) struct Cell {
     begun: AtomicU64,
     since: AtomicI64,
     tick: AtomicU64,
-    /// Beginnings and ends so far, also of earlier faults of this name and kind; and how many of them were logged.
+    /// The number of beginnings and ends so far, including those of earlier faults of this name and kind; `told` is the
+    /// number already logged.
     changes: AtomicU64,
     told: AtomicU64,
 }
@@ -84,13 +85,13 @@ impl Cell {
         }
     }
 
-    /// Whether this is another fault under the same name.
+    /// Returns true if this is another fault of the same name and kind.
     pub(super) fn is_namesake(&self, other: &Self) -> bool {
         self.name == other.name && self.kind == other.kind
     }
 
-    /// Goes on counting for the log where an earlier fault of its name has got to: who injects one again and again
-    /// does not fill the log.
+    /// Continues the log's count of an earlier fault of this name: a fault that is injected repeatedly does not fill
+    /// the log.
     pub(super) fn follow(&self, earlier: &Self) {
         let changes = earlier.changes.load(Ordering::Acquire);
         self.changes.store(changes, Ordering::Relaxed);
@@ -106,7 +107,7 @@ impl Cell {
         self.id
     }
 
-    /// How often it has begun.
+    /// How often the fault has begun.
     pub(super) fn begun(&self) -> u64 {
         self.begun.load(Ordering::Relaxed)
     }
@@ -117,7 +118,7 @@ impl Cell {
         let _ = write!(text, "\"{}\" ({})", self.name, self.kind);
     }
 
-    /// The length of that text in bytes.
+    /// The length of the title in bytes.
     pub(super) fn title_len(&self) -> usize {
         self.name.len() + self.kind.len() + "\"\" ()".len()
     }
@@ -148,11 +149,11 @@ impl Cell {
         }
     }
 
-    /// The log message about what has begun or ended since the last call.
+    /// The log message about beginnings and ends since the last call.
     pub(super) fn news(&self, driver: &str) -> Option<String> {
         let changes = self.changes.load(Ordering::Acquire);
         let told = self.told.swap(changes, Ordering::Relaxed);
-        // No text is made if the log drops it: on a stepped bus this runs within the tick.
+        // No text is made if the log would drop it: on a stepped bus this code runs within the tick.
         if told >= changes || !is_told(changes) || !log::log_enabled!(log::Level::Warn) {
             return None;
         }
@@ -173,7 +174,7 @@ impl Cell {
     }
 }
 
-/// Says that not every change is logged any more.
+/// A note that not every change is logged any more.
 struct Often(u64);
 
 impl fmt::Display for Often {

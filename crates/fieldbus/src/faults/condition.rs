@@ -11,12 +11,12 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 /// A condition on one signal: `LA1 position >= 120 mm`, `LA1 run == 1`, or a BOOL alone.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
-    /// As it was written.
+    /// The condition as written.
     text: String,
     signal: usize,
     relation: Relation,
     number: Number,
-    /// Numbers that differ by at most this are equal: a scaled value hardly ever equals a number exactly.
+    /// Numbers that differ by at most this much count as equal: a scaled value hardly ever equals a number exactly.
     tolerance: f64,
 }
 
@@ -56,7 +56,7 @@ impl Condition {
     ///
     /// # Errors
     ///
-    /// What is wrong with it, and what would be right.
+    /// The condition is wrong; the message says why, and has the remedy.
     pub fn parse(text: &str, table: &SignalTable) -> Result<Self, Mistake> {
         let text = text.trim();
         let position = |name: &str| table.position(name);
@@ -141,12 +141,12 @@ impl Condition {
         ))
     }
 
-    /// Index of its signal.
+    /// The index of the condition's signal.
     pub const fn signal(&self) -> usize {
         self.signal
     }
 
-    /// Whether it holds.
+    /// Returns true if the condition holds.
     pub fn holds(&self, slots: &[Slot]) -> bool {
         let slot = slots[self.signal];
         let (less, equal) = match self.number {
@@ -228,7 +228,7 @@ fn number_of(text: &str, signal: &Signal) -> Result<(Number, f64), Mistake> {
     Ok((Number::Real(number), number))
 }
 
-/// What is wrong with a name that no signal of `table` has, and what would be right.
+/// The mistake for a name that no signal of `table` has, with the remedy.
 pub fn unknown(name: &str, table: &SignalTable) -> Mistake {
     const MOST: usize = 20;
     let names: Vec<&str> = table.signals.iter().map(|s| s.name.as_str()).collect();

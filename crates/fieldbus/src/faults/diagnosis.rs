@@ -1,35 +1,36 @@
-//! What a device reports of itself to its master, on buses that have a diagnosis.
+//! The reports of a device to its master, on buses that have a diagnosis.
 
 use std::fmt;
 
-/// The most octets of a device's own.
+/// The maximum number of device-specific octets.
 pub(super) const OCTET_LIMIT: usize = 32;
 
-/// One thing that a station reports.
+/// One report of a station.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Diagnosis {
     /// The station, by its index in the signal table.
     pub station: usize,
-    /// What is wrong.
+    /// The problem that the station reports.
     pub finding: Finding,
-    /// It cannot exchange data properly until this is over: the master goes on reading the diagnosis.
+    /// True if the station cannot exchange data properly until the problem is over: the master continues to read the
+    /// diagnosis.
     pub is_static: bool,
 }
 
-/// What is wrong with a device.
+/// A problem of a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Finding {
-    /// Octets of the device's own, as its manual has them.
+    /// Device-specific octets, as in the device's manual.
     Device(Octets),
-    /// Something about the module in this slot, from 1.
+    /// A problem of the module in this slot, from 1.
     Module(u8),
-    /// A channel of the module in a slot, from 1; channels count from 0.
+    /// A problem of a channel of the module in a slot. Slots count from 1, channels from 0.
     Channel {
         /// The slot.
         slot: u8,
         /// The channel.
         channel: u8,
-        /// What is wrong with it.
+        /// The problem of the channel.
         error: ChannelError,
     },
 }
@@ -42,7 +43,7 @@ pub struct Octets {
 }
 
 impl Octets {
-    /// These octets; `None` if there are none, or too many.
+    /// A value of these octets; `None` for no octets, or too many.
     pub fn new(octets: &[u8]) -> Option<Self> {
         let mut all = [0; OCTET_LIMIT];
         all.get_mut(..octets.len())?.copy_from_slice(octets);
@@ -50,13 +51,13 @@ impl Octets {
         (length > 0).then_some(Self { all, length })
     }
 
-    /// All of them.
+    /// All octets.
     pub fn get(&self) -> &[u8] {
         &self.all[..self.length]
     }
 }
 
-/// What is wrong with a channel; the numbers are those of PROFIBUS DP.
+/// A problem of a channel; the numbers are those of PROFIBUS DP.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "their names say it")]
 pub enum ChannelError {
@@ -72,7 +73,7 @@ pub enum ChannelError {
 }
 
 impl ChannelError {
-    /// All of them, with the names that a fault has for them.
+    /// All channel errors, with their names in a fault.
     pub(super) const ALL: [(&'static str, Self); 9] = [
         ("short-circuit", Self::ShortCircuit),
         ("undervoltage", Self::Undervoltage),

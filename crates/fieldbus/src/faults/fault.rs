@@ -1,4 +1,4 @@
-//! What a fault is: its effect, its beginning and its end.
+//! The description of a fault: its effect, its beginning and its end.
 
 use std::fmt;
 
@@ -10,45 +10,45 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 /// One fault, as a `[[fault]]` section describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// Its name, for people.
+    /// The fault's name, for messages.
     pub name: String,
-    /// What it does.
+    /// The fault's effect.
     pub effect: Effect,
-    /// When it begins.
+    /// When the fault begins.
     pub begin: Begin,
-    /// When it ends by itself.
+    /// When the fault ends without a request.
     pub lasts: Lasts,
-    /// How many times it may begin; more than once only with [`Begin::When`]. Positive.
+    /// How many times the fault may begin; more than once only with [`Begin::When`]. Positive.
     pub times: u64,
-    /// The seed of its random numbers.
+    /// The seed of the fault's random numbers.
     pub seed: u64,
 }
 
-/// What a fault does.
+/// The effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
-    /// It changes the value of the signal with this index in the signal table.
+    /// The fault changes the value of the signal with this index in the signal table.
     Signal(usize, SignalEffect),
-    /// It disturbs the line.
+    /// The fault disturbs the line.
     Line(LineEffect),
 }
 
 /// How the value of a signal is changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SignalEffect {
-    /// It is stuck at a value; `None`: at the value it has when the fault begins.
+    /// The signal is stuck at a value; `None` means the value that it has when the fault begins.
     Stuck(Option<Slot>),
-    /// The inverse of a BOOL, or of each bit of a bit string.
+    /// A BOOL is inverted, or each bit of a bit string.
     Invert,
-    /// This is added, in the signal's unit.
+    /// This number is added, in the signal's unit.
     Offset(f64),
-    /// A random number between minus and plus this is added, a new one at every tick.
+    /// A random number between minus and plus this number is added, a new one at every tick.
     Noise(f64),
-    /// A BOOL is inverted with this probability, decided anew at every tick.
+    /// A BOOL is inverted with this probability, decided again at every tick.
     Flicker(f64),
 }
 
-/// What a fault does to the frames of the line.
+/// The effect of a fault on the frames of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LineEffect {
     /// Incoming frames are held back for this long.
@@ -63,16 +63,16 @@ pub enum LineEffect {
     LinkDown,
     /// The station with this index does not respond.
     StationDown(usize),
-    /// A station reports something to its master.
+    /// A station reports a problem to its master.
     Diagnosis(Diagnosis),
 }
 
-/// Which frames are affected, as seen from this end.
+/// The affected frames, as seen from this end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
-    /// Those that this end receives.
+    /// The frames that this end receives.
     In,
-    /// Those that this end sends.
+    /// The frames that this end sends.
     Out,
     /// Both.
     #[default]
@@ -80,12 +80,12 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Whether received frames are affected.
+    /// Returns true if received frames are affected.
     pub const fn comes_in(self) -> bool {
         matches!(self, Self::In | Self::Both)
     }
 
-    /// Whether sent frames are affected.
+    /// Returns true if sent frames are affected.
     pub const fn goes_out(self) -> bool {
         matches!(self, Self::Out | Self::Both)
     }
@@ -102,14 +102,14 @@ pub enum Begin {
     Tick(u64),
     /// When the condition becomes true.
     When(Condition),
-    /// When the condition becomes true; it ends when the condition becomes false.
+    /// When the condition becomes true; the fault ends when the condition becomes false.
     While(Condition),
 }
 
 /// How long a fault lasts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lasts {
-    /// Until it is ended, or its condition ends it.
+    /// Until a request or the condition ends the fault.
     UntilEnded,
     /// For this long.
     For(Nanos),
@@ -118,7 +118,7 @@ pub enum Lasts {
 }
 
 impl Fault {
-    /// Its kind, as a driver.cfg names it.
+    /// The fault's kind, as a driver.cfg names it.
     pub const fn kind(&self) -> &'static str {
         match self.effect {
             Effect::Signal(_, SignalEffect::Stuck(_)) => "stuck",
@@ -135,7 +135,7 @@ impl Fault {
         }
     }
 
-    /// What it does, as text: `"LA1 bottom" is stuck at 1`.
+    /// The fault's effect, as text: `"LA1 bottom" is stuck at 1`.
     pub fn what(&self, table: &SignalTable) -> String {
         match self.effect {
             Effect::Signal(index, change) => {

@@ -22,14 +22,14 @@ struct Sum {
     slow: Nanos,
 }
 
-/// What happens to an incoming frame.
+/// The fate of an incoming frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fate {
-    /// It is lost.
+    /// The frame is lost.
     Lost,
-    /// It is delivered this many times.
+    /// The frame is delivered this many times.
     Passes(u32),
-    /// It has to wait; see [`LineFaults::release`].
+    /// The frame has to wait; see [`LineFaults::release`].
     Held,
 }
 
@@ -40,13 +40,13 @@ pub struct LineFaults {
     faults: Vec<LineFault>,
     stations: Vec<Wire>,
     sum: Sum,
-    /// What was decided at random for the frames of the current incoming cycle.
+    /// The random decision for the frames of the current incoming cycle.
     fate: Fate,
-    /// Whether the frames of the current outgoing cycle repeat those of the previous one.
+    /// True if the frames of the current outgoing cycle repeat those of the previous one.
     repeats: bool,
     /// The active faults, as text.
     active: String,
-    /// What the stations report, in the order of the faults, and whether that is new.
+    /// The reports of the stations, in the order of the faults; `is_diagnosis_new` is true if they are new.
     diagnoses: Vec<Diagnosis>,
     is_diagnosis_new: bool,
 }
@@ -55,8 +55,8 @@ pub struct LineFaults {
 #[derive(Debug)]
 struct Wire {
     dead: bool,
-    /// Whether the station has had its turn in the current incoming, and in the current outgoing cycle. When
-    /// it comes again, the next cycle has begun, whichever station is its first.
+    /// True if the station has had its turn in the current incoming cycle (`came`) or outgoing cycle (`went`). Its next
+    /// turn begins the next cycle, whichever station is first in that cycle.
     came: bool,
     went: bool,
     out: Outgoing,
@@ -64,25 +64,25 @@ struct Wire {
     newest: Outcome,
     /// Received frames that are held back.
     waiting: Option<Ring>,
-    /// When the last of them came.
+    /// When the last released frame arrived.
     released: Nanos,
     rx_len: usize,
 }
 
-/// When a bus took the image of a station last, or repeated it.
+/// When a bus last took or repeated the image of a station.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Taken {
     /// Not yet.
     #[default]
     Never,
-    /// At this time, by the present connection.
+    /// At this time, on the current connection.
     At(Nanos),
-    /// By a connection before the present one.
+    /// On a connection before the current one.
     Before,
 }
 
 impl Taken {
-    /// The bus opens its line again.
+    /// The bus reopens its line.
     pub fn reopen(&mut self) {
         if *self != Self::Never {
             *self = Self::Before;
@@ -102,13 +102,13 @@ enum Outcome {
 /// The shape of one station's frames.
 #[derive(Clone, Debug)]
 pub struct Shape {
-    /// What it sent last.
+    /// The bytes that the station sent last.
     pub last_sent: Box<[u8]>,
-    /// When the bus took that.
+    /// When the bus took these bytes.
     pub taken: Taken,
-    /// The mask of the bits of which the peer has to see each change.
+    /// The mask of the bits whose every change the peer must see.
     pub latched: Box<[u8]>,
-    /// Size of the frames that come in, in bytes.
+    /// The size of incoming frames, in bytes.
     pub rx_len: usize,
 }
 
@@ -152,7 +152,7 @@ impl LineFaults {
                 _ => {}
             }
         }
-        // Reserved for all of them now, so that a tick at which one begins need not allocate.
+        // Memory for all titles is reserved now, so that the tick at which a fault begins need not allocate.
         let titles = self.faults.iter().chain([&fault]);
         let room = titles.map(|fault| fault.cell.title_len() + 2).sum();
         self.active.clear();
@@ -161,15 +161,15 @@ impl LineFaults {
         self.faults.push(fault);
     }
 
-    /// Lets the diagnoses count as new.
+    /// Marks the diagnoses as new.
     pub fn report_diagnoses_anew(&mut self) {
         self.is_diagnosis_new = true;
     }
 
-    /// Looks up which faults are active.
+    /// Reads from the board which faults are active.
     pub fn look(&mut self) {
         let mut sum = Sum::default();
-        // The fates of frames are drawn anew: a fault that is over must not leave anything behind.
+        // The fates of frames are drawn again: a fault that is over must leave nothing behind.
         for wire in &mut self.stations {
             (wire.dead, wire.came, wire.went) = (false, true, true);
         }
@@ -227,34 +227,34 @@ impl LineFaults {
         }
     }
 
-    /// The line is interrupted: the next cycle neither repeats nor delays what the bus sent before.
+    /// The line is interrupted: the next cycle neither repeats nor delays earlier frames of the bus.
     pub fn carries_nothing(&mut self) {
         for wire in &mut self.stations {
             wire.out.taken = Taken::Before;
         }
     }
 
-    /// Whether nothing goes out and nothing comes in.
+    /// Returns true if no frames are sent or received.
     pub fn is_down(&self) -> bool {
         self.sum.down
     }
 
-    /// Draws for each active fault for which `is_meant` gives a probability; tells whether any of them hits.
+    /// Draws a random number for each active fault for which `is_meant` returns a probability; returns true if any of
+    /// them hits.
     fn draw(faults: &mut [LineFault], is_meant: impl Fn(LineEffect) -> Option<f64>) -> bool {
         let mut happens = false;
         for fault in faults {
             if fault.cell.phase() == Phase::Active
                 && let Some(chance) = is_meant(fault.trouble)
             {
-                // Every fault draws, whether or not another one hit: its sequence of numbers must not depend
-                // on the others.
+                // Every fault draws, even if another one hit: its sequence of numbers must not depend on the others.
                 happens |= fault.random.happens(chance);
             }
         }
         happens
     }
 
-    /// Whether the frames of the cycle that is about to go out get lost.
+    /// Returns true if the frames of the next outgoing cycle get lost.
     pub fn loses_cycle(&mut self) -> bool {
         let lost = Self::draw(&mut self.faults, |trouble| match trouble {
             LineEffect::Drop(chance, direction) if direction.goes_out() => Some(chance),
@@ -266,8 +266,8 @@ impl LineFaults {
         lost
     }
 
-    /// Returns true if the previous frames are sent again at `now` instead of new ones. One decision holds for all stations
-    /// of a cycle.
+    /// Returns true if the previous frames are sent again at `now` instead of new ones. One decision applies to all
+    /// stations of a cycle.
     pub fn repeats(&mut self, station: usize, now: Nanos) -> bool {
         if std::mem::replace(&mut self.stations[station].went, true) {
             for (index, wire) in self.stations.iter_mut().enumerate() {
@@ -284,7 +284,7 @@ impl LineFaults {
         }
         let is_cut = self.is_cut(station);
         let out = &mut self.stations[station].out;
-        // A station that is asked separately may have paused alone.
+        // A station that is polled separately may have paused alone.
         out.repeats = self.repeats && !is_cut && !out.has_paused(now);
         if out.repeats {
             out.taken = Taken::At(now);
@@ -292,19 +292,19 @@ impl LineFaults {
         out.repeats
     }
 
-    /// Whether nothing gets through to or from the station.
+    /// Returns true if nothing gets through to or from the station.
     pub fn is_cut(&self, station: usize) -> bool {
         self.sum.down || self.stations[station].dead
     }
 
-    /// What the bus sends while the station is cut off: the bytes that it sent before.
+    /// The bytes that the bus sends while the station is cut off: the ones that it sent before.
     pub fn frozen(&mut self, station: usize) -> &[u8] {
         let out = &mut self.stations[station].out;
         out.given = Given::Nothing;
         &out.current
     }
 
-    /// Takes the image's outgoing bytes; true if the image may regard them as sent.
+    /// Takes the image's outgoing bytes; returns true if the image may regard them as sent.
     pub fn takes(&mut self, station: usize, now: Nanos, image: &[u8]) -> bool {
         let slow = self.sum.slow;
         let out = &mut self.stations[station].out;
@@ -326,8 +326,8 @@ impl LineFaults {
         &self.stations[station].out.current
     }
 
-    /// The peer has these bits (bit n of byte k is 8k + n) of what the bus was given last, `None` for all; true if
-    /// the image must be told.
+    /// The peer has these bits (bit n of byte k is 8k + n) of the bytes that the bus was given last, `None` for all.
+    /// Returns true if the image must be notified.
     pub fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) -> bool {
         let out = &mut self.stations[station].out;
         match bits {
@@ -348,13 +348,13 @@ impl LineFaults {
         out.given == Given::Image
     }
 
-    /// Whether the bus was given the image's newest bytes: no fault holds them back or repeats others.
+    /// Returns true if the bus was given the image's newest bytes: no fault holds them back or repeats others.
     pub fn gives_newest(&self, station: usize) -> bool {
         let out = &self.stations[station].out;
         !out.repeats && out.given != Given::Nothing && out.current == out.newest
     }
 
-    /// Decides what happens to a frame that arrived at `now`, and stores it if it has to wait.
+    /// Decides the fate of a frame that arrived at `now`, and stores the frame if it has to wait.
     pub fn arrives(&mut self, station: usize, now: Nanos, bytes: &[u8]) -> Fate {
         if !self.sum.down && std::mem::replace(&mut self.stations[station].came, true) {
             for (index, wire) in self.stations.iter_mut().enumerate() {
@@ -380,8 +380,8 @@ impl LineFaults {
             return self.fate;
         }
         for _ in 0..times {
-            // Callers release before they hand in, so the ring has room; if it is full even so, order is kept
-            // and the frame lost.
+            // Callers release frames before they hand one in, so the ring has room. If the ring is full nevertheless,
+            // the order is kept and the frame is lost.
             if !ring.is_full() {
                 ring.push(now, bytes);
             }
@@ -409,9 +409,9 @@ impl LineFaults {
         }
     }
 
-    /// The next held frame that is due by `now`, and when it came: where nobody looked for long, as while the process was
-    /// suspended, that was long ago. When the ring is nearly full, the oldest frame is released early: the order is kept, and
-    /// every edge is counted.
+    /// Releases the next held frame that is due by `now`, and returns the time that counts for it. After a long pause,
+    /// such as while the process was suspended, that time is long ago. When the ring is nearly full, the oldest frame
+    /// is released early: the order is kept, and every edge is counted.
     pub fn release(&mut self, station: usize, now: Nanos, into: &mut [u8]) -> Option<Nanos> {
         let delay = self.sum.delay;
         let wire = &mut self.stations[station];
@@ -422,7 +422,7 @@ impl LineFaults {
         if came > now && !early {
             return None;
         }
-        // A delay that has become shorter lets nothing come before what came already.
+        // With a delay that has become shorter, no frame arrives before an earlier one.
         let came = came.max(wire.released).min(now);
         wire.released = came;
         into.copy_from_slice(bytes);
@@ -433,7 +433,7 @@ impl LineFaults {
         Some(came)
     }
 
-    /// Whether the newest frame of the station has not been delivered: it is held back, or was lost.
+    /// Returns true if the newest frame of the station has not been delivered, but is held back or was lost.
     pub fn withholds(&self, station: usize) -> bool {
         let wire = &self.stations[station];
         let ring = wire.waiting.as_ref();
@@ -451,7 +451,7 @@ impl LineFaults {
         dues.min().unwrap_or(Nanos::MAX)
     }
 
-    /// What the stations report to their masters, if that has changed since the last call.
+    /// The reports of the stations to their masters, if they have changed since the last call.
     pub fn take_diagnoses(&mut self) -> Option<&[Diagnosis]> {
         std::mem::take(&mut self.is_diagnosis_new).then_some(&self.diagnoses)
     }

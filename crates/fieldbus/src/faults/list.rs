@@ -11,8 +11,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
-/// How the values of one end are arranged: slots in the order of the signal table, then those that count
-/// edges.
+/// The arrangement of the values of one end: slots in the order of the signal table, then the slots that count edges.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots<'a> {
     /// The signals.
@@ -35,17 +34,17 @@ pub struct Faults {
     given: Nanos,
 }
 
-/// A fault that is on the board and that no tick knows yet: made by any thread, so that the tick which
+/// A fault that is on the board but that no tick knows yet. Any thread can make one, so that the tick that
 /// [adopts](Faults::adopt) it need not allocate memory.
 #[derive(Debug)]
 pub struct Prepared {
     entry: Entry,
-    /// The number of the fault whose place it takes.
+    /// The number of the fault that this one replaces.
     forgotten: Option<u32>,
     board: Arc<FaultBoard>,
 }
 
-/// A fault that a tick has no more use for; dropping it frees memory.
+/// A fault that a tick no longer needs; dropping it frees memory.
 #[derive(Debug)]
 pub struct Retired(#[expect(dead_code, reason = "kept for its drop")] Entry);
 
@@ -89,12 +88,12 @@ impl Prepared {
         })
     }
 
-    /// Its number.
+    /// The fault's number.
     pub fn id(&self) -> u32 {
         self.entry.id
     }
 
-    /// No tick will adopt it: the board has it as over.
+    /// Marks the fault as over on the board; no tick will adopt it.
     pub fn cancel(self) {
         self.board
             .enter(&self.entry.cell, Phase::Over, TickTime::default());
@@ -111,11 +110,11 @@ struct Entry {
 
 #[derive(Debug)]
 enum Kind {
-    /// Bends a value that this end writes.
+    /// Changes a value that this end writes.
     Written(SignalFault),
-    /// Bends a value that this end reads.
+    /// Changes a value that this end reads.
     Read(SignalFault),
-    /// Has its effect in the bus, by way of the board.
+    /// Takes effect in the bus, which reads the board.
     Line,
 }
 
@@ -123,7 +122,7 @@ impl Faults {
     /// An empty list, which publishes its state on `board`.
     pub fn new(board: Arc<FaultBoard>) -> Self {
         Self {
-            // Those that are forgotten may leave a little later than others come.
+            // Forgotten faults may leave the list a little later than new ones join it.
             entries: Vec::with_capacity(2 * LIMIT),
             board,
             given: Nanos::ZERO,
@@ -131,7 +130,7 @@ impl Faults {
         }
     }
 
-    /// Adds a fault and gives its number; it can begin at the next tick.
+    /// Adds a fault and returns its number; the fault can begin at the next tick.
     ///
     /// # Errors
     ///
@@ -143,8 +142,8 @@ impl Faults {
         Ok(id)
     }
 
-    /// Adds a prepared fault, which can begin at the next tick; gives the one whose place it takes, if any. Neither
-    /// allocates nor frees memory.
+    /// Adds a prepared fault, which can begin at the next tick. Returns the fault that this one replaces, if any.
+    /// Neither allocates nor frees memory.
     pub fn adopt(&mut self, prepared: Prepared) -> Option<Retired> {
         let forgotten = prepared.forgotten;
         let place = self
@@ -156,7 +155,7 @@ impl Faults {
         retired
     }
 
-    /// Whether all of its faults are over.
+    /// Returns true if all faults are over.
     pub fn is_idle(&self) -> bool {
         let mut entries = self.entries.iter();
         entries.all(|entry| entry.cell.phase() == Phase::Over)
@@ -168,12 +167,12 @@ impl Faults {
         found.map(|entry| entry.schedule.end()).is_some()
     }
 
-    /// Begins a tick: restores bent values, then faults begin and end.
+    /// Begins a tick: restores changed values, then lets faults begin and end.
     ///
-    /// Conditions are judged on true values: what this end writes as of this tick (or the previous one, if
-    /// the tick receives first), what it reads as of the previous tick.
+    /// Conditions are evaluated on true values: written ones as of this tick (or the previous one, if the tick receives
+    /// first), read ones as of the previous tick.
     pub fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
-        // If time jumps back, faults go on from where they were: what was to last for a second lasts for a second.
+        // If time jumps back, faults continue where they were: one that was to last for a second lasts for a second.
         let passed = moment.time - std::mem::replace(&mut self.given, moment.time);
         self.time += passed.max(Nanos::ZERO);
         let moment = TickTime {
@@ -201,7 +200,7 @@ impl Faults {
         }
     }
 
-    /// The slots are about to be sent: bends them.
+    /// Changes the slots before they are sent.
     pub fn sending(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
             if let (true, Kind::Written(fault)) = (entry.schedule.is_active(), &mut entry.kind) {
@@ -210,8 +209,7 @@ impl Faults {
         }
     }
 
-    /// The signals that are bent at this moment, by index; those that this end writes, or those that it
-    /// reads.
+    /// The signals that faults change at this moment, by index: those that this end writes, or those that it reads.
     pub fn active(&self, written: bool) -> impl Iterator<Item = usize> {
         let active = self
             .entries
@@ -224,7 +222,7 @@ impl Faults {
         })
     }
 
-    /// Everything is sent: restores the simulation's own values.
+    /// Restores the simulation's own values after everything was sent.
     pub fn sent(&mut self, slots: &mut [Slot]) {
         for entry in self.entries.iter_mut().rev() {
             if let Kind::Written(fault) = &mut entry.kind {
@@ -233,7 +231,7 @@ impl Faults {
         }
     }
 
-    /// The slots hold what was received: bends them.
+    /// Changes the received values in the slots.
     pub fn received(&mut self, slots: &mut [Slot]) {
         for entry in &mut self.entries {
             if let (true, Kind::Read(fault)) = (entry.schedule.is_active(), &mut entry.kind) {

@@ -4,7 +4,7 @@ use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Value, shown};
 use tickbus_image::signal::Signal;
 
-/// A number and what follows it: `12.5 mm` is 12.5 and `mm`.
+/// Splits a number from the text that follows: `12.5 mm` is 12.5 and `mm`.
 pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     const LONGEST: usize = 64;
     let text = text.trim();
@@ -13,7 +13,7 @@ pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     let ends: Vec<usize> = ends.take(LONGEST).collect();
     let begins = |end: &usize| {
         let (number, rest) = text.split_at(*end);
-        // Excludes what Rust parses but nobody means by a number: `inf`, `nan`.
+        // Excludes texts that Rust parses but that are no numbers here: `inf`, `nan`.
         let digits = number.ends_with(|c: char| c.is_ascii_digit() || c == '.');
         let number = number.parse::<f64>().ok();
         number
@@ -23,7 +23,7 @@ pub(super) fn split(text: &str) -> Option<(f64, &str)> {
     ends.iter().rev().find_map(begins)
 }
 
-/// Whether `unit` is the signal's; if not, what is wrong and what would be right.
+/// Checks that `unit` is the signal's unit; the error has the remedy.
 pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), Mistake> {
     match signal.unit.as_deref() {
         _ if unit.is_empty() => Ok(()),
@@ -44,7 +44,7 @@ pub(super) fn check_unit(unit: &str, signal: &Signal) -> Result<(), Mistake> {
     }
 }
 
-/// A number in the unit of `signal`: `5`, or `"5 mm"`.
+/// Reads a number in the unit of `signal`: `5`, or `"5 mm"`.
 pub(super) fn of_value(value: &Value<'_>, signal: &Signal) -> Option<f64> {
     let right = match signal.unit.as_deref() {
         Some(unit) => format!("write a number, such as 2.5 or \"2.5 {}\"", shown(unit)),

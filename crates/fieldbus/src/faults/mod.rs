@@ -1,9 +1,9 @@
 //! Injected faults: wrong values of signals and trouble on the line, to test how a PLC program reacts.
 //!
-//! Nothing here does any I/O or reads a clock. [`Faults`] is the tick's side: it decides when each fault
-//! begins and ends, and bends the slots of an exchange. [`LineFaults`] is the bus's side: it loses, repeats and
-//! delays frames. Both share a [`FaultBoard`], on which the tick publishes what is active, so that neither waits
-//! for the other. Random numbers come from a seed: the same seed gives the same run.
+//! Nothing here does any I/O or reads a clock. [`Faults`] is the tick's side, which decides when each fault begins and
+//! ends, and changes the slots of an exchange. [`LineFaults`] is the bus's side, which loses, repeats and delays
+//! frames. Both share a [`FaultBoard`], on which the tick publishes the active faults, so that neither waits for the
+//! other. Random numbers come from a seed: the same seed gives the same run.
 
 mod board;
 mod cell;

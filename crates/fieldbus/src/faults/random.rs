@@ -1,5 +1,5 @@
-//! Reproducible random numbers. Own code, because a seed in a driver.cfg must give the same faults in every version
-//! of tickbus, and a crate may change its generator.
+//! Reproducible random numbers. The generator is written here, because a seed in a driver.cfg must give the same faults
+//! in every version of tickbus, and a crate may change its generator.
 
 /// Pseudo-random numbers from a seed: `SplitMix64` of Steele, Lea and Flood.
 #[derive(Clone, Debug)]

@@ -12,15 +12,15 @@ pub(super) struct Ring {
     count: usize,
 }
 
-/// The most frames that a ring holds.
+/// The maximum number of frames that a ring holds.
 const FRAMES: usize = 4096;
-/// The fewest frames that it holds, however large they are.
+/// The minimum number of frames that a ring holds, however large they are.
 const LEAST_FRAMES: usize = 64;
-/// The memory in bytes that a ring may take; within the two limits above it sets the number of frames.
+/// The memory in bytes for a ring. Within the two limits above, this sets the number of frames.
 const BYTES: usize = 8 << 20;
 
 impl Ring {
-    /// For frames of `size` bytes.
+    /// A ring for frames of `size` bytes.
     pub(super) fn new(size: usize) -> Self {
         Self::with_room(size, (BYTES / size.max(1)).clamp(LEAST_FRAMES, FRAMES))
     }
@@ -47,7 +47,7 @@ impl Ring {
         self.count == self.taken.len()
     }
 
-    /// Whether at most two more frames fit.
+    /// Returns true if at most two more frames fit.
     pub(super) fn is_nearly_full(&self) -> bool {
         self.count + 2 >= self.taken.len()
     }
@@ -56,7 +56,7 @@ impl Ring {
     ///
     /// # Panics
     ///
-    /// When it [is full](Self::is_full).
+    /// If the ring [is full](Self::is_full).
     pub(super) fn push(&mut self, now: Nanos, bytes: &[u8]) {
         assert!(!self.is_full(), "no room for another frame");
         let place = (self.first + self.count) % self.taken.len();

@@ -8,16 +8,16 @@ use tickbus_image::signal::Slot;
 pub(super) struct Schedule {
     begin: Begin,
     lasts: Lasts,
-    /// How many more times it may begin.
+    /// How many more times the fault may begin.
     left: u64,
     state: State,
-    /// It has to end at the next tick in any case.
+    /// True if the fault must end at the next tick in any case.
     told_to_end: bool,
 }
 
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// `was` is the value of its condition at the previous tick.
+    /// `was` is the value of the condition at the previous tick.
     Waiting {
         was: bool,
     },
@@ -25,14 +25,14 @@ enum State {
     Over,
 }
 
-/// What happened at a tick.
+/// The change at a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Step {
     Nothing,
     Begins,
-    /// It may begin again.
+    /// The fault may begin again.
     Pauses,
-    /// It is over for good.
+    /// The fault is over for good.
     Ends,
 }
 
@@ -51,7 +51,7 @@ impl Schedule {
         matches!(self.state, State::Active(_))
     }
 
-    /// Makes it end at the next tick.
+    /// Makes the fault end at the next tick.
     pub(super) fn end(&mut self) {
         self.told_to_end = true;
     }
@@ -102,7 +102,7 @@ impl Schedule {
         }
     }
 
-    /// Whether it is to end at this tick, and the value of its condition.
+    /// Returns true if the fault ends at this tick, and the value of its condition.
     fn is_up(&self, since: TickTime, moment: TickTime, slots: &[Slot]) -> (bool, bool) {
         let (ends, is) = match &self.begin {
             Begin::While(condition) => {

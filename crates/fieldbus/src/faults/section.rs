@@ -8,7 +8,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, read_text, show
 use tickbus_image::signal::SignalTable;
 use tickbus_image::signal::section::NAME_LIMIT;
 
-/// The most faults of one driver that wait or are active.
+/// The maximum number of faults of one driver that wait or are active.
 pub const LIMIT: usize = 64;
 
 /// The kinds of faults, and the keys that belong to each.
@@ -29,16 +29,16 @@ const KINDS: [(&str, &[&str]); 11] = [
     ),
 ];
 
-/// What faults are read for.
+/// The driver for which faults are read.
 #[derive(Clone, Copy, Debug)]
 pub struct Scope<'a> {
     /// The stations and signals of the driver.
     pub table: &'a SignalTable,
-    /// Whether its bus [has a diagnosis](crate::BusOptions::has_diagnosis).
+    /// True if the driver's bus [has a diagnosis](crate::BusOptions::has_diagnosis).
     pub has_diagnosis: bool,
 }
 
-/// A driver whose bus has none.
+/// The scope of a driver whose bus has no diagnosis.
 impl<'a> From<&'a SignalTable> for Scope<'a> {
     fn from(table: &'a SignalTable) -> Self {
         Self {
@@ -80,7 +80,7 @@ pub fn read_file<'a>(
 ///
 /// # Errors
 ///
-/// With every mistake in the text; they call the file `fault`.
+/// With every mistake in the text; the mistakes name the file `fault`.
 pub fn read_one<'a>(text: &str, scope: impl Into<Scope<'a>>) -> Result<Fault, Mistakes> {
     let scope = Some(scope.into());
     let mut collector = Collector::new("fault", text);
@@ -105,8 +105,7 @@ pub fn read_one<'a>(text: &str, scope: impl Into<Scope<'a>>) -> Result<Fault, Mi
     }
 }
 
-/// Reads `[[fault]]` sections and reports their mistakes. Without a scope, checks only what does not need
-/// one.
+/// Reads `[[fault]]` sections and reports their mistakes. Without a scope, runs only the checks that need none.
 pub fn read_sections(sections: Vec<Table<'_>>, scope: Option<Scope<'_>>) -> Vec<Fault> {
     if let Some(first) = sections.get(LIMIT) {
         first.wrong(

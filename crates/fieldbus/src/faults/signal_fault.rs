@@ -1,4 +1,4 @@
-//! Values of signals, made wrong.
+//! Faults that change the values of signals.
 
 use super::SignalEffect;
 use super::random::Random;
@@ -13,15 +13,15 @@ pub(super) struct SignalFault {
     kind: Kind,
     change: SignalEffect,
     random: Random,
-    /// The value at which it is stuck.
+    /// The value at which the signal is stuck.
     held: Slot,
-    /// The level shown last, which new edges are compared with.
+    /// The level shown last, with which the next level is compared to find edges.
     level: bool,
-    /// The true value and the true edge count, while the bent ones are in their slots.
+    /// The true value and the true edge count, while the slots hold the changed ones.
     truth: Option<(Slot, Slot)>,
 }
 
-/// The type of value in the slot.
+/// The type of the value in the slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Bit,
@@ -66,12 +66,12 @@ impl SignalFault {
         }
     }
 
-    /// Index of the signal.
+    /// The index of the signal.
     pub(super) fn signal(&self) -> usize {
         self.slot
     }
 
-    /// The fault begins; the slots hold the true values.
+    /// Begins the fault; the slots hold the true values.
     pub(super) fn begin(&mut self, slots: &[Slot]) {
         let slot = slots[self.slot];
         self.level = slot.real() != 0.0;
@@ -81,14 +81,14 @@ impl SignalFault {
         };
     }
 
-    /// Replaces the value in its slot by the bent one.
+    /// Replaces the value in the signal's slot by the changed one.
     pub(super) fn apply_to(&mut self, slots: &mut [Slot]) {
         let truth = slots[self.slot];
         let bent = self.bent(truth);
         slots[self.slot] = bent;
         let mut counted = Slot::default();
         if let Some((edges, latch)) = self.edges {
-            // An edge that the simulation is not shown must not be counted either.
+            // An edge that the simulation does not see must not be counted either.
             let level = bent.real() != 0.0;
             let is_edge = level != self.level
                 && match latch {
@@ -105,7 +105,7 @@ impl SignalFault {
         self.truth = Some((truth, counted));
     }
 
-    /// Puts the true value back, if the bent one is in its slot.
+    /// Restores the true value, if the slot holds the changed one.
     pub(super) fn restore(&mut self, slots: &mut [Slot]) {
         if let Some((truth, counted)) = self.truth.take() {
             slots[self.slot] = truth;

@@ -10,7 +10,7 @@ use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Area, DataType, Latch, Scale, Signal, SignalTable, Slot};
 
-/// A machine writes `run` and `level` and reads the others.
+/// The signals of a machine, which writes `run` and `level` and reads the others.
 pub(super) fn table() -> SignalTable {
     let signal = Signal::new;
     let signals = vec![
@@ -32,7 +32,7 @@ pub(super) fn table() -> SignalTable {
 
 const SIGNALS: usize = 5;
 
-/// A machine's end of the line, whose peer sends what the test says.
+/// A machine's end of the line; the test sets the values that the peer sends.
 struct End {
     table: SignalTable,
     faults: Faults,
@@ -69,8 +69,8 @@ impl End {
         self.faults.add(&fault, slots).expect("there is room")
     }
 
-    /// One tick of 10 ms; returns what was sent of the signals that this end writes. `arrives` puts received
-    /// values into the slots, if any arrive.
+    /// One tick of 10 ms; returns the sent values of the signals that this end writes. `arrives` puts received values
+    /// into the slots, if any arrive.
     fn tick(&mut self, arrives: impl FnOnce(&mut [Slot])) -> [f64; 2] {
         self.tick += 1;
         let moment = TickTime {
@@ -199,7 +199,7 @@ fn faults_go_on_when_the_time_of_the_simulation_jumps_back() {
     end.set(1, 1.0);
     let sent = |end: &mut End| end.tick(nothing)[1];
     assert_eq!([(); 3].map(|()| sent(&mut end)), [1.0, 1.0, 9.0]);
-    // The model begins anew.
+    // The model restarts.
     end.restart();
     assert_eq!([(); 4].map(|()| sent(&mut end)), [9.0, 9.0, 9.0, 1.0]);
 }
@@ -219,7 +219,7 @@ fn the_edges_of_a_bent_signal_are_those_of_the_levels_that_are_shown() {
         end.table.signals[2].latch = Some(latch);
         let (mut state, mut counted) = (1, 0.0);
         let (mut shown, mut truth) = (false, (false, 0.0));
-        // How the level is bent, and the number of the fault.
+        // The change of the level, and the number of the fault.
         let mut fault: Option<(Option<bool>, u32)> = None;
         for step in 0..5_000 {
             match (&fault, random(&mut state, 6)) {
@@ -378,7 +378,7 @@ fn a_fault_prepared_by_another_thread_begins_when_a_tick_adopts_it() {
     end.faults.end(1);
     assert_eq!(end.tick(nothing)[1], 100.0);
     assert!(end.faults.is_idle());
-    // What a fault that is over leaves behind is handed back to be freed elsewhere.
+    // The memory of a fault that is over is handed back, to be freed elsewhere.
     let mut retired = 0;
     for _ in 0..LIMIT {
         let next = prepare(&end).expect("those that are over make room");
@@ -387,7 +387,7 @@ fn a_fault_prepared_by_another_thread_begins_when_a_tick_adopts_it() {
         end.tick(nothing);
     }
     assert_eq!(end.board.list().len(), LIMIT);
-    // The one that was cancelled had left nothing.
+    // The cancelled fault had left nothing.
     assert_eq!(retired, 1);
 }
 
@@ -415,8 +415,8 @@ proptest! {
         prop_assert!(first.iter().any(|sent| sent[0] == 0.0));
     }
 
-    /// Whatever faults come and go, they never change the simulation's own values, and read values are true
-    /// as soon as all faults are over.
+    /// No sequence of faults changes the simulation's own values, and read values are true as soon as all faults are
+    /// over.
     #[test]
     fn nothing_is_left_behind(
         steps in prop::collection::vec((0..8_usize, -100.0..100.0_f64, any::<bool>()), 1..80),

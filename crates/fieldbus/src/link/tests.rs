@@ -20,7 +20,7 @@ fn names_and_codes_are_told_apart() {
 fn a_running_line_becomes_stale_and_running_again_by_age_alone() {
     let status = LinkStatus::new("test", MAX_AGE);
     status.running(at(1000), "the peer is there");
-    // The data are an earlier peer's, or missing: the new one has time to send its first.
+    // The data are from an earlier peer, or missing: the new peer has time to send its first data.
     status.observe(at(1100), std::iter::once(Nanos::MAX));
     assert_eq!(status.state(), LinkState::Running);
     status.observe(at(1101), std::iter::once(Nanos::MAX));

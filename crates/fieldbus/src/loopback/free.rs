@@ -1,4 +1,4 @@
-//! The loopback as a bus with a thread and a cycle of its own.
+//! The loopback as a bus with its own thread and cycle.
 
 use crate::{BusError, Free, Port};
 use tickbus_base::time::{Nanos, Pace, Stop};
@@ -12,12 +12,12 @@ pub struct FreeLoopback {
     cycle: Nanos,
 }
 
-/// How the end is obtained.
+/// The source of the end.
 #[derive(Debug)]
 enum EndSource {
     /// By joining the link of this name.
     Named(String),
-    /// It was handed in.
+    /// The end was handed in.
     Given(End),
 }
 

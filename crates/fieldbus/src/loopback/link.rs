@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use crate::{BusError, Port, Receipt, Role};
 use tickbus_base::time::Nanos;
 
-/// The named links, as long as one of their ends exists.
+/// The named links that have at least one end.
 static LINKS: Mutex<Option<HashMap<String, Weak<Mutex<SharedLanes>>>>> = Mutex::new(None);
 
 #[derive(Debug, Default)]
@@ -15,7 +15,7 @@ struct SharedLanes {
     lanes: [Lane; 2],
 }
 
-/// What one end sends.
+/// The frames that one end sends.
 #[derive(Debug, Default)]
 struct Lane {
     attached: bool,
@@ -23,7 +23,7 @@ struct Lane {
     sizes: Vec<(usize, usize)>,
     /// The last frames sent, of all stations.
     frames: Vec<Vec<u8>>,
-    /// Per station, whether the other end has yet to take its frame.
+    /// Per station, true if the other end has yet to take the frame.
     waiting: Vec<bool>,
     /// When the frames were offered.
     offered_at: Nanos,
@@ -50,9 +50,10 @@ pub struct End {
     role: Role,
     /// The receipt for the frames that the other end may have taken.
     offered: Option<Receipt>,
-    /// Whether the other end has been present.
+    /// True if the other end has been present.
     met: bool,
-    /// Whether both ends belong to one driver, which closes them one after the other: that is no peer that leaves.
+    /// True if both ends belong to one driver, which closes them one after the other: the first closed end does not
+    /// count as a peer that left.
     is_private: bool,
 }
 
@@ -81,7 +82,7 @@ impl End {
     ///
     /// # Errors
     ///
-    /// [`BusError::Refused`] when that end is taken, or when the other end has frames of other sizes.
+    /// [`BusError::Refused`] if that end is taken, or if the other end has frames of different sizes.
     pub fn join(name: &str, port: &Port) -> Result<Self, BusError> {
         let sizes = (0..port.stations())
             .map(|station| port.sizes(station))
@@ -134,21 +135,21 @@ impl End {
         })
     }
 
-    /// One bus cycle at `now`: takes what the other end sent, offers what the port has.
+    /// One bus cycle at `now`: takes the frames of the other end, and offers those of the port.
     pub fn cycle(&mut self, now: Nanos, port: &mut Port) {
         self.take(now, port);
         self.offer(now, port);
     }
 
-    /// Takes what the other end has sent.
+    /// Takes the frames that the other end has sent.
     pub fn take(&mut self, now: Nanos, port: &mut Port) {
         if !self.meets(now, port) {
             return;
         }
         let mut line = lock(&self.line);
         let theirs = &mut line.lanes[lane(other(self.role))];
-        // Time passes between the cycles of a free line, in which the process may stand still. On simulation time the other
-        // end's last values are those of now.
+        // Time passes between the cycles of a free line, and the process may be suspended in between. On simulation
+        // time the other end's last values are current.
         if port.clock().passes_alone() {
             port.came_at(theirs.offered_at.min(now));
         }
@@ -164,10 +165,10 @@ impl End {
         port.running("the other end is there");
     }
 
-    /// Offers what the port has.
+    /// Offers the frames of the port.
     ///
-    /// Frames that the other end has not taken are overwritten, since only the newest matter; their pulses
-    /// are not confirmed until it takes a frame that shows them.
+    /// Frames that the other end has not taken are overwritten, since only the newest frames matter. Their pulses are
+    /// confirmed once the other end takes a frame that shows them.
     pub fn offer(&mut self, now: Nanos, port: &mut Port) {
         if !self.meets(now, port) {
             return;
@@ -190,7 +191,7 @@ impl End {
         }
     }
 
-    /// Whether the line is up and the other end is there.
+    /// Returns true if the line is up and the other end is present.
     fn meets(&mut self, now: Nanos, port: &mut Port) -> bool {
         if !port.is_up(now) {
             return false;
@@ -200,8 +201,8 @@ impl End {
             self.met = true;
             return true;
         }
-        // A frame that the previous other end took is confirmed, so that the next one does not see its pulses again; a frame that
-        // it did not take is outdated.
+        // A frame that the previous other end took is confirmed, so that the next end does not see its pulses again. A
+        // frame that the previous end did not take is outdated.
         let waiting = &mut line.lanes[lane(self.role)].waiting;
         let is_taken = !waiting.contains(&true);
         waiting.fill(false);

@@ -1,8 +1,8 @@
 //! The loopback: both ends of the line in one process.
 //!
-//! Two drivers meet by the name of a link, one as Device, one as Controller; or a PLC program is hosted at
-//! the other end. Except for the wire it is a real bus: frames of fixed size, its own cycle, and pulses that
-//! are confirmed when the other end has taken them.
+//! Two drivers find each other by the name of a link, one as Device, one as Controller; or a PLC program is hosted at
+//! the other end. Except for the wire, the loopback is a real bus: it has frames of fixed size, its own cycle, and
+//! pulses that are confirmed when the other end has taken them.
 
 mod free;
 mod link;

@@ -5,8 +5,8 @@ use tickbus_base::time::Nanos;
 
 use super::link::End;
 
-/// A stepped loopback: each end exchanges within its own tick, so that only the order of the ticks decides
-/// what is seen.
+/// A stepped loopback: each end exchanges within its own tick, so only the order of the ticks decides which values each
+/// end sees.
 #[derive(Debug)]
 pub struct SteppedLoopback {
     name: String,

@@ -1,4 +1,4 @@
-//! Calls of a library that may not return.
+//! Library calls that may not return.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ use crate::{BusError, LinkStatus};
 const LOOK: Nanos = Nanos::from_millis(250);
 
 impl Port {
-    /// Runs `bus` while another thread watches its [calls](Self::calling): one that does not return cannot report
-    /// itself. `name` is that of the driver.
+    /// Runs `bus` while another thread watches its [calls](Self::calling): a call that does not return cannot report
+    /// itself. `name` is the driver's name.
     ///
     /// # Errors
     ///
-    /// Those of `bus`, or the system refuses the thread.
+    /// The errors of `bus`, or the system cannot start the thread.
     pub fn watching_calls(
         &mut self,
         name: &str,
@@ -33,8 +33,8 @@ impl Port {
 
         let cannot =
             |error: std::io::Error| BusError::Link(format!("the system refused a thread: {error}"));
-        // The watch uses the system's time, whatever clock the driver has, and is left behind with the bus thread
-        // if need be.
+        // The watch uses the system's time, whatever clock the driver has. The watch may be left behind together with
+        // the bus thread.
         let real = Monotonic::shared();
         let (watch, over) = (self.call_watch(), Stop::new());
         std::thread::scope(|scope| {
@@ -60,9 +60,9 @@ impl Port {
         }
     }
 
-    /// Makes a library call that may not return; the statistics report it if it lasts longer than `limit`.
+    /// Makes a library call that may not return; the statistics report a call that lasts longer than `limit`.
     pub fn calling<R>(&self, what: &Arc<str>, limit: Nanos, call: impl FnOnce() -> R) -> R {
-        /// Ends the call in any case: one that panics has not hung.
+        /// Ends the call in any case: a call that panics has not hung.
         struct Ends<'a>(&'a Port);
 
         impl Drop for Ends<'_> {
@@ -86,7 +86,7 @@ pub struct CallWatch {
 }
 
 impl CallWatch {
-    /// Makes the line stale, and logs that, when a call exceeds its limit.
+    /// Makes the line stale, and logs this, if a call exceeds its limit.
     pub fn look(&self) {
         self.status.observe_call(self.clock.now());
     }

@@ -1,4 +1,4 @@
-//! The end of a driver: its last cycle, and what its peer is left with.
+//! The end of a driver: the last cycle, and the values that remain at the peer.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use tickbus_base::time::{Clock, Nanos};
 
 use super::{Port, Receipt};
 
-/// What the peer gets where the values of the program can no longer be trusted.
+/// The values for the peer when those of the program can no longer be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Outputs {
     /// The fail-safe values of the signals.
@@ -21,7 +21,7 @@ pub enum Outputs {
 }
 
 impl Outputs {
-    /// Both, by their names in a driver.cfg.
+    /// Both choices, by their names in a driver.cfg.
     pub const CHOICES: [(&'static str, Self); 2] =
         [("fail_safe", Self::FailSafe), ("hold", Self::Hold)];
 }
@@ -36,20 +36,20 @@ pub struct Farewell {
 #[derive(Debug, Default)]
 struct Shared {
     begun: AtomicBool,
-    /// The driver closes, and waits until its peers have the last values.
+    /// True while the closing driver waits until its peers have the last values.
     is_awaited: AtomicBool,
-    /// Something was sent since the line was opened.
+    /// True if something was sent since the line was opened.
     is_used: AtomicBool,
 }
 
 impl Farewell {
-    /// Whether a peer may have got anything by this line.
+    /// Returns true if a peer may have received anything on this line.
     pub fn is_due(&self) -> bool {
         self.shared.is_used.load(Ordering::SeqCst)
     }
 
-    /// From now on every station sends its fail-safe values. Returns whether the farewell [is due](Self::is_due): if not, no
-    /// peer has got anything yet, and who reads from now on gets these values.
+    /// From now on every station sends its fail-safe values. Returns true if the farewell [is due](Self::is_due). If
+    /// not, no peer has received anything yet, and a peer that reads from now on gets these values.
     pub fn begin(&self) -> bool {
         self.shared.begun.store(true, Ordering::SeqCst);
         let is_due = self.is_due();
@@ -57,8 +57,8 @@ impl Farewell {
         is_due
     }
 
-    /// Waits until the peers of all stations have these values, or the line has ended; at most for `limit`. Returns
-    /// whether that was in time.
+    /// Waits until the peers of all stations have these values, or the line has ended, for at most `limit`. Returns
+    /// true if that was in time.
     pub fn wait(&self, clock: &dyn Clock, limit: Nanos) -> bool {
         wait_for(clock, &self.done, limit)
     }
@@ -68,20 +68,20 @@ impl Farewell {
 #[derive(Debug)]
 pub(super) struct Ending {
     shared: Arc<Shared>,
-    /// As the last cycle found it: all frames of a cycle are of one kind.
+    /// The state at the beginning of the last cycle: all frames of a cycle are of one kind.
     is_begun: bool,
     stations: Box<[Taker]>,
     done: Sender<()>,
 }
 
-/// The peer of a station, as far as it takes values.
+/// The peer of a station, as a receiver of values.
 #[derive(Clone, Copy, Debug)]
 struct Taker {
-    /// The cycles after which it has the last values; 0 for a station without outputs.
+    /// The number of cycles after which the peer has the last values; 0 for a station without outputs.
     missing: u32,
-    /// Whether its write guard lets anything through.
+    /// True if the station's write guard permits writes.
     may_write: bool,
-    /// Whether the bus has made a frame with the last values for it.
+    /// True if the bus has made a frame with the last values for the peer.
     is_offered: bool,
 }
 
@@ -150,21 +150,21 @@ impl Ending {
 
     fn end_if_none_is_owed(&self) {
         if !self.stations.iter().any(|taker| taker.is_owed()) {
-            // A closer that waits no longer needs no news.
+            // A closer that has stopped waiting needs no message.
             let _ = self.done.send(());
         }
     }
 }
 
 impl Port {
-    /// Lets `outputs` be sent while the peer is stale or its data are invalid.
+    /// Sets the values to send while the peer is stale or its data are invalid.
     pub fn set_while_stale(&mut self, outputs: Outputs) {
         let stations = self.stations();
         self.image.blind = (outputs == Outputs::FailSafe).then(|| vec![false; stations].into());
     }
 
-    /// Lets another thread end the exchange with the fail-safe values, which the peer of each station has after this many
-    /// `cycles`.
+    /// Lets another thread end the exchange with the fail-safe values, which reach the peer of each station after this
+    /// many `cycles`.
     pub fn farewell(&mut self, cycles: u32) -> Farewell {
         let missing = (0..self.stations()).map(|station| match self.sizes(station).0 {
             0 => 0,
@@ -175,12 +175,12 @@ impl Port {
         farewell
     }
 
-    /// Whether the driver closes, and these are its last cycles: a bus then spares no station that has refused.
+    /// Returns true in the last cycles of a closing driver: a bus then also tries stations that have refused.
     pub fn is_ending(&self) -> bool {
         self.image.ending.as_ref().is_some_and(Ending::is_begun)
     }
 
-    /// The line has failed, or the last peer has left: nobody waits for it.
+    /// The line has failed, or the last peer has left: closing does not wait for this line.
     pub fn line_ended(&mut self) {
         if let Some(ending) = &self.image.ending {
             ending.shared.is_used.store(false, Ordering::Relaxed);
@@ -190,8 +190,8 @@ impl Port {
         }
     }
 
-    /// Whether the driver closes and a station's older values may still be under way, but no frame with the fail-safe values
-    /// follows them. The bus then has to stop those older values from reaching the peer.
+    /// Returns true if the driver closes, a station's older values may still be in transit, and no frame with the
+    /// fail-safe values follows them. The bus must then stop those older values from reaching the peer.
     pub fn leaves_old_values(&self) -> bool {
         self.image.ending.as_ref().is_some_and(|ending| {
             let mut takers = ending.stations.iter();
@@ -200,15 +200,16 @@ impl Port {
         })
     }
 
-    /// A write guard permits or forbids writes to these stations: closing waits for none that nothing is written to.
+    /// A write guard permits or forbids writes to these stations. Closing does not wait for a station without
+    /// permission.
     pub(crate) fn set_may_write(&mut self, stations: Range<usize>, may_write: bool) {
         if let Some(ending) = &mut self.image.ending {
             ending.set_may_write(stations, may_write);
         }
     }
 
-    /// The peer of a station has the last values of all signals that it takes. For buses that send each signal alone: no
-    /// receipt of theirs is of a whole frame.
+    /// The peer of a station has the last values of all signals that it takes. For buses that send each signal
+    /// separately, and thus have no receipt for a whole frame.
     pub fn has_last(&mut self, station: usize) {
         // Injected faults may have given the bus older values.
         if let Some(ending) = &mut self.image.ending

@@ -10,19 +10,21 @@ use super::image::{ImagePort, Report};
 use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape, Taken};
 use crate::{Cause, LinkState, LinkStatus};
 
-/// Passes everything on to an [`ImagePort`], and distorts it while line faults are active. Until the first one is
-/// injected, it allocates nothing and costs one comparison.
+/// Passes all calls to an [`ImagePort`], and distorts the data while line faults are active. Until the first fault is
+/// injected, the layer allocates nothing and costs one comparison.
 #[derive(Debug, Default)]
 pub(super) struct FaultLayer {
     board: Arc<FaultBoard>,
     /// The board's change counter when it was last read.
     seen: u64,
     line: Option<Box<LineFaults>>,
-    /// When the bus took the image of each station last, while there was no line fault: the first one begins there.
+    /// When the bus last took the image of each station, while there was no line fault. The first line fault starts
+    /// from there.
     taken: Box<[Taken]>,
-    /// The board was read for the message that the bus is handing in: the same faults act on all of its frames.
+    /// True if the board was read for the message that the bus is handing in: the same faults act on all frames of the
+    /// message.
     has_looked: bool,
-    /// A frame per station, for handing in what was held back.
+    /// A buffer per station, for handing in frames that were held back.
     frames: Vec<Box<[u8]>>,
     /// While a fault holds the line down: the bus's own report of the line.
     beneath: Option<Beneath>,
@@ -37,7 +39,7 @@ struct Beneath {
 }
 
 impl FaultLayer {
-    /// The faults on `board`, of so many stations.
+    /// The layer for the faults on `board`, for this number of stations.
     pub(super) fn new(board: Arc<FaultBoard>, stations: usize) -> Self {
         Self {
             taken: vec![Taken::Never; stations].into(),
@@ -46,7 +48,7 @@ impl FaultLayer {
         }
     }
 
-    /// Whether there is anything to do.
+    /// Returns true if there is anything to do.
     #[inline]
     pub(super) fn any(&self) -> bool {
         self.line.is_some() || self.board.news() != self.seen
@@ -60,7 +62,8 @@ impl FaultLayer {
         }
     }
 
-    /// The bus begins to hand in the frames of one message. Without faults now, none acts on any of them.
+    /// The bus begins to hand in the frames of one message. If there are no faults now, no fault acts on any of these
+    /// frames.
     #[inline]
     pub(super) fn begin_together(&mut self) {
         self.has_looked = !self.any();
@@ -117,13 +120,13 @@ impl FaultLayer {
         }
     }
 
-    /// Whether nothing goes out and nothing comes in.
+    /// Returns true if no frames are sent or received.
     #[inline]
     pub(super) fn is_down(&self) -> bool {
         self.line.as_ref().is_some_and(|line| line.is_down())
     }
 
-    /// Decides at random whether the next outgoing frames are lost.
+    /// Decides at random if the next outgoing frames are lost.
     #[inline]
     pub(super) fn loses_cycle(&mut self) -> bool {
         let line = self.line.as_mut();
@@ -152,7 +155,7 @@ impl FaultLayer {
         line.outgoing(station)
     }
 
-    /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    /// The peer has these bits of the bytes that [`outgoing`](Self::outgoing) returned last; `None` for all.
     #[inline]
     pub(super) fn sent(
         &mut self,
@@ -166,7 +169,7 @@ impl FaultLayer {
         }
     }
 
-    /// Whether [`outgoing`](Self::outgoing) has returned the image's newest bytes.
+    /// Returns true if [`outgoing`](Self::outgoing) has returned the image's newest bytes.
     pub(super) fn gives_newest(&self, station: usize) -> bool {
         let line = self.line.as_ref();
         line.is_none_or(|line| line.gives_newest(station))
@@ -210,7 +213,7 @@ impl FaultLayer {
         }
     }
 
-    /// Whether a fault is active, or frames are held back.
+    /// Returns true if a fault is active, or frames are held back.
     #[inline]
     pub(super) fn is_distorting(&self) -> bool {
         self.line
@@ -218,7 +221,7 @@ impl FaultLayer {
             .is_some_and(|line| !line.active().is_empty() || line.due() != Nanos::MAX)
     }
 
-    /// Whether nothing goes to this station, and nothing comes from it.
+    /// Returns true if no frames go to or come from this station.
     #[inline]
     pub(super) fn is_cut(&self, station: usize) -> bool {
         self.line.as_ref().is_some_and(|line| line.is_cut(station))
@@ -230,20 +233,20 @@ impl FaultLayer {
         }
     }
 
-    /// What the stations report, if that has changed since the last call.
+    /// The reports of the stations, if they have changed since the last call.
     #[inline]
     pub(super) fn take_diagnoses(&mut self) -> Option<&[Diagnosis]> {
         self.line.as_mut()?.take_diagnoses()
     }
 
-    /// The peer wrote, on a bus on which every write matters.
+    /// The peer wrote, on a bus for which every write matters.
     pub(super) fn event(&mut self, event: Event, port: &mut ImagePort) {
         if !self.is_down() {
             port.event(event);
         }
     }
 
-    /// The bus reports this of its line: kept while a fault hides it.
+    /// The bus reports this state of its line. The report is kept while a fault hides it.
     pub(super) fn enter(&mut self, now: Nanos, report: Report<'_>, port: &mut ImagePort) {
         if report.state == LinkState::Opening {
             self.taken.iter_mut().for_each(Taken::reopen);
@@ -278,7 +281,7 @@ impl Beneath {
     fn of(status: &LinkStatus) -> Self {
         let link = status.link();
         if link.state == LinkState::Stale {
-            // Staleness is decided by the clock, not by the bus.
+            // The clock decides staleness, not the bus.
             return Self {
                 state: LinkState::Running,
                 cause: Cause::Running,

@@ -1,4 +1,4 @@
-//! The frames of one bus cycle, and what the peer has of them.
+//! The frames of one bus cycle, and the receipt for them.
 
 use std::ops::Range;
 
@@ -20,19 +20,19 @@ impl Frames<'_> {
     ///
     /// # Panics
     ///
-    /// When the station was not taken.
+    /// If the station was not taken.
     #[inline]
     pub fn frame(&mut self, station: usize) -> &[u8] {
         assert!(self.stations.contains(&station), "it was not taken");
         self.port.outgoing(station, self.now)
     }
 
-    /// Whether the line can carry anything to this station.
+    /// Returns true if the line can carry anything to this station.
     pub fn is_station_up(&self, station: usize) -> bool {
         !self.port.faults.is_cut(station)
     }
 
-    /// Whether these are the last frames: a station that refused may still take the values of its end.
+    /// Returns true if these are the last frames: a station that refused earlier may still take these values.
     pub fn is_ending(&self) -> bool {
         self.port.is_ending()
     }
@@ -43,7 +43,7 @@ impl Frames<'_> {
         self.stations.clone()
     }
 
-    /// The receipt for all of them.
+    /// The receipt for all frames.
     #[inline]
     pub fn receipt(&self) -> Receipt {
         Receipt {
@@ -54,22 +54,22 @@ impl Frames<'_> {
     }
 }
 
-/// What the peer gets of the frames of a cycle. Hand it to [`Port::sent`] once the peer has it: pulses count as seen
-/// from then on. If it never arrives, drop the receipt, and its pulses are shown again.
+/// The part of a cycle's frames that the peer gets. Hand the receipt to [`Port::sent`] once the peer has this part: its
+/// pulses count as seen from then on. If the part never arrives, drop the receipt, and the pulses are shown again.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Receipt {
     pub(super) stations: Range<usize>,
     pub(super) bits: Option<Range<usize>>,
-    /// The frames have the fail-safe values of a driver that closes.
+    /// True if the frames have the fail-safe values of a closing driver.
     pub(super) is_last: bool,
 }
 
 impl Receipt {
-    /// The part that is one station's frame.
+    /// The receipt for one station's frame.
     ///
     /// # Panics
     ///
-    /// When the station is not part of it.
+    /// If the station is not part of the receipt.
     #[must_use]
     pub fn of(&self, station: usize) -> Self {
         assert!(self.stations.contains(&station), "it was not taken");
@@ -80,12 +80,12 @@ impl Receipt {
         }
     }
 
-    /// The part that is these bits of a station's frame (bit n of byte k is 8k + n), for a peer that gets no others:
+    /// The receipt for these bits of a station's frame (bit n of byte k is 8k + n), for a peer that gets no others:
     /// pulses elsewhere do not count as seen.
     ///
     /// # Panics
     ///
-    /// When the station is not part of it.
+    /// If the station is not part of the receipt.
     #[must_use]
     pub fn bits(&self, station: usize, bits: Range<usize>) -> Self {
         Self {

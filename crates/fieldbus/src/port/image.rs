@@ -20,9 +20,9 @@ pub(super) struct ImagePort {
     pub(super) validity: Validity,
     /// When the first station's last frame arrived while the line was running.
     pub(super) last_cycle: Option<Nanos>,
-    /// What is handed in belongs together with what is still to come.
+    /// True if the data handed in belong together with data still to come.
     pub(super) is_held: bool,
-    /// Per station, whether its last cycle found its peer stale; `None` if that does not change what is sent.
+    /// Per station, true if the last cycle found the peer stale; `None` if staleness does not change the sent values.
     pub(super) blind: Option<Box<[bool]>>,
     pub(super) ending: Option<Ending>,
 }
@@ -43,7 +43,7 @@ impl ImagePort {
         }
     }
 
-    /// Whether the fail-safe values are to be sent, although the simulation ticks.
+    /// Returns true if the fail-safe values must be sent although the simulation ticks.
     fn is_untrusted(&mut self, station: usize, now: Nanos) -> bool {
         let is_ending = self.ending.as_mut().is_some_and(|ending| {
             ending.is_used(station);
@@ -54,12 +54,12 @@ impl ImagePort {
         };
         let age = self.image.peer_age(station, now);
         let is_stale = is_stale(age, self.status.max_age(), self.validity.is_valid(station));
-        // A process that was held up finds everything stale once, and has not asked yet.
+        // A process that was held up finds everything stale once, before it has polled its peers again.
         let was_stale = std::mem::replace(&mut blind[station], is_stale);
         is_ending || (is_stale && was_stale)
     }
 
-    /// The peer has these bits of what [`outgoing`](Self::outgoing) returned last; `None` for all.
+    /// The peer has these bits of the bytes that [`outgoing`](Self::outgoing) returned last; `None` for all.
     #[inline]
     pub(super) fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) {
         match bits {
@@ -75,7 +75,7 @@ impl ImagePort {
         {
             self.status.cycle(now - last);
         }
-        // Before the frame: edges of data that are not valid do not count.
+        // The validity is updated before the frame: edges of invalid data do not count.
         let is_news = self.validity.arrived(station, now, bytes);
         let is_valid = self.validity.is_valid(station);
         self.image.received(station, now, bytes, is_valid);
@@ -88,7 +88,7 @@ impl ImagePort {
         }
     }
 
-    /// The next frame of the station was written in these ranges of bits.
+    /// The peer wrote these ranges of bits in the next frame of the station.
     pub(super) fn written(&mut self, station: usize, bits: impl IntoIterator<Item = Range<usize>>) {
         if let Some(changes) = self.changes.get_mut(station) {
             bits.into_iter().for_each(|bits| changes.written(bits));
@@ -105,13 +105,13 @@ impl ImagePort {
         self.hand_over();
     }
 
-    /// Takes over what the simulation wrote last.
+    /// Takes the values that the simulation wrote last.
     #[inline]
     pub(super) fn attend(&mut self, now: Nanos) {
         self.image.attend(now, self.watchdog);
     }
 
-    /// Hands over to the tick what was handed in, unless more belongs to it.
+    /// Passes the data handed in to the tick, unless more data belong to them.
     #[inline]
     pub(super) fn hand_over(&mut self) {
         if !self.is_held {
@@ -149,7 +149,7 @@ impl ImagePort {
         self.image.events.push(event);
     }
 
-    /// Checks whether data have become stale, or are no longer stale.
+    /// Checks if data have become stale, or are no longer stale.
     pub(super) fn observe(&mut self, now: Nanos) {
         while let Some(station) = self.validity.look(now) {
             self.update_validity(station, now);
@@ -159,7 +159,7 @@ impl ImagePort {
         status.observe(now, ages);
     }
 
-    /// Passes the validity of `station`'s data on to image and line.
+    /// Passes the validity of `station`'s data to the image and the line.
     fn update_validity(&mut self, station: usize, now: Nanos) {
         let is_valid = self.validity.is_valid(station);
         self.image.set_valid(station, is_valid);
@@ -176,7 +176,7 @@ impl ImagePort {
         )
     }
 
-    /// The bus reports this of its line.
+    /// The bus reports this state of its line.
     pub(super) fn enter(&mut self, now: Nanos, line: Report<'_>) {
         if line.state == LinkState::Running {
             self.status.running(now, line.reason);
@@ -186,7 +186,7 @@ impl ImagePort {
     }
 }
 
-/// What a bus reports of its line.
+/// A report of a bus about its line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Report<'a> {
     pub(super) state: LinkState,

@@ -1,21 +1,23 @@
-//! When the bus looked at its line, and what that says of what it finds there.
+//! The times at which the bus looked at its line, and the age of the data that it finds there.
 
 use tickbus_base::time::Nanos;
 
-/// An idle line is not looked at more often, however short `max_age` is: that would keep a processor busy.
+/// The shortest time between two looks at an idle line, however short `max_age` is: more looks would keep a processor
+/// busy.
 const LEAST_REST: Nanos = Nanos::from_millis(1);
 
-/// The looks of a bus at its line. What it finds has come since the look before, and counts as young only if that was
-/// recent: a process that was suspended finds what came while it stood still, however long ago.
+/// The looks of a bus at its line. The data that a look finds have arrived since the previous look, and count as young
+/// only if that look was recent. A process that was suspended finds data that arrived during the suspension, however
+/// long ago.
 #[derive(Debug)]
 pub(super) struct Looks {
     /// The limit of age.
     max_age: Nanos,
     /// The last look, since the bus [began](Self::begin) to look at its line.
     last: Option<Nanos>,
-    /// The time that counts for what this look finds, if it came too late.
+    /// The arrival time that counts for the data that this look finds, if the look came too late.
     kept_since: Option<Nanos>,
-    /// The look has not found everything that waited.
+    /// True if the look has not found everything that waited.
     is_unfinished: bool,
 }
 
@@ -30,7 +32,7 @@ impl Looks {
         }
     }
 
-    /// Nothing waits on the line at `now`: it is new.
+    /// The line is new at `now`, so nothing waits there.
     pub(super) fn begin(&mut self, now: Nanos) {
         (self.last, self.kept_since, self.is_unfinished) = (Some(now), None, false);
     }
@@ -44,28 +46,28 @@ impl Looks {
         if !std::mem::take(&mut self.is_unfinished) {
             self.kept_since = None;
         }
-        // Twice what was promised: threads are woken a little late all the time.
+        // The limit is twice the promised time, because threads often wake up a little late.
         if now - last > self.rest() + self.rest() {
             self.kept_since.get_or_insert(last);
         }
     }
 
-    /// This look has not found everything: the next one finds what may have waited as long.
+    /// This look has not found everything: the data that the next look finds may have waited as long.
     pub(super) fn leaves_some(&mut self) {
         self.is_unfinished = true;
     }
 
-    /// What is handed in next has come at `at`.
+    /// The data that are handed in next arrived at `at`.
     pub(super) fn came(&mut self, at: Nanos) {
         self.kept_since = Some(at);
     }
 
-    /// When the next look is to come at the latest; [`Nanos::MAX`] if the bus has not begun to look.
+    /// The latest time for the next look; [`Nanos::MAX`] if the bus has not begun to look.
     pub(super) fn next(&self) -> Nanos {
         self.last.map_or(Nanos::MAX, |last| last + self.rest())
     }
 
-    /// The time that counts for what is handed in at `now`.
+    /// The arrival time that counts for data handed in at `now`.
     #[inline]
     pub(super) fn arrival(&self, now: Nanos) -> Nanos {
         let look = self.last.unwrap_or(now);
@@ -86,7 +88,7 @@ mod tests {
         Nanos::from_millis(ms)
     }
 
-    /// Of a line whose data may be 100 ms old, begun at 1000 ms.
+    /// The looks at a line whose data may be 100 ms old, begun at 1000 ms.
     fn looks() -> Looks {
         let mut looks = Looks::new(at(100));
         looks.begin(at(1000));
@@ -107,7 +109,7 @@ mod tests {
     fn what_is_read_long_after_a_look_counts_as_found_by_that_look() {
         let mut looks = looks();
         looks.look(at(1025));
-        // The thread was without a processor between the look and the reading.
+        // The thread had no processor between the look and the reading.
         assert_eq!(looks.arrival(at(1900)), at(1025));
     }
 

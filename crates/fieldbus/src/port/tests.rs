@@ -34,7 +34,7 @@ impl Random {
     }
 }
 
-/// Both ends of an image of stations with one byte each way, and the tick that has the faults of its line.
+/// Both ends of an image of stations with one byte each way, and the tick side of the line's faults.
 struct Rig {
     tick: TickEnd,
     port: Port,
@@ -147,7 +147,8 @@ fn a_fault_that_is_injected_and_begins_while_stations_are_handed_in_together_mee
     assert_eq!([0, 1].map(|station| rig.tick.latest(station)), [[1], [1]]);
 }
 
-/// What came for one station: frames that are held back, with the times of their arrival, and what the tick has.
+/// The incoming data of one station: frames that are held back, with the times of their arrival, and the byte that the
+/// tick has.
 #[derive(Default)]
 struct Incoming {
     held: VecDeque<(i64, u8)>,
@@ -162,7 +163,8 @@ impl Incoming {
             && (delay == 0 || came + delay <= now)
         {
             self.held.pop_front();
-            // A frame counts from when it was due, even if the port looks later, but never from before the frame ahead of it.
+            // A frame counts from its due time, even if the port looks later, but never from a time before the previous
+            // frame.
             let due = (came + delay).max(self.released);
             (self.released, self.heard, self.byte) = (due, Some(due), byte);
         }
@@ -192,7 +194,7 @@ fn the_tick_gets_frames_as_late_as_the_line_is_and_takes_no_data_for_younger_tha
                 }
             }
             4 | 5 => {
-                // No sign of life is younger than the data that it comes with.
+                // A sign of life is never younger than the data that it comes with.
                 rig.port.touch(station, Nanos(now));
                 let line = &mut lines[station];
                 if line.held.is_empty() {
@@ -243,7 +245,7 @@ fn the_tick_gets_frames_as_late_as_the_line_is_and_takes_no_data_for_younger_tha
 #[test]
 fn a_pulse_is_sent_until_the_peer_has_it_or_the_line_has_lost_it() {
     let (mut rig, mut random) = (Rig::new(), Random(2));
-    // Per station, the level that this end believes to be at the peer, and whether a pulse waits.
+    // Per station, the level that this end assumes at the peer, and true if a pulse waits.
     let mut models = [(false, false); STATIONS];
     let (mut now, mut fault) = (0, None);
     let (mut lost, mut shown) = (0, 0);

@@ -22,9 +22,9 @@ pub struct Address {
 /// A host, by number or by name.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Host {
-    /// By its address.
+    /// The host's address.
     Ip(IpAddr),
-    /// By a name that must be looked up.
+    /// A name that must be looked up.
     Name(String),
 }
 
@@ -43,7 +43,7 @@ impl Address {
         text.parse().map_err(|mistake| value.refuse(mistake)).ok()
     }
 
-    /// Reads one to connect to.
+    /// Reads an address to connect to.
     pub fn read_dialled(value: &Value<'_>) -> Option<Self> {
         let address = Self::read(value)?;
         let checked = address.check_dialled();
@@ -51,7 +51,7 @@ impl Address {
         Some(address)
     }
 
-    /// Checks that it can be connected to.
+    /// Checks that the address is one to connect to.
     ///
     /// # Errors
     ///
@@ -127,7 +127,7 @@ impl FromStr for Host {
         if let Ok(ip) = text.parse::<Ipv4Addr>() {
             return Ok(Self::Ip(ip.into()));
         }
-        // This name means this machine everywhere; one address without a look-up, rather than two.
+        // This name always means this machine. Without a look-up there is one address; a look-up could return two.
         if text.eq_ignore_ascii_case("localhost") {
             return Ok(Self::Ip(Ipv4Addr::LOCALHOST.into()));
         }

@@ -1,7 +1,7 @@
-//! Telling a web browser from a peer.
+//! Distinguishes a web browser from a peer.
 
-/// Request lines of browsers begin so. The published grammar of dispatchers has a `CONNECT` of its own, and browsers send
-/// that to proxies only.
+/// The beginnings of browsers' request lines. `CONNECT` is not among them: the published grammar of dispatchers has its
+/// own `CONNECT`, and browsers send that method only to proxies.
 const REQUESTS: [&[u8]; 9] = [
     b"GET /",
     b"POST /",
@@ -14,23 +14,23 @@ const REQUESTS: [&[u8]; 9] = [
     b"TRACE /",
 ];
 
-/// What every STUN message has behind its type and length.
+/// The bytes that follow type and length in every STUN message.
 const STUN_COOKIE: [u8; 4] = [0x21, 0x12, 0xA4, 0x42];
 
-/// Why such a connection is closed, for a log or as an answer.
+/// The reason for closing such a connection, for a log or as an answer.
 pub const IS_BROWSER: &str = "this is an HTTP request or another message of a web browser, as a web page may send it without the user's knowledge; no web server is here";
 
-/// Whether the first bytes of a connection are those of a web browser: an HTTP request, the hello of TLS behind `https:` and
-/// `wss:`, or a message to a relay of WebRTC.
+/// Returns true if the first bytes of a connection are those of a web browser: an HTTP request, the TLS hello of
+/// `https:` and `wss:`, or a message to a WebRTC relay.
 ///
-/// Any web site can have a browser open connections to ports of the same computer and its network, and chooses parts of what is
-/// sent: the body of a request, and the ticket in a hello. Ports without a password therefore close such a connection before
-/// they look further.
+/// Any web site can make a browser open connections to ports of the same computer and its network. The site chooses
+/// parts of the sent bytes: the body of a request, and the ticket in a hello. Ports without a password therefore close
+/// such a connection before they read further.
 pub fn begins_like_browser(bytes: &[u8]) -> bool {
     REQUESTS.iter().any(|it| bytes.starts_with(it)) || is_tls_hello(bytes) || is_stun(bytes)
 }
 
-/// How a handshake record with a `ClientHello` begins; versions and lengths stand as `None`.
+/// The beginning of a handshake record with a `ClientHello`; `None` for versions and lengths.
 const HELLO: [Option<u8>; 10] = [
     Some(0x16),
     Some(3),
@@ -44,13 +44,13 @@ const HELLO: [Option<u8>; 10] = [
     Some(3),
 ];
 
-/// Whether the bytes, or as many as a beginning has, are those of a hello.
+/// Returns true if the bytes, compared as far as [`HELLO`] goes, are those of a hello.
 fn fits_hello(bytes: &[u8]) -> bool {
     let mut pairs = bytes.iter().zip(HELLO);
     pairs.all(|(byte, right)| right.is_none_or(|right| *byte == right))
 }
 
-/// A handshake record that holds one `ClientHello` and nothing else.
+/// Returns true for a handshake record that holds one `ClientHello` and nothing else.
 fn is_tls_hello(bytes: &[u8]) -> bool {
     let &[_, _, _, high, low, _, _, hello_high, hello_low, _, ..] = bytes else {
         return false;
@@ -59,15 +59,17 @@ fn is_tls_hello(bytes: &[u8]) -> bool {
     fits_hello(bytes) && record.checked_sub(4) == Some(u16::from_be_bytes([hello_high, hello_low]))
 }
 
-/// The types that browsers send begin with 0 or 1: the methods of STUN and TURN (RFC 8489, RFC 8656) and the class.
+/// Returns true for a STUN message. The types that browsers send begin with 0 or 1: the methods of STUN and TURN (RFC
+/// 8489, RFC 8656) and the class.
 fn is_stun(bytes: &[u8]) -> bool {
     matches!(bytes, [0 | 1, ..]) && bytes.get(4..8) == Some(&STUN_COOKIE)
 }
 
-/// Whether bytes that [`begins_like_browser`] does not know yet may turn out to be a browser's with those that follow.
+/// Returns true if bytes that [`begins_like_browser`] does not recognise yet may still become a browser's, together
+/// with the bytes that follow.
 ///
-/// A hello of TLS and a message of STUN may have a line feed among their first bytes, so that a port that takes lines must not
-/// take such a line for one before the rest is there.
+/// The first bytes of a TLS hello or a STUN message may contain a line feed. A port that reads lines must therefore
+/// wait for the rest before it accepts such a line.
 pub fn may_become_browser(bytes: &[u8]) -> bool {
     let cookie = bytes.get(4..).unwrap_or_default();
     let is_hello = bytes.len() < HELLO.len() && fits_hello(bytes);
@@ -104,7 +106,7 @@ mod tests {
 
     #[test]
     fn what_browsers_send_with_https_and_webrtc_is_told_from_records() {
-        // As Chromium sends it to https://127.0.0.1:20070/, and with turn:127.0.0.1:20070?transport=tcp.
+        // The bytes that Chromium sends to https://127.0.0.1:20070/, and with turn:127.0.0.1:20070?transport=tcp.
         let hello = b"\x16\x03\x01\x07\x6b\x01\x00\x07\x67\x03\x03\x2a\xbd";
         let allocate = b"\x00\x03\x00\x08\x21\x12\xa4\x42\x32\x4d\x58\x4d";
         assert!(begins_like_browser(hello));

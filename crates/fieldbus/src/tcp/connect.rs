@@ -14,7 +14,7 @@ use tickbus_base::time::{Nanos, Simulation, Stop};
 use super::resolve::resolve;
 use super::{Address, no_wait, prepare};
 
-/// How long an address has to answer. The system itself would try for minutes.
+/// The time in which an address must answer. The system itself would try for minutes.
 const PATIENCE: Nanos = Nanos::from_secs(5);
 
 /// Connects without blocking, within a few seconds; `None` if `stop` came first.
@@ -46,11 +46,11 @@ pub fn connect(
     Ok(Some((stream, peer)))
 }
 
-/// As [`reach`], on the network of `simulation` if there is one.
+/// As [`reach`], but on the network of `simulation` if there is one.
 ///
 /// # Errors
 ///
-/// As there.
+/// As [`reach`].
 pub fn reach_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<TcpStream> {
     let Some(simulation) = simulation else {
         return reach(address).map(TcpStream::from);
@@ -149,7 +149,7 @@ fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::
     Ok(false)
 }
 
-/// If the system happens to choose the destination port for this end, the socket connects to itself.
+/// Refuses a socket that connected to itself, which happens if the system chooses the destination port for this end.
 fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
     if own == peer {
         return Err(ErrorKind::ConnectionRefused.into());
@@ -157,7 +157,7 @@ fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
     Ok(())
 }
 
-/// Starts to connect, without waiting.
+/// Starts to connect; does not wait.
 fn begin(address: SocketAddr) -> io::Result<net::TcpStream> {
     let socket = Socket::new(
         Domain::for_address(address),

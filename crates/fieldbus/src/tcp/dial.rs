@@ -15,17 +15,17 @@ use super::{Address, close_by_reset, close_gracefully, connect, is_for_later, no
 /// At most this many bytes are read at once.
 const BUFFER: usize = 16 * 1024;
 
-/// At most this many reads in a row, before anything else is done.
+/// At most this many consecutive reads, before anything else is done.
 const READS: usize = 64;
 
-/// A protocol as one end of a connection speaks it: bytes in, bytes out, and the image behind the port.
-/// It does no I/O itself.
+/// A protocol as one end of a connection speaks it: bytes in, bytes out, and the image behind the port. A caller does
+/// no I/O.
 ///
-/// In each turn a [`Call`] passes on what has arrived, by [`hear`](Self::hear); lets the caller do what is
-/// due, by [`turn`](Self::turn); writes [`to_write`](Self::to_write) until it is empty or the system accepts
-/// no more, and reports each piece by [`wrote`](Self::wrote); and asks by [`check`](Self::check) whether the
-/// connection may go on. Then it waits for the peer until [`deadline`](Self::deadline). The first error of
-/// any of them ends the connection.
+/// In each turn a [`Call`] passes received bytes to [`hear`](Self::hear), and calls [`turn`](Self::turn) for everything
+/// that is due. Then it writes [`to_write`](Self::to_write) until that is empty or the system accepts no more, and
+/// reports each piece to [`wrote`](Self::wrote). Finally it calls [`check`](Self::check) to ask if the connection may
+/// continue, and waits for the peer until [`deadline`](Self::deadline). The first error of any of these calls ends the
+/// connection.
 pub trait Caller {
     /// `bytes` have arrived, at least one; any part of a telegram, or several.
     ///
@@ -38,18 +38,18 @@ pub trait Caller {
     ///
     /// # Errors
     ///
-    /// The connection may not go on.
+    /// The connection must end.
     fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError>;
 
     /// The bytes to be written at `now`, if any.
     fn to_write(&self, now: Nanos) -> &[u8];
 
-    /// The system has accepted the first `count` bytes of [`to_write`](Self::to_write), at least one. More
-    /// may be made at once: they are written in the same turn.
+    /// The system has accepted the first `count` bytes of [`to_write`](Self::to_write), at least one. The caller may
+    /// make more bytes at once: they are written in the same turn.
     fn wrote(&mut self, now: Nanos, count: usize, port: &mut Port);
 
-    /// Checks the time-outs at `now`, last of all: if this process was held up, the peer is not blamed for
-    /// what it has sent or taken in the meantime.
+    /// Checks the time-outs at `now`, at the end of the turn. After a delay of this process, the peer thus gets credit
+    /// for the bytes that it has sent or taken in the meantime.
     ///
     /// # Errors
     ///
@@ -58,8 +58,8 @@ pub trait Caller {
         Ok(())
     }
 
-    /// Until when to wait if nothing arrives and nothing can be written, beside what the port itself is
-    /// [due](Port::due) for. A time that has passed means at once.
+    /// The time until which to wait if nothing arrives and nothing can be written; the port has its own [due
+    /// time](Port::due). A time in the past means no wait.
     fn deadline(&self, port: &Port) -> Nanos;
 
     /// The error that ends the connection, now that the peer has closed it.
@@ -71,10 +71,11 @@ pub trait Caller {
 
 /// A stream of bytes that never blocks.
 pub trait Stream: Read + Write + Pollable {
-    /// It is about to be dropped.
+    /// Called when the stream is about to be dropped.
     fn close(&mut self) {}
 
-    /// It is about to be dropped, and with it what the peer has not got yet. A stream that cannot do that is closed.
+    /// Called when the stream is about to be dropped together with the bytes that the peer has not received yet. A
+    /// stream that cannot drop these is closed.
     fn close_by_reset(&mut self) {
         self.close();
     }
@@ -115,8 +116,8 @@ impl Stream for SerialLine {}
 #[cfg(unix)]
 impl Stream for LinkedTerminal {}
 
-/// Connects with `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came
-/// first. The peer may leave sent data unacknowledged for `patience`.
+/// Connects to `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came first. The peer
+/// may leave sent data unacknowledged for `patience`.
 ///
 /// # Errors
 ///
@@ -136,18 +137,18 @@ pub fn dial(
     }))
 }
 
-/// A connection with one peer: transfers bytes between a stream and a [`Caller`]. It is closed properly when
-/// dropped, or broken if the peer may still get what is no longer meant: at an [end](Self::end) without the
-/// last values.
+/// A connection with one peer: transfers bytes between a stream and a [`Caller`]. Dropping the call closes the
+/// connection properly. After an [end](Self::end) without the last values, dropping it resets the connection instead,
+/// so that outdated values do not reach the peer.
 #[derive(Debug)]
 pub struct Call<S: Stream> {
     stream: S,
     buffer: Box<[u8]>,
-    /// Whether the system has not accepted all that was to be written.
+    /// True if the system has not accepted all bytes to be written.
     blocked: bool,
-    /// When connecting began, until the first look: what the peer has sent may wait since then.
+    /// When connecting began, until the first look: bytes from the peer may have waited since then.
     since: Option<Nanos>,
-    /// Whether what the peer has not got yet must not reach it any more.
+    /// True if bytes that the peer has not received yet must no longer reach it.
     ends_by_reset: bool,
 }
 
@@ -167,7 +168,7 @@ impl<S: Stream> Call<S> {
     ///
     /// # Errors
     ///
-    /// Why the connection has ended.
+    /// The reason why the connection has ended.
     pub fn run(
         &mut self,
         caller: &mut impl Caller,
@@ -185,7 +186,7 @@ impl<S: Stream> Call<S> {
         while !stop.is_stopped() {
             port.look_at_line(port.clock().now());
             if std::mem::take(&mut is_first) {
-                // Nothing is read before the system has said that there is something.
+                // The first turn reads nothing, because the system has not reported any bytes yet.
                 port.look_leaves_some();
             }
             self.turn(readable, caller, port)?;
@@ -203,7 +204,7 @@ impl<S: Stream> Call<S> {
         Ok(())
     }
 
-    /// The driver closes, so that the connection ends although nothing has failed.
+    /// Called when the driver closes: the connection ends although nothing has failed.
     pub fn end(&mut self, port: &Port) {
         self.ends_by_reset = port.leaves_old_values();
     }
@@ -213,7 +214,7 @@ impl<S: Stream> Call<S> {
         &self.stream
     }
 
-    /// What to wait for before the next [`turn`](Self::turn).
+    /// The events to wait for before the next [`turn`](Self::turn).
     pub fn interest(&self) -> Interest {
         if self.blocked {
             Interest::ReadWrite
@@ -222,12 +223,12 @@ impl<S: Stream> Call<S> {
         }
     }
 
-    /// One turn of `caller`, for an owner that waits for several streams and has [looked](Port::look_at_line) at them; see
-    /// [`run`](Self::run).
+    /// One turn of `caller`, for an owner that waits for several streams and has [looked](Port::look_at_line) at these;
+    /// see [`run`](Self::run).
     ///
     /// # Errors
     ///
-    /// Why the connection has ended.
+    /// The reason why the connection has ended.
     pub fn turn(
         &mut self,
         readable: bool,
@@ -249,7 +250,7 @@ impl<S: Stream> Call<S> {
     ///
     /// # Errors
     ///
-    /// Why the connection has ended.
+    /// The reason why the connection has ended.
     pub fn read_all(&mut self, caller: &mut impl Caller, port: &mut Port) -> Result<(), BusError> {
         let now = port.clock().now();
         for _ in 0..READS {
@@ -260,7 +261,7 @@ impl<S: Stream> Call<S> {
         Ok(())
     }
 
-    /// Reads once; returns whether there was anything.
+    /// Reads once; returns true if there was anything.
     fn read(
         &mut self,
         now: Nanos,

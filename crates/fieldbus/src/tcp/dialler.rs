@@ -1,4 +1,4 @@
-//! Connecting, again and again, without keeping anybody waiting.
+//! Repeated connection attempts that never block the caller.
 
 use std::io;
 use std::net::TcpStream;
@@ -7,13 +7,13 @@ use std::sync::mpsc::{self, Receiver, TryRecvError};
 use super::{Address, prepare, reach};
 use tickbus_base::time::{Nanos, Stop};
 
-/// How long after an attempt has failed, or a connection was lost, the next attempt begins.
+/// The pause after a failed attempt or a lost connection, before the next attempt.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// How long the other machine may leave data unacknowledged.
 const PATIENCE: Nanos = Nanos::from_secs(10);
 
-/// Connects on a thread of its own: looking a name up blocks, and so does a host that does not answer.
+/// Connects on a separate thread, because a look-up blocks, and so does a host that does not answer.
 #[derive(Debug)]
 pub struct Dialler {
     address: Address,
@@ -23,7 +23,7 @@ pub struct Dialler {
 }
 
 impl Dialler {
-    /// Calls `address`; wakes `stop` when there is a result.
+    /// A dialler for `address`, which wakes `stop` when there is a result.
     pub fn new(address: &Address, stop: &Stop) -> Self {
         Self {
             address: address.clone(),
@@ -38,7 +38,7 @@ impl Dialler {
         self.not_before = now + PAUSE;
     }
 
-    /// When [`turn`](Self::turn) has something to do even if it is not woken.
+    /// The time at which [`turn`](Self::turn) has something to do even if no result wakes `stop`.
     pub fn deadline(&self) -> Nanos {
         if self.calling.is_some() {
             Nanos::MAX
@@ -47,8 +47,8 @@ impl Dialler {
         }
     }
 
-    /// Begins an attempt if it is time, and returns the result of one that has ended: a stream that never blocks, or why
-    /// there is none.
+    /// Begins an attempt if one is due. Returns the result of an attempt that has ended: a stream that never blocks, or
+    /// the error.
     pub fn turn(&mut self, now: Nanos) -> Option<io::Result<TcpStream>> {
         let Some(calling) = &self.calling else {
             if now >= self.not_before {
@@ -83,7 +83,7 @@ impl Dialler {
         let thread = std::thread::Builder::new().name("tickbus-dial".to_owned());
         match thread.spawn(call) {
             Ok(_) => self.calling = Some(receiver),
-            // The system has no thread now.
+            // The system cannot start a thread now.
             Err(_) => self.pause(now),
         }
     }

@@ -10,7 +10,7 @@ use tickbus_base::time::{Simulation, Stop};
 use super::Address;
 use super::resolve::resolve;
 
-/// Listens on `address`, without blocking; returns what was bound, or `None` if `stop` came first.
+/// Listens on `address`, without blocking; returns the listener and its bound address, or `None` if `stop` came first.
 ///
 /// # Errors
 ///
@@ -47,8 +47,8 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
-/// Listens on `address` at once, without blocking, for a server that has no [`Port`], on the network of `simulation` if there is
-/// one; returns what was bound. Port 0 lets the system choose one.
+/// Listens on `address` at once, without blocking, for a server that has no [`Port`], on the network of `simulation` if
+/// there is one. Returns the listener and its bound address. Port 0 lets the system choose a port.
 ///
 /// # Errors
 ///
@@ -63,7 +63,7 @@ pub fn bind(
     Ok((listener, bound))
 }
 
-/// Counts a client for which the system had no socket, and logs that.
+/// Counts and logs a client for which the system had no socket.
 pub fn not_accepted(error: &io::Error, port: &Port) {
     port.count("clients.not_accepted");
     port.log(
@@ -75,7 +75,7 @@ pub fn not_accepted(error: &io::Error, port: &Port) {
     );
 }
 
-/// Whether accepting failed for a reason that concerns only this client.
+/// Returns true if accepting failed for a reason that concerns only this client.
 pub fn is_of_the_client(error: &io::Error) -> bool {
     matches!(
         error.kind(),

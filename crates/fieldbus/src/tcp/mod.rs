@@ -25,7 +25,7 @@ pub use server::{Limits, Service};
 pub use stream::{close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};
 pub use writers::{Writer, Writers, report_second};
 
-/// The system cannot wait on this thread, or for this socket.
+/// The error when the system cannot wait on this thread, or for this socket.
 pub fn no_wait(error: &std::io::Error) -> BusError {
     BusError::Link(format!(
         "the system cannot wait for the socket ({error}); close other programs or raise the limit of \

@@ -11,8 +11,8 @@ use super::{Address, Host};
 
 /// All addresses of a host, with its port; `None` if `stop` came first.
 ///
-/// A name is looked up on a separate thread, because a look-up cannot be cancelled: closing leaves the thread
-/// behind, to end by itself.
+/// A name is looked up on a separate thread, because a look-up cannot be cancelled: closing leaves the thread behind,
+/// which ends when the look-up does.
 ///
 /// # Errors
 ///
@@ -99,7 +99,7 @@ mod tests {
     fn a_stop_waits_for_no_look_up() {
         let stop = Stop::new();
         stop.stop();
-        // Either result is fine: neither is waited for any longer than the other.
+        // Both results are correct: the look-up and the stop may finish in either order.
         let found = resolve(&named("localhost"), &*Manual::new(), &stop);
         assert!(matches!(found, Ok(None | Some(_))));
     }

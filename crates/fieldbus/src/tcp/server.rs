@@ -19,10 +19,10 @@ const LISTENER: usize = usize::MAX - 1;
 /// At most this many clients are accepted per turn, before others are served.
 const ACCEPTS: usize = 32;
 
-/// How long no client is accepted after the system had no socket.
+/// How long the server accepts no client after the system had no socket.
 const PAUSE: Nanos = Nanos::from_secs(1);
 
-/// What a server allows its clients.
+/// The limits that a server sets for its clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// The longest telegram of the protocol, in bytes. A client that sends this many bytes without a complete
@@ -34,8 +34,8 @@ pub struct Limits {
     pub patience: Nanos,
 }
 
-/// A protocol as the server speaks it with each client: bytes in, bytes out, and the image behind the port.
-/// It does no I/O itself.
+/// A protocol as the server speaks it with each client: bytes in, bytes out, and the image behind the port. A service
+/// does no I/O.
 pub trait Service {
     /// The state of one client.
     type Client;
@@ -48,13 +48,13 @@ pub trait Service {
 
     /// Examines the bytes received from a client and not yet consumed.
     ///
-    /// Returns the length of the telegram at their beginning, and appends the answer, if any, to `reply`; 0
-    /// if the telegram is not complete yet. It is called again until it returns 0.
+    /// Returns the length of the telegram at their beginning, and appends the answer, if any, to `reply`. Returns 0 if
+    /// the telegram is not complete yet. The server repeats the call until it returns 0.
     ///
     /// # Errors
     ///
-    /// The client violates the protocol. It is disconnected, after what is in `reply` was sent; others are
-    /// served as before.
+    /// The client violates the protocol. The server sends the bytes in `reply` and disconnects the client; other
+    /// clients are not affected.
     fn telegram(
         &mut self,
         client: &mut Self::Client,
@@ -80,7 +80,7 @@ pub fn serve<S: Service>(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    // A client may come as soon as the system listens, and this thread later.
+    // A client may connect as soon as the system listens, before this thread runs again.
     let since = port.clock().now();
     let Some((listener, bound)) = listen(address, port, stop)? else {
         return Ok(());
@@ -130,10 +130,10 @@ struct Server<'a, S: Service> {
     /// The answer to the current client.
     reply: Vec<u8>,
     ready: Vec<Ready>,
-    /// Until when no client is accepted, after the system had no socket.
+    /// The time until which no client is accepted, after the system had no socket.
     accept_paused_until: Option<Nanos>,
-    /// When and why the last client that had spoken left, as long as it may come back: some clients connect
-    /// anew for every request, which does not make the line broken.
+    /// When and why the last client that had spoken left, for as long as it may come back: some clients reconnect for
+    /// every request, and that is no broken line.
     gone: Option<(Nanos, BusError)>,
 }
 
@@ -145,7 +145,7 @@ struct Clients<C> {
     count: usize,
     /// The number of clients that have sent a valid telegram.
     speakers: usize,
-    /// The number of clients that owe something: the rest of a telegram, or reading an answer.
+    /// The number of clients that owe something: the rest of a telegram, or the reading of an answer.
     awaited: usize,
 }
 
@@ -153,14 +153,14 @@ struct Client<C> {
     stream: TcpStream,
     peer: SocketAddr,
     state: C,
-    /// When it was last heard from: a complete telegram, or its connection.
+    /// When the client was last heard from: its last complete telegram, or its connection.
     heard: Nanos,
     speaks: bool,
     /// Bytes of an incomplete telegram.
     begun: Vec<u8>,
     /// Bytes of an answer that the system has not accepted yet.
     unsent: Vec<u8>,
-    /// Since when either of them has been waiting.
+    /// The time since which either of them has been waiting.
     waits_since: Option<Nanos>,
 }
 
@@ -201,7 +201,7 @@ impl<C> Clients<C> {
         places.filter_map(|(place, client)| Some((place, client.as_ref()?)))
     }
 
-    /// The client that has been silent for longest.
+    /// The client that has been silent for the longest time.
     fn most_silent(&self) -> Option<(usize, Nanos)> {
         let times = self.iter().map(|(place, client)| (place, client.heard));
         times.min_by_key(|(_, heard)| *heard)
@@ -281,14 +281,14 @@ impl<S: Service> Server<'_, S> {
         };
         if !client.unsent.is_empty() {
             if is_writable && client.write_on()? {
-                // Its incomplete telegram is timed from now on, since the server has not read from it before.
+                // The incomplete telegram is timed from now on, since the server did not read from the client before.
                 client.waits_since = (!client.begun.is_empty()).then_some(now);
                 self.clients.awaited -= usize::from(client.waits_since.is_none());
                 let client = &*client;
                 let heard = self.set.change(place, &client.stream, Interest::Read);
                 heard.map_err(|error| no_wait(&error))?;
             }
-            // A client that does not read its answers is not read from.
+            // The server does not read from a client that does not read its answers.
             return Ok(());
         }
         let count = match client.stream.read(&mut self.buffer) {
@@ -417,7 +417,7 @@ impl<S: Service> Server<'_, S> {
     }
 
     fn welcome(&mut self, stream: TcpStream, peer: SocketAddr, now: Nanos, port: &mut Port) {
-        // If it cannot be prepared, it is gone already.
+        // A connection that cannot be prepared is gone already.
         if let Err(error) = prepare(stream.os(), self.limits.patience) {
             log::debug!("the connection with {peer} broke at once: {error}");
             return;
@@ -445,7 +445,7 @@ impl<S: Service> Server<'_, S> {
             return;
         }
         port.count("clients.accepted");
-        // What it has sent waits for the next look, and may have waited as long as its connection.
+        // The client's bytes wait for the next look, and may have waited as long as its connection.
         port.look_leaves_some();
         self.tell(port);
         if self.clients.speakers == 0 && self.gone.is_none() {
@@ -456,7 +456,7 @@ impl<S: Service> Server<'_, S> {
         log::debug!("{peer} has connected");
     }
 
-    /// Disconnects the client that has been silent for longest, if that is long enough.
+    /// Disconnects the client that has been silent for the longest time, if that is long enough.
     fn make_room(&mut self, now: Nanos, port: &mut Port) -> bool {
         let Some((place, heard)) = self.clients.most_silent() else {
             return false;
@@ -551,7 +551,7 @@ impl<C> Client<C> {
         Ok(telegrams)
     }
 
-    /// Continues an answer; returns whether all of it was sent.
+    /// Continues an answer; returns true if all of it was sent.
     fn write_on(&mut self) -> Result<bool, BusError> {
         match self.stream.write(&self.unsent) {
             Ok(count) => {

@@ -9,14 +9,14 @@ use socket2::SockRef;
 use tickbus_base::net::{HalfClose, TcpStream};
 use tickbus_base::time::Nanos;
 
-/// How many times a socket is read at most while it is being closed.
+/// The maximum number of reads from a socket while it is being closed.
 const READS: usize = 64;
 
-/// The longest time-out that is set: systems accept no more than some hours.
+/// The longest time-out to set: systems accept no more than some hours.
 const LONGEST: Nanos = Nanos::from_secs(3600);
 
-/// Closes the sending direction before a connection is closed: with unread bytes the system would reset the
-/// connection, and the peer would lose what it has not read yet.
+/// Closes the sending direction before a connection is closed. With unread bytes the system would reset the connection,
+/// and the peer would lose the bytes that it has not read yet.
 pub fn close_gracefully<'a, S: HalfClose>(mut stream: &'a S)
 where
     &'a S: Read,
@@ -31,10 +31,11 @@ where
     }
 }
 
-/// Makes the system break a connection that is about to be dropped, and drop what the peer has not got.
+/// Makes the system reset a connection that is about to be dropped, and discard the bytes that the peer has not
+/// received.
 ///
-/// For values that are no longer meant: the system would go on sending them to a peer whose cable is pulled after the
-/// program has ended, and they would count there when the cable is back.
+/// For outdated values. Without the reset, the system would continue to send them to a peer with a pulled cable, even
+/// after the program has ended. Once the cable is back, the peer would use them.
 pub fn close_by_reset(stream: &TcpStream) {
     match stream {
         TcpStream::Os(stream) => {
@@ -45,13 +46,13 @@ pub fn close_by_reset(stream: &TcpStream) {
     }
 }
 
-/// Whether the call has not failed, but has to be repeated when the socket is ready.
+/// Returns true if the call has not failed, but must be repeated when the socket is ready.
 pub fn is_for_later(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted)
 }
 
-/// Makes the system send at once, never block, and give up after `patience` on a peer whose cable was pulled; `None`, of a
-/// simulation, does so anyway.
+/// Makes the system send at once, never block, and give up after `patience` on a peer with a pulled cable. `None` means
+/// a simulated connection, which behaves like this anyway.
 ///
 /// # Errors
 ///
@@ -77,9 +78,10 @@ pub fn prepare<'a>(
     socket.set_tcp_keepalive(&keepalive)
 }
 
-/// Replaces the patience of [`prepare`] for a peer that need not read: the system asks its computer every second whether the
-/// connection is still there, and ends it after two questions without an answer. While data are on their way it does not ask;
-/// [`peer_silence`](tickbus_base::os::peer_silence) tells of those. `None`, of a simulation, does so anyway.
+/// Replaces the patience of [`prepare`] for a peer that need not read. The system probes the peer's computer every
+/// second, and ends the connection after two probes without an answer. While data are unacknowledged the system does
+/// not probe; [`peer_silence`](tickbus_base::os::peer_silence) covers that case. `None` means a simulated connection,
+/// which behaves like this anyway.
 ///
 /// # Errors
 ///
@@ -89,7 +91,7 @@ pub fn watch_peer<'a>(stream: impl Into<Option<&'a net::TcpStream>>) -> io::Resu
         return Ok(());
     };
     let socket = SockRef::from(stream);
-    // A limit would count for a peer as well that is there and does not read.
+    // A user time-out would also end the connection with a peer that is alive but does not read.
     #[cfg(any(target_os = "linux", target_os = "android"))]
     socket.set_tcp_user_timeout(None)?;
     let second = std::time::Duration::from_secs(1);

@@ -1,4 +1,4 @@
-//! Who writes to a station of a server: two controllers on one machine undo each other's outputs.
+//! The writers of a server's stations: two controllers on one machine undo each other's outputs.
 
 use std::fmt::Display;
 use std::net::SocketAddr;
@@ -10,28 +10,28 @@ use tickbus_base::toml_text::Table;
 
 use crate::Port;
 
-/// A client of a server, as its writes know it. They forget it once it is dropped.
+/// A client of a server, as the record of its writes names it. The record forgets a client once this value is dropped.
 pub type Writer = Arc<SocketAddr>;
 
-/// Who wrote each bit of one station last.
+/// The last writer of each bit of one station.
 #[derive(Debug, Default)]
 pub struct Writers {
     is_single: bool,
     clients: Vec<Weak<SocketAddr>>,
-    /// Up to the last bit that was ever written.
+    /// The last write of each bit, up to the last bit that was ever written.
     bits: Vec<Option<Write>>,
 }
 
 /// The last write to a bit.
 #[derive(Clone, Copy, Debug)]
 struct Write {
-    /// Index of its client.
+    /// The index of the client that wrote.
     client: u32,
     at: Nanos,
 }
 
 impl Writers {
-    /// No writes yet; with `is_single` a second writer is refused.
+    /// A station without writes yet; with `is_single` a second writer is refused.
     pub fn new(is_single: bool) -> Self {
         Self {
             is_single,
@@ -39,19 +39,19 @@ impl Writers {
         }
     }
 
-    /// Reads the key `writers`: whether a second writer is refused.
+    /// Reads the key `writers`; returns true if a second writer is refused.
     pub fn read(table: &mut Table<'_>) -> Option<bool> {
         let writers = table.take("writers");
         writers.map_or(Some(false), |value| value.whole(1..=1).map(|_| true))
     }
 
-    /// Whether a second writer is refused.
+    /// Returns true if a second writer is refused.
     pub fn is_single(&self) -> bool {
         self.is_single
     }
 
-    /// Whether `writer` may write these bits at `now`. If another client has written any of them within `max_age`, that
-    /// is counted as `counter` and logged.
+    /// Returns true if `writer` may write these bits at `now`. If another client has written any of them within
+    /// `max_age`, counts this as `counter` and logs it.
     pub fn may_write(
         &mut self,
         writer: &Writer,
@@ -74,7 +74,7 @@ impl Writers {
         true
     }
 
-    /// The index of a client, which may be that of one that has left.
+    /// The index of a client; may reuse the index of a client that has left.
     fn index(&mut self, writer: &Writer) -> usize {
         let mut clients = self.clients.iter();
         if let Some(known) = clients.position(|client| client.as_ptr() == Arc::as_ptr(writer)) {
@@ -95,7 +95,7 @@ impl Writers {
         free
     }
 
-    /// The client other than `own` that has written one of these bits at or after `since`, and that is still there.
+    /// The client other than `own` that has written one of these bits at or after `since`, and is still connected.
     fn other(&self, own: usize, bits: Range<usize>, since: Nanos) -> Option<Writer> {
         if self.clients.len() == 1 {
             return None;
@@ -108,7 +108,8 @@ impl Writers {
     }
 }
 
-/// Counts and logs that `writer` writes what `other` wrote within `max_age`; `is_refused`: this write has no effect.
+/// Counts and logs that `writer` writes bits that `other` wrote within `max_age`. With `is_refused` this write has no
+/// effect.
 pub fn report_second(
     port: &Port,
     counter: &'static str,

@@ -1,4 +1,4 @@
-//! What the texts for the buses are made of: they know nothing of one another.
+//! The parts of the texts for the buses. The texts are independent of one another.
 
 use crate::plcopen::{Kind, Variable, variable};
 use crate::st::life::{ALIVE, time};
@@ -12,24 +12,24 @@ pub(super) struct Part {
     pub(super) lines: Vec<String>,
 }
 
-/// How the registers come and go.
+/// How the registers are received and sent.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Link {
     /// Global variables beside those of signals.
     pub(super) globals: Vec<Variable>,
-    /// Before the inputs are copied.
+    /// The part before the inputs are copied.
     pub(super) before: Part,
-    /// After the outputs are copied.
+    /// The part after the outputs are copied.
     pub(super) after: Part,
-    /// What is to be set in the editor.
+    /// The settings to be made in the editor.
     pub(super) steps: Vec<String>,
-    /// What a person should know.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
-    /// The variables of signals come and go by themselves: there are no registers to copy from and to.
+    /// True if the bus reads and writes the variables of signals directly: no registers are copied.
     pub(super) is_by_name: bool,
 }
 
-/// What the texts for records over TCP need to know.
+/// The data for the texts about records over TCP.
 #[derive(Clone, Debug)]
 pub(super) struct Stream<'a> {
     /// The list of global variables.
@@ -37,29 +37,29 @@ pub(super) struct Stream<'a> {
     /// The simulation's host and port.
     pub(super) host: String,
     pub(super) port: u16,
-    /// Bytes of a record from the simulation, and of one to it.
+    /// The size in bytes of a record from the simulation, and of a record to the simulation.
     pub(super) bytes: [usize; 2],
     pub(super) cycle: Nanos,
     pub(super) max_age: Nanos,
 }
 
-/// What an editor's library needs to carry records over TCP.
+/// The library calls of an editor for records over TCP.
 #[derive(Debug)]
 pub(super) struct Calls<'a> {
-    /// What is to be set up first, and what a person should know at last.
+    /// The set-up that comes first, and the note for the user that comes last.
     pub(super) steps: [&'a str; 2],
     /// Global variables of the connection.
     pub(super) globals: Vec<Variable>,
-    /// The global variable that tells whether there is a connection.
+    /// The global variable that is TRUE while connected.
     pub(super) connected: &'a str,
-    /// Makes the connection, and makes it anew when it is lost.
+    /// Makes the connection, and reconnects when it is lost.
     pub(super) connection: Part,
-    /// The variables of the receiving block, and the type in which it counts bytes.
+    /// The variables of the receiving block, and the type in which that block counts bytes.
     pub(super) receiver: Vec<Variable>,
     pub(super) count: &'static str,
     /// Receives bytes to `Incoming`: the statements before and after a complete record is taken.
     pub(super) receive: [&'a [&'a str]; 2],
-    /// How far the statements that take it are indented.
+    /// The indentation of the statements that take a record.
     pub(super) indent: usize,
     /// The sending block.
     pub(super) sender: Variable,
@@ -102,7 +102,7 @@ impl Link {
         }
     }
 
-    /// The counters and the sign of life of a route that sees what comes and goes.
+    /// The counters and the sign of life of a link that sees its traffic.
     fn counters() -> Vec<Variable> {
         [
             (ALIVE, "BOOL", "the simulation was heard of lately"),
@@ -122,7 +122,7 @@ impl Link {
     }
 }
 
-/// The simulation's host as the PLC dials it; one that listens everywhere does not say where it is.
+/// The simulation's host as the PLC dials it. If the simulation listens on all addresses, its own address is unknown.
 pub(super) fn dialled(address: &Address) -> String {
     match &address.host {
         Host::Ip(ip) if !ip.is_unspecified() => ip.to_string(),
@@ -131,7 +131,7 @@ pub(super) fn dialled(address: &Address) -> String {
     }
 }
 
-/// What is to be known of an address that the PLC can reach only on the computer of the simulation itself.
+/// The note about an address that the PLC can reach only on the simulation's own computer.
 pub(super) fn loopback_note(address: &Address) -> Option<String> {
     let is_loopback = match &address.host {
         Host::Ip(ip) => ip.is_loopback(),
@@ -145,7 +145,7 @@ pub(super) fn loopback_note(address: &Address) -> Option<String> {
     })
 }
 
-/// What tells that nothing came for too long.
+/// The statements that detect a silence that is too long.
 pub(super) fn silence(list: &str, max_age: Nanos) -> [String; 2] {
     [
         format!(
@@ -156,7 +156,7 @@ pub(super) fn silence(list: &str, max_age: Nanos) -> [String; 2] {
     ]
 }
 
-/// Registers out of the bytes of a record, or back.
+/// Converts the bytes of a record to registers, or back.
 fn registers(list: &str, count: usize, incoming: bool) -> [String; 3] {
     let last = count.saturating_sub(1);
     let body = if incoming {
@@ -176,7 +176,7 @@ fn registers(list: &str, count: usize, incoming: bool) -> [String; 3] {
     ]
 }
 
-/// Makes the connection, and puts records together from what it receives.
+/// Makes the connection, and assembles records from the received bytes.
 fn receiving(stream: &Stream<'_>, calls: &Calls<'_>) -> Part {
     let Stream {
         list,
@@ -222,7 +222,7 @@ fn receiving(stream: &Stream<'_>, calls: &Calls<'_>) -> Part {
     Part { locals, lines }
 }
 
-/// Makes and sends a record when it is time.
+/// Makes and sends a record when it is due.
 fn sending(stream: &Stream<'_>, calls: &Calls<'_>) -> Part {
     let Stream {
         list,

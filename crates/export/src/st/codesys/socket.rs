@@ -1,4 +1,4 @@
-//! Records over TCP in CODESYS, by the library CAA Net Base Services, which is always installed.
+//! Records over TCP in CODESYS, using the library CAA Net Base Services, which is always installed.
 
 use super::parts::{Calls, Link, Part, Stream};
 use crate::plcopen::{Kind, variable};

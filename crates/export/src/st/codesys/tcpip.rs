@@ -1,4 +1,4 @@
-//! Records over TCP in TwinCAT, by the library `Tc2_TcpIp` of TF6310.
+//! Records over TCP in TwinCAT, using the library `Tc2_TcpIp` of TF6310.
 
 use super::parts::{Calls, Link, Part, Stream};
 use crate::plcopen::{Kind, variable};

@@ -121,7 +121,7 @@ pub(super) fn text(config: &Config, notes: &mut Vec<String>) -> Result<String, M
     Ok(text)
 }
 
-/// Whether either end counts a signal up.
+/// Returns true if either end counts a signal up.
 fn is_life_sign(config: &Config, signal: &Signal) -> bool {
     let signs = &config.life_signs;
     let beats = signs.heartbeat.iter().map(|beat| beat.signal);

@@ -1,7 +1,7 @@
 //! `OpenPLC` as a Modbus server: the simulation reads and writes its holding registers.
 //!
-//! Its table, from `modbus.cpp` of `OpenPLC` v3: holding registers 0 to 1023 are `%QW0` to `%QW1023`, 1024 to
-//! 2047 are `%MW0` to `%MW1023`; beyond are parts of wider variables.
+//! The table of the server, from `modbus.cpp` of `OpenPLC` v3: holding registers 0 to 1023 are `%QW0` to `%QW1023`,
+//! 1024 to 2047 are `%MW0` to `%MW1023`; the registers beyond are parts of wider variables.
 
 use super::wired::{self, Wires};
 use tickbus_base::toml_text::Mistakes;

@@ -1,18 +1,18 @@
-//! What a station sends while answers are slow.
+//! The frames that a station sends while answers are slow.
 
 use tickbus_base::time::Nanos;
 
 use super::super::ring::Ring;
 use super::Taken;
 
-/// How long a pulse may hold up the frames behind it while the peer polls other bits only. Peers poll more
-/// often than that.
+/// How long a pulse may hold up the frames behind it while the peer polls only other bits. Peers poll more often than
+/// that.
 pub(super) const PATIENCE: Nanos = Nanos::from_secs(1);
 
 /// Outgoing frames.
 #[derive(Debug)]
 pub(super) struct Outgoing {
-    /// The mask of latched bits: the peer has to see each of their changes.
+    /// The mask of latched bits: the peer must see each change of these.
     latched: Box<[u8]>,
     /// The newest bytes of the image.
     pub(super) newest: Box<[u8]>,
@@ -20,38 +20,39 @@ pub(super) struct Outgoing {
     pub(super) current: Box<[u8]>,
     /// The bytes that the peer received last.
     pub(super) sent: Box<[u8]>,
-    /// The mask of bits that the peer reads: all, until it has not read one for [`PATIENCE`].
+    /// The mask of bits that the peer reads: all at first; a bit that the peer has not read for [`PATIENCE`] is
+    /// removed.
     pub(super) read: Box<[u8]>,
-    /// Whether the peer has read anything since `current` was set, and since when a pulse in it has held up
-    /// the frames behind it nevertheless.
+    /// True if the peer has read anything since `current` was set. `held_up` is the time since when a pulse in
+    /// `current` has held up the frames behind it nevertheless.
     pub(super) reads: bool,
     held_up: Option<Nanos>,
     /// Changes that are held back.
     pub(super) waiting: Option<Ring>,
-    /// When the bus took an image last, or repeated it. After a link was down, behind a new connection, and after a pause of more
-    /// than [`PATIENCE`], such as after a lost request, `slow-answers` does not hold back the next image: the outage has delayed
-    /// it already.
+    /// When the bus last took or repeated an image. `slow-answers` does not hold back the next image after a link was
+    /// down, on a new connection, or after a pause of more than [`PATIENCE`] such as after a lost request: the outage
+    /// has delayed that image already.
     pub(super) taken: Taken,
-    /// The frame of the current cycle repeats the one before.
+    /// True if the frame of the current cycle repeats the previous one.
     pub(super) repeats: bool,
-    /// How many of them, from the oldest on, wait for the sake of their edges alone: the peer has newer values already.
+    /// How many waiting changes, from the oldest on, wait only for their edges: the peer has newer values already.
     overtaken: usize,
-    /// The origin of the bytes that the bus was given: decides who is told that they were sent.
+    /// The origin of the bytes that the bus was given, and thus the one to notify when they were sent.
     pub(super) given: Given,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Given {
-    /// The image: it keeps its pulses until they were sent.
+    /// The image, which keeps its pulses until they were sent.
     Image,
-    /// The ring: the image has released these bytes long ago.
+    /// The ring: the image released these bytes long ago.
     Held,
-    /// Neither: old bytes, so that the bus has something to send.
+    /// Neither: old bytes, which give the bus something to send.
     Nothing,
 }
 
 impl Outgoing {
-    /// Of a station that sent `last_sent` last, which the bus took at `taken`.
+    /// The frames of a station that sent `last_sent` last; the bus took these bytes at `taken`.
     pub(super) fn new(last_sent: Box<[u8]>, latched: Box<[u8]>, taken: Taken) -> Self {
         Self {
             latched,
@@ -69,21 +70,22 @@ impl Outgoing {
         }
     }
 
-    /// Whether the image's bytes go to the bus directly.
+    /// Returns true if the image's bytes go to the bus directly.
     pub(super) fn is_through(&self, slow: Nanos) -> bool {
         slow == Nanos::ZERO
             && self.waiting.as_ref().is_none_or(Ring::is_empty)
             && !(self.given == Given::Held && self.has_unseen(&self.current))
     }
 
-    /// The bus takes the image at `now`. Returns whether the line has delayed it, so that no fault has to.
+    /// The bus takes the image at `now`. Returns true if the line has already delayed the image, so that no fault has
+    /// to.
     pub(super) fn catches_up(&mut self, now: Nanos) -> bool {
         let has_paused = self.has_paused(now);
         self.taken = Taken::At(now);
         has_paused
     }
 
-    /// Whether what the bus took last is of another connection, or older than [`PATIENCE`].
+    /// Returns true if the bus last took an image on another connection, or more than [`PATIENCE`] ago.
     pub(super) fn has_paused(&self, now: Nanos) -> bool {
         match self.taken {
             Taken::Never => false,
@@ -92,7 +94,7 @@ impl Outgoing {
         }
     }
 
-    /// Whether replacing `current` by `next` would lose a latched bit that the peer has not seen.
+    /// Returns true if replacing `current` by `next` would lose a latched bit that the peer has not seen.
     fn loses(&self, next: &[u8]) -> bool {
         let bytes = self.current.iter().zip(&self.sent).zip(next);
         let mut bits = bytes.zip(self.watched());
@@ -107,8 +109,8 @@ impl Outgoing {
         bytes.map(|(latched, read)| latched & read)
     }
 
-    /// Whether the peer has polled for [`PATIENCE`] without reading the pulse in `current`: it does not read
-    /// that bit, and the bits that it does read must not wait forever.
+    /// Returns true if the peer has polled for [`PATIENCE`] without reading the pulse in `current`. Such a peer does
+    /// not read that bit, and the bits that it does read must not wait forever.
     fn is_left_out(&mut self, now: Nanos) -> bool {
         if !self.reads {
             return false;
@@ -123,13 +125,14 @@ impl Outgoing {
         true
     }
 
-    /// Whether a latched bit of `bytes` differs from what the peer has seen.
+    /// Returns true if a latched bit of `bytes` differs from the one that the peer has seen.
     fn has_unseen(&self, bytes: &[u8]) -> bool {
         let mut bits = bytes.iter().zip(&self.sent).zip(self.watched());
         bits.any(|((bytes, sent), watched)| (bytes ^ sent) & watched != 0)
     }
 
-    /// Holds the image's bytes back and finds what is due by `now`; true if something was sent early.
+    /// Holds the image's bytes back and finds the bytes that are due by `now`; returns true if something was sent
+    /// early.
     pub(super) fn hold(&mut self, now: Nanos, slow: Nanos, image: &[u8]) -> bool {
         let mut hurried = false;
         self.given = Given::Held;
@@ -158,7 +161,7 @@ impl Outgoing {
             self.advance();
         }
         if slow == Nanos::ZERO || was_behind {
-            // The fault or the outage is over: values are current at once, edges are shown one at a time.
+            // The fault or the outage is over: values become current at once, and edges are shown one at a time.
             take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
             self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
         }
@@ -170,7 +173,7 @@ impl Outgoing {
         if let Some(ring) = &mut self.waiting
             && let Some((_, next)) = ring.front()
         {
-            // Values do not go back, though the next fault has begun before all edges were shown.
+            // Values do not go back, even if the next fault began before all edges were shown.
             let is_overtaken = self.overtaken > 0;
             self.overtaken = self.overtaken.saturating_sub(1);
             take_bits(&mut self.current, next, |byte| {
@@ -186,7 +189,7 @@ impl Outgoing {
     }
 }
 
-/// Takes over from `next` those bits that `mask` gives for each byte.
+/// Copies from `next` the bits that `mask` gives for each byte.
 fn take_bits(current: &mut [u8], next: &[u8], mask: impl Fn(usize) -> u8) {
     for (byte, (current, next)) in current.iter_mut().zip(next).enumerate() {
         let mask = mask(byte);

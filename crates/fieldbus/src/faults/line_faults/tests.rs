@@ -76,7 +76,7 @@ impl Rig {
         self.wires.look();
     }
 
-    /// One cycle of sending: the bytes sent, and whether the image may regard them as sent.
+    /// One cycle of sending. Returns the bytes sent, and true if the image may regard them as sent.
     fn send(&mut self, now: i64, image: [u8; 2], taken: bool) -> ([u8; 2], bool) {
         let repeats = self.wires.repeats(0, Nanos(now));
         let mut confirmed = !repeats && self.wires.takes(0, Nanos(now), &image);
@@ -87,7 +87,7 @@ impl Rig {
         (out, confirmed)
     }
 
-    /// Hands a frame to the line; returns what is delivered at `now`.
+    /// Hands a frame to the line; returns the bytes that are delivered at `now`.
     fn receive(&mut self, now: i64, frame: Option<u8>) -> Vec<u8> {
         let mut come = self.released(now);
         if let Some(frame) = frame
@@ -302,7 +302,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     rig.send(0, [1, 5], false);
     rig.send(1, [0, 6], false);
     assert_eq!(rig.send(20, [0, 6], false).0, [1, 5]);
-    // A peer that stopped polling may come back: to values of now.
+    // A peer that stopped polling gets current values when it comes back.
     let long = PATIENCE.0 * 5;
     assert_eq!(rig.send(long, [0, 6], false).0, [1, 6]);
     rig.wires.sent(0, Some(&(8..16)));
@@ -314,7 +314,7 @@ fn a_pulse_that_the_peer_never_reads_holds_up_what_it_reads_once_and_not_for_eve
     assert_eq!(rig.send(after + 20, [0, 8], false).0, [0, 8]);
     rig.end(slow);
     assert_eq!(rig.send(after + 21, [1, 9], false), ([1, 9], false));
-    // Once it has been read, it waits for the peer again.
+    // Once the peer has read the bit, pulses of that bit wait for the peer again.
     rig.wires.sent(0, Some(&(0..1)));
     rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
     rig.send(after + 30, [0, 0], false);

@@ -14,8 +14,8 @@ use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 /// The longest delay.
 const LONGEST: Nanos = Nanos::from_secs(60);
 
-/// Reads the effect of a fault of `kind` and reports its mistakes; with `whole` no line of the section was
-/// left out, so that a key that is absent was not written.
+/// Reads the effect of a fault of `kind` and reports its mistakes. With `whole` no line of the section was skipped, so
+/// an absent key was not written.
 pub(super) fn read_effect(
     kind: &str,
     keys: &Keys<'_>,
@@ -89,7 +89,7 @@ fn read_direction(keys: &Keys<'_>) -> Option<Direction> {
         .map_or(Some(Direction::Both), choose)
 }
 
-/// The most slots and channels of a station that a diagnosis tells apart.
+/// The maximum number of slots and channels that a diagnosis distinguishes in a station.
 const DIAGNOSIS_LIMIT: i128 = 64;
 
 fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<Diagnosis> {
@@ -159,7 +159,7 @@ fn read_octets(value: &Value<'_>) -> Option<Octets> {
     all
 }
 
-/// The station that a value names; `right` says what to do where there is but one.
+/// The station that a value names; `right` is the remedy for a driver with only one station.
 fn read_station(value: &Value<'_>, table: &SignalTable, right: &str) -> Option<usize> {
     let name = value.text("write the name of a [[station]] in quotes")?;
     if let [_] = &table.stations[..] {

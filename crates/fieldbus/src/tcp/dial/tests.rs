@@ -13,20 +13,20 @@ use tickbus_image::image;
 
 const SECOND: Nanos = Nanos::from_secs(1);
 
-/// Says what it is told to say, remembers what it hears, and ends when it is told to.
+/// A caller that sends the given bytes, records the received ones, and ends when the test asks for that.
 #[derive(Debug)]
 struct Speaker {
     heard: Vec<u8>,
-    /// What is to be written, and what follows when that is written.
+    /// The bytes to be written, and the bytes that follow them.
     says: Vec<u8>,
     written: usize,
     then: Vec<u8>,
     deadline: Nanos,
-    /// The peer has to say something before this.
+    /// The time by which the peer must send something.
     limit: Nanos,
-    /// After this many turns it ends the connection.
+    /// The number of turns after which the speaker ends the connection.
     turns: usize,
-    /// The calls, without those that ask.
+    /// The calls so far, without those that only ask.
     calls: Vec<&'static str>,
 }
 
@@ -96,7 +96,7 @@ impl Caller for Speaker {
     }
 }
 
-/// A port over an image without stations, with a clock that stands still.
+/// A port over an image without stations, with a manual clock.
 fn port() -> (Port, Arc<Manual>, LinkStatus) {
     let clock = Manual::new();
     let status = LinkStatus::new("test", Nanos::from_secs(3600));
@@ -134,13 +134,13 @@ fn until(what: &str, done: impl Fn() -> bool) {
     }
 }
 
-/// Waits until the other thread waits for nothing but the clock and its socket.
+/// Waits until the other thread waits only for the clock and its socket.
 #[track_caller]
 fn settle(clock: &Manual) {
     until("it comes to rest", || clock.is_settled(1));
 }
 
-/// Stops a call also when the test fails, so that it ends.
+/// Stops a call when dropped, so that the call ends even if the test fails.
 struct Stopping<'a>(&'a Stop);
 
 impl Drop for Stopping<'_> {
@@ -149,7 +149,7 @@ impl Drop for Stopping<'_> {
     }
 }
 
-/// Runs a call whose end comes of itself, after `act`; returns why.
+/// Runs a call that ends without a stop, after `act`; returns the reason.
 fn run(call: &mut Call<TcpStream>, speaker: &mut Speaker, act: impl FnOnce(&Manual)) -> String {
     let (mut port, clock, _) = port();
     let stop = Stop::new();
@@ -226,7 +226,7 @@ fn what_has_arrived_in_the_meantime_counts_before_the_time_is_checked() {
 fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
     let (mut call, mut peer) = connected();
     let (mut port, ..) = port();
-    // More than the system takes while nobody reads.
+    // More bytes than the system accepts while the peer reads none.
     let size = 64 * 1024;
     let room = SockRef::from(call.stream()).set_send_buffer_size(size);
     room.expect("an option");

@@ -10,8 +10,8 @@ use tickbus_base::time::{Clock, Manual, Monotonic};
 use tickbus_image::image;
 use tickbus_test_log as logged;
 
-/// Telegrams of a length byte and as many bytes, which are echoed; a length of 255 violates the protocol, and
-/// 200 gets a very long answer.
+/// A protocol whose telegrams are a length byte and that many bytes, which are echoed. A length of 255 violates the
+/// protocol, and 200 gets a very long answer.
 struct Echo;
 
 const LIMITS: Limits = Limits {
@@ -61,7 +61,7 @@ impl Service for Echo {
 
 const MAX_AGE: Nanos = Nanos::from_secs(3600);
 
-/// A server on its own thread, with a clock that stands still.
+/// A server on its own thread, with a manual clock.
 struct Running {
     clock: Arc<Manual>,
     stop: Stop,
@@ -254,7 +254,8 @@ fn half_a_telegram_has_its_time() {
     ask(&mut good, &[1, 1]);
     ask(&mut slow, &[1, 1]);
     slow.write_all(&[5, 1]).expect("the server reads");
-    // The answer to another client shows that the half has been read, or will be before the time is checked.
+    // The answer to another client shows that the server has read the half telegram, or will read it before it checks
+    // the time.
     ask(&mut good, &[1, 2]);
     server.until(|server| {
         server.clock.advance(Nanos::from_millis(10));
@@ -288,7 +289,7 @@ fn who_does_not_read_is_not_read_and_dropped_in_the_end() {
     let mut greedy = vec![0; 200];
     greedy[0] = 199;
     let waiting = Waiting::begin();
-    // Until the system accepts no more: the server has then stopped reading.
+    // Sends until the system accepts no more: the server has then stopped reading.
     while server.fact("clients.dropped").is_none() {
         waiting.check("a server that reads for ever");
         if (&slow).write(&greedy).is_err() {

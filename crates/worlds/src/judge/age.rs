@@ -48,7 +48,7 @@ pub(crate) fn held(plan: &Plan) -> i64 {
 }
 
 /// The age that is told is at least the true one.
-pub(super) fn judge(plan: &Plan, seen: &Seen<'_>) -> Result<(), Broken> {
+pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broken> {
     if seen.is_stale || plan.bus == Bus::Loopback {
         return Ok(());
     }
@@ -56,14 +56,22 @@ pub(super) fn judge(plan: &Plan, seen: &Seen<'_>) -> Result<(), Broken> {
     let Some(last) = seen.deliveries.last() else {
         return broken("age", format!("{} ns, though nothing has come", seen.age));
     };
+    // A slave of PROFIBUS clears its outputs when its master has sent nothing for the time of its watchdog.
+    let silence = seen.began - last.at;
+    let limit = plan.slave_watchdog().0 + slack(plan);
+    if plan.bus == Bus::Profibus && area == 0 && silence > limit {
+        return broken(
+            "age",
+            format!("not stale, {silence} ns after the last request"),
+        );
+    }
     // As docs/ARCHITECTURE.md has it: half of max_age, or 2 ms.
     let allowed = (plan.max_age.0 / 2).max(2_000_000) + slack(plan);
-    let truth = seen.began - last.at;
-    if truth > seen.age + allowed {
+    if silence > seen.age + allowed {
         return broken(
             "age",
             format!(
-                "told {} ns, and the last bytes came {truth} ns ago",
+                "told {} ns, and the last bytes came {silence} ns ago",
                 seen.age
             ),
         );

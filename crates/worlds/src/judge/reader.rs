@@ -125,6 +125,6 @@ impl Reader {
                 *since = now.min(*since);
             }
         }
-        super::age::judge(plan, seen)
+        super::age::judge(plan, area, seen)
     }
 }

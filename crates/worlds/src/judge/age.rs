@@ -56,10 +56,17 @@ pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broke
     let Some(last) = seen.deliveries.last() else {
         return broken("age", format!("{} ns, though nothing has come", seen.age));
     };
-    // A slave of PROFIBUS clears its outputs when its master has sent nothing for the time of its watchdog.
+    // A slave of PROFIBUS clears its outputs when its master has sent nothing for the time of its watchdog. One whose adapter was
+    // unplugged begins again without a watchdog.
     let silence = seen.began - last.at;
     let limit = plan.slave_watchdog().0 + slack(plan);
-    if plan.bus == Bus::Profibus && area == 0 && silence > limit {
+    let is_watched = plan.bus == Bus::Profibus
+        && area == 0
+        && !plan
+            .events
+            .iter()
+            .any(|event| event.what == Misfortune::Reset);
+    if is_watched && silence > limit {
         return broken(
             "age",
             format!("not stale, {silence} ns after the last request"),

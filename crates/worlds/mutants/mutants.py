@@ -1,7 +1,7 @@
 """Builds tickbus with every mutation of mutants.toml as a switch, and runs simulated worlds until they find each of them.
 
 With --random COUNT it changes that many random lines of image, fieldbus, driver and the buses (always the same ones), and
-runs the unit tests of the crate on each change before the worlds.
+runs the tests of the crate on each change, those of the buses and of whole drivers, and then the worlds.
 """
 
 import argparse
@@ -33,6 +33,8 @@ pub fn mutant(number: u32) -> bool {
     *CHOSEN == number
 }
 """
+# Tests of whole drivers that need no program of a third party.
+WHOLE = ["loopback", "faults", "record", "ending", "log", "profibus"]
 # Crates whose lines are changed at random.
 CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7", "bus-profibus"]
 
@@ -173,18 +175,13 @@ def by_chance(count, seconds):
     changes = compiling(files, changes, ["--keep-going", *packages])[:count]
     texts = changed(files, changes)
     build(texts, ["-p", "tickbus-worlds"])
-    built = cargo("test", ["--no-run", "--lib", "--message-format", "json", *packages])
-    if built.returncode:
-        sys.exit(f"mutants: the tests do not compile:\n{built.stderr[-4000:]}")
-    tests = {}
-    for message in map(json.loads, built.stdout.splitlines()):
-        if message.get("executable"):
-            tests[Path(message["manifest_path"]).parent.name] = message["executable"]
+    whole = [word for name in WHOLE for word in ("--test", name)]
+    tests = test_programs(["--lib", "--tests", *packages]) + test_programs(["-p", "tickbus", *whole])
     killed = 0
     for change in changes:
         crate = change["file"].split("/")[1]
         begun = time.monotonic()
-        verdict, seed = unit_tests(tests[crate], crate, change["number"]), ""
+        verdict, seed = by_tests(tests, crate, change["number"]), ""
         took = time.monotonic() - begun
         if not verdict:
             took, verdict, seed = by_worlds(change["number"], seconds)
@@ -225,15 +222,28 @@ def changed(files, changes):
     return {name: "\n".join(lines) for name, lines in texts.items()}
 
 
-def unit_tests(binary, crate, number):
-    environment = chosen(number)
-    try:
-        done = subprocess.run(
-            [binary, "-q"], cwd=TREE / "crates" / crate, env=environment, capture_output=True, timeout=120, check=False
-        )
-    except subprocess.TimeoutExpired:
-        return "unit tests hang"
-    return "unit tests" if done.returncode else None
+def test_programs(arguments):
+    """The folder of the package, the name and the file of each test program."""
+    built = cargo("test", ["--no-run", "--message-format", "json", *arguments])
+    if built.returncode:
+        sys.exit(f"mutants: the tests do not compile:\n{built.stderr[-4000:]}")
+    found = []
+    for message in map(json.loads, built.stdout.splitlines()):
+        if message.get("executable") and message["profile"]["test"]:
+            found.append((Path(message["manifest_path"]).parent, message["target"]["name"], message["executable"]))
+    return found
+
+
+def by_tests(tests, crate, number):
+    """The test program that finds a change, its own crate's first."""
+    for folder, name, binary in sorted(tests, key=lambda test: test[0].name != crate):
+        try:
+            done = subprocess.run([binary, "-q"], cwd=folder, env=chosen(number), capture_output=True, timeout=180, check=False)
+        except subprocess.TimeoutExpired:
+            return f"{folder.name} {name} hangs"
+        if done.returncode:
+            return f"{folder.name} {name}"
+    return None
 
 
 def build(texts, arguments):

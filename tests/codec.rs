@@ -51,6 +51,7 @@ fn table(signals: Vec<Signal>, bytes: usize) -> SignalTable {
     SignalTable {
         stations: vec![station; 2],
         signals,
+        structures: Vec::new(),
     }
 }
 
@@ -593,6 +594,7 @@ fn placed(stretches: &[Stretch], scales: &[Scale]) -> SignalTable {
     SignalTable {
         stations: vec![station(0), station(1)],
         signals,
+        structures: Vec::new(),
     }
 }
 

@@ -14,7 +14,7 @@ pub mod section;
 
 use std::collections::HashMap;
 
-use tickbus_image::signal::{SignalTable, Slot};
+use tickbus_image::signal::{SignalTable, Slot, Structure};
 
 pub use command::{Command, Mode, Motion};
 pub use drive::{Demand, Drive, Feedback};
@@ -98,6 +98,14 @@ impl Axis {
     /// The index of a field's signal in the signal table; `None` for fields that this axis does not have.
     pub fn slot(&self, field: Field) -> Option<usize> {
         self.slots[field.index()]
+    }
+
+    /// The bytes of the feedback structure, and those of the command structure.
+    pub fn structure(&self) -> Structure {
+        Structure {
+            inputs: self.feedback..self.feedback + self.feedback_bytes,
+            outputs: self.command..self.command + COMMAND_BYTES,
+        }
     }
 
     /// The name of a field's signal.

@@ -1,6 +1,5 @@
 //! The kind `dispatcher`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
@@ -63,7 +62,7 @@ impl BusOptions for Options {
         self.place_signals(lines, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 

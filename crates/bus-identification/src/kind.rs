@@ -1,6 +1,5 @@
 //! The kinds `ivi-client` and `ivi-reader`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
@@ -50,7 +49,7 @@ impl BusOptions for ClientOptions {
         self.heads.read_station(count, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.heads.fit(table, client_bus::BEFORE_DATA, collector);
     }
 
@@ -106,7 +105,7 @@ impl BusOptions for ReaderOptions {
         self.heads.read_station(count, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.heads.fit(table, reader_bus::BEFORE_DATA, collector);
     }
 

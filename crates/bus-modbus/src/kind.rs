@@ -1,6 +1,5 @@
 //! The kinds `modbus-server` and `modbus-client`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
@@ -45,7 +44,7 @@ impl BusOptions for ServerOptions {
         self.stations.read_station(count, false, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 
@@ -96,7 +95,7 @@ impl BusOptions for ClientOptions {
         self.place_signals(lines, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 

@@ -1,6 +1,5 @@
 //! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
@@ -48,7 +47,7 @@ impl BusOptions for ClientOptions {
         self.place_signals(lines, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 

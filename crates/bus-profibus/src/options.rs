@@ -7,7 +7,6 @@ mod station;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
@@ -203,7 +202,7 @@ impl BusOptions for Options {
         details.flatten().flatten().collect()
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         if self.own.is_empty() && self.common == Keys::Absent {
             collector.report(
                 self.at,

@@ -1,6 +1,5 @@
 //! The kinds `s7-server` and `s7-client`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, shown};
@@ -51,7 +50,7 @@ impl BusOptions for ServerOptions {
         self.read_station(count, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 }
@@ -112,7 +111,7 @@ impl BusOptions for ClientOptions {
         self.place_signals(lines, table);
     }
 
-    fn fit(&self, table: &SignalTable, _axes: &[Axis], collector: &Collector<'_>) {
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }
 

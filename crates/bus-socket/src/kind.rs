@@ -1,6 +1,5 @@
 //! The kind `socket`, for the list of bus kinds.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
@@ -49,7 +48,7 @@ impl BusOptions for Options {
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        let socket = Socket::new(self, setup.table, setup.role, setup.cycle, setup.axes);
+        let socket = Socket::new(self, setup.table, setup.role, setup.cycle);
         Ok(Bus::Free(Box::new(socket)))
     }
 
@@ -65,7 +64,7 @@ impl BusOptions for Options {
         self.read_station(table);
     }
 
-    fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
-        self.fit(table, axes, collector);
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        self.fit(table, collector);
     }
 }

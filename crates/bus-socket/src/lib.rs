@@ -19,7 +19,6 @@ mod parts;
 mod record;
 mod session;
 
-use tickbus_axis::{Axis, COMMAND_BYTES};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_image::signal::{Area, SignalTable};
 
@@ -44,14 +43,7 @@ pub struct Socket {
 
 impl Socket {
     /// The bus that `options` describe, for the end with `role`, with a bus cycle of `cycle` if stated.
-    /// `axes` are those of the table, in case each has its own message.
-    pub fn new(
-        options: &Options,
-        table: &SignalTable,
-        role: Role,
-        cycle: Option<Nanos>,
-        axes: &[Axis],
-    ) -> Self {
+    pub fn new(options: &Options, table: &SignalTable, role: Role, cycle: Option<Nanos>) -> Self {
         let stations = table.stations.len();
         let lines = if options.stations.is_empty() {
             let frames = ConnectionFrames::new(table, role, 0..stations);
@@ -59,7 +51,7 @@ impl Socket {
                 Message::Image => frames,
                 Message::Axis { .. } => {
                     let (tx, rx) = role.areas();
-                    let parts = |area| divide(table, area, axes);
+                    let parts = |area| divide(table, area);
                     frames.in_parts(parts(tx), parts(rx))
                 }
             };
@@ -104,13 +96,11 @@ impl Socket {
     }
 }
 
-/// Splits an area into its axes.
-fn divide(table: &SignalTable, area: Area, axes: &[Axis]) -> Parts {
-    let structure = |axis: &Axis| match area {
-        Area::Output => axis.command..axis.command + COMMAND_BYTES,
-        Area::Input => axis.feedback..axis.feedback + axis.feedback_bytes,
-    };
-    Parts::new(table.stations[0].bytes(area), axes.iter().map(structure))
+/// Splits an area into its structures.
+fn divide(table: &SignalTable, area: Area) -> Parts {
+    let structures = table.structures.iter();
+    let structures = structures.map(|structure| structure.bytes(area));
+    Parts::new(table.stations[0].bytes(area), structures)
 }
 
 impl Free for Socket {

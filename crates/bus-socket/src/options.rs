@@ -1,6 +1,5 @@
 //! The options of the socket bus in a driver.cfg.
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value};
@@ -155,11 +154,11 @@ impl Options {
     }
 
     /// Reports conflicts with the stations and axes of the driver.
-    pub fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
+    pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         let Message::Axis { at } = self.message else {
             return;
         };
-        if axes.is_empty() {
+        if table.structures.is_empty() {
             collector.report(
                 at,
                 "message = \"axis\", but there is no axis",

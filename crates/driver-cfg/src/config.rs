@@ -226,7 +226,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         .map(|fieldbus| fieldbus.sizes.clone())
         .unwrap_or_default();
     let bus = fieldbus.as_mut().and_then(|fieldbus| fieldbus.bus.as_mut());
-    let table = layout::lay_out(sections, declared, sizes, bus);
+    let table = layout::lay_out(sections, &axes, declared, sizes, bus);
     if let Some(fieldbus) = &mut fieldbus
         && let (Some(at), Some(bus), Some(table)) = (&fieldbus.at, &mut fieldbus.bus, &table)
     {
@@ -238,7 +238,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     };
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
-        bus.fit(table, &axes, root.collector());
+        bus.fit(table, root.collector());
     }
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table

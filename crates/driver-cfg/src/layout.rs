@@ -74,12 +74,13 @@ pub(super) fn read_signals<'a>(
     (read, all.into_iter().map(|(_, section)| section).collect())
 }
 
-/// Assigns the signals to their stations and reports conflicts.
+/// Assigns the signals, those of `axes` among them, to their stations and reports conflicts.
 ///
 /// `declared` are the `[[station]]` tables and `sizes` the sizes in `[fieldbus]`; `bus` reads its own keys from the
 /// `[[station]]` tables. Returns a table even if there were mistakes, as far as that makes sense.
 pub(super) fn lay_out<'a>(
     mut sections: Vec<Section<'a>>,
+    axes: &[Axis],
     declared: Option<Vec<Table<'a>>>,
     sizes: Sizes<'a>,
     bus: Option<&mut Options>,
@@ -127,7 +128,12 @@ pub(super) fn lay_out<'a>(
         .collect();
     check_overlaps(&sections, &placed);
     let signals = sections.into_iter().map(|section| section.signal).collect();
-    Some(SignalTable { stations, signals })
+    let structures = axes.iter().map(Axis::structure).collect();
+    Some(SignalTable {
+        stations,
+        signals,
+        structures,
+    })
 }
 
 /// Reads the `[[station]]` tables. The flag is true if all their names are known.

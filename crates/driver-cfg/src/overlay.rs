@@ -79,7 +79,7 @@ fn read_fieldbus(
         if let Some(at) = &at {
             bus.place_signals(&At::read(at, &config.table), &config.table);
         }
-        bus.fit(&config.table, &config.axes, collector);
+        bus.fit(&config.table, collector);
         if bus.replayed().is_some() {
             config.record = None;
         }

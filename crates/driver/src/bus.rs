@@ -47,7 +47,6 @@ pub(super) fn open(
         folder: config.folder(),
         role: config.role,
         table: &config.table,
-        axes: &config.axes,
         cycle: config.timing.cycle,
         max_age: config.timing.max_age,
         events: config.events,

@@ -95,6 +95,7 @@ impl FrameBeats {
             let alone = SignalTable {
                 stations: config.table.stations.clone(),
                 signals: vec![signal.clone()],
+                structures: Vec::new(),
             };
             FrameBeat {
                 beat: Beat::new(&signal, 0, every),

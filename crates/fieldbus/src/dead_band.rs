@@ -60,6 +60,7 @@ impl DeadBands {
                 &SignalTable {
                     stations: table.stations.clone(),
                     signals,
+                    structures: Vec::new(),
                 },
                 station,
                 area,

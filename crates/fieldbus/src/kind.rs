@@ -6,7 +6,6 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use tickbus_axis::Axis;
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Table};
@@ -27,8 +26,6 @@ pub struct BusSetup<'a> {
     pub role: Role,
     /// The driver's stations and signals.
     pub table: &'a SignalTable,
-    /// The driver's axes, whose signals are in the table.
-    pub axes: &'a [Axis],
     /// The bus cycle, if stated.
     pub cycle: Option<Nanos>,
     /// Data older than this are stale.
@@ -173,9 +170,9 @@ pub trait BusOptions: AnyOptions {
         let _ = (lines, table);
     }
 
-    /// Reports options that do not fit the driver's stations, signals and axes.
-    fn fit(&self, table: &SignalTable, axes: &[Axis], collector: &Collector<'_>) {
-        let _ = (table, axes, collector);
+    /// Reports options that do not fit the driver's stations, signals and structures.
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let _ = (table, collector);
     }
 
     /// Reads the files that the options name, relative to `folder`, and reports mistakes and missing parts in them; for

@@ -534,6 +534,7 @@ mod tests {
         SignalTable {
             stations: vec![station(), station()],
             signals: signals.collect(),
+            structures: Vec::new(),
         }
     }
 

@@ -39,6 +39,7 @@ fn table(stations: &[&str]) -> SignalTable {
     SignalTable {
         stations: stations.collect(),
         signals,
+        structures: Vec::new(),
     }
 }
 

@@ -105,6 +105,7 @@ fn bits_of(table: &SignalTable) -> SignalTable {
     SignalTable {
         stations: table.stations.clone(),
         signals: signals.collect(),
+        structures: table.structures.clone(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The signal table of one driver.
 
+use std::ops::Range;
+
 use super::{Address, Area, ByteOrder, DataType, Scale, Slot};
 use tickbus_base::time::Nanos;
 
@@ -113,6 +115,27 @@ pub struct SignalTable {
     pub stations: Vec<Station>,
     /// In file order, which is slot order.
     pub signals: Vec<Signal>,
+    /// The parts of the only station that a bus can send in messages of their own, such as those of axes.
+    pub structures: Vec<Structure>,
+}
+
+/// Bytes of a station that belong together.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Structure {
+    /// Those of `%I`.
+    pub inputs: Range<usize>,
+    /// Those of `%Q`.
+    pub outputs: Range<usize>,
+}
+
+impl Structure {
+    /// The bytes in an area.
+    pub fn bytes(&self, area: Area) -> Range<usize> {
+        match area {
+            Area::Input => self.inputs.clone(),
+            Area::Output => self.outputs.clone(),
+        }
+    }
 }
 
 impl Station {
@@ -135,6 +158,7 @@ impl SignalTable {
                 output_bytes,
             }],
             signals,
+            structures: Vec::new(),
         }
     }
 

@@ -21,7 +21,7 @@ def switched(old, new, switch):
 
 
 def ways(line, switch):
-    """All changes of a line, at its place; each has effect only while `switch` is true."""
+    """Returns all changes of a line, at its place. A change takes effect only while `switch` is true."""
     for pattern in (COMPARES, SUMS):
         for found in pattern.finditer(line):
             before, left, operator, right = found.groups()

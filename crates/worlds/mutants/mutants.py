@@ -25,7 +25,7 @@ TREE = OUT / "tree"
 BUILT = OUT / "target"
 PROFILE = ["--profile", "bench", "--config", "tests/profile.toml", "--config", "profile.bench.opt-level=1"]
 SWITCH = """
-/// Whether this run is that of the mutation with this number.
+/// Returns true if this run is that of the mutation with this number.
 pub fn mutant(number: u32) -> bool {
     static CHOSEN: std::sync::LazyLock<u32> = std::sync::LazyLock::new(|| {
         std::env::var("TICKBUS_MUTANT").ok().and_then(|text| text.parse().ok()).unwrap_or(0)
@@ -40,11 +40,11 @@ CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7", "
 
 
 def write_tree(texts):
-    """Copies the files that git knows, with these changes; unchanged files keep their times, and are not recompiled."""
+    """Copies the files tracked by git, with these changes. Unchanged files keep their times, and are not recompiled."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
     names = set(filter(None, listed.decode().split("\0")))
     for path in TREE.rglob("*.rs"):
-        # A module that has moved would exist twice.
+        # Otherwise a module that has moved would exist twice.
         if str(path.relative_to(TREE)) not in names:
             path.unlink()
     for name in sorted(names):
@@ -79,14 +79,14 @@ def put_back(mutants, texts):
 
 
 def by_worlds(number, seconds):
-    """How long fresh worlds take to find a mutation, by which promise, and in which of them; what only a rare one meets, those of
-    the corpus find, which make test runs as well."""
+    """Returns how long fresh worlds take to find a mutation, the promise that it breaks, and the seed. If only a rare world
+    finds the mutation, the worlds of the corpus do, which make test also runs."""
     took, found, seed = fresh(number, seconds)
     return (took, found, seed) if found else corpus(number)
 
 
 def fresh(number, seconds):
-    """How long worlds take to find a mutation, by which promise, and in which of them."""
+    """Returns how long fresh worlds take to find a mutation, the promise that it breaks, and the seed."""
     binary = BUILT / "release" / "worlds"
     begun = time.monotonic()
     process = subprocess.Popen(
@@ -118,7 +118,7 @@ def fresh(number, seconds):
 
 
 def corpus(number):
-    """As fresh(), by the worlds that broke a promise once."""
+    """Like fresh(), with the worlds that once broke a promise."""
     begun = time.monotonic()
     seed = ""
     for seed in (HERE.parent / "corpus.txt").read_text().splitlines():
@@ -169,7 +169,7 @@ def by_chance(count, seconds):
         for path in sorted((ROOT / "crates" / crate / "src").rglob("*.rs")):
             if "test" not in str(path.relative_to(ROOT / "crates")):
                 files[str(path.relative_to(ROOT))] = path.read_text()
-    # Some do not compile.
+    # Some changes do not compile.
     changes = chance.drawn(files, count * 2, lambda index: f"tickbus_base::mutant({index + 1})")
     packages = [word for crate in CRATES for word in ("-p", f"tickbus-{crate}")]
     changes = compiling(files, changes, ["--keep-going", *packages])[:count]
@@ -193,7 +193,7 @@ def by_chance(count, seconds):
 
 
 def compiling(files, changes, arguments):
-    """The changes that compile; the compiler names the lines of the others."""
+    """Returns the changes that compile. The compiler names the lines of the others."""
     while True:
         base = "crates/base/src/lib.rs"
         texts = changed(files, changes)
@@ -214,7 +214,7 @@ def compiling(files, changes, arguments):
 
 
 def changed(files, changes):
-    """The texts of the files with these changes; each keeps its number."""
+    """Returns the texts of the files with these changes. Each change keeps its number."""
     texts = {}
     for change in changes:
         lines = texts.setdefault(change["file"], files[change["file"]].split("\n"))

@@ -5,9 +5,9 @@ use std::fmt;
 /// A promise that was broken.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Broken {
-    /// Its short name.
+    /// The short name of the promise.
     pub promise: &'static str,
-    /// What was seen, and what would have been right.
+    /// The observation, and the right behaviour.
     pub what: String,
 }
 
@@ -17,7 +17,7 @@ impl fmt::Display for Broken {
     }
 }
 
-/// Says that a promise was broken.
+/// Returns a broken promise as an error.
 pub(crate) fn broken<T>(promise: &'static str, what: String) -> Result<T, Broken> {
     Err(Broken { promise, what })
 }

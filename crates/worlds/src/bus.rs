@@ -3,9 +3,9 @@
 /// The line between the two ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Bus {
-    /// By link name, in one process.
+    /// In one process, by the name of the link.
     Loopback,
-    /// Records in each cycle.
+    /// Records in every cycle.
     Socket,
     /// Records when something has changed.
     SocketOnChange,
@@ -15,14 +15,14 @@ pub enum Bus {
     ModbusRtu,
     /// S7.
     S7,
-    /// Lines of values, which a dispatcher in a process of its own passes on.
+    /// Lines of values that a dispatcher in a separate process forwards.
     Dispatcher,
     /// PROFIBUS DP on a serial line; the controller is the master.
     Profibus,
 }
 
 impl Bus {
-    /// The names of all.
+    /// The names of all buses.
     pub(crate) const NAMES: [&str; 8] = [
         "loopback",
         "socket",
@@ -34,12 +34,12 @@ impl Bus {
         "profibus",
     ];
 
-    /// The name, as a feature of a world.
+    /// The name of the bus, as a feature of a world.
     pub(crate) fn name(self) -> &'static str {
         Self::NAMES[self as usize]
     }
 
-    /// Whether one end asks and the other answers.
+    /// Returns true if one end asks and the other answers.
     pub(crate) fn asks(self) -> bool {
         matches!(
             self,
@@ -47,12 +47,12 @@ impl Bus {
         )
     }
 
-    /// True if each station is asked separately: a unit of Modbus, a slave of PROFIBUS.
+    /// Returns true if each station is asked separately: a unit of Modbus, a slave of PROFIBUS.
     pub(crate) fn has_units(self) -> bool {
         matches!(self, Self::Modbus | Self::ModbusRtu | Self::Profibus)
     }
 
-    /// Whether one message carries several stations.
+    /// Returns true if one message carries several stations.
     pub(crate) fn has_stations(self) -> bool {
         matches!(
             self,

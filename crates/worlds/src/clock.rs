@@ -1,4 +1,4 @@
-//! The clock of a simulated world, and the sockets that it has in the place of the system's.
+//! The clock of a simulated world, and the sockets that replace those of the system.
 
 use std::fs::File;
 use std::io::{self, ErrorKind};
@@ -19,7 +19,7 @@ use crate::scheduler::{self, network};
 pub(crate) struct SimulatedClock;
 
 impl SimulatedClock {
-    /// The clock, to be handed in.
+    /// The clock, for a driver.
     pub(crate) fn shared() -> Arc<dyn Clock> {
         Arc::new(Self)
     }

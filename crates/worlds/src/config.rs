@@ -103,8 +103,8 @@ impl Plan {
         lines
     }
 
-    /// The time without a request after which a slave of PROFIBUS clears its outputs: in half of all worlds its data are stale
-    /// before. Masters count in steps of 10 ms.
+    /// The time without a request after which a slave of PROFIBUS clears its outputs. In half of all worlds its data are
+    /// stale earlier. Masters count in steps of 10 ms.
     pub(crate) fn slave_watchdog(&self) -> Nanos {
         let time = if self.seed.number.is_multiple_of(2) {
             (self.max_age.0 / 3).max(self.cycle.0 * 3 + self.round_trip() + 10_000_000)
@@ -152,7 +152,7 @@ impl Plan {
         Some((every, is_watched.then_some(within)))
     }
 
-    /// Whether an end waits for the other one to connect.
+    /// Returns true if an end waits for the other one to connect.
     pub(crate) fn serves(&self, end: usize) -> bool {
         (end == 1) == self.controller_serves
     }
@@ -184,7 +184,7 @@ impl Plan {
         own.into_iter().chain(other).collect()
     }
 
-    /// What every bus has.
+    /// The keys that every bus has.
     fn timing(&self, end: usize) -> Vec<String> {
         let (cycle, max_age, reconnect) = (self.cycle, self.max_age, self.reconnect);
         let mut lines = vec![format!(

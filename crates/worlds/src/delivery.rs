@@ -9,6 +9,6 @@ pub(crate) struct Delivery {
     pub sent: i64,
     /// The process that sent them.
     pub from: usize,
-    /// They are the last ones of what it wanted to send then; before that, nobody can know what it is.
+    /// True for the last bytes of a message; without them, the receiver cannot know the message.
     pub is_whole: bool,
 }

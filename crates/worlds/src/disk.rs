@@ -1,7 +1,7 @@
 //! The disk of a simulated world: real files in a folder, with as much room as the world gives them.
 //!
-//! The worlds of a thread use one folder in turn. Its path is the same for all of them, so two worlds with the same driver.cfg
-//! have the same text, and the text is parsed once.
+//! The worlds of a thread use one folder in turn, under the same path. Two worlds with the same driver.cfg therefore
+//! have the same text, which is parsed once.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-/// Where files are kept in memory, on systems that have this.
+/// The folder for files in memory, on systems that have it.
 const IN_MEMORY: &str = "/dev/shm";
 
 thread_local! {
@@ -28,14 +28,14 @@ fn new_folder() -> TempDir {
 #[derive(Debug, Default)]
 pub(crate) struct Disk {
     folder: Option<PathBuf>,
-    /// How long files may become, by their paths.
+    /// The maximum lengths of files, by path.
     limits: BTreeMap<PathBuf, u64>,
-    /// Processes that write no more, and since when.
+    /// Killed processes, which write nothing more, and the times of the kills.
     killed: BTreeMap<usize, i64>,
 }
 
 impl Disk {
-    /// Where the files of this world are; they are removed with it.
+    /// The folder of this world's files, which are removed with the world.
     pub(crate) fn folder(&mut self) -> &Path {
         self.folder.get_or_insert_with(|| {
             FOLDER.with_borrow_mut(|folder| folder.get_or_insert_with(new_folder).path().to_owned())
@@ -49,22 +49,22 @@ impl Disk {
         }
     }
 
-    /// A file may become this long.
+    /// Limits the length of a file.
     pub(crate) fn limit(&mut self, path: PathBuf, limit: u64) {
         self.limits.insert(path, limit);
     }
 
-    /// Nothing that a process writes from now on reaches a file.
+    /// Kills a process: nothing that it writes from now on reaches a file.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
         self.killed.entry(process).or_insert(now);
     }
 
-    /// Takes back that a process was killed; returns when it was.
+    /// Undoes the kill of a process; returns when it was killed.
     pub(crate) fn revive(&mut self, process: usize) -> Option<i64> {
         self.killed.remove(&process)
     }
 
-    /// A process writes to a file.
+    /// Writes bytes of a process to a file, as far as there is room.
     pub(crate) fn write(
         &self,
         process: usize,

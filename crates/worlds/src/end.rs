@@ -1,4 +1,4 @@
-//! One end of a world's line: its driver, and what ticks it.
+//! One end of a world's line: its driver, and the code that ticks it.
 
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Driver};
@@ -21,7 +21,7 @@ use crate::typed::Typed;
 struct Places {
     stamp: usize,
     pulse: usize,
-    /// Where rising edges of `pulse` are counted, at the end that reads it.
+    /// The slot that counts rising edges of `pulse`, at the end that reads it.
     edges: Option<usize>,
     level: usize,
     numbers: Option<(usize, usize)>,
@@ -45,14 +45,14 @@ pub(crate) struct End {
     injector: Injector,
 }
 
-/// What a tick found.
+/// The result of a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Found {
     pub(crate) code: Code,
     pub(crate) age: i64,
     pub(crate) sequence: u64,
     pub(crate) stations: Vec<Shown>,
-    /// What the end itself found.
+    /// The promise that the end itself found broken.
     pub(crate) broken: Option<Broken>,
 }
 
@@ -132,7 +132,7 @@ impl End {
         })
     }
 
-    /// One tick, the `tick`th of this `life`; returns what it found, and whether it wrote a pulse.
+    /// Runs tick `tick` of this `life`; returns its result, and true if it wrote a pulse.
     pub(crate) fn tick(&mut self, life: u64, tick: u64) -> (Found, bool) {
         let time = now().0;
         let is_pulse = self.pulses.are_due(time);
@@ -174,7 +174,7 @@ impl End {
         (found, is_pulse)
     }
 
-    /// What it wrote it finds again, and who looks sees what it has.
+    /// Judges that the end finds the values that it wrote, and that a viewer sees the same slots.
     fn judge_own(&mut self, tick: u64, code: Code) -> Result<(), Broken> {
         let slots = &self.slots;
         for places in &self.writes {
@@ -219,7 +219,7 @@ impl End {
         }
     }
 
-    /// The slots, with what this end sends as it is on the line.
+    /// The slots, with the values that this end sends as they are on the line.
     fn on_line(&self) -> Vec<u64> {
         let mut values: Vec<u64> = self.slots.iter().map(|slot| slot.0).collect();
         for places in &self.writes {
@@ -231,7 +231,7 @@ impl End {
         values
     }
 
-    /// The signals beside the stamps that it writes.
+    /// The signals beside the stamps that this end writes.
     fn beside(&self) -> &[Typed] {
         self.plan.features.beside(['Q', 'I'][1 - self.which])
     }
@@ -267,7 +267,7 @@ impl End {
         shown.collect()
     }
 
-    /// Closes the driver, and judges what it leaves behind.
+    /// Closes the driver, and judges its recording.
     pub(crate) fn close(self) -> Result<(), Broken> {
         self.driver.close();
         match &self.tape {

@@ -1,80 +1,80 @@
-//! Injected faults and forced signals: which are active in which tick of an end, and what they make of values.
+//! Injected faults and forced signals: those active in a tick of an end, and their effects on values.
 
 use tickbus_base::time::Nanos;
 
 use crate::random::Random;
 use crate::stamp::{Stamp, level, real, whole};
 
-/// A signal beside each stamp that faults bend: its name, and its fail-safe value.
+/// The signals beside each stamp that faults affect: their names, and their fail-safe values.
 const SIGNALS: [(&str, f64); 3] = [("level", 0.0), ("whole", -7.0), ("real", 2.5)];
 
-/// What a fault does.
+/// The effect of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Effect {
-    /// The signal of this index and area stays at a value, or where it is.
+    /// The signal of this index and area stays at this value, or at its current one.
     Stuck(usize, char, Option<f64>),
-    /// A BOOL is the other way round.
+    /// A BOOL is inverted.
     Invert(char),
-    /// Something is added.
+    /// A number is added to a signal.
     Offset(usize, char, f64),
-    /// Something up to that is added or taken away.
+    /// A random number up to this one is added to a signal or subtracted from it.
     Noise(usize, char, f64),
     /// A BOOL is inverted now and then.
     Flicker(char),
-    /// What comes in is held back.
+    /// Received frames are held back.
     Delay(Nanos),
-    /// What goes out is.
+    /// Sent frames are held back.
     SlowAnswers(Nanos),
-    /// Frames are lost, of `direction`.
+    /// Frames of this direction are lost.
     Drop(&'static str),
-    /// Frames come twice.
+    /// Frames of this direction come twice.
     Duplicate(&'static str),
-    /// Nothing goes out or comes in.
+    /// No frames are sent or received.
     LinkDown,
 }
 
-/// How it is injected, and ended.
+/// The way in which a fault is injected and ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// By a section in driver.cfg, with `tick` and `ticks`.
     File,
     /// While the driver ticks, with `ticks`.
     Injected,
-    /// The same, and ended by a call.
+    /// While the driver ticks; a call ends the fault.
     Ended,
-    /// By somebody who watches, as the live page does: a stuck signal.
+    /// By a viewer, as the live page does: a stuck signal.
     Forced,
 }
 
 /// A fault of an end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FaultPlan {
-    /// Where.
+    /// The index of the end.
     pub end: usize,
-    /// What it does.
+    /// The effect of the fault.
     pub effect: Effect,
-    /// How it comes about.
+    /// The way in which the fault is injected and ended.
     pub way: Way,
-    /// Its first tick in each life of the driver.
+    /// The first tick of the fault in each life of the driver.
     pub first: u64,
-    /// How many ticks it lasts.
+    /// The duration of the fault, in ticks.
     pub ticks: u64,
 }
 
-/// Whether a fault is active in a tick.
+/// The state of a fault in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activity {
     No,
-    /// The tick may have learnt of it already, or not yet.
+    /// The tick may or may not know of the fault.
     Maybe,
     Yes,
 }
 
-/// The least and the greatest value that may be shown.
+/// The minimum and the maximum value that may be shown.
 pub(crate) type Span = (f64, f64);
 
 impl FaultPlan {
-    /// Some faults: of signals, of the line, and forced signals, as far as they may be.
+    /// Draws some faults: of signals, of the line, and forced signals, as far as the world can have them.
     pub(crate) fn draw(random: &mut Random, numbers: bool, max_age: i64) -> Vec<Self> {
         let count = random.within(1, 4);
         let mut used = Vec::new();
@@ -118,7 +118,7 @@ impl FaultPlan {
         faults
     }
 
-    /// The signal that it bends: its index and area.
+    /// The signal that the fault affects: its index and area.
     pub(crate) fn signal(&self) -> Option<(usize, char)> {
         match self.effect {
             Effect::Stuck(signal, area, _)
@@ -129,13 +129,13 @@ impl FaultPlan {
         }
     }
 
-    /// The name of the signal that it bends: that of station 0.
+    /// The name of the signal that the fault affects: that of station 0.
     pub(crate) fn signal_name(&self) -> Option<String> {
         let (signal, area) = self.signal()?;
         Some(format!("{}{area}0", SIGNALS[signal].0))
     }
 
-    /// How long it holds frames back.
+    /// The time for which the fault holds frames back, in ns.
     pub(crate) fn held(&self) -> i64 {
         match self.effect {
             Effect::Delay(by) | Effect::SlowAnswers(by) => by.0,
@@ -143,15 +143,15 @@ impl FaultPlan {
         }
     }
 
-    /// Whether it is one of the line.
+    /// Returns true for a fault of the line.
     pub(crate) fn is_of_line(&self) -> bool {
         self.signal().is_none()
     }
 
-    /// Whether it is active in a tick of its end.
+    /// Returns the state of the fault in a tick of its end.
     pub(crate) fn activity(&self, tick: u64) -> Activity {
         let over = self.first + self.ticks;
-        // A tick takes over at its end what is ordered from outside, so that the next one is the first that knows.
+        // A tick takes over orders from outside at its end, so that the next tick is the first to know them.
         let is_forced = self.way == Way::Forced;
         if is_forced && (tick == self.first || tick == over) {
             return Activity::Maybe;
@@ -163,12 +163,12 @@ impl FaultPlan {
         }
     }
 
-    /// Whether it has nothing more to do from a tick on.
+    /// Returns true if the fault has no more effect from a tick on.
     pub(crate) fn is_over(&self, tick: u64) -> bool {
         tick > self.first + self.ticks
     }
 
-    /// Its section, without the keys that say when.
+    /// The section of the fault, without the keys for its time.
     pub(crate) fn section(&self) -> String {
         let name = self.signal_name().unwrap_or_default();
         match self.effect {
@@ -202,7 +202,7 @@ impl FaultPlan {
         }
     }
 
-    /// What it makes of a value; `was` are the values where it may have begun.
+    /// The possible results of the fault for a value; `was` has the possible values at which the fault began.
     fn bend(&self, (least, most): Span, was: &[f64]) -> Vec<Span> {
         match self.effect {
             Effect::Stuck(_, _, Some(value)) => vec![(value, value)],
@@ -216,7 +216,7 @@ impl FaultPlan {
     }
 }
 
-/// A value that was seen, or any if it was not.
+/// The span of a value that was seen; if it was not seen, any value.
 fn known(value: f64) -> Span {
     if value.is_nan() {
         (f64::NEG_INFINITY, f64::INFINITY)
@@ -225,7 +225,7 @@ fn known(value: f64) -> Span {
     }
 }
 
-/// The values beside a stamp, or the fail-safe ones.
+/// The values beside a stamp, or the fail-safe values.
 pub(crate) fn values(stamp: Option<u64>) -> [f64; 3] {
     match stamp {
         None => SIGNALS.map(|(_, fail_safe)| fail_safe),
@@ -237,7 +237,7 @@ pub(crate) fn values(stamp: Option<u64>) -> [f64; 3] {
     }
 }
 
-/// What the codec makes of a signal's value: an INT is rounded and saturated; a REAL may lose its last digits.
+/// The codec's result for a signal's value: an INT is rounded and saturated; a REAL may lose its last digits.
 fn on_line(signal: usize, (least, most): Span) -> Span {
     match signal {
         0 => (least, most),
@@ -254,8 +254,8 @@ fn on_line(signal: usize, (least, most): Span) -> Span {
     }
 }
 
-/// What the end that reads a station may be shown of the signals beside a stamp, in `tick` of its own: `held` is what was
-/// shown when its own faults began, NaN where that was not seen.
+/// The values beside a stamp that the end that reads a station may show in its own tick `tick`. `held` returns the
+/// values shown when its own faults began, or NaN if they were not seen.
 pub(crate) fn expected(
     (faults, hosted): (&[FaultPlan], Option<usize>),
     (area, station): (char, usize),
@@ -266,9 +266,9 @@ pub(crate) fn expected(
     let reader = usize::from(area == 'I');
     let mut all = values(stamp).map(|value| vec![(value, value)]);
     let faults = faults.iter().enumerate();
-    // A program reads bytes, and its faults bend these.
+    // A program reads bytes, which its faults affect.
     let reads_bytes = hosted == Some(reader);
-    // Those of the end that writes come first, whichever is the first in the list.
+    // The faults of the writing end come first, whatever their order in the list.
     let (own, others): (Vec<_>, Vec<_>) = faults.partition(|(_, fault)| fault.end == reader);
     for (index, fault) in others.into_iter().chain(own) {
         let Some((signal, of)) = fault.signal() else {
@@ -281,7 +281,7 @@ pub(crate) fn expected(
         let (at, was) = if fault.end == reader {
             (Some(tick), held(index, signal))
         } else {
-            // The end that writes sends fail-safe values without faults.
+            // The writing end sends fail-safe values without faults.
             let written = stamp.map(Stamp::of);
             let at = written.map(|stamp| stamp.tick);
             let first = |tick| {

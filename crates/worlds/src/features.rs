@@ -1,4 +1,5 @@
-//! More of a driver.cfg than its line: what is drawn from the seed after all else, so that older seeds stay what they are.
+//! Features of a driver.cfg beyond its line. They are drawn from the seed after everything else, so that older seeds
+//! keep their worlds.
 
 use crate::bus::Bus;
 use crate::faults::{Effect, FaultPlan, Way};
@@ -9,49 +10,49 @@ use crate::typed::Typed;
 /// The simulation time that an end hands in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Times {
-    /// None.
+    /// No time: the clock counts.
     Clock,
-    /// That many nanoseconds more in each tick.
+    /// This many nanoseconds more in each tick.
     Steps(i64),
-    /// The same, but every so often a tick is as early as one before.
+    /// Like `Steps`, but now and then a tick is as early as one before it.
     Back(i64),
 }
 
 /// The table `[record]` of an end.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RecordPlan {
-    /// CSV, and not VCD.
+    /// True for CSV, false for VCD.
     pub is_csv: bool,
     /// The key `ring`.
     pub ring: Option<u64>,
-    /// How long the file may become.
+    /// The maximum length of the file, in bytes.
     pub disk: Option<u64>,
-    /// Others want the same file.
+    /// True if others want the same file.
     pub is_contended: bool,
-    /// The file is cut somewhere after a kill, as by a power failure.
+    /// True if the file is cut somewhere after a kill, as by a power failure.
     pub is_torn: bool,
 }
 
-/// What both ends have besides.
+/// The features that both ends have beyond the line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Features {
     /// The recording of each end.
     pub recordings: [Option<RecordPlan>; 2],
     /// The simulation time of each end.
     pub times: [Times; 2],
-    /// Recordings are replayed: by exchanges of the same kind, and by ticks at other times.
+    /// True if recordings are replayed: by exchanges of the same kind, and by ticks at other times.
     pub replays: bool,
-    /// What is beside the stamps: of what the device reads, and of what the controller reads.
+    /// The signals beside the stamps: those that the device reads, and those that the controller reads.
     pub typed: [Vec<Typed>; 2],
     /// Injected faults, and forced signals.
     pub faults: Vec<FaultPlan>,
-    /// Somebody looks at an end.
+    /// True for an end that somebody watches.
     pub watched: [bool; 2],
-    /// Each end beats every so many of its ticks, and the other one watches that.
+    /// The heartbeat of each end: its interval in ticks, and true if the other end watches it.
     pub beats: [Option<(i64, bool)>; 2],
-    /// An end is a PLC program that tickbus scans.
+    /// The end that is a PLC program, scanned by tickbus.
     pub hosted: Option<usize>,
-    /// Pulses come in pairs, the second one while the first is still held.
+    /// True if pulses come in pairs, the second one while the first is still held.
     pub pairs: bool,
 }
 
@@ -63,15 +64,15 @@ impl Features {
         numbers: bool,
         max_age: i64,
     ) -> Self {
-        // A client of Modbus writes no gap, so that what is behind one is a request of its own, and seen later.
+        // A Modbus client does not write gaps, so values after a gap take a separate request, and are seen later.
         let (first, has_gaps) = match bus {
             Bus::Modbus | Bus::ModbusRtu => (if numbers { 16 } else { 10 }, false),
             _ => (16, true),
         };
         let random = &mut Random::new(scramble(seed.number ^ 0x6D6F_7265));
-        // Of each of them a quarter of all worlds has some.
+        // Each feature exists in a quarter of all worlds.
         let has = random.number() & random.number() & u64::from(seed.more);
-        // A dispatcher has a station for all that it carries, and no room beside it.
+        // A dispatcher has one station for everything that it carries, and no room beside it.
         let has = if bus == Bus::Dispatcher { 0 } else { has };
         let is = |bit: u32| has >> bit & 1 == 1;
         let recordings = [0, 1].map(|end| {
@@ -124,18 +125,18 @@ impl Features {
         features
     }
 
-    /// Makes an end a program: it has no recording, hands in no time, and its faults are those of its driver.cfg.
+    /// Makes an end a program: it has no recording, passes no time, and its faults are those of its driver.cfg.
     fn host(&mut self, end: usize) {
         self.hosted = Some(end);
         self.recordings[end] = None;
         self.watched[end] = false;
-        // What a program beats is its own affair.
+        // The program decides on its own heartbeat.
         self.beats[end] = None;
         self.faults
             .retain(|fault| fault.end != end || fault.way == Way::File);
     }
 
-    /// Their names.
+    /// The names of the features.
     pub(crate) fn names(&self) -> Vec<&'static str> {
         let mut names = Vec::new();
         let mut add = |is: bool, name| {
@@ -201,7 +202,7 @@ impl Features {
         names
     }
 
-    /// How many bytes a station has in one direction at most.
+    /// The maximum number of bytes of a station in one direction.
     pub(crate) fn frame(&self) -> usize {
         let typed = self.typed.iter().flatten();
         typed.map(|typed| typed.place + 8).max().unwrap_or(16)
@@ -213,7 +214,7 @@ impl Features {
     }
 }
 
-/// All of them.
+/// The names of all features that are drawn here.
 pub(crate) const NAMES: &[&str] = &[
     "record csv",
     "record vcd",

@@ -10,21 +10,21 @@ pub(crate) struct FileRow {
     pub(crate) status: i32,
     pub(crate) stations: Vec<i32>,
     pub(crate) dropped: u64,
-    /// By the columns of the file.
+    /// The values, in the order of the columns.
     pub(crate) values: Vec<u64>,
 }
 
-/// The whole of a file.
+/// The contents of a file.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Contents {
-    /// The columns: signals, and what counts their edges.
+    /// The columns: signals, and counts of their edges.
     pub(crate) names: Vec<String>,
     pub(crate) rows: Vec<FileRow>,
-    /// What the recorder said at its end.
+    /// The line with which the recorder closed the file, if there is one.
     pub(crate) end: Option<String>,
 }
 
-/// Whether a column counts the edges of a signal.
+/// Returns true if a column counts the edges of a signal.
 #[expect(
     clippy::case_sensitive_file_extension_comparisons,
     reason = "the name of a column"
@@ -33,7 +33,7 @@ pub(crate) fn is_count(name: &str) -> bool {
     name.ends_with(".edges")
 }
 
-/// The bits of a slot with a number as it is written: those of an integer where the name says so, or else of a double.
+/// The bits of a slot with the number in `text`: those of an integer if the name says so, otherwise those of a double.
 fn bits(name: &str, text: &str) -> Result<u64, String> {
     let wrong = || format!("\"{text}\" is no value of {name}");
     if name.starts_with("stamp") || name.starts_with("u64") {
@@ -46,7 +46,7 @@ fn bits(name: &str, text: &str) -> Result<u64, String> {
     }
 }
 
-/// The area of a signal, which its name has.
+/// The area of a signal, from its name.
 pub(crate) fn area_of(name: &str) -> char {
     let mut letters = name.chars().filter(char::is_ascii_uppercase);
     letters.next().expect("each name has its area")
@@ -102,7 +102,7 @@ pub(crate) fn csv(text: &str) -> Result<Contents, String> {
     })
 }
 
-/// What a variable of a VCD file is.
+/// A variable of a VCD file.
 #[derive(Clone, Copy, Debug)]
 enum Variable {
     Tick,
@@ -126,7 +126,7 @@ pub(crate) fn vcd(text: &str) -> Result<Contents, String> {
         values: Vec::new(),
     };
     for line in whole.lines() {
-        // Nothing looks at a fifth word; and a list on the heap for each line would take longer than the rest.
+        // No branch needs a fifth word, and a heap list for each line would take longer than everything else.
         let mut words = [""; 4];
         let mut count = 0;
         for (place, word) in words.iter_mut().zip(line.split_ascii_whitespace()) {

@@ -1,4 +1,4 @@
-//! Injects the faults of an end, forces its signals, and looks at it as the live page does.
+//! Injects the faults of an end, forces its signals, and watches it as the live page does.
 
 use tickbus_driver::{Code, Driver, Watch};
 use tickbus_image::signal::Slot;
@@ -7,10 +7,10 @@ use crate::broken::Broken;
 use crate::faults::{Effect, FaultPlan, Way};
 use crate::plan::Plan;
 
-/// Who interferes with a driver.
+/// The faults of a driver, and its viewer.
 pub(crate) struct Injector {
     faults: Vec<FaultPlan>,
-    /// The numbers of those that are to be ended.
+    /// The numbers of the active faults that have to be ended.
     numbers: Vec<Option<u32>>,
     watch: Option<Watch>,
     has_asked: bool,
@@ -24,7 +24,7 @@ fn refused(what: &str, why: impl std::fmt::Display) -> Broken {
 }
 
 impl Injector {
-    /// Of a driver that was opened.
+    /// An injector for a driver that has just been opened.
     pub(crate) fn new(plan: &Plan, end: usize, driver: &mut Driver) -> Self {
         let faults = plan.features.faults.iter().copied();
         let faults: Vec<FaultPlan> = faults.filter(|fault| fault.end == end).collect();
@@ -37,7 +37,7 @@ impl Injector {
         }
     }
 
-    /// A tick is about to begin.
+    /// Starts and ends the faults that are due, before a tick.
     pub(crate) fn before(&mut self, tick: u64, driver: &mut Driver) -> Result<(), Broken> {
         for (fault, number) in self.faults.iter().zip(&mut self.numbers) {
             if tick != fault.first && tick != fault.first + fault.ticks {
@@ -79,7 +79,7 @@ impl Injector {
                 }
             }
         }
-        // Not in each tick, so that others have nothing to do but to exchange.
+        // Not in every tick, so that some ticks do nothing but exchange.
         self.has_asked = tick % 5 < 2 && self.watch.is_some();
         if let (true, Some(watch)) = (self.has_asked, &mut self.watch) {
             watch.ask(tick.is_multiple_of(10));
@@ -87,7 +87,7 @@ impl Injector {
         Ok(())
     }
 
-    /// A tick has ended, with these slots.
+    /// Judges that the viewer sees a tick that has just ended with these slots.
     pub(crate) fn behind(&mut self, tick: u64, code: Code, slots: &[Slot]) -> Result<(), Broken> {
         let (true, Some(watch)) = (self.has_asked, &mut self.watch) else {
             return Ok(());

@@ -1,11 +1,11 @@
-//! Parsed driver.cfg files. Several worlds have the same one, and parsing it takes longer than a life of its driver.
+//! Parsed driver.cfg files. Several worlds have the same file, and parsing it takes longer than a life of its driver.
 
 use std::cell::RefCell;
 use std::collections::VecDeque;
 
 use tickbus_driver_cfg::Config;
 
-/// The number of files that are kept: two ends have one each, and one for each way in which a recording is replayed.
+/// The number of files that are kept: one for each end, and one for each way to replay a recording.
 const KEPT: usize = 12;
 
 /// A parsed driver.cfg.
@@ -23,7 +23,7 @@ thread_local! {
 ///
 /// # Panics
 ///
-/// tickbus refuses the file, and worlds have none such.
+/// tickbus refuses the file. The files of worlds are valid.
 pub(crate) fn parse(path: &str, text: String) -> Config {
     let known = KNOWN.with_borrow(|files| {
         let known = files

@@ -1,4 +1,4 @@
-//! The dispatcher between both ends: a process of its own, which misfortunes befall as well.
+//! The dispatcher between both ends: a separate process, which suffers misfortunes as well.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -18,7 +18,7 @@ use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
 use crate::stamp::Stamp;
 
-/// A dispatcher that is to end has done so within this.
+/// The time within which a dispatcher has to end.
 const LONGEST_END: Nanos = Nanos::from_secs(2);
 
 /// The dispatcher of a world, from life to life.
@@ -29,14 +29,14 @@ pub(crate) struct Laboratory {
     clients: [RefCell<Vec<usize>>; 2],
     stop: RefCell<Stop>,
     is_running: Cell<bool>,
-    /// It was killed or closed, and another one follows.
+    /// True if the dispatcher was killed or closed, and another one follows.
     is_ending: Cell<bool>,
-    /// No further one is to begin.
+    /// True if no further dispatcher is to begin.
     is_over: Cell<bool>,
 }
 
 impl Laboratory {
-    /// An end has begun a life as this process.
+    /// Registers `process` as a new life of an end.
     pub(crate) fn joins(&self, end: usize, process: usize) {
         self.clients[end].borrow_mut().push(process);
     }
@@ -68,7 +68,7 @@ impl Laboratory {
         });
     }
 
-    /// What befalls it; how long that lasts is in `what`.
+    /// Applies a misfortune to the dispatcher; `what` has its duration.
     pub(crate) fn befall(self: &Rc<Self>, plan: &Plan, what: Misfortune) {
         if !self.is_running.get() || self.is_ending.get() {
             return;
@@ -93,11 +93,11 @@ impl Laboratory {
         });
     }
 
-    /// Ends it.
+    /// Ends the dispatcher.
     ///
     /// # Errors
     ///
-    /// That takes too long.
+    /// The dispatcher does not end in time.
     pub(crate) fn end(&self) -> Result<(), Broken> {
         self.is_over.set(true);
         self.stop.borrow().stop();
@@ -112,8 +112,9 @@ impl Laboratory {
         Ok(())
     }
 
-    /// What the dispatcher knew of the other end than `end`, which is `writer` and was not stale in its lives since `valid_since`,
-    /// when it sent what `end` had heard by `heard`, and read as `deliveries`.
+    /// Returns what the dispatcher knew of the other end when it sent what `end` had heard by `heard`. The other end is
+    /// `writer`, and `valid_since` has the time at which each of its lives was first not stale. `deliveries` are those
+    /// that `end` has read.
     pub(crate) fn known(
         &self,
         plan: &Plan,
@@ -125,14 +126,15 @@ impl Laboratory {
         let before = deliveries.partition_point(|delivery| delivery.at <= heard - 1_000_000);
         let answers = &deliveries[before.checked_sub(1)?..];
         let writers = self.clients[1 - end].borrow();
-        // The life of the writer that sent this, from 1.
+        // The life of the writer that sent a delivery, from 1.
         let life = |delivery: &Delivery| {
             let life = writers.iter().position(|from| *from == delivery.from)?;
             Some(life as u64 + 1)
         };
         let first = answers.first()?;
         let mut silent = i64::MAX;
-        // What had come to the dispatcher of an answer. Of earlier answers that ends no later, so one walk back serves them all.
+        // The deliveries that had reached the dispatcher before an answer. Earlier answers have no more, so one walk
+        // back serves all.
         let mut arrived: &[Delivery] = &[];
         let mut later: Option<&Delivery> = None;
         for answer in answers.iter().rev() {
@@ -141,7 +143,7 @@ impl Laboratory {
                 arrived = all.map_or(&[], |all| all);
             }
             later = Some(answer);
-            // It may read while it writes that.
+            // The dispatcher may read while it writes the answer.
             let is_newest =
                 |delivery: &Delivery| delivery.at <= answer.at && life(delivery).is_some();
             let newest = arrived.iter().rposition(is_newest);
@@ -150,9 +152,9 @@ impl Laboratory {
                 silent = silent.min(answer.sent - newest.at);
             }
         }
-        // What a life says is no sign that the last ticks of the life before it have come: that may have closed without a
-        // further cycle, and a dispatcher that holds has its values on.
-        // Nor is what it says before it has been heard: that may ask to join, and be refused.
+        // The lines of a life do not prove that the last ticks of the previous life have come. That life may have
+        // closed without a further cycle, and a dispatcher that holds keeps its values. Nor do lines count that a life
+        // sends before it has been heard: they may be a request to join that is refused.
         let has_joined = |at: i64, life: u64| {
             let life = usize::try_from(life - 1).ok();
             let since = life.and_then(|life| valid_since.get(life));
@@ -174,8 +176,8 @@ impl Laboratory {
     }
 }
 
-/// For how long what the dispatcher reads may have waited: right behind a suspension it reads that in several turns, and passes on
-/// what each of them has.
+/// The time that data read by the dispatcher may have waited, in ns. Right after a suspension the dispatcher reads them
+/// in several turns, and forwards in each what it has read.
 fn waited(plan: &Plan, sent: i64, slack: i64) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Suspend(BETWEEN, span) => {
@@ -191,7 +193,8 @@ fn waited(plan: &Plan, sent: i64, slack: i64) -> i64 {
     spans.sum()
 }
 
-/// A source that has been silent for longer than it promised is lost: nothing of it counts any more, unless the dispatcher holds.
+/// Judges that a source is lost if it has been silent for longer than it promised: none of its values count any more,
+/// unless the dispatcher holds.
 pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Result<(), Broken> {
     let allowed = promise(plan) * 2 + slack(plan) + held(plan);
     match seen.stations.iter().find(|shown| shown.stamp != FAIL_SAFE) {
@@ -224,7 +227,8 @@ fn serve(settings: Settings, patch: Patch, stop: &Stop) {
         .expect("a simulation can wait");
 }
 
-/// Each output of an end is connected with the input of the same number of the other one, unless they ask for that.
+/// The patch that connects each output of an end to the input of the same number at the other; empty if the ends
+/// request their connections.
 fn patch(plan: &Plan) -> Patch {
     let mut patch = Patch::new();
     if plan.laboratory.is_asked {

@@ -1,9 +1,9 @@
-//! Simulated worlds: two drivers at the ends of a line, with their threads, a network and a clock that one seed rules, judged
-//! by values that say themselves when they were written.
+//! Simulated worlds: two drivers at the ends of a line. One seed controls their threads, the network and the clock. The
+//! judge relies on values that show when they were written.
 //!
-//! [`Plan::draw`] draws a world from a seed: which bus, which keys of driver.cfg, which misfortunes exist at all, and when they
-//! happen. [`Plan::run`] lets it happen, within some milliseconds, and returns the first promise that was broken. The
-//! same seed gives the same world on every machine, to the last bit. `docs/testing-tickbus.md` tells more.
+//! [`Plan::draw`] draws a world from a seed: its bus, its keys of driver.cfg, the misfortunes that exist, and when they
+//! happen. [`Plan::run`] runs it within some milliseconds, and returns the first promise that was broken. The same seed
+//! gives the same world on every machine, to the last bit. See `docs/testing-tickbus.md`.
 
 #![allow(
     clippy::float_cmp,

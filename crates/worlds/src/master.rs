@@ -1,5 +1,5 @@
-//! The bus `profibus-master`: the other end of PROFIBUS in worlds. The protocol is profirust's, so that no telegram of the
-//! product meets itself; this file carries frames between it and the port.
+//! The bus `profibus-master`: the other end of PROFIBUS in worlds. The protocol is profirust's, so the product is not
+//! tested against itself; this file carries frames between profirust and the port.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -187,7 +187,7 @@ struct Side {
     /// When the current request was sent first. A station answers one that is repeated as it did the first time.
     asked: Option<Nanos>,
     exchanges: bool,
-    /// It had its turn in this bus cycle.
+    /// The slave had its turn in this bus cycle.
     is_done: bool,
 }
 
@@ -207,8 +207,8 @@ struct Line {
     due: Nanos,
 }
 
-/// The identifiers of modules with this many bytes of inputs and of outputs. profirust keeps a reference to them; there are as
-/// many as frames of different sizes.
+/// The identifiers of modules with this many bytes of inputs and of outputs. profirust keeps a reference to them, so they
+/// are kept for ever: one list for each pair of sizes.
 fn modules(inputs: usize, outputs: usize) -> &'static [u8] {
     thread_local! {
         static KNOWN: RefCell<BTreeMap<(usize, usize), &'static [u8]>> = RefCell::default();
@@ -259,7 +259,7 @@ impl Line {
         parameters
             .slot_bits(options.slot_bits)
             .highest_station_address(ADDRESS + 1)
-            // One token is held for a whole bus cycle: after each token, profirust looks for other masters for a slot time.
+            // The token is held for a whole bus cycle: after each token, profirust spends a slot time on other masters.
             .token_rotation_bits(16_000_000)
             .watchdog_timeout(Duration::from_millis(options.watchdog_ms.into()));
         let mut fdl = FdlActiveStation::new(parameters.build());
@@ -280,8 +280,8 @@ impl Line {
         }
     }
 
-    /// Takes the frames of stations that have no request to answer; returns false if there are none in this cycle. Where parameters
-    /// and configuration are sent first, outputs taken before would be old.
+    /// Takes the frames of stations without a pending request; returns false if there are none in this cycle. Outputs that
+    /// were taken before parameters and configuration were sent would be old.
     fn take(&mut self, now: Nanos, port: &mut Port) -> bool {
         for (index, side) in self.stations.iter_mut().enumerate() {
             if side.asked.is_some() || now - side.taken < Nanos(self.cycle.0 / 2) {

@@ -1,4 +1,4 @@
-//! The network of a simulated world: TCP as its ends see it, with what may happen to bytes on their way.
+//! The network of a simulated world: TCP as its ends see it, with everything that may happen to bytes on their way.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{self, ErrorKind};
@@ -10,14 +10,14 @@ use crate::delivery::Delivery;
 use crate::random::Random;
 use crate::wire::{self, Wire};
 
-/// How the network of a world behaves.
+/// The behaviour of a world's network.
 #[derive(Clone, Copy, Debug)]
 pub struct Conditions {
-    /// The least and the greatest time that bytes take, in ns.
+    /// The minimum and the maximum latency of bytes, in ns.
     pub latency: (i64, i64),
-    /// A write arrives in pieces, at times of their own, once in so many; 0 for never.
+    /// On average, one write in this many arrives in pieces, each at its own time; 0 for never.
     pub splits: u64,
-    /// How many bytes a connection holds that were not read.
+    /// The number of unread bytes that a connection holds.
     pub capacity: usize,
 }
 
@@ -31,7 +31,7 @@ impl Default for Conditions {
     }
 }
 
-/// An end that sends nothing asks after so long whether the other one is still there, in ns.
+/// The time after which an end that sends nothing checks that the other end is still there, in ns.
 const KEEP_ALIVE: i64 = 1_000_000_000;
 
 /// Bytes on their way, or waiting to be read.
@@ -39,11 +39,11 @@ const KEEP_ALIVE: i64 = 1_000_000_000;
 struct Piece {
     /// When they arrive.
     at: i64,
-    /// Since when the sender had not waited when it sent them.
+    /// The time since which the sender had run without a wait when it sent them.
     sent: i64,
     /// The sender's process.
     from: usize,
-    /// The end of what was to be sent with them.
+    /// True for the piece with the last bytes of a write.
     is_last: bool,
     bytes: Vec<u8>,
     read: usize,
@@ -55,18 +55,19 @@ struct End {
     own: SocketAddr,
     peer: SocketAddr,
     other: u64,
-    /// When connecting is decided, and what it comes to.
+    /// When the attempt to connect succeeds or fails; `error` has the failure.
     connected: i64,
     error: Option<ErrorKind>,
     incoming: VecDeque<Piece>,
-    /// Nothing arrives before that.
+    /// Nothing arrives before this time.
     held_until: i64,
     /// When the end of what the peer sends arrives.
     fin: Option<i64>,
     /// When the connection breaks for this end.
     reset: Option<i64>,
     has_shut_down: bool,
-    /// Since when the sender had not waited when it began to write what the connection has not taken yet.
+    /// The time since which the sender had run without a wait when it began a write that the connection has not fully
+    /// taken.
     owed_since: Option<i64>,
 }
 
@@ -85,13 +86,13 @@ pub(crate) struct Network {
     listeners: BTreeMap<u64, Listening>,
     next: u64,
     ports: u16,
-    /// Until when the cable is pulled.
+    /// The time until which the cable is pulled.
     cut_until: i64,
-    /// When the newest connection of each process was made, though it may have ended.
+    /// When the newest connection of each process was made, even if it has ended.
     last_connected: BTreeMap<usize, i64>,
     /// The serial line.
     pub(crate) wire: Wire,
-    /// What each process has read.
+    /// The deliveries that each process has read.
     pub(crate) deliveries: BTreeMap<usize, Vec<Delivery>>,
 }
 
@@ -135,12 +136,12 @@ impl Network {
         due.min().unwrap_or(i64::MAX)
     }
 
-    /// When a socket can be read and written, as far as that is of interest; `i64::MAX` otherwise.
+    /// The times at which a socket can be read and written; `i64::MAX` for a direction without interest.
     fn ready_at(&self, id: u64, interest: Interest) -> (i64, i64) {
         let (reads, writes) = (interest != Interest::Write, interest != Interest::Read);
         if let Some(listening) = self.listeners.get(&id) {
             let waiting = listening.waiting.iter();
-            // One that is closed already is told by accepting it.
+            // Accepting reports a connection that is already closed.
             let connected = waiting.map(|id| self.ends.get(id).map_or(0, |end| end.connected));
             let connected = connected.min().filter(|_| reads);
             return (connected.unwrap_or(i64::MAX), i64::MAX);
@@ -225,7 +226,7 @@ impl Network {
             has_shut_down: false,
             owed_since: None,
         };
-        // While nobody answers, the system tries again after 1, 3 and 7 s.
+        // While nobody answers, the system retries after 1, 3 and 7 s.
         let tries = [0, 1, 3, 7].map(|seconds| now + seconds * 1_000_000_000);
         let heard = tries.into_iter().find(|at| *at >= self.cut_until);
         let there = heard.unwrap_or(tries[3]) + random.within(least, most);
@@ -260,7 +261,7 @@ impl Network {
         self.wire.unplug();
     }
 
-    /// Nothing arrives for `span`, and then everything.
+    /// Holds back everything for `span`; then all of it arrives.
     pub(crate) fn hold_all(&mut self, now: i64, span: i64) {
         for end in self.ends.values_mut() {
             end.held_until = end.held_until.max(now + span);
@@ -280,7 +281,7 @@ impl Network {
         self.wire.cut(now + span);
     }
 
-    /// The system closes what a process that was killed has left.
+    /// Closes everything that a killed process has left, as the system does.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
         self.wire.kill(process);
         self.listeners
@@ -312,7 +313,7 @@ impl Network {
         }
     }
 
-    /// As [`close`](Self::close), and what is not there when bytes would be is dropped.
+    /// Closes a connection like [`close`](Self::close), but drops bytes that would arrive after the reset.
     pub(crate) fn close_by_reset(&mut self, id: u64, now: i64) {
         let Some(end) = self.ends.remove(&id) else {
             return;
@@ -320,7 +321,8 @@ impl Network {
         let last = now + self.conditions.latency.1;
         if let Some(other) = self.ends.get_mut(&end.other) {
             other.incoming.retain(|piece| piece.at <= last);
-            // Nobody repeats a reset: while the cable is pulled it is lost, and the other end finds out by its keep-alive.
+            // Nobody repeats a reset: while the cable is pulled it is lost, and the other end notices by its
+            // keep-alive.
             let is_cut = other.held_until > last;
             let found = if is_cut {
                 other.held_until + KEEP_ALIVE
@@ -349,7 +351,8 @@ impl Network {
         self.wire.read(id, buffer, now, &mut self.deliveries)
     }
 
-    /// Writes to a port of the serial line. Where a connection would carry its bytes in pieces, some telegrams are damaged.
+    /// Writes to a port of the serial line. If connections carry their bytes in pieces, some telegrams are damaged
+    /// here.
     pub(crate) fn write_serial(
         &mut self,
         id: u64,
@@ -376,7 +379,7 @@ impl Network {
         Ok((id, end.peer))
     }
 
-    /// Nobody listens there any more.
+    /// Closes a listener.
     pub(crate) fn close_listener(&mut self, id: u64, now: i64) {
         if let Some(listening) = self.listeners.remove(&id) {
             for id in listening.waiting {
@@ -385,7 +388,7 @@ impl Network {
         }
     }
 
-    /// The sending direction of a connection is closed.
+    /// Closes the sending direction of a connection.
     pub(crate) fn shut_down(&mut self, id: u64, now: i64) -> io::Result<()> {
         let latency = self.conditions.latency.1;
         let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
@@ -399,7 +402,7 @@ impl Network {
         Ok(())
     }
 
-    /// Where a socket is, and where its other end is.
+    /// The addresses of a socket and of its other end.
     pub(crate) fn addresses(&self, id: u64) -> io::Result<(SocketAddr, SocketAddr)> {
         if let Some(listening) = self.listeners.get(&id) {
             return Ok((listening.address, listening.address));
@@ -408,7 +411,7 @@ impl Network {
         Ok((end.own, end.peer))
     }
 
-    /// Why connecting failed, once.
+    /// Takes the reason why connecting failed.
     pub(crate) fn take_error(&mut self, id: u64) -> io::Result<Option<ErrorKind>> {
         let end = self.ends.get_mut(&id).ok_or(ErrorKind::NotConnected)?;
         Ok(end.error.take())
@@ -419,7 +422,7 @@ impl Network {
         if end.connected > now {
             return Err(ErrorKind::WouldBlock.into());
         }
-        // What came before the connection broke can still be read, as on Linux.
+        // Bytes that came before the connection broke can still be read, as on Linux.
         let until = now.min(end.reset.unwrap_or(i64::MAX));
         let mut count = 0;
         let log = self.deliveries.entry(end.process).or_default();
@@ -478,14 +481,14 @@ impl Network {
             .get(&other)
             .map(|other| other.room(conditions.capacity))
         else {
-            // The other end is closed: its computer says so, and not before what it sent earlier has come.
+            // The other end is closed. Its computer reports that, but not before what it sent earlier has arrived.
             let end = self.ends.get_mut(&own).expect("it was just there");
             let told = (now + most).max(end.held_until);
             end.reset.get_or_insert(told);
             return Ok(bytes.len());
         };
         let count = bytes.len().min(room);
-        // What the connection does not take at once is old when it does.
+        // Bytes that the connection does not take at once are old when it does.
         let end = self.ends.get_mut(&own).expect("it was just there");
         let sent = end.owed_since.unwrap_or(sent);
         end.owed_since = (count < bytes.len()).then_some(sent);

@@ -1,4 +1,4 @@
-//! The page of a run: its figures, which features have met, and what was found.
+//! The page of a run: its figures, the features that have met, and the findings.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use tickbus_report::still_head;
@@ -9,26 +9,26 @@ use crate::run::{Finding, Run};
 
 const OWN_STYLE: &str = include_str!("page.css");
 
-/// The number of findings that the page shows: a defect that breaks every world would fill it otherwise.
+/// The number of findings that the page shows. Otherwise a defect that breaks every world would fill it.
 const SHOWN: usize = 200;
 
-/// A run, and how it was made.
+/// A run and its circumstances.
 #[derive(Clone, Copy, Debug)]
 pub struct Page<'a> {
     /// The run.
     pub run: &'a Run,
-    /// The number of its first seed.
+    /// The number of the first seed.
     pub first: u64,
-    /// How long it took.
+    /// The duration of the run, in seconds.
     pub seconds: f64,
     /// The number of threads.
     pub processors: usize,
-    /// The commit that was run, if that is known.
+    /// The commit that was run, if known.
     pub commit: Option<&'a str>,
 }
 
 impl Page<'_> {
-    /// The page as HTML, which loads nothing.
+    /// The page as HTML. The page loads nothing.
     #[must_use]
     pub fn html(&self) -> String {
         let title = "Simulated worlds";
@@ -149,7 +149,7 @@ fn finding(found: &Finding) -> Markup {
     }
 }
 
-/// The counts from which on a cell has the next colour.
+/// The counts at which a cell gets the next colour.
 const LEVELS: [u64; 5] = [1, 10, 100, 1_000, 10_000];
 
 /// The class of a cell with a count that is not 0.

@@ -1,4 +1,4 @@
-//! Which pairs of features have met in a world, and which no world has.
+//! The pairs of features that have met in a world, and those that never meet.
 
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
@@ -13,7 +13,7 @@ static NUMBERS: LazyLock<BTreeMap<&'static str, usize>> = LazyLock::new(|| {
     names.map(|(number, name)| (name, number)).collect()
 });
 
-/// Other features that no world has together, with the reason.
+/// Further features that no world has together, with the reason.
 const APART: [(&[&str], &[&str], &str); 4] = [
     (
         &["stations"],
@@ -37,7 +37,7 @@ const APART: [(&[&str], &[&str], &str); 4] = [
     ),
 ];
 
-/// How many worlds had both features of a pair.
+/// The number of worlds that had both features of a pair.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pairs {
     /// By the numbers of both features, the lower one first.
@@ -57,7 +57,7 @@ fn place(one: usize, other: usize) -> usize {
 }
 
 impl Pairs {
-    /// A world is about to be run.
+    /// Counts a world that is about to run.
     pub fn add(&mut self, plan: &Plan) {
         let features = plan.features();
         let numbers: Vec<usize> = features.iter().map(|name| NUMBERS[name]).collect();
@@ -68,24 +68,24 @@ impl Pairs {
         }
     }
 
-    /// Adds what other worlds had.
+    /// Adds the counts of other worlds.
     pub fn merge(&mut self, other: &Self) {
         for (count, further) in self.counts.iter_mut().zip(&other.counts) {
             *count += further;
         }
     }
 
-    /// How many worlds had both features.
+    /// The number of worlds that had both features.
     pub(crate) fn count(&self, one: &str, other: &str) -> u64 {
         self.counts[place(NUMBERS[one], NUMBERS[other])]
     }
 
-    /// How many pairs have met.
+    /// The number of pairs that have met.
     pub fn met(&self) -> usize {
         self.counts.iter().filter(|count| **count > 0).count()
     }
 
-    /// The pairs that could have met, and have not.
+    /// The pairs that could have met but have not.
     pub(crate) fn strangers(&self) -> Vec<[&'static str; 2]> {
         let pairs = all_pairs()
             .filter(|[one, other]| self.count(one, other) == 0 && never_meet(one, other).is_none());
@@ -100,13 +100,13 @@ fn all_pairs() -> impl Iterator<Item = [&'static str; 2]> {
     pairs.map(move |pair| pair.map(|number| features[number]))
 }
 
-/// How many pairs can meet.
+/// The number of pairs that can meet.
 pub(crate) fn possible() -> usize {
     let pairs = all_pairs().filter(|[one, other]| never_meet(one, other).is_none());
     pairs.count()
 }
 
-/// Why no world has both features; `None` if one can.
+/// The reason why no world has both features; `None` if one can.
 pub(crate) fn never_meet(one: &str, other: &str) -> Option<&'static str> {
     let is_bus = |name| Bus::NAMES.contains(&name);
     if is_bus(one) && is_bus(other) {

@@ -1,4 +1,4 @@
-//! What a world consists of, drawn from its seed.
+//! The plan of a world, drawn from its seed.
 
 mod faults;
 
@@ -12,7 +12,8 @@ use crate::scheduler::Habits;
 use crate::seed::Seed;
 use crate::{master, wire};
 
-/// What befalls a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], who stands between them; spans say how long it lasts.
+/// A misfortune of a world. Ends are 0, the device, 1, the controller, and [`BETWEEN`], the dispatcher; spans are
+/// durations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Misfortune {
     /// All threads of an end stand still.
@@ -32,7 +33,7 @@ pub enum Misfortune {
 /// The dispatcher, where misfortunes name an end.
 pub const BETWEEN: usize = 2;
 
-/// What makes the numbers that came later others than those of the seed.
+/// Makes the random numbers of later features independent of those of the seed.
 const LATER: u64 = 0x6C61_7465_7200;
 
 /// The bit of `more` that allows several units of Modbus.
@@ -46,14 +47,14 @@ const PROFIBUS: u32 = 20;
 pub struct Event {
     /// After the beginning.
     pub at: Nanos,
-    /// What happens.
+    /// The misfortune.
     pub what: Misfortune,
 }
 
 /// The key `watchdog` of an end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Watchdog {
-    /// It is not there.
+    /// The key is absent.
     Default,
     /// `"off"`.
     Off,
@@ -66,7 +67,7 @@ pub enum Watchdog {
 pub struct EndPlan {
     /// The time between two ticks.
     pub period: Nanos,
-    /// Whether ticks come in two halves.
+    /// True if ticks come in two halves.
     pub halves: bool,
     /// When the other end gets fail-safe values if this one does not tick.
     pub watchdog: Watchdog,
@@ -76,7 +77,7 @@ pub struct EndPlan {
     pub holds_while_stale: bool,
 }
 
-/// What the dispatcher of a world does.
+/// The behaviour of the dispatcher of a world.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LaboratoryPlan {
     /// The ends ask for their connections; without that, they stand in its patch.
@@ -88,11 +89,11 @@ pub struct LaboratoryPlan {
 /// A whole world.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What it was drawn from; rules all that is not here.
+    /// The seed that the plan was drawn from; it rules everything that has no field here.
     pub seed: Seed,
     /// The line.
     pub bus: Bus,
-    /// Whether the controller is the end that listens.
+    /// True if the controller is the end that listens.
     pub controller_serves: bool,
     /// How many stations the line has.
     pub stations: usize,
@@ -110,19 +111,19 @@ pub struct Plan {
     pub pair: Nanos,
     /// A bit that is written beside the others, so that the frames have other sizes.
     pub numbers: bool,
-    /// What the dispatcher does, if there is one.
+    /// The behaviour of the dispatcher, if there is one.
     pub laboratory: LaboratoryPlan,
     /// Both ends.
     pub ends: [EndPlan; 2],
-    /// What the scheduler does.
+    /// The habits of the scheduler.
     pub habits: Habits,
     /// How the network behaves.
     pub conditions: Conditions,
     /// How long misfortunes may happen.
     pub span: Nanos,
-    /// What happens, in the order of time.
+    /// The misfortunes, in the order of time.
     pub events: Vec<Event>,
-    /// What both ends have besides.
+    /// The further features of both ends.
     pub features: Features,
 }
 
@@ -157,7 +158,7 @@ fn draw_habits(random: &mut Random, is: impl Fn(u32) -> bool, max_age: Nanos) ->
     }
 }
 
-/// What the network of a world is like.
+/// Draws the conditions of the network.
 fn draw_conditions(random: &mut Random, is: impl Fn(u32) -> bool, bus: Bus) -> Conditions {
     let slowest = random.of(&[20_000, 200_000, 3_000_000]);
     // An answer fits into what a system keeps for a connection.
@@ -337,8 +338,8 @@ impl Plan {
         self.conditions.latency.1 * 2 + self.habits.late * 4 + preempted + answer * 2 + 1_000_000
     }
 
-    /// The time that a slave of PROFIBUS takes to come back after two damaged telegrams in a row, in ns: its master asks for its
-    /// diagnosis twice, and sends parameters and configuration, one in a bus cycle, and some of these may be damaged as well.
+    /// The time that a slave of PROFIBUS takes to return after two damaged telegrams in a row, in ns. Its master requests
+    /// the diagnosis twice, and sends parameters and configuration, one in a bus cycle; some of these may be damaged, too.
     fn restart(&self) -> i64 {
         if self.bus == Bus::Profibus && self.conditions.splits > 0 {
             self.cycle.0 * 10 + self.slot() * 4
@@ -347,7 +348,7 @@ impl Plan {
         }
     }
 
-    /// What befalls who stands between the ends.
+    /// The misfortunes of the dispatcher between the ends.
     fn events_between(&self, random: &mut Random, is: impl Fn(u32) -> bool) -> Vec<Event> {
         let mut events = Vec::new();
         for index in 5..8 {

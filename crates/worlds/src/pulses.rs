@@ -1,4 +1,4 @@
-//! When an end writes pulses.
+//! The times at which an end writes pulses.
 
 use crate::plan::Plan;
 
@@ -8,14 +8,14 @@ pub(crate) struct Pulses {
     next: i64,
     /// From one pulse to the next, or from one pair to the next, in ns.
     between: i64,
-    /// From the first of a pair to the second, which a hold of the first may still last.
+    /// From the first pulse of a pair to the second, in ns; the first may still be held then.
     within: Option<i64>,
     is_second: bool,
     was_due: bool,
 }
 
 impl Pulses {
-    /// Those of a life that begins at `now`.
+    /// The pulses of a life that begins at `now`.
     pub(crate) fn new(plan: &Plan, now: i64) -> Self {
         Self {
             next: now + plan.pulses.0,
@@ -26,9 +26,9 @@ impl Pulses {
         }
     }
 
-    /// Whether the tick at `now` writes one.
+    /// Returns true if the tick at `now` writes a pulse.
     pub(crate) fn are_due(&mut self, now: i64) -> bool {
-        // Between two of a pair is a tick without.
+        // A tick without a pulse separates the two of a pair.
         let is_apart = self.within.is_none() || !self.was_due;
         self.was_due = now >= self.next && is_apart;
         if self.was_due {

@@ -1,11 +1,11 @@
-//! The one source of chance of a world.
+//! The only source of randomness of a world.
 
 /// `SplitMix64`, by Steele, Lea and Flood (2014): the same numbers from the same seed on every machine.
 #[derive(Clone, Debug)]
 pub(crate) struct Random(u64);
 
 impl Random {
-    /// The numbers of a seed.
+    /// A source that starts from `seed`.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
@@ -31,7 +31,7 @@ impl Random {
         self.below(times) == 0
     }
 
-    /// One of them.
+    /// One of the choices.
     pub(crate) fn of<T: Copy>(&mut self, choices: &[T]) -> T {
         choices[usize::try_from(self.below(choices.len() as u64)).expect("an index")]
     }

@@ -1,4 +1,5 @@
-//! A recording is what was delivered, tick by tick: all of it in order, or the beginning of it.
+//! Judges recordings. A recording has the data that were delivered, tick by tick and in order: all of them or the first
+//! part.
 
 use std::fs::{self, File};
 use std::path::Path;
@@ -13,17 +14,17 @@ use crate::replay::{self, Original};
 use crate::scheduler::{self, STARVED};
 use crate::tape::Tape;
 
-/// Ticks in a ring that has no key.
+/// The number of ticks in a ring without the key `ring`.
 const RING: usize = 4_096;
 
-/// A line of a file is shorter than that, with what closes the recording behind it.
+/// A line of a file is shorter than this, including the closing of the recording after it.
 const LONGEST: u64 = 4_000;
 
-/// What a signal adds to the head of a file, which a file without ticks lacks as well.
+/// The bytes that a signal adds to the head of a file; a file without ticks may have no head either.
 const DECLARED: u64 = 120;
 
 impl Tape {
-    /// While a driver records, nobody else gets the file.
+    /// Judges that nobody else gets the file while a driver records.
     pub(crate) fn judge_lock(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
         if !self.plan.is_contended {
             return Ok(());
@@ -42,7 +43,7 @@ impl Tape {
         }
     }
 
-    /// The driver has closed, or its process was killed.
+    /// Judges the recording after the driver has closed, or after its process was killed.
     pub(crate) fn judge(&self, plan: &Plan, end: usize) -> Result<(), Broken> {
         let process = scheduler::process();
         let killed = scheduler::disk(|disk, _| disk.revive(process));
@@ -50,7 +51,7 @@ impl Tape {
     }
 }
 
-/// Judges the recording of a life that has ended, by being `killed` at a time.
+/// Judges the recording of a life that has ended; `killed` is the time at which it was killed.
 fn judge_recording(
     plan: &Plan,
     end: usize,
@@ -86,7 +87,7 @@ fn judge_recording(
     Ok(())
 }
 
-/// Each row is the tick of its number, in order, and what is missing is counted.
+/// Judges that each row is the tick of its number, that rows are in order, and that missing ticks are counted.
 fn judge_rows(plan: &Plan, end: usize, tape: &Tape, contents: &Contents) -> Result<(), String> {
     let places = tape.names.iter().map(|name| {
         let place = contents.names.iter().position(|known| known == name);
@@ -98,7 +99,7 @@ fn judge_rows(plan: &Plan, end: usize, tape: &Tape, contents: &Contents) -> Resu
         places.collect::<Result<_, _>>()?
     };
     let mut before: Option<&FileRow> = None;
-    // A ring that is rounded up takes what is between two looks at it.
+    // The ring is rounded up, and holds the ticks between two looks at it.
     let may_drop = tape.plan.ring.is_some() || tape.rows.len() > RING;
     for (index, row) in contents.rows.iter().enumerate() {
         let number = row.number;
@@ -153,7 +154,7 @@ fn judge_rows(plan: &Plan, end: usize, tape: &Tape, contents: &Contents) -> Resu
     Ok(())
 }
 
-/// The file has as much as it has to.
+/// Judges that the file has as many ticks as it must.
 fn judge_extent(
     plan: &Plan,
     tape: &Tape,
@@ -187,7 +188,7 @@ fn judge_extent(
         }
         return Ok(());
     };
-    // A tenth of a second may be missing, and what the thread that writes was without the processor.
+    // A tenth of a second may be missing, plus the time for which the writing thread had no processor.
     let suspended = plan.events.iter().map(|event| match event.what {
         Misfortune::Suspend(_, span) => span.0,
         _ => 0,
@@ -205,7 +206,7 @@ fn judge_extent(
     Ok(())
 }
 
-/// What was recorded is replayed, from `file`.
+/// Replays the recording from `file`, and judges the replay.
 fn judge_replay(
     plan: &Plan,
     end: usize,
@@ -222,7 +223,7 @@ fn judge_replay(
     original.judge_other(file)
 }
 
-/// After a power failure the file may end anywhere, and is read up to its last whole tick.
+/// Judges a file after a power failure: it may end anywhere, and is read up to its last whole tick.
 fn judge_torn(plan: &Plan, end: usize, tape: &Tape, text: &str) -> Result<(), Broken> {
     let random = &mut Random::new(scramble(plan.seed.number ^ 0x746F));
     let cut = random.below(text.len() as u64 + 1);

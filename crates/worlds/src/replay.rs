@@ -1,5 +1,5 @@
-//! Replays a recording, and judges what the ticks are shown: the same again, or, by ticks at other times, what docs/recording.md
-//! makes of it.
+//! Replays a recording, and judges its ticks. Ticks at the recorded times show the same again; ticks at other times
+//! show what docs/recording.md describes.
 
 use std::fs;
 use std::ops::Range;
@@ -32,16 +32,16 @@ pub(crate) struct Original<'a> {
     reads: Vec<Column>,
 }
 
-/// A slot, and where a recording has it.
+/// A slot, and its place in a recording.
 struct Column {
     slot: usize,
     place: usize,
     is_count: bool,
-    /// Rising edges of several ticks are shown in one.
+    /// True if rising edges of several ticks are shown in one.
     is_latched: bool,
 }
 
-/// Opens a driver that replays `file`, and records that to `again` if there is a name.
+/// Opens a driver that replays `file`, and records the replay to `again`, if given.
 pub(crate) fn open(
     plan: &Plan,
     end: usize,
@@ -97,7 +97,7 @@ impl Original<'_> {
         &self.contents.rows
     }
 
-    /// The rows of one time each.
+    /// The rows of each time.
     fn groups(&self) -> Vec<Range<usize>> {
         let rows = self.rows();
         let mut groups: Vec<Range<usize>> = Vec::new();
@@ -110,7 +110,7 @@ impl Original<'_> {
         groups
     }
 
-    /// The status that rows have together, on one tick.
+    /// The status of several rows that fall into one tick.
     fn status(&self, group: &Range<usize>) -> i32 {
         let rows = &self.rows()[group.clone()];
         let last = rows.last().expect("it has rows");
@@ -127,7 +127,8 @@ impl Original<'_> {
         all.max().unwrap_or(FRESH)
     }
 
-    /// Judges the slots of a tick on which these rows fall, if any, after the row `last`.
+    /// Judges the slots of a tick. `group` are the rows that are due in it, if any, and `last` is the newest row that
+    /// is due.
     fn judge_slots(
         &self,
         slots: &[Slot],
@@ -135,8 +136,8 @@ impl Original<'_> {
         shaped: &mut usize,
     ) -> Result<(), String> {
         let rows = self.rows();
-        // A level is shaped where the edges of several ticks are shown at once, and in the tick behind that. What is due in a
-        // stale tick is shown when data count again.
+        // A latched level differs where the edges of several ticks are shown at once, and in the tick after that. Edges
+        // that are due in a stale tick are shown when data count again.
         if group.len() > 1 {
             *shaped = 2;
         }
@@ -162,7 +163,7 @@ impl Original<'_> {
         Ok(())
     }
 
-    /// What this end wrote in a row, and nothing that it read.
+    /// Copies the values that this end wrote in a row, but none that it read.
     fn written(&self, row: usize, slots: &mut [Slot]) {
         let tick = usize::try_from(self.rows()[row].number).expect("small") - 1;
         let values = &self.tape.rows[tick].values;
@@ -174,9 +175,9 @@ impl Original<'_> {
         }
     }
 
-    /// By ticks at the recorded times, the same again.
+    /// Judges that ticks at the recorded times show the same again.
     pub(crate) fn judge_same(&self, file: &Path, is_whole: bool) -> Result<(), Broken> {
-        // The other end may be judged meanwhile.
+        // The recording of the other end may be judged at the same time.
         let name = file.file_name().unwrap_or_default().to_string_lossy();
         let again = file.with_file_name(format!("again {name}"));
         let mut driver = match open(self.plan, self.end, file, Some(&again)) {
@@ -245,7 +246,7 @@ impl Original<'_> {
         Ok(())
     }
 
-    /// After its end, data become stale.
+    /// Judges that data become stale after the end of the recording.
     fn judge_end(&self, driver: &mut Driver, slots: &mut [Slot]) -> Result<(), Broken> {
         let Some(last) = self.rows().last() else {
             return Ok(());
@@ -261,7 +262,7 @@ impl Original<'_> {
         Ok(())
     }
 
-    /// By ticks at other times: the last row that is due, the edges of all that have become due.
+    /// Judges ticks at other times: they show the last row that is due, and the edges of all rows that have become due.
     pub(crate) fn judge_other(&self, file: &Path) -> Result<(), Broken> {
         let mut driver = match open(self.plan, self.end, file, None) {
             Ok(driver) => driver,
@@ -304,7 +305,7 @@ impl Original<'_> {
     }
 }
 
-/// The recording of a replay is the recording, but for the tick behind its end.
+/// Judges that the recording of a replay equals the recording, except for the tick after its end.
 fn judge_again(file: &Path, again: &Path) -> Result<(), Broken> {
     let (one, other) = (fs::read(file), fs::read(again));
     let (one, other) = (one.unwrap_or_default(), other.unwrap_or_default());

@@ -1,4 +1,4 @@
-//! Many worlds: runs them on one processor or on all, and keeps what was found.
+//! Runs many worlds, on one processor or on all, and keeps the findings.
 
 use std::any::Any;
 use std::fmt;
@@ -12,7 +12,7 @@ use crate::pairs::Pairs;
 use crate::plan::Plan;
 use crate::seed::Seed;
 
-/// The numbers of two processors are this far apart, so that no world is run twice.
+/// The distance between the seed numbers of two processors, so that no world runs twice.
 const APART: u64 = 1_000_000_000;
 
 /// The promise of a world that panicked.
@@ -21,13 +21,13 @@ const PANIC: &str = "panic";
 /// A world that broke a promise.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Finding {
-    /// The promise, and what was seen.
+    /// The promise, and the observation.
     pub broken: Broken,
     /// The world.
     pub seed: Seed,
-    /// A smaller one that breaks the same promise.
+    /// A smaller world that breaks the same promise.
     pub small: Seed,
-    /// The features of the smaller one.
+    /// The features of the smaller world.
     pub features: Vec<&'static str>,
 }
 
@@ -68,12 +68,12 @@ pub struct Run {
     pub worlds: u64,
     /// The worlds that broke a promise.
     pub findings: Vec<Finding>,
-    /// Which features have met.
+    /// The pairs of features that have met.
     pub pairs: Pairs,
 }
 
 impl Run {
-    /// Runs worlds from `first` on until `limit` has passed; `report` gets each finding at once.
+    /// Runs worlds from `first` on until `limit` has passed; passes each finding to `report` at once.
     ///
     /// A world that panics is a finding, and ends the run.
     pub fn on_one(first: Seed, limit: Nanos, clock: &dyn Clock, report: &dyn Fn(&Finding)) -> Self {
@@ -105,7 +105,8 @@ impl Run {
         run
     }
 
-    /// Runs worlds on `processors` threads until `limit` has passed; `report` gets each finding at once, from any of them.
+    /// Runs worlds on `processors` threads until `limit` has passed; any of the threads passes each finding to `report`
+    /// at once.
     ///
     /// # Panics
     ///

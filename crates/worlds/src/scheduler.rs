@@ -1,8 +1,8 @@
-//! Threads of a simulated world, as coroutines on one thread: which of them runs next, and when time passes, only the seed
-//! decides.
+//! Threads of a simulated world, as coroutines on one thread. Only the seed decides which of them runs next, and when
+//! time passes.
 //!
-//! A thread runs until it waits. In a world with [`Habits::preempts`] it may also lose the processor where it looks at the
-//! clock, so that others run, and time passes, between what it has read and what it does with that.
+//! A thread runs until it waits. In a world with [`Habits::preempts`] a thread may also lose the processor where it
+//! reads the clock. Other threads then run, and time passes, between what it has read and what it does with it.
 #![allow(
     unsafe_code,
     reason = "a coroutine gives its thread a reference that the clock, which knows no coroutines, has to find again"
@@ -20,34 +20,35 @@ use crate::disk::Disk;
 use crate::network::Network;
 use crate::random::Random;
 
-/// How much of a stack a thread of a driver has.
+/// The size of a thread's stack, in bytes.
 const STACK: usize = 512 * 1024;
 
 /// The time at which a world begins, in ns.
 pub(crate) const BEGIN: i64 = 1_000_000_000;
 
-/// So many times a thread is starved in a world.
+/// The number of times that threads are starved in a world.
 pub(crate) const STARVED: u32 = 3;
 
-/// A world in which nothing ends does so after that many turns.
+/// The number of turns after which a world that does not end is ended.
 const MOST_TURNS: u64 = 2_000_000;
 
-/// What the scheduler may do to threads.
+/// The liberties that the scheduler takes with threads.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Habits {
-    /// A thread that looks at the clock loses the processor once in so many looks; 0 for never.
+    /// On average, a thread loses the processor at one look at the clock in this many; 0 for never.
     pub preempts: u64,
-    /// A thread that is woken may get the processor late by up to this, in ns.
+    /// The maximum time by which a woken thread may get the processor late, in ns.
     pub late: i64,
-    /// A thread that has lost the processor may be without it for up to this, in ns, three times in a world.
+    /// The maximum time for which a thread that has lost the processor may be without it, in ns; three times in a
+    /// world.
     pub starves: i64,
 }
 
 type Thread = Coroutine<(), (), (), DefaultStack>;
 
-/// What a thread waits for.
+/// The event for which a thread waits.
 enum Wait {
-    /// The processor alone.
+    /// Nothing but the processor.
     Nothing,
     /// A time, a token, or a socket.
     Event {
@@ -55,7 +56,7 @@ enum Wait {
         stop: Option<Stop>,
         sockets: Vec<(u64, Interest)>,
     },
-    /// Whatever another thread does, or a time.
+    /// Any action of another thread, or a time.
     Anything { deadline: i64, seen: u64 },
 }
 
@@ -63,21 +64,21 @@ struct Task {
     thread: Option<Thread>,
     yielder: *const Yielder<(), ()>,
     wait: Wait,
-    /// The process that it belongs to.
+    /// The process to which the task belongs.
     process: usize,
-    /// Since when it runs without having waited.
+    /// The time since which the task has run without a wait.
     awake_since: i64,
-    /// Not to be run before that.
+    /// The task does not run before this time.
     not_before: i64,
 }
 
 #[derive(Default)]
 struct Process {
-    /// Its threads do not run before that.
+    /// The threads of the process do not run before this time.
     suspended_until: i64,
 }
 
-/// All that is simulated on this thread.
+/// The simulation of this thread.
 struct World {
     now: i64,
     random: Random,
@@ -85,35 +86,36 @@ struct World {
     tasks: Vec<Task>,
     /// The tasks that have not ended.
     alive: Vec<usize>,
-    /// When each of those can run; kept for the next turn.
+    /// When each of the tasks in `alive` can run; kept for the next turn.
     dues: Vec<i64>,
-    /// The places of those that can run; kept for the next turn.
+    /// The places in `alive` of the tasks that can run; kept for the next turn.
     ready: Vec<usize>,
     processes: Vec<Process>,
     current: Option<usize>,
-    /// Threads run so far.
+    /// The number of turns so far, in each of which a thread has run.
     turns: u64,
     network: Network,
     disk: Disk,
-    /// What was spawned since the last look.
+    /// The threads spawned since the last look.
     spawned: Vec<(usize, Box<dyn FnOnce()>)>,
-    /// How many times more a thread may be starved.
+    /// The number of times that a thread may still be starved.
     starvations: u32,
-    /// The world is to end now.
+    /// True if the world is to end now.
     is_over: bool,
 }
 
 thread_local! {
     static WORLD: RefCell<Option<World>> = const { RefCell::new(None) };
-    /// Stacks of threads that have ended.
+    /// The stacks of threads that have ended.
     static STACKS: RefCell<Vec<DefaultStack>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Once in a process.
+/// Runs [`keep_memory`] once in a process.
 static KEEP_MEMORY: Once = Once::new();
 
-/// Makes the system's allocator keep what a world frees for the next one: what was once allocated and freed in one piece, up to
-/// 32 MiB, glibc neither asks the system for again nor gives back. A tenth of a world's time.
+/// Makes the system's allocator keep the memory that a world frees, for the next one. Once a piece of up to 32 MiB has
+/// been allocated and freed, glibc neither requests that much from the system again nor returns it. This saves a tenth
+/// of a world's time.
 fn keep_memory() {
     drop(black_box(vec![1_u8; 24 << 20]));
 }
@@ -127,24 +129,24 @@ fn with<R>(act: impl FnOnce(&mut World) -> R) -> R {
     })
 }
 
-/// Why a world has come to no end.
+/// The reason why a world does not end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stuck {
     /// Every thread waits for another one.
     Deadlock,
-    /// Threads go on and on.
+    /// Threads run without end.
     Endless,
 }
 
-/// Runs `main` and all that it spawns, in a world of its own on this thread, until none is left.
+/// Runs `main` and all threads that it spawns in a new world on this thread, until none is left.
 ///
 /// # Errors
 ///
-/// It comes to no end.
+/// The world does not end.
 ///
 /// # Panics
 ///
-/// A thread panicked, or a world runs on this thread already.
+/// A thread panicked, or a world is already running on this thread.
 pub(crate) fn run(seed: u64, habits: Habits, main: impl FnOnce() + 'static) -> Result<(), Stuck> {
     KEEP_MEMORY.call_once(keep_memory);
     WORLD.with(|world| {
@@ -185,8 +187,9 @@ impl Drop for Ending {
                 && !thread.done()
             {
                 with(|world| world.disk.abandon());
-                // What it holds is leaked: its drops would wait in a world that has ended.
-                // SAFETY: nothing on its stack is reachable from elsewhere but by reference counts that never fall.
+                // The contents of the stack are leaked: their drops would wait in a world that has ended.
+                // SAFETY: nothing on the stack is reachable from elsewhere, except through reference counts that never
+                // fall.
                 unsafe { thread.force_reset() };
                 STACKS.with(|stacks| stacks.borrow_mut().push(thread.into_stack()));
             }
@@ -253,7 +256,7 @@ fn begin_spawned() {
 }
 
 impl World {
-    /// Lets the running thread wait for the processor for longer, now and then.
+    /// Now and then, makes the running thread wait longer for the processor.
     fn starve(&mut self) {
         let longest = self.habits.starves;
         if longest == 0 || self.starvations == 0 || !self.random.once_in(10) {
@@ -272,7 +275,7 @@ impl World {
         if self.alive.is_empty() {
             return Ok(None);
         }
-        // Nothing changes these times until a thread runs, but for a thread that gets the processor late.
+        // These times do not change until a thread runs, except for a thread that gets the processor late.
         self.dues.clear();
         for place in 0..self.alive.len() {
             let due = self.due(self.alive[place]);
@@ -309,10 +312,10 @@ impl World {
         }
     }
 
-    /// When a thread can run, if no other one does so before.
+    /// When a thread can run, if no other thread does so before.
     fn due(&mut self, index: usize) -> i64 {
         let task = &mut self.tasks[index];
-        // A wake counts once: it is not to be asked for again.
+        // A wake counts once, so it must not be queried again.
         if let Wait::Event {
             stop: Some(stop), ..
         } = &task.wait
@@ -333,20 +336,20 @@ impl World {
     }
 }
 
-/// Lets the running thread wait.
+/// Makes the running thread wait.
 fn suspend(wait: Wait) {
     let yielder = with(|world| {
         let current = world.current.expect("a thread of this world runs");
         world.tasks[current].wait = wait;
         world.tasks[current].yielder
     });
-    // SAFETY: the thread that runs is the one whose yielder this is, and its coroutine lives until it has returned.
+    // SAFETY: this is the yielder of the running thread, whose coroutine lives until it has returned.
     unsafe { (*yielder).suspend(()) };
     with(|world| {
         let current = world.current.expect("it was resumed");
         let now = world.now;
         if world.tasks[current].not_before > 0 && world.tasks[current].awake_since < now {
-            // It was woken late, or waited for nothing but the processor.
+            // The thread was woken late, or waited only for the processor.
             world.tasks[current].not_before = 0;
         }
     });
@@ -362,7 +365,7 @@ pub(crate) fn stop() {
     with(|world| world.is_over = true);
 }
 
-/// Lets the running thread sleep.
+/// Makes the running thread sleep.
 pub(crate) fn sleep(span: Nanos) {
     let deadline = with(|world| world.now + span.0.max(0));
     suspend(Wait::Event {
@@ -372,7 +375,7 @@ pub(crate) fn sleep(span: Nanos) {
     });
 }
 
-/// Lets the running thread sleep until `done`.
+/// Makes the running thread sleep until `done`.
 pub(crate) fn sleep_until(done: impl Fn() -> bool) {
     while !done() {
         let seen = with(|world| world.turns);
@@ -403,22 +406,22 @@ pub(crate) fn suspend_process(process: usize, span: Nanos) {
     });
 }
 
-/// Until when a process is suspended, or was the last time.
+/// The time until which a process is suspended, or was the last time.
 pub(crate) fn suspended_until(process: usize) -> Nanos {
     with(|world| Nanos(world.processes[process].suspended_until))
 }
 
-/// Acts on the network.
+/// Calls `act` with the network.
 pub(crate) fn network<R>(act: impl FnOnce(&mut Network, &mut Random, i64) -> R) -> R {
     with(|world| act(&mut world.network, &mut world.random, world.now))
 }
 
-/// Acts on the disk.
+/// Calls `act` with the disk.
 pub(crate) fn disk<R>(act: impl FnOnce(&mut Disk, i64) -> R) -> R {
     with(|world| act(&mut world.disk, world.now))
 }
 
-/// The time in this world, as the running thread reads it: it may lose the processor right after that.
+/// The time in this world, as the running thread reads it. The thread may lose the processor right after that.
 pub(crate) fn look() -> Nanos {
     let (now, is_preempted) = with(|world| {
         let preempts = world.habits.preempts;
@@ -435,7 +438,8 @@ pub(crate) fn look() -> Nanos {
     Nanos(now)
 }
 
-/// Lets the running thread wait until `deadline`, until `stop` is stopped or woken, or until one of these sockets is ready.
+/// Makes the running thread wait until `deadline`, until `stop` is stopped or woken, or until one of these sockets is
+/// ready.
 pub(crate) fn wait(deadline: Nanos, stop: &Stop, sockets: Vec<(u64, Interest)>) {
     suspend(Wait::Event {
         deadline: deadline.0,
@@ -444,7 +448,7 @@ pub(crate) fn wait(deadline: Nanos, stop: &Stop, sockets: Vec<(u64, Interest)>) 
     });
 }
 
-/// Lets others run until `done` holds, or for `limit`; returns whether it held in time.
+/// Lets other threads run until `done` holds, or for `limit`; returns true if it held in time.
 pub(crate) fn wait_for(limit: Nanos, done: &mut dyn FnMut() -> bool) -> bool {
     let deadline = with(|world| world.now.saturating_add(limit.0));
     loop {
@@ -468,7 +472,7 @@ pub(crate) fn process() -> usize {
     })
 }
 
-/// The time, and since when the running thread has not waited.
+/// The time, and the time since which the running thread has run without a wait.
 pub(crate) fn awake_since() -> (i64, i64) {
     with(|world| {
         let current = world

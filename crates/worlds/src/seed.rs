@@ -1,22 +1,23 @@
-//! What a world is drawn from.
+//! The seeds of worlds.
 
 use std::fmt;
 use std::str::FromStr;
 
 use crate::random::scramble;
 
-/// What a world is drawn from. All bits of both masks are set, but in a world that was shrunk.
+/// The seed of a world. All bits of the masks are set, except in a world that was shrunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seed {
-    /// The source of all chance.
+    /// The source of all randomness.
     pub number: u64,
-    /// 0, or another fate for the same two drivers: reading two files costs as much as what happens to them.
+    /// Selects the course of events. Several turns share the same two drivers, since reading two files takes as long as
+    /// everything that happens to them.
     pub turn: u8,
-    /// Which features may exist.
+    /// The features that may exist.
     pub features: u64,
-    /// Which of the misfortunes drawn happen.
+    /// The drawn misfortunes that happen.
     pub events: u8,
-    /// Which of the features that are drawn last may exist.
+    /// The features drawn last that may exist.
     pub more: u32,
 }
 
@@ -33,10 +34,10 @@ impl From<u64> for Seed {
 }
 
 impl Seed {
-    /// How many turns a number has, where many worlds are run.
+    /// The number of turns per number when many worlds run.
     pub const TURNS: u8 = 8;
 
-    /// The seed after this one, where many are run.
+    /// The seed after this one when many worlds run.
     #[must_use]
     pub fn next(self) -> Self {
         let turn = (self.turn + 1) % Self::TURNS;
@@ -47,7 +48,7 @@ impl Seed {
         }
     }
 
-    /// The number that rules what happens to the two drivers.
+    /// The number that controls what happens to the two drivers.
     pub(crate) fn chance(self) -> u64 {
         if self.turn == 0 {
             return self.number;
@@ -56,7 +57,8 @@ impl Seed {
     }
 }
 
-/// As it is written in the corpus, and on the command line: `number` or `number/turn`; with `:features:events` behind that, which
+/// The form of a seed in the corpus and on the command line: `number` or `number/turn`. With `:features:events`
+/// appended, none of the features drawn last exist; `:features:events:more` permits those of the mask.
 /// has none of the features that are drawn last, or with `:features:events:more`.
 impl fmt::Display for Seed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

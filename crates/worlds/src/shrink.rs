@@ -1,12 +1,12 @@
-//! How a world that broke a promise is made smaller.
+//! Shrinks a world that broke a promise.
 
 use crate::broken::Broken;
 use crate::plan::Plan;
 use crate::seed::Seed;
 
 impl Seed {
-    /// The smallest world found in which the same promise is broken: features and misfortunes are left out one by one, as long
-    /// as it is.
+    /// The smallest world found that breaks the same promise. Features and misfortunes are left out one by one, as long
+    /// as the promise stays broken.
     #[must_use]
     pub fn shrunk(self, promise: &str) -> Self {
         self.smallest(|seed| {

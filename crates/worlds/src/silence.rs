@@ -1,5 +1,6 @@
-//! A logger for worlds that nobody reads. A driver that logs makes its statistics, for which it looks at the clock, and where a thread
-//! looks at the clock it may lose the processor: without a logger a world would take another course than where its seed is repeated.
+//! A logger for worlds whose log nobody reads. A driver that logs also makes its statistics, reads the clock for them,
+//! and may lose the processor when it does. Without a logger, a world would take another course than when its seed is
+//! repeated with one.
 
 use std::sync::Once;
 
@@ -17,7 +18,7 @@ impl Log for Silence {
     fn flush(&self) {}
 }
 
-/// Sets that logger in this process, unless there is one.
+/// Sets this logger for the process, unless there is one already.
 pub(crate) fn begin() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,8 +1,8 @@
-//! Values that say when and by whom they were written.
+//! Values that show who wrote them, and in which tick.
 
 use crate::random::scramble;
 
-/// What a stamp says: the writer's life, its station, and its tick.
+/// The contents of a stamp: the writer's life, its area and station, and its tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Stamp {
     pub(crate) life: u64,
@@ -36,7 +36,7 @@ pub(crate) fn whole(stamp: u64) -> i16 {
     i16::from_be_bytes([one, other])
 }
 
-/// In halves, so that it passes the scale and 32 bits unharmed.
+/// A multiple of one half, so that it passes the scale and 32 bits unchanged.
 pub(crate) fn real(stamp: u64) -> f64 {
     let [_, _, one, other, ..] = scramble(stamp).to_be_bytes();
     f64::from(i16::from_be_bytes([one, other])) / 2.0

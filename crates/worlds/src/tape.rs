@@ -1,4 +1,4 @@
-//! What a driver delivered, tick by tick, as its recording should have it.
+//! The data that a driver delivered, tick by tick, as its recording should have them.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -13,26 +13,26 @@ use crate::scheduler;
 /// One tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Row {
-    /// When its first call began and its last one ended.
+    /// When the first call of the tick began and the last one ended.
     pub(crate) began: i64,
     pub(crate) ended: i64,
-    /// The simulation time that was handed in.
+    /// The simulation time that was passed.
     pub(crate) time: Option<i64>,
     pub(crate) code: i32,
-    /// All slots behind it, as bits.
+    /// All slots after the tick, as bits.
     pub(crate) values: Vec<u64>,
-    /// The same, with what this end sends as it is on the line.
+    /// The same, with the values that this end sends as they are on the line.
     pub(crate) on_line: Vec<u64>,
 }
 
 /// The ticks of one life of an end, from its first.
 #[derive(Clone, Debug)]
 pub(crate) struct Tape {
-    /// The names of the slots: signals, and what counts edges.
+    /// The names of the slots: signals, and counts of edges.
     pub(crate) names: Vec<String>,
     pub(crate) rows: Vec<Row>,
     pub(crate) plan: RecordPlan,
-    /// The file, and what it had before.
+    /// The file, and its previous contents.
     pub(crate) path: PathBuf,
     pub(crate) before: Vec<u8>,
 }
@@ -57,7 +57,7 @@ impl Plan {
 }
 
 impl Tape {
-    /// A driver of an end is about to be opened. `None` if it records nothing.
+    /// Begins a tape for a driver that is about to open; `None` if the end records nothing.
     pub(crate) fn begin(plan: &Plan, end: usize) -> Option<Self> {
         let file = plan.recording(end)?;
         let plan = plan.features.recordings[end].clone()?;
@@ -69,7 +69,7 @@ impl Tape {
             path
         });
         if plan.is_contended && !path.exists() {
-            // Something else, and longer.
+            // Fill the file with something else that is longer than the recording.
             std::fs::write(&path, "what was there before\n".repeat(2_000)).expect("a file");
         }
         let before = std::fs::read(&path).unwrap_or_default();
@@ -82,7 +82,7 @@ impl Tape {
         })
     }
 
-    /// Another process records to the file: it is not touched, and the refusal says what would help.
+    /// Judges a driver that wants the file of another process: the file is left alone, and the refusal names a remedy.
     pub(crate) fn judge_refusal(
         &self,
         open: impl FnOnce() -> Option<String>,

@@ -1,12 +1,12 @@
-//! Signals of every type, with byte orders and scales, whose values follow from the stamp beside them; and what docs/driver-cfg.md
-//! makes of such a value on its way.
+//! Signals of every type, with byte orders and scales, and the conversions of docs/driver-cfg.md. Their values follow
+//! from the stamp beside them.
 
 use std::iter::Take;
 use std::ops::Deref;
 
 use crate::random::{Random, scramble};
 
-/// What the bits of a type mean.
+/// The meaning of a type's bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// True or false.
@@ -38,41 +38,41 @@ const TYPES: [(&str, Shape, u32); 15] = [
     ("LREAL", Shape::Float, 64),
 ];
 
-/// Two points of a scale: raw values, and what they stand for.
+/// Two points of a scale: raw values, and the values that they represent.
 type Points = [f64; 4];
 
 /// A signal beside the stamp.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Typed {
-    /// Its number, which is in its name.
+    /// The number of the signal, which is in its name.
     pub number: usize,
-    /// Its type.
+    /// The type of the signal.
     pub kind: &'static str,
-    /// What the bits of that mean.
+    /// The meaning of the type's bits.
     pub shape: Shape,
-    /// How many bits that has.
+    /// The width of the type, in bits.
     pub bits: u32,
     /// The key `order`.
     pub order: &'static str,
     /// The key `scale`.
     pub scale: Option<Points>,
-    /// Its first byte.
+    /// The first byte of the signal.
     pub place: usize,
-    /// Its raw fail-safe value.
+    /// The raw fail-safe value of the signal.
     pub fail_safe: i64,
-    /// The end that reads it has a USINT in place of each of its bytes.
+    /// True if the reading end has a USINT in place of each byte of the signal.
     pub is_split: bool,
 }
 
 impl Typed {
-    /// Some signals from a byte on, with gaps between them if these may be.
+    /// Draws some signals from byte `first` on, with gaps between them if `has_gaps`.
     pub(crate) fn draw(random: &mut Random, first: usize, has_gaps: bool) -> Vec<Self> {
         let mut place = first;
         let count = usize::try_from(random.within(1, 5)).expect("small");
         let typed = (0..count).map(|number| {
             let (kind, shape, bits) = random.of(&TYPES);
             let order = random.of(&["ABCD", "DCBA", "CDAB", "BADC"]);
-            // Powers of two, so that nothing is rounded but raw values.
+            // Powers of two, so that only raw values are rounded.
             let (raw, value) = (random.of(&[0.0, 8.0, 32.0]), random.of(&[0.0, 8.0, -3.5]));
             let gain = random.of(&[0.25, 2.0, -0.5, 64.0]);
             let has_scale = random.once_in(2) && bits > 1 && (bits < 64 || shape == Shape::Float);
@@ -95,7 +95,7 @@ impl Typed {
         typed.collect()
     }
 
-    /// Whether its slot holds an integer, and no double.
+    /// Returns true if the slot holds an integer, false if it holds a double.
     fn is_integer(&self) -> bool {
         self.bits == 64 && self.shape != Shape::Float
     }
@@ -104,7 +104,7 @@ impl Typed {
         usize::try_from(self.bits.div_ceil(8)).expect("small")
     }
 
-    /// Its name, from which the readers of recordings know how its values are written.
+    /// The name of the signal, which tells the readers of recordings how the values are written.
     fn name(&self, area: char, station: usize) -> String {
         let how = match self.kind {
             "LINT" => "i64",
@@ -118,7 +118,7 @@ impl Typed {
         self.is_split && reads
     }
 
-    /// Its names at an end.
+    /// The names of the signal at an end.
     pub(crate) fn names(&self, area: char, station: usize, reads: bool) -> Vec<String> {
         if !self.is_split_at(reads) {
             return vec![self.name(area, station)];
@@ -128,7 +128,7 @@ impl Typed {
         names.collect()
     }
 
-    /// Its sections in the driver.cfg of an end, without what they have of the station.
+    /// The sections of the signal in the driver.cfg of an end, without the keys for the station.
     pub(crate) fn sections(&self, area: char, station: usize, reads: bool) -> Vec<String> {
         let place = self.place;
         if self.is_split_at(reads) {
@@ -173,11 +173,11 @@ impl Typed {
         vec![[section, order, scale, fail_safe].concat()]
     }
 
-    /// The bits of its fail-safe value.
+    /// The bits of the fail-safe value.
     fn safe_bits(&self) -> u64 {
         #[expect(clippy::cast_precision_loss, reason = "a small number")]
         let half = self.fail_safe as f64 / 2.0;
-        // A zero has the sign of the gain that it was divided by.
+        // A zero takes the sign of the gain that it is divided by.
         let is_negative_zero = half == 0.0 && self.line().0 < 0.0;
         let half = if is_negative_zero { -0.0 } else { half };
         match (self.shape, self.bits) {
@@ -188,14 +188,14 @@ impl Typed {
         }
     }
 
-    /// Gain and offset of its scale.
+    /// The gain and the offset of the scale.
     fn line(&self) -> (f64, f64) {
         let [raw, other, value, behind] = self.scale.unwrap_or([0.0, 1.0, 0.0, 1.0]);
         let gain = (behind - value) / (other - raw);
         (gain, value - raw * gain)
     }
 
-    /// The slot that a simulation writes in the tick of a stamp.
+    /// The slot that a simulation writes in the tick with this stamp.
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -209,11 +209,11 @@ impl Typed {
             (Shape::Bool, _) => (chance & 1) as f64,
             _ if self.is_integer() => return chance,
             _ if chance >> 60 == 0 => f64::NAN,
-            // What some floating-point numbers become is not of this shape.
+            // Quarters of whole numbers pass the scale and the type exactly; some floating-point numbers do not.
             (Shape::Float, 32) => f64::from(wide as i16) / 4.0 * gain + offset,
             (Shape::Float, _) => f64::from(wide as i32) / 4.0 * gain + offset,
             _ => {
-                // A little beyond both ends, and halves.
+                // Slightly beyond both limits, and with halves.
                 let span = 1_u64 << (self.bits + 1);
                 let raw =
                     (chance % span) as f64 - (span / 2) as f64 + (chance >> 59 & 1) as f64 / 2.0;
@@ -223,7 +223,7 @@ impl Typed {
         value.to_bits()
     }
 
-    /// The bits that this slot has on the line.
+    /// The bits of a slot on the line.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "what is clamped fits, and a REAL is what it is"
@@ -255,7 +255,7 @@ impl Typed {
         }
     }
 
-    /// The slot that bits on the line become.
+    /// The slot that results from bits on the line.
     #[expect(
         clippy::cast_precision_loss,
         clippy::cast_possible_truncation,
@@ -276,7 +276,7 @@ impl Typed {
         (raw * gain + offset).to_bits()
     }
 
-    /// The bytes of bits on the line, in its order.
+    /// The bytes of bits on the line, in the order of the signal.
     fn laid_out(&self, bits: u64) -> Few<u8> {
         let size = self.size();
         let mut bytes = Few::default();
@@ -287,7 +287,7 @@ impl Typed {
         bytes
     }
 
-    /// Puts bytes from the greatest on in its order; and the other way round, which is the same.
+    /// Puts bytes, most significant first, into the order of the signal; the reverse is the same operation.
     fn reorder(&self, bytes: &mut [u8]) {
         if matches!(self.order, "DCBA" | "CDAB") {
             bytes.reverse();
@@ -297,12 +297,12 @@ impl Typed {
         }
     }
 
-    /// The bytes of a tick with this stamp.
+    /// The bytes of the signal in the tick with this stamp.
     pub(crate) fn bytes(&self, stamp: u64) -> Few<u8> {
         self.laid_out(self.on_line(self.written(stamp)))
     }
 
-    /// What bytes that begin with its own are, as an end is [shown](Self::shown) them.
+    /// The slots that an end reads from bytes that begin with those of the signal; see [`shown`](Self::shown).
     pub(crate) fn taken(&self, bytes: &[u8], reads: bool) -> Few<u64> {
         let mut big = [0; 8];
         let big = &mut big[..self.size()];
@@ -319,7 +319,7 @@ impl Typed {
         )
     }
 
-    /// What an end is shown of a tick with this stamp, or of fail-safe values.
+    /// The slots that an end shows for the tick with this stamp, or for fail-safe values.
     pub(crate) fn shown(&self, stamp: Option<u64>, reads: bool) -> Few<u64> {
         let bits = stamp.map_or(self.safe_bits(), |stamp| self.on_line(self.written(stamp)));
         if self.is_split_at(reads) {
@@ -329,7 +329,7 @@ impl Typed {
     }
 }
 
-/// Up to eight items, without memory from the heap: the judge makes one for each signal in each tick.
+/// Up to eight items without heap memory: the judge makes one for each signal in each tick.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Few<T> {
     items: [T; 8],

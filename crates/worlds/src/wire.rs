@@ -164,8 +164,8 @@ impl Wire {
     }
 }
 
-/// The characters in the code of [`Marks`](tickbus_base::os::Marks). In a damaged telegram one of them has wrong parity, or
-/// another value.
+/// The characters in the code of [`Marks`](tickbus_base::os::Marks). In a damaged telegram one of them has wrong parity,
+/// or another value.
 fn marked(bytes: &[u8], is_damaged: bool, random: &mut Random) -> Vec<u8> {
     let place = if is_damaged {
         usize::try_from(random.below(bytes.len() as u64)).expect("a length")

@@ -1,4 +1,4 @@
-//! A world as it happens.
+//! Runs a world.
 
 mod edges;
 mod hosted;
@@ -20,14 +20,14 @@ use crate::scheduler::{self, Stuck};
 use crate::silence;
 use crate::stamp::Stamp;
 
-/// After its last misfortune a world is whole again within this: an attempt to connect that was begun while the cable was
+/// A world recovers within this time after its last misfortune. An attempt to connect that began while the cable was
 /// pulled may take 5 s to fail.
 const PATIENCE: Nanos = Nanos::from_secs(16);
 
-/// Closing takes no longer than the last values may take, and a bus that does not end.
+/// The maximum time for closing, which includes that for the last values and for a bus that does not end.
 const LONGEST_CLOSE: Nanos = Nanos::from_secs(5);
 
-/// What an end is to do at its next tick.
+/// The order to an end for its next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Order {
     Pause(Nanos),
@@ -45,9 +45,9 @@ struct EndState {
     writer: RefCell<Writer>,
     reader: RefCell<Reader>,
     tick: Cell<u64>,
-    /// How long the next scan of its program is to take.
+    /// The time for which the next scan of the end's program stalls.
     stall: Cell<Nanos>,
-    /// Since when its line is down on purpose.
+    /// The time since which the end's line has been down on purpose.
     down_since: Cell<Option<i64>>,
 }
 
@@ -57,9 +57,9 @@ struct Shared {
     ends: [EndState; 2],
     laboratory: Rc<Laboratory>,
     broken: RefCell<Option<Broken>>,
-    /// When the controller had closed for good, and its device could know that.
+    /// When the controller had closed for good and its device could know that.
     controller_left: Cell<Option<i64>>,
-    /// What was found, if anybody wants it.
+    /// The log of all ticks, if requested.
     trace: Option<Rc<RefCell<String>>>,
 }
 
@@ -77,7 +77,7 @@ impl Shared {
 }
 
 impl Plan {
-    /// Lets it happen.
+    /// Runs the world.
     ///
     /// # Errors
     ///
@@ -86,7 +86,7 @@ impl Plan {
         self.happen(None)
     }
 
-    /// What both ends found in each tick, and which promise was broken, as text: the same in every run.
+    /// All ticks of both ends, and the broken promise, as text; the same in every run.
     pub fn trace(&self) -> String {
         let trace = Rc::new(RefCell::new(String::new()));
         let result = self.happen(Some(Rc::clone(&trace)));
@@ -102,7 +102,7 @@ impl Plan {
         thread_local! {
             static LEAKED: Cell<u64> = const { Cell::new(0) };
         }
-        // Links are shared by all worlds of the process; what a broken world leaves is never let go.
+        // All worlds of a process share the links, and a broken world never releases its own.
         let leaked = LEAKED.get();
         let thread = std::thread::current().id();
         let shared = Rc::new(Shared {
@@ -136,7 +136,7 @@ impl Plan {
     }
 }
 
-/// Starts both ends, lets the misfortunes happen, and looks whether the world recovers.
+/// Starts both ends, lets the misfortunes happen, and judges that the world recovers.
 fn fate(shared: &Rc<Shared>) {
     let plan = &shared.plan;
     scheduler::network(|network, _, _| network.conditions = plan.conditions);
@@ -152,7 +152,7 @@ fn fate(shared: &Rc<Shared>) {
         scheduler::sleep(at - scheduler::now());
         befall(shared, event.what);
     }
-    // What a cable holds back comes, however long after that.
+    // A pulled cable delivers what it held back, however late.
     let holds = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold(span) => event.at + span,
         _ => Nanos::ZERO,
@@ -176,8 +176,8 @@ fn fate(shared: &Rc<Shared>) {
             });
         }
         if end == 1 {
-            // A device that was suspended meanwhile has confirmed nothing: it keeps the last values until nothing has come for
-            // `max_age`.
+            // A device that was suspended in the meantime has confirmed nothing. It keeps the last values until nothing
+            // has come for `max_age`.
             let until = scheduler::suspended_until(shared.ends[0].process.get());
             let left = if until > asked {
                 scheduler::now().max(until) + plan.max_age
@@ -224,7 +224,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
         Misfortune::Reset => scheduler::network(|network, _, now| network.reset_all(now)),
         Misfortune::Close(end, span) => order(end, Order::Close(span)),
         Misfortune::Kill(end, span) => {
-            // What the process does from now on reaches nobody.
+            // Nothing that the process does from now on leaves it.
             let process = shared.ends[end].process.get();
             scheduler::network(|network, _, now| network.kill(process, now));
             scheduler::disk(|disk, now| disk.kill(process, now));
@@ -233,7 +233,7 @@ fn befall(shared: &Rc<Shared>, what: Misfortune) {
     }
 }
 
-/// Without further misfortunes both ends have each other's newest values soon.
+/// Waits until both ends have each other's newest values; after the last misfortune that must happen soon.
 fn recover(shared: &Shared) {
     let plan = &shared.plan;
     let limit = scheduler::now() + PATIENCE;
@@ -262,7 +262,7 @@ fn recover(shared: &Shared) {
     }
 }
 
-/// One end, from life to life.
+/// Runs one life of an end; a close or a kill begins the next one.
 fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     let plan = &shared.plan;
     let state = &shared.ends[end];
@@ -320,7 +320,7 @@ fn live(shared: &Rc<Shared>, end: usize, life: u64, process: usize) {
     }
 }
 
-/// What ticks an end.
+/// The driver or the host that ticks an end.
 enum Ticker {
     Driven(Box<End>),
     Hosted(Box<Host>),
@@ -362,7 +362,7 @@ fn one_tick(
     );
 }
 
-/// Judges what a tick found.
+/// Judges the result of a tick.
 fn judge_tick(
     shared: &Shared,
     (end, process): (usize, usize),
@@ -378,7 +378,7 @@ fn judge_tick(
     state.tick.set(tick);
     let down_since = state.down_since.get().unwrap_or(began);
     let down_since = plan.is_down(end, tick).then_some(down_since);
-    // The next tick ends that when it begins, and is judged later.
+    // If the next tick is not down, the line comes up as that tick begins, before it is judged.
     let is_down_next = plan.is_down(end, tick + 1);
     state.down_since.set(down_since.filter(|_| is_down_next));
     if plan.is_disturbed(end, tick) {
@@ -410,7 +410,7 @@ fn judge_tick(
     }
     log::trace!("{}", line());
     let connected = scheduler::network(|network, _, _| network.last_connected(process));
-    // A client connects and asks who answers though its line is down, and any request is a sign of life.
+    // A client whose line is down still connects and asks who answers, and any request is a sign of life.
     let heard = peer.down_since.get().map(|since| {
         if plan.bus.asks() {
             since.max(connected)
@@ -424,7 +424,7 @@ fn judge_tick(
     let judged = scheduler::network(|network, _, _| {
         let deliveries = network.deliveries.get(&process).map_or(&[][..], |all| all);
         let heard = (end, began - found.age);
-        // Stale data are judged by themselves.
+        // Stale data are judged separately.
         let known = (found.code != Code::Stale)
             .then(|| {
                 shared.laboratory.known(

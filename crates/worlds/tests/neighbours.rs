@@ -1,10 +1,10 @@
-//! What stands beside the drivers, against its models: seeds that once broke a promise, and fresh ones.
+//! The neighbours of the drivers against their models: seeds that once broke a promise, and fresh ones.
 #![allow(missing_docs, reason = "tests")]
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_worlds::{Neighbour, Seed};
 
-/// How long fresh ones of each are drawn, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
+/// The time for fresh seeds of each neighbour, in seconds, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
 const SECONDS: u32 = 3;
 
 #[track_caller]
@@ -60,7 +60,7 @@ fn fresh_ones_keep_all_promises() {
     let seconds = seconds.map_or(SECONDS, |text| text.parse().expect("whole seconds"));
     let clock = Monotonic::shared();
     for neighbour in Neighbour::ALL {
-        // Others in each run, and printed.
+        // Every run takes other seeds, and prints the first.
         let first = u64::from(std::process::id()) << 32;
         println!("{neighbour} from {first} on");
         let begun = clock.now();

@@ -8,7 +8,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_base::toml_text::{Collector, read_text};
 use tickbus_worlds::{Pairs, Plan, Seed};
 
-/// How long fresh worlds are drawn, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
+/// The time for fresh worlds, in seconds, unless `TICKBUS_WORLDS_SECONDS` says otherwise.
 const SECONDS: u32 = 30;
 
 #[track_caller]
@@ -44,9 +44,9 @@ fn the_same_seed_is_the_same_world() {
     }
 }
 
-/// Nothing of the computer shows in a world: neither where the system puts its memory, which is another place in each process, nor
-/// the seeds of hash tables, nor the environment. No number is kept here, since each change of the product changes it;
-/// `worlds traces` prints it, for other machines to compare.
+/// Nothing of the computer shows in a world: not where the system puts its memory, which differs from process to
+/// process, nor the seeds of hash tables, nor the environment. The test keeps no number, since each change of the
+/// product would change it; `worlds traces` prints it, for other machines to compare.
 #[test]
 fn another_process_has_the_same_worlds() {
     let traces = |setting: &mut dyn FnMut(&mut Command)| {
@@ -76,7 +76,7 @@ fn another_process_has_the_same_worlds() {
     assert_eq!(first, other);
 }
 
-/// `tools/mutants` puts them back into the code; here it is only seen that it can.
+/// `tools/mutants` puts the mutants into the code; this test only checks that they fit.
 #[test]
 fn every_mutant_fits_the_code() {
     let list = include_str!("../mutants/mutants.toml");
@@ -108,7 +108,7 @@ fn fresh_worlds_keep_all_promises() {
     let seconds = std::env::var("TICKBUS_WORLDS_SECONDS");
     let seconds = seconds.map_or(SECONDS, |text| text.parse().expect("whole seconds"));
     let clock = Monotonic::shared();
-    // Others in each run, and printed.
+    // Every run takes other seeds, and prints the first.
     let first = u64::from(std::process::id()) << 32;
     println!("worlds from {first} on");
     let begun = clock.now();

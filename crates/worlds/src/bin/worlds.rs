@@ -1,9 +1,13 @@
-//! Simulated worlds from the command line: `worlds SEED` repeats one, with everything that its drivers log;
-//! `worlds FIRST SECONDS` runs fresh ones from that seed on, and shrinks those that break a promise; `worlds all FIRST SECONDS PAGE`
-//! does so on all processors, and writes an HTML file of what has met and what was found; `worlds traces FIRST COUNT`
-//! prints one number for all that happens in so many worlds, the same on every machine. FIRST may be a
-//! seed with masks, such as `4711:3ff:ff`: the worlds then have no features beside those of the masks. The name of a neighbour before
-//! the first two, as in `worlds board SEED`, runs that neighbour.
+//! Simulated worlds from the command line.
+//!
+//! - `worlds SEED` repeats one world, with everything that its drivers log.
+//! - `worlds FIRST SECONDS` runs fresh worlds from that seed on, and shrinks those that break a promise.
+//! - `worlds all FIRST SECONDS PAGE` does so on all processors, and writes an HTML file with the pairs of features that
+//!   have met and the findings.
+//! - `worlds traces FIRST COUNT` prints one number for all that happens in COUNT worlds, the same on every machine.
+//!
+//! FIRST may be a seed with masks, such as `4711:3ff:ff`: the worlds then have no features beyond those of the masks.
+//! The name of a neighbour before the arguments of the first two, as in `worlds board SEED`, runs that neighbour.
 
 use std::num::NonZero;
 use std::process::ExitCode;
@@ -65,7 +69,7 @@ fn usage(why: &str) -> ExitCode {
 }
 
 fn one(seed: Seed) -> ExitCode {
-    // Nobody else sets one.
+    // This is the only logger of the process.
     let _ = log::set_logger(&Log);
     log::set_max_level(log::LevelFilter::Trace);
     let plan = Plan::draw(seed);
@@ -87,7 +91,7 @@ fn one(seed: Seed) -> ExitCode {
 
 fn traces(first: u64, count: u32) -> ExitCode {
     let mut seed = Seed::from(first);
-    // FNV-1a, which every machine computes alike.
+    // FNV-1a, which gives the same result on every machine.
     let mut hash = 0xCBF2_9CE4_8422_2325_u64;
     for _ in 0..count {
         for byte in Plan::draw(seed).trace().bytes() {

@@ -1,4 +1,4 @@
-//! Ages: never less than the true one, and nothing old is told to be young.
+//! Judges ages: a reported age is never less than the true one, and nothing old passes as young.
 
 use tickbus_dispatcher::LEAST_PROMISE;
 
@@ -8,7 +8,8 @@ use super::{Broken, Stamp, broken};
 use crate::plan::{BETWEEN, Bus, Event, Misfortune, Plan};
 use crate::scheduler::STARVED;
 
-/// What the line adds to the age of what arrives on it, in ns: cycles of both ends, and threads that run late.
+/// The time that the line adds to the age of data that arrive on it, in ns: cycles of both ends, and threads that run
+/// late.
 pub(crate) fn slack(plan: &Plan) -> i64 {
     let cycles = plan.cycle.0 * 4;
     let late = plan.habits.late * 6
@@ -20,7 +21,8 @@ pub(crate) fn slack(plan: &Plan) -> i64 {
     cycles + late + plan.round_trip() + plan.held_by_faults() + 1_000_000
 }
 
-/// How long lines may have waited for a dispatcher that is suspended, and count: up to twice the time within which one was promised.
+/// The time for which lines may have waited for a suspended dispatcher and still count, in ns: up to twice the promised
+/// interval.
 pub(super) fn relayed(plan: &Plan) -> i64 {
     let is_suspended = |event: &Event| matches!(event.what, Misfortune::Suspend(BETWEEN, _));
     if plan.events.iter().any(is_suspended) {
@@ -30,29 +32,30 @@ pub(super) fn relayed(plan: &Plan) -> i64 {
     }
 }
 
-/// Within what an end promises a dispatcher a line, in ns.
+/// The interval at which an end promises lines to a dispatcher, in ns.
 pub(crate) fn promise(plan: &Plan) -> i64 {
     plan.max_age.max(LEAST_PROMISE).0
 }
 
-/// How long what was taken to be sent may be on its way, beyond what the network takes.
+/// The time for which data that were taken for sending may be under way, beyond the time of the network, in ns.
 pub(crate) fn held(plan: &Plan) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         Misfortune::Hold(span) => span.0,
         Misfortune::Suspend(BETWEEN, _) => 0,
-        // A thread that has taken what to send may lose the processor before it sends that.
+        // A thread that has taken data for sending may lose the processor before it sends them.
         Misfortune::Suspend(_, span) if plan.habits.preempts > 0 || plan.bus.asks() => span.0,
         _ => 0,
     });
     spans.sum::<i64>() + plan.habits.starves * i64::from(STARVED)
 }
 
-/// The age that is told is at least the true one.
+/// Judges that the reported age is at least the true one.
 pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broken> {
     if seen.is_stale || plan.bus == Bus::Loopback {
         return Ok(());
     }
-    // A tick that loses the processor behind its look at the clock may see what came meanwhile: that is younger.
+    // A tick that loses the processor after it has read the clock may see bytes that came in the meantime; they are
+    // younger.
     let Some(last) = seen.deliveries.last() else {
         return broken("age", format!("{} ns, though nothing has come", seen.age));
     };
@@ -72,7 +75,7 @@ pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broke
             format!("not stale, {silence} ns after the last request"),
         );
     }
-    // As docs/ARCHITECTURE.md has it: half of max_age, or 2 ms.
+    // The tolerance of docs/ARCHITECTURE.md: half of `max_age`, but at least 2 ms.
     let allowed = (plan.max_age.0 / 2).max(2_000_000) + slack(plan);
     if silence > seen.age + allowed {
         return broken(
@@ -86,7 +89,8 @@ pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broke
     Ok(())
 }
 
-/// Old data as young: the peer had written something newer before it sent what made the age so small.
+/// Judges that old data do not pass as young: the peer had written nothing newer before it sent the bytes that set the
+/// age.
 pub(super) fn judge_young(
     plan: &Plan,
     writer: &Writer,
@@ -100,7 +104,7 @@ pub(super) fn judge_young(
     let slack =
         slack(plan) + plan.waits_for_pulses() + if plan.bus.asks() { held(plan) } else { 0 };
     let heard = now - seen.age;
-    // What a fault delays is told to have come that much later.
+    // Data that a fault delays count from the end of the delay.
     let arrived = heard - plan.delayed_at(usize::from(area == 1));
     let least = match plan.bus {
         Bus::Loopback => writer.newest_at(heard - slack),
@@ -109,7 +113,7 @@ pub(super) fn judge_young(
             let before = seen
                 .deliveries
                 .partition_point(|delivery| delivery.at <= arrived - 1_000_000);
-            // The beginning of a message that has not come whole makes nothing young.
+            // The beginning of a message that has not fully arrived makes nothing young.
             let whole = seen.deliveries[..before]
                 .iter()
                 .rfind(|delivery| delivery.is_whole);

@@ -1,4 +1,4 @@
-//! Signs of life: a heartbeat counts up as its end ticks, and an end that watches one does not take a frozen peer for alive.
+//! Signs of life: a heartbeat counts up as its end ticks, and an end that watches one notices a frozen peer.
 
 use super::age::{held, slack};
 use super::reader::Reader;
@@ -31,8 +31,8 @@ impl Reader {
             .last()
             .zip(times.first())
             .map_or(0, |(last, first)| last - first);
-        // One tick each, and no pause longer than the time between two beats and the tick behind it; the clock is looked at
-        // within a tick.
+        // Each beat has its own tick. Two beats are at most the interval and the tick after it apart; a tick reads the
+        // clock somewhere within it.
         let least = (span - slack(plan)) / (every.0 + longest + 1);
         let count = u64::from(beat.wrapping_sub(counted));
         if ticks > 200 || count <= ticks && i64::try_from(count).is_ok_and(|count| count >= least) {
@@ -46,8 +46,9 @@ impl Reader {
         )
     }
 
-    /// The heartbeat of a writer that does not tick stands still, and the end that watches it becomes stale. The first frame
-    /// of a connection is a change of the heartbeat, and so is fail-safe values in place of a tick's values, or the other way round.
+    /// Judges that an end becomes stale when the writer that it watches does not tick, so that its heartbeat is frozen.
+    /// The first frame of a connection counts as a change of the heartbeat. So do fail-safe values after those of a
+    /// tick, and the reverse.
     pub(crate) fn judge_frozen(
         &mut self,
         plan: &Plan,
@@ -65,7 +66,7 @@ impl Reader {
         let is_fail_safe = seen.stations.iter().all(|shown| shown.stamp == FAIL_SAFE);
         let same = self.kind.filter(|kind| kind.0 == is_fail_safe);
         let (_, replaced) = *self.kind.insert(same.unwrap_or((is_fail_safe, seen.began)));
-        // A tick that loses the processor behind its look at the clock may see what was written meanwhile.
+        // A tick that loses the processor after it has read the clock may see values that were written in the meantime.
         let is_new = |shown: &Shown| {
             shown.stamp != FAIL_SAFE && writer.wrote_after(seen.began, Stamp::of(shown.stamp))
         };
@@ -88,7 +89,7 @@ impl Reader {
     }
 }
 
-/// For how long an end is suspended: what it wrote right before goes out right behind that.
+/// The time for which an end is suspended, in ns. Values that it wrote right before are sent right after.
 pub(super) fn suspended(plan: &Plan, end: usize) -> i64 {
     let spans = plan.events.iter().map(|event| match event.what {
         // Both ends of a loopback are one process.

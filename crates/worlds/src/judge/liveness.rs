@@ -1,4 +1,4 @@
-//! An end whose misfortunes are over has the newest values of its peer soon.
+//! Judges that an end soon has the newest values of its peer once its misfortunes are over.
 
 use super::age::slack;
 use super::reader::Reader;
@@ -7,7 +7,7 @@ use super::{Broken, broken};
 use crate::plan::Plan;
 
 impl Reader {
-    /// Whether the newest of what `writer` wrote `slack` before `now` has arrived.
+    /// Judges that the newest values that `writer` wrote more than the slack before `now` have arrived.
     pub(crate) fn judge_liveness(
         &self,
         plan: &Plan,

@@ -1,7 +1,7 @@
-//! Who judges a world: what each end wrote and when, and what the other end may therefore see.
+//! The judge of a world: what each end wrote and when, and what the other end may therefore see.
 //!
-//! Every value that is written says by whom and in which tick it was written, or follows from one that does. So what is seen
-//! can be judged without a look into the drivers. Each promise has a file.
+//! Every value shows who wrote it and in which tick, or follows from one that does. The judge therefore needs no look
+//! into the drivers. Each promise has a file.
 
 mod age;
 mod beats;

@@ -1,4 +1,4 @@
-//! Nothing is left on: a writer that stopped, and a controller that closed, leave fail-safe values.
+//! Judges that nothing is left on: a writer that stopped and a controller that closed leave fail-safe values.
 
 use super::age::{held, relayed, slack};
 use super::beats::suspended;
@@ -9,7 +9,7 @@ use super::{Broken, Stamp, broken};
 use crate::plan::{Bus, FAIL_SAFE, Plan};
 
 impl Reader {
-    /// While a writer does not tick, its watchdog trips: nothing of it may count any more.
+    /// Judges that the watchdog of a writer that does not tick has tripped, so that none of its values count any more.
     pub(crate) fn judge_watchdog(
         plan: &Plan,
         limit: i64,
@@ -20,7 +20,7 @@ impl Reader {
         let Some(last) = writer.last_ended(now) else {
             return Ok(());
         };
-        // A dispatcher that holds the values of a source that is gone does as it was told.
+        // A dispatcher that holds the values of a lost source is configured to do so.
         let holds = plan.laboratory.holds && !plan.events.is_empty();
         if holds
             || writer.is_ticking()
@@ -35,7 +35,8 @@ impl Reader {
             return Ok(());
         }
         for (station, shown) in seen.stations.iter().enumerate() {
-            // A tick that loses the processor behind its look at the clock may see what was written meanwhile.
+            // A tick that loses the processor after it has read the clock may see values that were written in the
+            // meantime.
             if shown.stamp != FAIL_SAFE && !writer.wrote_after(now, Stamp::of(shown.stamp)) {
                 broken(
                     "left on",
@@ -50,14 +51,14 @@ impl Reader {
         Ok(())
     }
 
-    /// A controller that has closed leaves its fail-safe values behind, unless it was to hold.
+    /// Judges that a closed controller leaves its fail-safe values, unless it is configured to hold.
     pub(crate) fn judge_farewell(
         plan: &Plan,
         controller: &Self,
         left: i64,
         seen: &Seen<'_>,
     ) -> Result<(), Broken> {
-        // One that closes before it has joined leaves a dispatcher with what the life before it said.
+        // A controller that closes before it has joined leaves a dispatcher with the values of its previous life.
         let has_joined = controller.valid_since.last() < Some(&i64::MAX);
         let holds = plan.ends[1].holds_at_close
             || plan.habits.starves > 0
@@ -82,7 +83,8 @@ impl Reader {
         }
     }
 
-    /// A controller that has heard nothing of its peer sends fail-safe values, unless it was to hold; its peer was `connected` then.
+    /// Judges that a controller that hears nothing from its peer sends fail-safe values, unless it is configured to
+    /// hold. The peer's newest connection is from `connected`.
     pub(crate) fn judge_blind(
         &self,
         plan: &Plan,
@@ -94,14 +96,14 @@ impl Reader {
             return Ok(());
         };
         let heard = seen.began - seen.age;
-        // One that is asked is no longer blind when it answers. Of a program that reads, nobody knows the age of what it reads. The
-        // first cycle of a line that was down is like that of a new one.
+        // A controller that is asked is no longer blind when it answers. The age of the data that a program reads is
+        // unknown. The first cycle of a line that was down is like that of a new one.
         let is_unknown = plan.bus.asks()
             || plan.goes_down(1)
             || plan.bus == Bus::Dispatcher
             || plan.features.hosted == Some(0)
             || heard > blind.last;
-        // Its first cycle finds everything stale, and sends what the program has.
+        // The controller's first cycle finds everything stale, and sends the values of its program.
         let since = blind
             .since
             .max(connected)
@@ -127,7 +129,7 @@ impl Reader {
         }
     }
 
-    /// A line that is down on purpose, at either end, is stale soon.
+    /// Judges that data are stale soon after the line of either end went down on purpose.
     pub(crate) fn judge_down(plan: &Plan, since: i64, seen: &Seen<'_>) -> Result<(), Broken> {
         let limit = plan.max_age.0 + slack(plan) + held(plan);
         if seen.is_stale || seen.began - since <= limit {

@@ -1,4 +1,4 @@
-//! What one end sees, tick by tick: nothing torn across stations, and fresh only what is new.
+//! The data that one end sees, tick by tick: nothing is torn across stations, and only new data are fresh.
 
 use std::collections::BTreeMap;
 
@@ -8,42 +8,43 @@ use super::{Broken, Stamp, broken};
 use crate::faults::{self, FaultPlan};
 use crate::plan::{Bus, FAIL_SAFE, Plan};
 
-/// While ticks of an end were stale, without a gap in which it might not have been.
+/// A time in which all ticks of an end were stale, without a gap in which it might not have been.
 #[derive(Debug)]
 pub(super) struct Blind {
     pub(super) since: i64,
     pub(super) last: i64,
 }
 
-/// What one end has seen.
+/// The data that one end has seen.
 #[derive(Debug, Default)]
 pub(crate) struct Reader {
     pub(super) newest: Vec<(u64, u64)>,
     sequence: u64,
-    /// When rising edges were seen, per station.
+    /// The times at which rising edges were seen, and their counts, per station.
     pub(crate) edges: Vec<Vec<(i64, u64)>>,
-    /// When it was last not stale, and what it saw then.
+    /// The last tick that was not stale: its time, and the tick of its peer that it saw.
     pub(crate) last_valid: Option<(i64, Option<(u64, u64)>)>,
-    /// When each of its lives was first not stale; [`i64::MAX`] if none was.
+    /// When each life of the end was first not stale; [`i64::MAX`] if it never was.
     pub(crate) valid_since: Vec<i64>,
-    /// The first tick of its life.
+    /// The time of the first tick of this life.
     pub(super) begun: Option<i64>,
-    /// Since when it has been stale, up to its last tick.
+    /// The time since which the end has been stale, up to its last tick.
     pub(super) blind: Option<Blind>,
-    /// The times at which it was stale, or its line disturbed on purpose.
+    /// The times at which the end was stale, or its line was disturbed on purpose.
     pub(crate) stale: Vec<i64>,
-    /// What the signals beside the stamp of station 0 were in the tick before.
+    /// The signals beside the stamp of station 0 in the previous tick.
     pub(super) before: [f64; 3],
-    /// What was shown when faults of this end began, by their numbers.
+    /// The values that were shown when faults of this end began, by the numbers of the faults.
     pub(super) held: BTreeMap<usize, f64>,
-    /// The heartbeat that was shown last, and with which stamp.
+    /// The heartbeat that was shown last, and its stamp.
     pub(super) beat: Option<(Stamp, u8)>,
-    /// The last tick that counted showed fail-safe values, or those of its peer's ticks; and since when ticks have shown that.
+    /// True if the last tick that counted showed fail-safe values, false if it showed those of its peer's ticks; with
+    /// the time since which ticks have done so.
     pub(super) kind: Option<(bool, i64)>,
 }
 
 impl Reader {
-    /// A new driver looks: it knows nothing of what the one before it saw.
+    /// Begins a life: the new driver knows nothing of what the previous one saw.
     pub(crate) fn begin(&mut self, stations: usize) {
         self.newest = vec![(0, 0); stations];
         self.before = faults::values(None);
@@ -56,7 +57,7 @@ impl Reader {
         self.valid_since.push(i64::MAX);
     }
 
-    /// Judges what a tick of the end that reads `area` shows of what `writer` wrote.
+    /// Judges what a tick of the end that reads `area` shows of the values that `writer` wrote.
     pub(crate) fn judge(
         &mut self,
         plan: &Plan,
@@ -68,7 +69,7 @@ impl Reader {
         // A client that got no answer may read again before it writes again.
         let is_unwritten = plan.features.faults.iter().any(FaultPlan::is_of_line)
             && seen.stations.iter().any(|shown| shown.stamp == FAIL_SAFE);
-        // Behind a dispatcher, a source that is lost leaves fail-safe values as well.
+        // A dispatcher shows fail-safe values for a lost source as well.
         let is_lost = plan.bus == Bus::Dispatcher
             && (seen.stations.iter()).all(|shown| shown.stamp == FAIL_SAFE);
         if seen.is_stale || is_unwritten || is_lost {
@@ -99,8 +100,8 @@ impl Reader {
                 let Stamp { life, tick, .. } = Stamp::of(shown.stamp);
                 (life, tick)
             });
-            // All of them travel in one message; connections that are asked for come one by one, also those that are asked for again,
-            // and until then a station keeps what it has.
+            // All stations travel in one message. Connections on request are made one by one, also when they are
+            // requested again, and until then a station keeps its values.
             let is_apart = plan.laboratory.is_asked
                 && (stamp.is_none() || first == Some(None) || !plan.events.is_empty())
                 || plan.bus.has_units();

@@ -1,8 +1,8 @@
-//! What a tick shows.
+//! The data that a tick shows.
 
 use crate::delivery::Delivery;
 
-/// What a station shows in one tick.
+/// The values that a station shows in one tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Shown {
     pub(crate) stamp: u64,
@@ -15,11 +15,11 @@ pub(crate) struct Shown {
     pub(crate) beat: Option<u8>,
 }
 
-/// A tick as its end got it.
+/// A tick as its end received it.
 #[derive(Debug)]
 pub(crate) struct Seen<'a> {
     pub(crate) began: i64,
-    /// The tick of the end that sees.
+    /// The number of the tick at the end that reads.
     pub(crate) tick: u64,
     pub(crate) is_stale: bool,
     pub(crate) is_fresh: bool,
@@ -27,15 +27,15 @@ pub(crate) struct Seen<'a> {
     pub(crate) sequence: u64,
     pub(crate) stations: &'a [Shown],
     pub(crate) deliveries: &'a [Delivery],
-    /// Through a dispatcher.
+    /// The dispatcher's knowledge of the writer, behind a dispatcher.
     pub(crate) known: Option<Known>,
 }
 
-/// What who stands between both ends knew of a writer when it sent what a reader has heard.
+/// The dispatcher's knowledge of a writer at the time when it sent what a reader has heard.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Known {
-    /// The oldest that may be seen, as life and tick; `None` if anything may.
+    /// The oldest tick that may be seen, with its life; `None` if any may.
     pub(crate) least: Option<(u64, u64)>,
-    /// For how long nothing had come from the writer, in ns.
+    /// The time for which nothing had come from the writer, in ns.
     pub(crate) silent: i64,
 }

@@ -1,4 +1,5 @@
-//! What one station shows: nothing that nobody wrote, nothing torn, nothing after something newer, fail-safe values while stale.
+//! Judges what one station shows: only values that somebody wrote, untorn and in order, and fail-safe values while
+//! stale.
 
 use super::reader::Reader;
 use super::seen::{Seen, Shown};
@@ -16,10 +17,11 @@ impl Reader {
         seen: &Seen<'_>,
         shown: &Shown,
     ) -> Result<(), Broken> {
-        // Of several stations one may have its sources, and another none yet.
+        // Of several stations, one may have its sources while another has none yet.
         let is_other = (plan.laboratory.is_asked || plan.bus.has_units()) && plan.stations > 1;
         if seen.is_stale && plan.features.hosted.map(|end| end as u64) == Some(area) {
-            // What its inputs are meanwhile nobody has promised. Where a signal has got stuck then is known when they count again.
+            // The inputs of a stale program are not promised. The value of a signal that got stuck meanwhile is known
+            // when they count again.
             self.hold(plan, area, seen.tick, &[f64::NAN; 3]);
             return Ok(());
         }
@@ -60,7 +62,7 @@ impl Reader {
         super::age::judge_young(plan, writer, seen, (station, stamp))
     }
 
-    /// The level and the numbers beside a stamp follow from it, but for what faults make of them.
+    /// Judges the level and the numbers beside a stamp, which follow from it, except for the effects of faults.
     fn judge_beside(
         &mut self,
         plan: &Plan,
@@ -79,7 +81,7 @@ impl Reader {
         let (whole, real) = shown.numbers.unwrap_or_default();
         let values = &[level, whole, real][..if shown.numbers.is_some() { 3 } else { 1 }];
         let is_bent = |fault: &FaultPlan| fault.signal().is_some_and(|(_, of)| of == letter);
-        // Most ticks are as they were written.
+        // Most ticks show the values as they were written.
         if !(station == 0 && bends.0.iter().any(is_bent)) && values == &truth[..values.len()] {
             if station == 0 {
                 self.before[..values.len()].copy_from_slice(values);
@@ -87,7 +89,8 @@ impl Reader {
             return Ok(());
         }
         let spans = faults::expected(bends, (letter, station), stamp, tick, was);
-        // Connections that are asked for come one by one, and a signal without one has its fail-safe value; so has the stamp.
+        // Connections on request are made one by one. A signal without one has its fail-safe value, and so has the
+        // stamp.
         let apart = plan.laboratory.is_asked.then(|| faults::values(None));
         for (index, (value, spans)) in values.iter().zip(&spans).enumerate() {
             let is_alone = apart.is_some_and(|apart| stamp.is_none() || *value == apart[index]);
@@ -117,7 +120,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Remembers where signals are stuck.
+    /// Remembers the values at which signals are stuck.
     fn hold(&mut self, plan: &Plan, area: u64, tick: u64, values: &[f64]) {
         for (index, fault) in plan.features.faults.iter().enumerate() {
             let Some((signal, letter)) = fault.signal() else {
@@ -139,7 +142,7 @@ impl Reader {
     }
 }
 
-/// The signals beside a stamp follow from it, whatever their types, orders and scales.
+/// Judges the signals beside a stamp, which follow from it, whatever their types, orders and scales.
 fn judge_typed(plan: &Plan, area: u64, stamp: Option<u64>, shown: &Shown) -> Result<(), Broken> {
     let letter = if area == 0 { 'Q' } else { 'I' };
     let typed = plan.features.beside(letter).iter();

@@ -1,4 +1,4 @@
-//! What one end has written, and when.
+//! The values that one end has written, and when.
 
 use crate::stamp::Stamp;
 
@@ -10,16 +10,16 @@ struct Written {
     ended: i64,
 }
 
-/// What one end has written.
+/// The ticks and pulses that one end has written.
 #[derive(Debug, Default)]
 pub(crate) struct Writer {
     written: Vec<Written>,
-    /// When pulses were written, to all stations at once.
+    /// The times at which pulses were written, to all stations at once.
     pub(crate) pulses: Vec<i64>,
 }
 
 impl Writer {
-    /// A tick begins.
+    /// Begins a tick.
     pub(crate) fn begin(&mut self, life: u64, tick: u64) {
         self.written.push(Written {
             life,
@@ -28,14 +28,14 @@ impl Writer {
         });
     }
 
-    /// It ends.
+    /// Ends the tick.
     pub(crate) fn end(&mut self, now: i64) {
         if let Some(written) = self.written.last_mut() {
             written.ended = now;
         }
     }
 
-    /// The newest that was whole at a time.
+    /// The newest tick that was complete at a time, with its life.
     pub(crate) fn newest_at(&self, time: i64) -> Option<(u64, u64)> {
         let after = self
             .written
@@ -44,12 +44,12 @@ impl Writer {
         Some((written.life, written.tick))
     }
 
-    /// Whether a stamp was not whole yet at a time.
+    /// Returns true if a stamp was not yet complete at a time.
     pub(super) fn wrote_after(&self, time: i64, Stamp { life, tick, .. }: Stamp) -> bool {
         Some((life, tick)) > self.newest_at(time)
     }
 
-    /// When the ticks of a life from one to another ended.
+    /// The times at which the ticks `first` to `last` of a life ended.
     pub(super) fn times(&self, life: u64, first: u64, last: u64) -> Vec<i64> {
         let of_life = self.written.iter().rev();
         let ticks = of_life
@@ -66,13 +66,13 @@ impl Writer {
         newest.is_some_and(|newest| (life, tick) <= (newest.life, newest.tick))
     }
 
-    /// When its last tick before `now` ended.
+    /// When the writer's last tick before `now` ended.
     pub(super) fn last_ended(&self, now: i64) -> Option<i64> {
         let after = self.written.partition_point(|written| written.ended <= now);
         Some(self.written.get(after.checked_sub(1)?)?.ended)
     }
 
-    /// When the tick after the one that was written ended.
+    /// Returns true while a tick is running.
     pub(super) fn is_ticking(&self) -> bool {
         self.written
             .last()

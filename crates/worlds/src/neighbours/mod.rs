@@ -1,5 +1,5 @@
-//! The neighbours of the drivers, each against a model from the same seeds: the dispatcher's board, and a run on virtual
-//! time.
+//! The neighbours of the drivers: the dispatcher's board, and a run on virtual time. Each is judged against a model
+//! that runs from the same seeds.
 
 mod board;
 mod lockstep;
@@ -10,20 +10,20 @@ use std::str::FromStr;
 use crate::broken::Broken;
 use crate::seed::Seed;
 
-/// What is judged beside worlds.
+/// A part of tickbus that is judged beside worlds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Neighbour {
     /// The dispatcher, its clients and their lines.
     Board,
-    /// A server of virtual time, and both ends in lock-step.
+    /// A server of virtual time, and two ends in lock-step.
     Lockstep,
 }
 
 impl Neighbour {
-    /// All of them.
+    /// All neighbours.
     pub const ALL: [Self; 2] = [Self::Board, Self::Lockstep];
 
-    /// Its name, as in the corpus.
+    /// The name of the neighbour in the corpus.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -32,7 +32,7 @@ impl Neighbour {
         }
     }
 
-    /// Lets happen what is drawn from this seed; what happened is added to `trace`.
+    /// Runs the events drawn from this seed, and adds them to `trace`.
     ///
     /// # Errors
     ///

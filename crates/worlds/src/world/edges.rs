@@ -1,4 +1,4 @@
-//! The pulses of a whole world: what was written, and what was seen.
+//! The pulses of a whole world: those written, and those seen.
 
 use tickbus_base::time::Nanos;
 
@@ -7,18 +7,18 @@ use crate::broken::Broken;
 use crate::faults::FaultPlan;
 use crate::plan::{Bus, Misfortune};
 
-/// Each pulse that is written while all is well is seen once; no more are seen than were written.
+/// Judges that each pulse written while all is well is seen once, and that no more pulses are seen than were written.
 pub(super) fn judge(shared: &Shared, ended: Nanos) {
     let plan = &shared.plan;
     let readers = [0, 1].map(|end| shared.ends[end].reader.borrow());
-    // From the first data on, if there were no misfortunes.
+    // All is well from the first data on, if there are no misfortunes.
     let well_since = readers
         .iter()
         .map(|reader| reader.valid_since.iter().copied().min().unwrap_or(i64::MAX))
         .max();
     let well_since = well_since
         .filter(|_| plan.events.is_empty() && plan.habits.starves == 0)
-        // Connections that are asked for come one by one, that of a pulse perhaps last.
+        // Connections on request are made one by one, and that of the pulse may be the last.
         .filter(|_| !plan.laboratory.is_asked)
         .unwrap_or(i64::MAX);
     for end in 0..2 {
@@ -27,8 +27,8 @@ pub(super) fn judge(shared: &Shared, ended: Nanos) {
             let edges = reader.edges.get(station).map_or(&[][..], |edges| edges);
             let seen: u64 = edges.iter().map(|edge| edge.1).sum();
             let written = writer.pulses.len() as u64;
-            // A level that fail-safe values have interrupted rises again, and so does one whose answer was lost, and one that a
-            // new driver finds on.
+            // Three levels rise again: one that fail-safe values have interrupted, one whose answer was lost, and one
+            // that is on when a new driver first sees it.
             let begins_anew = plan.events.iter().any(|event| match event.what {
                 Misfortune::Kill(which, _) | Misfortune::Close(which, _) => which == end,
                 _ => false,

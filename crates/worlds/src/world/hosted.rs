@@ -1,4 +1,4 @@
-//! An end that is a PLC program, scanned by tickbus: it writes and reads frames, and no slots.
+//! An end that is a PLC program, scanned by tickbus. It writes and reads frames instead of slots.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -19,16 +19,16 @@ use crate::scheduler;
 use crate::stamp::{Stamp, level, real, whole};
 
 thread_local! {
-    /// The world of this thread: a program is sent to the thread that scans it, which is the same one.
+    /// The world of this thread. A program is sent to the thread that scans it, which here is the same thread.
     static HERE: RefCell<Option<Rc<Shared>>> = const { RefCell::new(None) };
 }
 
-/// A world begins.
+/// Sets the world of this thread.
 pub(super) fn enter(shared: &Rc<Shared>) {
     HERE.with(|here| *here.borrow_mut() = Some(Rc::clone(shared)));
 }
 
-/// It has ended.
+/// Clears the world of this thread.
 pub(super) fn leave() {
     HERE.with(|here| here.borrow_mut().take());
 }
@@ -41,7 +41,7 @@ struct Stamped {
     life: u64,
     tick: u64,
     pulses: Pulses,
-    /// The pulse that it read last.
+    /// The last pulse that the program read.
     had_pulse: bool,
 }
 
@@ -69,7 +69,7 @@ pub(super) fn open(shared: &Shared, (end, process): (usize, usize), life: u64) -
     .unwrap_or_else(|why| panic!("a program that is not scanned: {why}"))
 }
 
-/// Ends it.
+/// Ends the scanning.
 pub(super) fn close(host: Host) -> Result<(), Broken> {
     match host.close() {
         None => Ok(()),
@@ -81,7 +81,7 @@ pub(super) fn close(host: Host) -> Result<(), Broken> {
 }
 
 impl Stamped {
-    /// The area that it writes, or reads.
+    /// The area that the program writes or reads.
     fn area(&self, writes: bool) -> char {
         if (self.end == 0) == writes { 'I' } else { 'Q' }
     }
@@ -130,8 +130,8 @@ impl Stamped {
         }
     }
 
-    /// A program is told that its inputs do not count, and sees those that came last: they are judged as if it took fail-safe
-    /// values for them.
+    /// The values by which a program without its peer is judged. Such a program learns that its inputs do not count,
+    /// and sees those that came last; the judge treats it as if it took fail-safe values instead.
     fn without_peer(&self) -> Shown {
         let typed = self.plan.features.beside(self.area(false)).iter();
         Shown {
@@ -184,7 +184,7 @@ impl Program for Stamped {
                 writer.pulses.push(now);
             }
         }
-        // No age is told, but that it is below the limit.
+        // A program learns no age, only that it is within the limit.
         let found = Found {
             code: if scan.alive {
                 Code::Unchanged

@@ -1,5 +1,5 @@
-//! The dispatcher's board: clients that join, leave, connect, set values, fall silent, do not read and make mistakes, an operator
-//! and a slow disk, against a model that knows nothing of seats, routes and outboxes.
+//! The dispatcher's board, with an operator and a slow disk. Its clients join, leave, connect, set values, fall silent,
+//! stop reading and make mistakes. The model knows nothing of seats, routes and outboxes.
 
 mod model;
 mod rig;
@@ -12,10 +12,10 @@ use crate::seed::Seed;
 use rig::Rig;
 use words::{CHANNELS, Identity, NAMES, Peer, Pin, Request, SHAPES, is_input};
 
-/// Connections at a time, at most.
+/// The maximum number of simultaneous connections.
 const SLOTS: u64 = 5;
 
-/// What may exist in a world; the bits of a seed's features.
+/// The features that a world may have: the bits of a seed's features.
 #[derive(Clone, Copy)]
 enum Feature {
     Holds,
@@ -34,34 +34,34 @@ enum Feature {
     Floods,
 }
 
-/// Something that happens.
+/// An event.
 #[derive(Clone, Debug)]
 enum Step {
     Say(usize, Request),
-    /// A client says many values of a channel.
+    /// A client sends many values of a channel.
     Flood(usize, usize),
     /// The connection of a client breaks.
     Leave(usize),
-    /// A client reads no longer.
+    /// A client stops reading.
     Deafen(usize),
-    /// A client reads so many bytes.
+    /// A client reads this many bytes.
     Sip(usize, usize),
     /// A client reads again.
     Hear(usize),
-    /// A client stops or begins to send signs of life.
+    /// A client stops or starts sending signs of life.
     Ping(usize, bool),
-    /// Quarters of a second pass.
+    /// This many quarters of a second pass.
     Wait(i64),
-    /// So many seconds pass while the dispatcher stands still.
+    /// This many seconds pass while the dispatcher is paused.
     Pause(i64),
-    /// The disk has written the patch, or could not.
+    /// The disk has written the patch, or failed to.
     Disk(bool),
     Patch(Pin, Pin),
     Pull(Pin),
     Force(Pin, Option<u64>),
 }
 
-/// What exists, and how it happens.
+/// The features and the events of a seed.
 struct Plan {
     seed: Seed,
     features: u64,
@@ -77,7 +77,7 @@ impl Plan {
         self.features >> feature as u32 & 1 == 1
     }
 
-    /// What happens at a moment. Each is drawn from a number of its own, so that the others stay if it is left out.
+    /// The event of a moment. Each is drawn from its own number, so that leaving one out does not change the others.
     fn step(&self, at: u64) -> Option<(Step, Random)> {
         if u64::from(self.seed.events) >> (at % 8) & 1 == 0 {
             return None;
@@ -89,7 +89,7 @@ impl Plan {
 
     fn draw_step(&self, random: &mut Random, at: u64) -> Option<Step> {
         let slot = index(random.below(SLOTS));
-        // Most begin with clients that are here.
+        // Most worlds begin with clients that are connected.
         if at < 3 || random.once_in(10) {
             let slot = if at < 3 { index(at) } else { slot };
             return Some(Step::Say(slot, Request::Identify(self.identity(random))));
@@ -175,7 +175,7 @@ impl Plan {
                 },
                 _ => Peer::Name(index(random.below(NAMES.len() as u64))),
             };
-            // Mostly one that fits.
+            // Mostly a channel that fits.
             let fits = |peer: &usize| {
                 is_input(*peer) != is_input(own) && words::is_analog(*peer) == words::is_analog(own)
             };
@@ -191,7 +191,7 @@ impl Plan {
     }
 }
 
-/// What has no figures.
+/// Requests without parameters.
 #[derive(Clone, Copy)]
 enum Ask {
     List,
@@ -239,7 +239,7 @@ fn items(random: &mut Random) -> Vec<(usize, u64)> {
     (0..count).map(item).collect()
 }
 
-/// Lets everything happen, and judges after each thing.
+/// Runs all events, and judges after each.
 pub(super) fn run(seed: Seed, trace: &mut Vec<String>) -> Result<(), Broken> {
     let plan = Plan::draw(seed);
     let mut rig = Rig::new(&plan);

@@ -1,21 +1,21 @@
-//! The dispatcher as docs/dispatcher.md has it, too slow and too simple to be wrong: after each thing that happens, every input is
-//! looked at.
+//! The dispatcher as docs/dispatcher.md describes it, too slow and too simple to be wrong: after each event, the model
+//! checks every input.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::mem::{replace, take};
 
 use super::words::{CHANNELS, Identity, NAMES, Peer, Pin, Request, SHAPES, is_analog, is_input};
 
-/// What a client hears.
+/// An event that a client receives.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Heard {
-    /// A line that has no values; of a refusal as much as `ERR 404`.
+    /// A line without values; only the code of a refusal, as in `ERR 404`.
     Line(String),
-    /// Values that arrive in one line: channels, and what is behind the sign.
+    /// The values of one line: channels, and the text after the equals sign.
     Values(Vec<(String, String)>),
 }
 
-/// What an input shows.
+/// The value that an input shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Value {
     Number(u64),
@@ -31,17 +31,17 @@ pub(super) struct Client {
     order: u64,
     heard: i64,
     is_silent: bool,
-    /// Its answer waits for the disk, and so do its next lines.
+    /// True while an answer to the client waits for the disk; its next lines wait as well.
     is_blocked: bool,
     is_closing: bool,
     queue: VecDeque<Request>,
     said: BTreeMap<usize, u64>,
     shown: BTreeMap<usize, Value>,
-    /// Inputs that show what an operator wants.
+    /// The inputs that show a value forced by an operator.
     forced: BTreeSet<usize>,
-    /// What inputs showed last that no operator wanted.
+    /// The values that inputs showed last without a force.
     real: BTreeMap<usize, Value>,
-    /// What inputs were to show when they were looked at last.
+    /// The values that inputs were to show at the last check; true if forced.
     wanted: BTreeMap<usize, (u64, bool)>,
     events: Vec<(u64, Heard)>,
 }
@@ -76,26 +76,26 @@ struct Promised {
 
 #[derive(Debug, Default)]
 pub(super) struct Model {
-    /// Inputs keep what they have when their source is lost.
+    /// True if inputs keep their values when their source is lost.
     holds: bool,
-    /// In milliseconds.
+    /// The idle time after which a client is closed, in milliseconds.
     idle: i64,
     clients: BTreeMap<usize, Client>,
     orders: u64,
     patch: BTreeMap<Pin, Pin>,
     forces: BTreeMap<Pin, u64>,
-    /// The patch is not on the disk as it is.
+    /// True if the patch differs from the one on the disk.
     is_dirty: bool,
     promised: Vec<Promised>,
     saving: usize,
-    /// What happens together.
+    /// The number of the current group of events; the values of a group arrive in one line.
     group: u64,
-    /// What operators have heard, as codes; 0 for a success.
+    /// The answers that operators have received, as codes; 0 for success.
     pub(super) replies: Vec<u16>,
 }
 
 impl Model {
-    /// A board without clients, where inputs keep what they have when their source is lost, or not.
+    /// A board without clients; `holds` is true if inputs keep their values when their source is lost.
     pub(super) fn new(holds: bool, idle: i64) -> Self {
         Self {
             holds,
@@ -147,7 +147,7 @@ impl Model {
             .is_some_and(|slot| self.clients[&slot].has(channel))
     }
 
-    /// The names of those who are here, in the order in which they came.
+    /// The clients that have identified themselves, in the order in which they did.
     fn in_order(&self) -> Vec<&Client> {
         let mut all: Vec<&Client> = self
             .clients
@@ -158,7 +158,7 @@ impl Model {
         all
     }
 
-    /// What an input is to show, and whether an operator wants it.
+    /// The value that an input is to show, and true if an operator forces it.
     fn wanted(&self, sink: Pin) -> Option<(u64, bool)> {
         let source = self.patch.get(&sink);
         let forced = self.forces.get(&sink).or_else(|| self.forces.get(source?));
@@ -171,7 +171,7 @@ impl Model {
         said.map(|value| (*value, false))
     }
 
-    /// Looks at every input.
+    /// Checks every input.
     fn settle(&mut self) {
         let slots: Vec<usize> = self.clients.keys().copied().collect();
         for slot in slots {
@@ -187,7 +187,7 @@ impl Model {
         let name = self.identity(slot).expect("it has channels").name;
         let sink = (name, channel);
         let wanted = self.wanted(sink);
-        // Whoever connects gets the value when the connection is saved, and until then what changes.
+        // A client that connects gets the value when the connection is saved; until then it gets changes only.
         let is_promised = self.promised.iter().any(|it| it.sinks.contains(&sink));
         let client = self.client(slot);
         let before = match wanted {
@@ -244,7 +244,7 @@ impl Model {
         }
     }
 
-    /// A line has come.
+    /// Handles a line that has arrived.
     pub(super) fn arrived(&mut self, now: i64, slot: usize, request: Request) {
         let client = self.client(slot);
         if client.is_closing {
@@ -255,7 +255,7 @@ impl Model {
             return;
         }
         client.heard = now;
-        // Values count before those of the time when it fell silent.
+        // New values count before the client is heard again, so that no input shows those from before its silence.
         if !matches!(request, Request::Values(_) | Request::WrongValues) {
             self.speak(slot);
         }
@@ -438,7 +438,7 @@ impl Model {
             .collect()
     }
 
-    /// Changes the patch, which is to be answered when it is on the disk.
+    /// Changes the patch; the answer follows when the patch is on the disk.
     fn change(&mut self, author: Author, make: &[(Pin, Pin)], cut: &[Pin]) {
         if let Author::Client(slot, _) = author {
             self.client(slot).is_blocked = true;
@@ -450,7 +450,7 @@ impl Model {
             self.is_dirty |= self.patch.insert(*sink, *source).is_none();
         }
         let sinks: Vec<Pin> = make.iter().map(|(sink, _)| *sink).collect();
-        // Connected, and not told yet.
+        // These inputs are connected, but their values have not been sent yet.
         for sink in &sinks {
             if let (Some(slot), Some(wanted)) = (self.named(sink.0), self.wanted(*sink)) {
                 self.client(slot).wanted.insert(sink.1, wanted);
@@ -464,12 +464,12 @@ impl Model {
         }
     }
 
-    /// The patch as it is now begins to be written to the disk.
+    /// The disk begins to write the current patch.
     pub(super) fn saving(&mut self) {
         self.saving = self.promised.len();
     }
 
-    /// It is on the disk, or could not be written.
+    /// The patch is on the disk, or could not be written.
     pub(super) fn saved(&mut self, now: i64, code: u16) {
         let count = match replace(&mut self.saving, 0) {
             0 => self.promised.len(),
@@ -519,7 +519,7 @@ impl Model {
         }
     }
 
-    /// The connection of a client is gone.
+    /// The connection of a client has ended.
     pub(super) fn gone(&mut self, slot: usize) {
         for promised in &mut self.promised {
             if matches!(promised.author, Author::Client(it, _) if it == slot) {
@@ -529,7 +529,7 @@ impl Model {
         let identity = self.identity(slot);
         let is_here = |pin: &Pin| identity.is_none_or(|it| it.name != pin.0);
         if self.holds {
-            // What an operator has put there goes first.
+            // Values forced by an operator are released first, so that inputs hold the client's own values.
             self.group += 1;
             self.forces.retain(|pin, _| is_here(pin));
             self.settle();
@@ -540,7 +540,7 @@ impl Model {
         self.settle();
     }
 
-    /// Time has passed; who is silent for too long is so.
+    /// Time has passed: marks clients as silent that have broken their promise, and closes idle ones.
     pub(super) fn look(&mut self, now: i64) {
         let mut slots: Vec<usize> = self.clients.keys().copied().collect();
         slots.sort_by_key(|slot| self.clients[slot].seat);
@@ -605,7 +605,7 @@ impl Model {
         self.replies.push(if is_done { 0 } else { 404 });
     }
 
-    /// What a client has heard since it was asked last.
+    /// Takes the events that a client has received since the last call.
     pub(super) fn take_events(&mut self, slot: usize) -> Vec<Heard> {
         take(&mut self.client(slot).events)
             .into_iter()
@@ -613,7 +613,7 @@ impl Model {
             .collect()
     }
 
-    /// What the board says: a line for each client and its channels, and for each connection.
+    /// The contents of the board: a line for each client, each of its channels, and each connection.
     pub(super) fn board(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for client in self.in_order() {
@@ -646,7 +646,7 @@ impl Model {
     }
 }
 
-/// A channel of the board.
+/// The board's line for a channel.
 pub(super) fn channel_line(
     channel: &str,
     value: Option<impl ToString>,

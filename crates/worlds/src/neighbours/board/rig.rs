@@ -1,4 +1,4 @@
-//! The dispatcher between simulated clients, as `tickbus dispatch` runs it, and the model beside it.
+//! The dispatcher between simulated clients, as `tickbus dispatch` runs it, with the model beside it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::mem::take;
@@ -17,22 +17,22 @@ use super::model::{Heard, Model, channel_line};
 use super::words::{CHANNELS, NAMES, Pin, Request};
 use super::{Feature, Plan, Step};
 
-/// A quarter of a second, in milliseconds. Promises end 100 ms behind a multiple of it, so that at a multiple nobody is between
-/// kept and broken.
+/// A quarter of a second, in milliseconds. Promises end 100 ms after a multiple of it, so that none is at its limit at
+/// a multiple.
 const QUARTER: i64 = 250;
 
-/// What a client that does not read may ask at most: the dispatcher does not run out of room for its answers.
+/// The maximum number of requests of a client that does not read, so that the dispatcher has room for its answers.
 const ASKED: u32 = 30;
 
 #[derive(Debug)]
 struct Seat {
-    /// Its number in the dispatcher.
+    /// The client's number in the dispatcher.
     number: usize,
-    /// What the client has sent, and the dispatcher has not taken: bytes, and what they mean at the end of a line.
+    /// The bytes that the client has sent and the dispatcher has not taken, with the request that each line completes.
     sent: VecDeque<(Vec<u8>, Request)>,
     heard: Vec<u8>,
     is_deaf: bool,
-    /// Something had to wait in the dispatcher: newer values may have replaced older ones.
+    /// True if something had to wait in the dispatcher, so that newer values may have replaced older ones.
     may_have_waited: bool,
     asked: u32,
     pings: bool,
@@ -45,7 +45,7 @@ struct Seat {
 pub(super) struct Rig {
     dispatcher: Dispatcher,
     model: Model,
-    /// In milliseconds.
+    /// The time, in milliseconds.
     now: i64,
     seats: BTreeMap<usize, Seat>,
     next_port: u16,
@@ -95,14 +95,15 @@ impl Rig {
     pub(super) fn take(&mut self, step: Step, random: &mut Random) {
         match step {
             Step::Say(slot, request) => self.say(slot, request, random),
-            // Refusals would wait for a client that does not read, and so would its next lines.
+            // Only for a channel of the client: a refusal would wait for a client that does not read, as would its next
+            // lines.
             Step::Flood(slot, channel) if self.model.has_output(slot, channel) => {
                 for value in 0..1500_u64 {
-                    // Long enough to fill the room of whoever does not read.
+                    // Long enough to fill the room of a client that does not read.
                     let value = 1_000_000_000_000_000 + value;
                     self.write(slot, Request::Values(vec![(channel, value)]), random);
                 }
-                // More than has room before anybody can read.
+                // This is more than fits before anybody can read.
                 for seat in self.seats.values_mut() {
                     seat.may_have_waited = true;
                 }
@@ -116,7 +117,7 @@ impl Rig {
                 }
             }
             Step::Deafen(slot) => {
-                // A list that nobody reads keeps back what stands behind it.
+                // An unread list holds back everything after it.
                 let seat = self.seats.get_mut(&slot).filter(|seat| {
                     !seat
                         .sent
@@ -151,7 +152,7 @@ impl Rig {
             Step::Pause(seconds) => {
                 self.now += 1000 * seconds;
                 self.ping();
-                // Nobody is blamed for that at once.
+                // The dispatcher blames no client for its own pause at once.
                 self.pass(QUARTER);
                 self.ping();
                 self.wait();
@@ -186,7 +187,7 @@ impl Rig {
         self.dispatcher.operate(order, reply);
     }
 
-    /// A client sends a line; in pieces, perhaps only a part of it arrives now.
+    /// A client sends a line; if lines come in pieces, perhaps only a part of it arrives now.
     fn say(&mut self, slot: usize, request: Request, random: &mut Random) {
         if !self.seats.contains_key(&slot) {
             if !matches!(request, Request::Identify(_)) && !random.once_in(10) {
@@ -211,7 +212,8 @@ impl Rig {
         let seat = &self.seats[&slot];
         let request = match request {
             _ if seat.is_deaf && seat.asked >= ASKED => return,
-            // With a slow disk, whose list and whose leaving comes first depends on who is written to first.
+            // With a slow disk, the order of a client's list and another client's leaving depends on who is written to
+            // first.
             Request::List if seat.is_deaf || self.is_disk_slow => Request::Ping,
             request => request,
         };
@@ -233,7 +235,7 @@ impl Rig {
         }
     }
 
-    /// Bytes of a client reach the dispatcher, in one piece, as far as it wants them.
+    /// Delivers bytes of a client to the dispatcher, in one piece, as far as it accepts them.
     fn deliver(&mut self, slot: usize, most: usize) {
         let Some(seat) = self.seats.get_mut(&slot) else {
             return;
@@ -245,7 +247,8 @@ impl Rig {
         let mut asks_list = false;
         while let Some((line, request)) = seat.sent.front_mut()
             && bytes.len() < most
-            // Who waits for the disk and for a list, and who only for the disk: in which order they go on is nobody's concern.
+            // Some clients wait for the disk and a list, others for the disk alone; the order in which they continue
+            // does not matter.
             && !(self.is_disk_slow && (asks_list || *request == Request::List && !bytes.is_empty()))
         {
             let rest = line.split_off(line.len().min(most - bytes.len()));
@@ -265,7 +268,7 @@ impl Rig {
         }
     }
 
-    /// What the thread of `tickbus dispatch` does until nothing is left to be done.
+    /// Does the work of the thread of `tickbus dispatch` until none is left.
     fn turn(&mut self) {
         loop {
             self.dispatcher.tick(self.nanos());
@@ -302,7 +305,7 @@ impl Rig {
         if !take(&mut self.is_saving) {
             return;
         }
-        // What waits behind an answer may be a flood.
+        // A flood may be waiting behind an answer.
         for seat in self.seats.values_mut() {
             seat.may_have_waited |= self.has_floods;
         }
@@ -314,7 +317,7 @@ impl Rig {
         self.dispatcher.saved(&outcome);
         self.model.saved(self.now, if is_well { 0 } else { 500 });
         self.turn();
-        // Whoever has its answer goes on, and so gives a sign of life.
+        // A client that has its answer continues, and so gives a sign of life.
         let slots: Vec<usize> = self.seats.keys().copied().collect();
         for slot in slots {
             let seat = self.seats.get_mut(&slot).expect("here");
@@ -328,7 +331,7 @@ impl Rig {
         }
     }
 
-    /// Writes what a client reads.
+    /// Writes to a client that reads.
     fn pump(&mut self, slot: usize) {
         let Some(seat) = self.seats.get_mut(&slot) else {
             return;
@@ -348,7 +351,7 @@ impl Rig {
         }
     }
 
-    /// A client that does not read takes some bytes.
+    /// Lets a client that does not read take some bytes.
     fn sip(&mut self, slot: usize, count: usize) {
         let Some(seat) = self.seats.get_mut(&slot) else {
             return;
@@ -361,7 +364,7 @@ impl Rig {
         }
     }
 
-    /// A quarter of a second passes.
+    /// Lets a quarter of a second pass.
     fn wait(&mut self) {
         self.pass(QUARTER);
         self.model.look(self.now);
@@ -369,7 +372,7 @@ impl Rig {
         self.ping();
     }
 
-    /// Time passes, and the dispatcher wakes whenever it wants to.
+    /// Lets time pass; the dispatcher wakes whenever it wants to.
     fn pass(&mut self, span: i64) {
         let end = self.now + span;
         loop {
@@ -377,7 +380,7 @@ impl Rig {
             if deadline >= Nanos::from_millis(end) {
                 break;
             }
-            // Up to a whole millisecond.
+            // Round up to a whole millisecond.
             self.now = self.now.max(deadline.0.div_euclid(1_000_000) + 1);
             if self.now >= end {
                 break;
@@ -395,7 +398,7 @@ impl Rig {
                 .model
                 .identity(slot)
                 .is_some_and(|it| it.alive.is_some());
-            // A line that has begun is ended: the sign of life stands behind it.
+            // The sign of life follows the rest of a line that has begun.
             if promises && seat.pings && !(seat.is_deaf && seat.asked >= ASKED) {
                 seat.asked += u32::from(seat.is_deaf);
                 seat.sent.push_back((b"\r\n".to_vec(), Request::Nothing));
@@ -405,7 +408,7 @@ impl Rig {
         self.turn();
     }
 
-    /// The disk writes, everyone reads, and all lines arrive.
+    /// Lets the disk write, all clients read, and all lines arrive.
     pub(super) fn quieten(&mut self) {
         let slots: Vec<usize> = self.seats.keys().copied().collect();
         for _ in 0..100 {
@@ -421,7 +424,7 @@ impl Rig {
         }
     }
 
-    /// Compares what everyone has heard, and what the board says, with the model.
+    /// Compares the lines that all clients have received, and the contents of the board, with the model.
     pub(super) fn judge(&mut self, trace: &mut Vec<String>) -> Result<(), Broken> {
         for (slot, seat) in &mut self.seats {
             if seat.is_deaf {
@@ -465,7 +468,7 @@ impl Rig {
         Ok(())
     }
 
-    /// As the model has it.
+    /// The contents of the board, in the model's format.
     fn board(&self) -> Vec<String> {
         let snapshot = self.dispatcher.snapshot();
         let mut lines = Vec::new();
@@ -495,7 +498,7 @@ fn board_pin((name, channel): Pin) -> BoardPin {
     BoardPin::new(NAMES[name], channel)
 }
 
-/// What stands in the lines of a client.
+/// The contents of a client's lines.
 fn read(bytes: &[u8]) -> Result<Vec<Heard>, Broken> {
     let text = String::from_utf8_lossy(bytes);
     if !text.is_empty() && !text.ends_with("\r\n") {
@@ -526,7 +529,7 @@ fn read(bytes: &[u8]) -> Result<Vec<Heard>, Broken> {
     Ok(lines.collect())
 }
 
-/// The order of channels in one line is nobody's concern.
+/// Sorts the channels within each line, whose order does not matter.
 fn sorted(events: &[Heard]) -> Vec<Heard> {
     let mut events = events.to_vec();
     for event in &mut events {
@@ -537,7 +540,8 @@ fn sorted(events: &[Heard]) -> Vec<Heard> {
     events
 }
 
-/// Whether a client that did not always read heard all lines, and of each channel some of the values in their order, with the last.
+/// Returns true if a client that did not always read received all lines. Of each channel it may have missed values, but
+/// neither their order nor the last one.
 fn is_digest(heard: &[Heard], expected: &[Heard]) -> bool {
     let (lines, values) = parts(heard);
     let (expected_lines, expected_values) = parts(expected);

@@ -1,16 +1,16 @@
-//! What clients of the board say, as the model reads it, and as the dispatcher does.
+//! The lines of the board's clients, as the model and as the dispatcher read them.
 
 use std::fmt::Write as _;
 
 use crate::random::Random;
 
-/// The names that clients take. The last one looks like the first process.
+/// The names that clients take. The last one looks like a reference to the first process.
 pub(super) const NAMES: [&str; 4] = ["A", "B", "C", "P1"];
 
-/// The channels that clients have, or believe to have.
+/// The channels that clients have, or believe they have.
 pub(super) const CHANNELS: [&str; 8] = ["Q1", "Q2", "I1", "I2", "AQ0", "AQ1", "AI0", "AI1"];
 
-/// What a client may have: how it says so, as Q, I, AQ and AI, and its channels.
+/// The shapes of clients: the numbers of Q, I, AQ and AI that a client states, and its channels.
 pub(super) const SHAPES: [([u8; 4], &[usize]); 4] = [
     ([2, 1, 0, 0], &[0, 1, 2]),
     ([1, 2, 1, 1], &[0, 2, 3, 4, 5, 6, 7]),
@@ -18,7 +18,7 @@ pub(super) const SHAPES: [([u8; 4], &[usize]); 4] = [
     ([2, 0, 1, 0], &[0, 1, 4, 5]),
 ];
 
-/// One channel of one client: the numbers of both.
+/// One channel of one client, by their numbers.
 pub(super) type Pin = (usize, usize);
 
 pub(super) fn is_input(channel: usize) -> bool {
@@ -29,25 +29,25 @@ pub(super) fn is_analog(channel: usize) -> bool {
     CHANNELS[channel].starts_with('A')
 }
 
-/// How a client calls another one.
+/// The reference of a client to another one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Peer {
     Name(usize),
-    /// The nth controller, or process.
+    /// The nth controller or process.
     Nth {
         is_controller: bool,
         number: usize,
     },
 }
 
-/// Who a client says that it is.
+/// The identity that a client states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Identity {
     pub(super) is_controller: bool,
     pub(super) name: usize,
     pub(super) shape: usize,
     pub(super) version: u8,
-    /// In milliseconds.
+    /// The promised time between two signs of life, in milliseconds.
     pub(super) alive: Option<i64>,
 }
 
@@ -62,14 +62,14 @@ pub(super) enum Request {
     Ping,
     Nothing,
     Bye,
-    /// Not in the grammar.
+    /// A line outside the grammar.
     Wrong,
-    /// The same, in the values of a line that has the right keyword.
+    /// A line with the right keyword and values outside the grammar.
     WrongValues,
 }
 
 impl Request {
-    /// The line, with its end. What is `sloppy` is written in another way that means the same.
+    /// The line, with its end. A `sloppy` line is written differently and means the same.
     pub(super) fn line(&self, random: &mut Random, sloppy: bool) -> Vec<u8> {
         let mut line = String::new();
         match self {

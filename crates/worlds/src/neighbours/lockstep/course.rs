@@ -12,23 +12,24 @@ use crate::random::{Random, scramble};
 use crate::scheduler::Habits;
 use crate::seed::Seed;
 
-/// What befalls a run.
+/// A misfortune of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum What {
     Suspend(usize, Nanos),
     Pause(usize, Nanos),
     Hold(Nanos),
-    /// These end a run: connections break, a client or the server is killed, a client closes, the server is stopped.
+    /// From here on, misfortunes end a run: connections break, a client or the server is killed, a client closes, the
+    /// server is stopped.
     Reset,
     Kill(usize),
     Close(usize),
     Stop,
 }
 
-/// One of both ends.
+/// One of the two ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EndCourse {
-    /// It has a step in so many of the server's.
+    /// The end has one step in this many of the server's.
     pub(super) multiple: u64,
     pub(super) halves: bool,
 }
@@ -100,7 +101,7 @@ impl Course {
         }
     }
 
-    /// The same run without anything that could change it.
+    /// The same run without scheduler habits and misfortunes.
     pub(super) fn quiet(&self) -> Self {
         Self {
             habits: Habits::default(),
@@ -113,17 +114,17 @@ impl Course {
         self.events.iter().any(|event| test(event.1))
     }
 
-    /// How many steps an end has in a run of so many.
+    /// The number of ticks that an end has in a run of `steps` steps.
     pub(super) fn ticks(&self, end: usize, steps: u64) -> u64 {
         steps.div_ceil(self.ends[end].multiple)
     }
 
-    /// Which tick of its peer an end sees in one of its own; 0 for the values from before the first.
+    /// The tick of its peer that an end sees in its own tick `tick`; 0 for the values from before the first tick.
     pub(super) fn expected(&self, end: usize, tick: u64) -> u64 {
-        // What is written in a step is read in the next one.
+        // Values written in a step are read in the next one.
         let step = 1 + (tick - 1) * self.ends[end].multiple;
         let answers = self.ticks(1 - end, step - 1);
-        // An exchange hands in its values before it gets a step, and a half afterwards.
+        // An exchange passes its values before it gets a step; a half does so afterwards.
         answers + u64::from(!self.ends[1 - end].halves)
     }
 

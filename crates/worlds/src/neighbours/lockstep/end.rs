@@ -1,4 +1,4 @@
-//! One end of a run on virtual time: ticks, and what they show.
+//! One end of a run on virtual time: its ticks, and the values that they show.
 
 use tickbus_base::time::Nanos;
 use tickbus_driver::{Code, Driver, Exchange};
@@ -14,7 +14,7 @@ use crate::random::{Random, scramble};
 use crate::scheduler;
 use crate::stamp::{Stamp, level};
 
-/// Whether a pulse is written in a tick.
+/// Returns true if a tick writes a pulse.
 const fn is_pulse(tick: u64) -> bool {
     tick % 3 == 2
 }
@@ -35,11 +35,11 @@ struct End<'a> {
     slots: Vec<Slot>,
     writes: Vec<Places>,
     reads: Vec<Places>,
-    /// How many ticks it has had in the run.
+    /// The number of ticks that the end has had in the run.
     ticks: u64,
 }
 
-/// One end, tick by tick.
+/// Runs one end, tick by tick.
 pub(super) fn live(shared: &Shared, end: usize) {
     let course = &shared.course;
     let mut at = End::open(shared, end);
@@ -56,7 +56,7 @@ pub(super) fn live(shared: &Shared, end: usize) {
         }
         let found = at.tick();
         if shared.is_gone[end].get() {
-            // Nobody sees what a process finds that was killed.
+            // Nobody sees the results of a killed process.
             break;
         }
         let (now, code) = (scheduler::now().0, found.code);
@@ -75,7 +75,7 @@ pub(super) fn live(shared: &Shared, end: usize) {
             && attempts < ATTEMPTS
             && !shared.is_done[SERVER].get()
         {
-            // Before the start, each tick tries again.
+            // Before the start, each tick tries again to join.
             attempts += 1;
             shared.is_retried.set(true);
         } else {
@@ -154,7 +154,8 @@ impl<'a> End<'a> {
         )
     }
 
-    /// A tick of the run shows the one of its peer that docs/sdsp.md promises, and the edges since the one before.
+    /// Judges a tick of the run: it shows the tick of its peer that docs/sdsp.md promises, and the edges since the
+    /// previous tick.
     fn judge(&self, found: Exchange) -> Result<(), Broken> {
         let Self {
             shared,
@@ -170,7 +171,7 @@ impl<'a> End<'a> {
             0
         };
         let edges = u8::from(is_pulse(expected) && expected != before);
-        // An end with longer steps misses what its peer writes between two of them.
+        // An end with longer steps misses values that its peer writes between two of them.
         let counts = course.ends[end].multiple <= course.ends[1 - end].multiple;
         for (station, places) in (0..).zip(&self.reads) {
             let stamp = stamp(1 - end, station, expected);
@@ -206,7 +207,7 @@ impl<'a> End<'a> {
         Ok(())
     }
 
-    /// Behind the end of the run, ticks show fail-safe values, and go on to return the same code.
+    /// Judges that ticks after the end of the run show fail-safe values and keep returning the same code.
     fn judge_end(&mut self, code: Code) -> Result<(), Broken> {
         let mut reads = self.reads.iter();
         let is_safe = reads.all(|places| self.shown(places) == (FAIL_SAFE, 0.0));
@@ -224,7 +225,7 @@ impl<'a> End<'a> {
     }
 }
 
-/// What an end writes in a tick; before the first one, variables are 0.
+/// The stamp that an end writes in a tick; before the first one, variables are 0.
 fn stamp(end: usize, station: u64, tick: u64) -> u64 {
     match tick {
         0 => 0,

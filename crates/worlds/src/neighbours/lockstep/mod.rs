@@ -1,7 +1,8 @@
-//! A run on virtual time: a server, and a machine and a PLC that tick in lock-step, each a process of its own, against docs/sdsp.md.
+//! A run on virtual time, judged against docs/sdsp.md: a server, and a machine and a PLC that tick in lock-step. Each
+//! is a separate process.
 //!
-//! What a tick shows is known to the last bit, whatever the threads, the network and the misfortunes do. Some of these end the run;
-//! then everyone is told, and nobody goes on.
+//! The values that a tick shows are known to the last bit, whatever the threads, the network and the misfortunes do.
+//! Some misfortunes end the run; then every process learns of the end, and none continues.
 
 mod course;
 mod end;
@@ -26,7 +27,7 @@ use crate::seed::Seed;
 use course::{Course, What};
 use end::live;
 
-/// The server, where the ends are 0, the machine, and 1, the PLC.
+/// The index of the server; 0 is the machine, and 1 is the PLC.
 const SERVER: usize = 2;
 
 /// The names of the clients.
@@ -35,16 +36,18 @@ const NAMES: [&str; 2] = ["cell", "cell PLC"];
 /// The server's step.
 const STEP: Nanos = Nanos::from_millis(1);
 
-/// The longest misfortune: three of them are shorter than what a client and the server wait for each other.
+/// The longest misfortune. Three of them are shorter than the time for which a client and the server wait for each
+/// other.
 const LONGEST: Nanos = Nanos::from_secs(1);
 
-/// A run, or its end, reaches everyone within this: the last time to wait for a client is 10 s, and for the server 5 s.
+/// A run, or its end, reaches all processes within this time. The last wait for a client takes 10 s, and that for the
+/// server 5 s.
 const PATIENCE: Nanos = Nanos::from_secs(40);
 
-/// So many attempts has an end that does not get into the run.
+/// The number of attempts of an end that cannot join the run.
 const ATTEMPTS: u32 = 20;
 
-/// How it went for an end that is still there.
+/// The outcome for an end that is still there.
 #[derive(Clone, Copy, Debug)]
 struct Told {
     ticks: u64,
@@ -54,12 +57,12 @@ struct Told {
 struct Shared {
     course: Course,
     processes: [Cell<usize>; 3],
-    /// What a simulation is to do before its next tick.
+    /// The order to an end for its next tick.
     orders: [Cell<Option<What>>; 2],
-    /// Was killed or closed.
+    /// True for a process that was killed or closed.
     is_gone: [Cell<bool>; 3],
     is_done: [Cell<bool>; 3],
-    /// An end has tried to get into the run more than once.
+    /// True if an end has tried to join the run more than once.
     is_retried: Cell<bool>,
     told: [Cell<Option<Told>>; 2],
     outcome: RefCell<Option<Result<Outcome, Ended>>>,
@@ -82,7 +85,8 @@ impl Shared {
     }
 }
 
-/// Lets a run happen, and, if nothing has ended it, the same once more without what must not change it.
+/// Runs a course. If nothing has ended it, runs it again without habits and misfortunes, which must not change the
+/// outcome.
 pub(super) fn run(seed: Seed, trace: &mut Vec<String>) -> Result<(), Broken> {
     let course = Course::draw(seed);
     trace.push(format!("{course:?}"));
@@ -100,12 +104,12 @@ pub(super) fn run(seed: Seed, trace: &mut Vec<String>) -> Result<(), Broken> {
     Ok(())
 }
 
-/// Whether it ends a run.
+/// Returns true if a misfortune ends a run.
 fn is_end(what: What) -> bool {
     !matches!(what, What::Suspend(..) | What::Pause(..) | What::Hold(_))
 }
 
-/// How the run ended; `None` if ends needed several attempts, so that it may have had other initial values.
+/// The outcome of a run; `None` if ends needed several attempts, so that initial values may have differed.
 fn happen(
     course: &Course,
     chance: u64,
@@ -140,7 +144,7 @@ fn happen(
     Ok(outcome.filter(|_| !shared.is_retried.get()))
 }
 
-/// Starts everyone, lets the misfortunes happen, and waits for the end.
+/// Starts all processes, lets the misfortunes happen, and waits for the end.
 fn fate(shared: &Rc<Shared>) {
     let course = &shared.course;
     scheduler::network(|network, _, _| network.conditions = course.conditions);
@@ -162,7 +166,7 @@ fn fate(shared: &Rc<Shared>) {
         befall(shared, *what);
     }
     if !await_all(shared) {
-        // A server waits without limit for a client that is gone, so somebody has to stop the run.
+        // A server waits without limit for a client that is gone, so the run has to be stopped.
         if course.has(is_end) {
             shared.controls.send(Control::Stop);
         }
@@ -176,7 +180,7 @@ fn fate(shared: &Rc<Shared>) {
     }
 }
 
-/// Whether all are done within the time that this may take.
+/// Returns true if all processes are done in time.
 fn await_all(shared: &Shared) -> bool {
     let limit = scheduler::now() + PATIENCE;
     let is_over = || shared.is_done.iter().all(Cell::get);
@@ -197,7 +201,7 @@ fn befall(shared: &Shared, what: What) {
             let process = shared.processes[who].get();
             scheduler::network(|network, _, now| network.kill(process, now));
             if who == SERVER {
-                // Its thread ends; nobody hears that.
+                // The server's thread ends unnoticed.
                 shared.controls.send(Control::Stop);
             }
         }
@@ -226,12 +230,12 @@ fn serve(shared: &Shared) {
     }
 }
 
-/// Everyone was told the same end.
+/// Judges that the server reported the same outcome to all ends.
 fn judge_end(shared: &Shared) -> Result<(), Broken> {
     let course = &shared.course;
     let outcome = shared.outcome.borrow();
     let Some(outcome) = outcome.as_ref() else {
-        // A server that was killed has told nobody anything.
+        // A killed server has reported nothing to anybody.
         return Ok(());
     };
     if !course.has(is_end)
@@ -252,7 +256,7 @@ fn judge_end(shared: &Shared) -> Result<(), Broken> {
             // The last message may be lost with its connection.
             Ok(_) if course.has(|what| what == What::Reset) => true,
             Ok(outcome) => code == Code::Stale && ticks == course.ticks(end, outcome.steps),
-            // It may be in the step that was not committed.
+            // The end may be in the step that was not committed.
             Err(ended) => code == Code::BusFailed && ticks <= course.ticks(end, ended.steps + 1),
         };
         if !is_right {

@@ -73,12 +73,12 @@ fn formats() -> impl TypedValueParser<Value = Format> {
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     match arguments.format {
         Format::Sources(target) => run_sources(arguments, target, kinds),
-        Format::Fmu(version) => run_fmu(arguments, version),
+        Format::Fmu(version) => run_fmu(arguments, version, kinds),
     }
 }
 
-fn run_fmu(arguments: &Arguments, version: Version) -> Outcome {
-    let written = make_fmu(arguments, version);
+fn run_fmu(arguments: &Arguments, version: Version, kinds: &'static Kinds) -> Outcome {
+    let written = make_fmu(arguments, version, kinds);
     let mut stderr = std::io::stderr().lock();
     match written {
         Ok((file, package)) => {
@@ -105,13 +105,21 @@ fn run_fmu(arguments: &Arguments, version: Version) -> Outcome {
 fn make_fmu(
     arguments: &Arguments,
     version: Version,
+    kinds: &'static Kinds,
 ) -> Result<(PathBuf, made::Package), (String, usize)> {
     let one = |mistake: Mistake| (mistake.to_string(), 1);
+    // First the mistakes that the user can see, then the parts that this computer lacks.
+    let config = Config::load(&arguments.file, kinds)
+        .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
     // The FMU's library has these kinds, not those that a custom program adds.
     let kinds = &crate::KINDS;
-    // First the mistakes that the user can see, then the parts that this computer lacks.
-    Config::load(&arguments.file, kinds)
-        .map_err(|mistakes| (mistakes.to_string(), mistakes.len()))?;
+    let kind = config.bus.kind();
+    if !kinds.names().contains(&kind) {
+        return Err(one(Mistake::new(
+            format!("an FMU has no bus of kind \"{kind}\", which is one of this program alone"),
+            "export a driver.cfg with a bus of tickbus",
+        )));
+    }
     let own = std::env::current_exe().ok();
     let beside = own.as_deref().and_then(Path::parent);
     let libraries = made::find_libraries(&arguments.library, beside).map_err(one)?;

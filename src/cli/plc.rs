@@ -1,6 +1,6 @@
 //! `tickbus plc PROGRAM --config FILE`: runs a PLC program in a separate process.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::Outcome;
 use super::host::{self, Job, span};
@@ -45,7 +45,10 @@ fn pair(text: &str) -> Result<(String, String), String> {
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
-    let program = match tickbus_programs::program(&arguments.program, &arguments.options) {
+    let program = match kinds
+        .programs()
+        .make(Path::new(""), &arguments.program, &arguments.options)
+    {
         Ok(program) => program,
         Err(error) => {
             eprintln!("plc: {error}");

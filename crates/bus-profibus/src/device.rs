@@ -102,6 +102,16 @@ impl Stations {
         }
     }
 
+    /// The line is gone, and with it the masters of all stations.
+    fn lost(&mut self, port: &mut Port, why: &str) {
+        let now = port.clock().now();
+        for (index, side) in self.all.iter_mut().enumerate() {
+            if std::mem::take(&mut side.exchanges) {
+                port.station_left(index, now, Cause::Link, why);
+            }
+        }
+    }
+
     /// The addresses of the stations that exchange data, as text.
     fn exchanging(&self) -> Option<String> {
         let exchanging = self.all.iter().filter(|side| side.exchanges);

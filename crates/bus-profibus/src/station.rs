@@ -139,6 +139,8 @@ pub struct Station {
     /// Outputs that wait for the next SYNC.
     held: Vec<u8>,
     is_held: bool,
+    /// When the master last sent them.
+    held_since: Nanos,
     /// The last answer to `Data_Exchange` has inputs that the master may not have received.
     is_pending: bool,
     last: Last,
@@ -196,6 +198,7 @@ impl Station {
             is_cleared: true,
             held: vec![0; identity.configuration.outputs()],
             is_held: false,
+            held_since: Nanos(0),
             is_pending: false,
             last: Last::default(),
             identity,

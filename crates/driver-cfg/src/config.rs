@@ -59,7 +59,6 @@ pub struct CommandLineEnd {
     /// The end. A file without a role serves both ends.
     pub role: Role,
     /// True if another address will replace the file's; see [`Options::set_address`].
-    /// [`Options::set_address`].
     pub moved: bool,
 }
 

@@ -105,7 +105,12 @@ impl Kinds {
             Some(others) => others.names(),
             None => vec![loopback::NAME],
         };
-        names.extend(self.buses.iter().map(|kind| kind.name));
+        for kind in self.buses {
+            // A further kind of the same name is never used.
+            if !names.contains(&kind.name) {
+                names.push(kind.name);
+            }
+        }
         names
     }
 
@@ -156,10 +161,13 @@ impl Kinds {
     /// Reports that no kind is called `name`.
     fn report(&self, kind: &Value<'_>, name: &str) {
         let lower = name.to_ascii_lowercase();
+        let names = self.names();
+        let is_kind = names.iter().any(|known| known.eq_ignore_ascii_case(name));
         let advice = self.advice.iter().find(|(known, _)| *known == lower);
+        let advice = advice.filter(|_| !is_kind);
         let right = match advice {
             Some((_, right)) => (*right).to_owned(),
-            None => did_you_mean(name, "bus kinds", &self.names()),
+            None => did_you_mean(name, "bus kinds", &names),
         };
         kind.wrong(format!("bus kind \"{}\" is unknown", shown(name)), right);
     }

@@ -105,9 +105,11 @@ impl ServedUnits {
         let unit = &mut self.all[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
-        // If the line is down, the request takes effect, but its answer is lost.
-        let is_up = port.is_station_up(station, now);
-        let receipt = if writes_only || !is_up {
+        // A station that is cut off hears and answers nothing, as if its client were silent.
+        if !port.is_station_up(station, now) {
+            return None;
+        }
+        let receipt = if writes_only {
             None
         } else {
             port.take(station..station + 1, now).map(|mut frames| {
@@ -119,7 +121,7 @@ impl ServedUnits {
                 frames.receipt()
             })
         };
-        let is_lost = !is_up || !writes_only && receipt.is_none();
+        let is_lost = !writes_only && receipt.is_none();
         let before = reply.len();
         // Only refused writes are undone.
         let held = unit.writers.is_single().then(|| unit.holds.clone());
@@ -157,10 +159,7 @@ impl ServedUnits {
                     return None;
                 }
                 unit.has_writer = true;
-                // A station that is cut off learns nothing, as if its client were silent.
-                if is_up {
-                    source.renewals[station].wrote(now);
-                }
+                source.renewals[station].wrote(now);
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
                     port.received_parts(station, now, frame, [bits]);
@@ -170,7 +169,7 @@ impl ServedUnits {
             }
             // A client that only reads must not make the values of one that writes look recent.
             (None, None) => {
-                let counts = is_up && source.renewals[station].counts(now, port.max_age());
+                let counts = source.renewals[station].counts(now, port.max_age());
                 if counts || !unit.has_writer {
                     port.touch(station, now);
                 }

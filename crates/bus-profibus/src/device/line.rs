@@ -57,7 +57,12 @@ pub(super) fn serve(
     // Restarted stations have neither masters nor diagnoses.
     port.tell("exchanging", "none");
     port.report_diagnoses_anew();
-    call.run(&mut line, port, stop)
+    let ended = call.run(&mut line, port, stop);
+    if let Err(error) = &ended {
+        // The stations begin again without their master's watchdog, which would have cleared the outputs.
+        line.stations.lost(port, &error.to_string());
+    }
+    ended
 }
 
 struct Line<'a> {

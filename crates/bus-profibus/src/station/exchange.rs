@@ -53,7 +53,7 @@ impl Station {
             process.alive(self.address, now);
         } else if self.is_synced {
             self.held.copy_from_slice(request.data);
-            self.is_held = true;
+            (self.is_held, self.held_since) = (true, now);
             if self.is_cleared {
                 // The machine still has the outputs from before CLEAR, or before the outage.
                 self.hand_over(now, process);
@@ -100,7 +100,8 @@ impl Station {
             // Every SYNC releases the held outputs; UNSYNC ends holding.
             if (has(4) || has(5)) && std::mem::take(&mut self.is_held) && !clear.is_on() {
                 self.outputs.copy_from_slice(&self.held);
-                self.hand_over(now, process);
+                // A command makes them no younger than the exchange that brought them.
+                self.hand_over(self.held_since, process);
             }
             self.is_synced = !has(4) && (has(5) || self.is_synced);
         }
@@ -132,6 +133,8 @@ impl Station {
             self.is_held = false;
             process.tell(self.address, now, Event::Cleared);
         } else {
+            // The first outputs after CLEAR are new, even if their bytes and the frame count bit are those of the last request.
+            self.last.head = None;
             process.tell(self.address, now, Event::Operates);
         }
     }

@@ -11,6 +11,8 @@ struct Machine {
     inputs: u8,
     loses: bool,
     outputs: Vec<Vec<u8>>,
+    /// The time that counts for the last outputs.
+    came: Nanos,
     delivered: usize,
     alive: usize,
     events: Vec<Event>,
@@ -26,8 +28,9 @@ impl Process for Machine {
         self.delivered += 1;
     }
 
-    fn outputs(&mut self, _station: u8, _now: Nanos, outputs: &[u8]) {
+    fn outputs(&mut self, _station: u8, now: Nanos, outputs: &[u8]) {
         self.outputs.push(outputs.to_vec());
+        self.came = now;
     }
 
     fn alive(&mut self, _station: u8, _now: Nanos) {
@@ -564,6 +567,34 @@ fn outputs_from_before_clear_do_not_come_back_under_sync() {
     assert_eq!(rig.machine.outputs.last(), Some(&vec![0, 0]), "held");
     rig.control(0x20, 0);
     assert_eq!(rig.machine.outputs.last(), Some(&vec![5, 6]));
+}
+
+#[test]
+fn outputs_after_clear_are_served_though_the_master_never_toggles_its_bit() {
+    let mut rig = Rig::exchanging(identity(), 0, 0);
+    rig.raw(None, 0x5D, &[1, 2]);
+    rig.control(0x02, 0);
+    for _ in 0..2 {
+        rig.raw(None, 0x5D, &[0, 0]);
+    }
+    rig.control(0x00, 0);
+    for _ in 0..2 {
+        rig.raw(None, 0x5D, &[0, 0]);
+    }
+    assert_eq!(rig.machine.outputs, [[1, 2], [0, 0]]);
+}
+
+#[test]
+fn outputs_that_sync_held_are_as_old_as_the_exchange_that_brought_them() {
+    let mut rig = Rig::exchanging(identity(), 0x20, 0);
+    rig.exchange(&[1, 2]);
+    rig.control(0x20, 0);
+    rig.now = Nanos::from_millis(10);
+    rig.exchange(&[3, 4]);
+    rig.now = Nanos::from_secs(60);
+    rig.control(0x20, 0);
+    assert_eq!(rig.machine.outputs, [[1, 2], [3, 4]]);
+    assert_eq!(rig.machine.came, Nanos::from_millis(10));
 }
 
 #[test]

@@ -250,6 +250,11 @@ impl Jobs<'_> {
         if place.area == sends {
             return Err(ReturnCode::ACCESS);
         }
+        // A station that is cut off hears and answers nothing, as if its client were silent.
+        if !self.port.is_station_up(place.station, self.now) {
+            self.lost = true;
+            return Err(ReturnCode::ACCESS);
+        }
         let station = &mut self.shared.stations[place.station];
         let first = range.start * 8;
         let changed = first + bits.start..first + bits.end;
@@ -331,10 +336,7 @@ impl Memory for Jobs<'_> {
                 let addressed = std::mem::take(&mut station.addressed);
                 if !station.changed.is_empty() {
                     station.has_writer = true;
-                    // A station that is cut off learns nothing, as if its client were silent.
-                    if port.is_station_up(index, now) {
-                        renewals[index].wrote(now);
-                    }
+                    renewals[index].wrote(now);
                     let written = station.changed.drain(..);
                     if shared.every_write {
                         port.received_parts(index, now, &station.written, written);

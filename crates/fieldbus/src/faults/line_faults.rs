@@ -44,6 +44,8 @@ pub struct LineFaults {
     fate: Fate,
     /// True if the frames of the current outgoing cycle repeat those of the previous one.
     repeats: bool,
+    /// The cycle's repetition is counted.
+    is_counted: bool,
     /// The active faults, as text.
     active: String,
     /// The reports of the stations, in the order of the faults; `is_diagnosis_new` is true if they are new.
@@ -132,6 +134,7 @@ impl LineFaults {
             sum: Sum::default(),
             fate: Fate::Passes(1),
             repeats: false,
+            is_counted: false,
             active: String::new(),
             diagnoses: Vec::new(),
             is_diagnosis_new: false,
@@ -277,17 +280,21 @@ impl LineFaults {
                 LineEffect::Duplicate(chance, direction) if direction.goes_out() => Some(chance),
                 _ => None,
             });
-            self.repeats &= !self.stations[station].out.has_paused(now);
-            if self.repeats {
-                self.board.duplicated.fetch_add(1, Ordering::Relaxed);
-            }
+            self.is_counted = false;
         }
         let is_cut = self.is_cut(station);
         let out = &mut self.stations[station].out;
-        // A station that is polled separately may have paused alone.
+        // Each station pauses alone: it was cut off, or is polled separately.
         out.repeats = self.repeats && !is_cut && !out.has_paused(now);
+        out.is_cut = is_cut;
+        if is_cut {
+            out.taken = Taken::Before;
+        }
         if out.repeats {
             out.taken = Taken::At(now);
+            if !std::mem::replace(&mut self.is_counted, true) {
+                self.board.duplicated.fetch_add(1, Ordering::Relaxed);
+            }
         }
         out.repeats
     }
@@ -298,10 +305,8 @@ impl LineFaults {
     }
 
     /// The bytes that the bus sends while the station is cut off: the ones that it sent before.
-    pub fn frozen(&mut self, station: usize) -> &[u8] {
-        let out = &mut self.stations[station].out;
-        out.given = Given::Nothing;
-        &out.current
+    pub fn frozen(&self, station: usize) -> &[u8] {
+        &self.stations[station].out.current
     }
 
     /// Takes the image's outgoing bytes; returns true if the image may regard them as sent.
@@ -331,7 +336,7 @@ impl LineFaults {
     pub fn sent(&mut self, station: usize, bits: Option<&Range<usize>>) -> bool {
         let out = &mut self.stations[station].out;
         match bits {
-            _ if out.given == Given::Nothing => {}
+            _ if out.is_cut => return false,
             None => {
                 out.sent.copy_from_slice(&out.current);
                 out.read.fill(0xFF);
@@ -351,7 +356,7 @@ impl LineFaults {
     /// Returns true if the bus was given the image's newest bytes: no fault holds them back or repeats others.
     pub fn gives_newest(&self, station: usize) -> bool {
         let out = &self.stations[station].out;
-        !out.repeats && out.given != Given::Nothing && out.current == out.newest
+        !out.repeats && !out.is_cut && out.current == out.newest
     }
 
     /// Decides the fate of a frame that arrived at `now`, and stores the frame if it has to wait.

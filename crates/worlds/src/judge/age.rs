@@ -59,17 +59,10 @@ pub(super) fn judge(plan: &Plan, area: u64, seen: &Seen<'_>) -> Result<(), Broke
     let Some(last) = seen.deliveries.last() else {
         return broken("age", format!("{} ns, though nothing has come", seen.age));
     };
-    // A slave of PROFIBUS clears its outputs when its master has sent nothing for the time of its watchdog. One whose adapter was
-    // unplugged begins again without a watchdog.
+    // A slave of PROFIBUS clears its outputs when its master has sent nothing for the time of its watchdog.
     let silence = seen.began - last.at;
     let limit = plan.slave_watchdog().0 + slack(plan);
-    let is_watched = plan.bus == Bus::Profibus
-        && area == 0
-        && !plan
-            .events
-            .iter()
-            .any(|event| event.what == Misfortune::Reset);
-    if is_watched && silence > limit {
+    if plan.bus == Bus::Profibus && area == 0 && silence > limit {
         return broken(
             "age",
             format!("not stale, {silence} ns after the last request"),

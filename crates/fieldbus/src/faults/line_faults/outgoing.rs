@@ -35,6 +35,8 @@ pub(super) struct Outgoing {
     pub(super) taken: Taken,
     /// True if the frame of the current cycle repeats the previous one.
     pub(super) repeats: bool,
+    /// True if the station is cut off in the current cycle: the bus was given old bytes, so that it has something to send.
+    pub(super) is_cut: bool,
     /// How many waiting changes, from the oldest on, wait only for their edges: the peer has newer values already.
     overtaken: usize,
     /// The origin of the bytes that the bus was given, and thus the one to notify when they were sent.
@@ -47,8 +49,6 @@ pub(super) enum Given {
     Image,
     /// The ring: the image released these bytes long ago.
     Held,
-    /// Neither: old bytes, which give the bus something to send.
-    Nothing,
 }
 
 impl Outgoing {
@@ -64,6 +64,7 @@ impl Outgoing {
             held_up: None,
             waiting: None,
             repeats: false,
+            is_cut: false,
             taken,
             overtaken: 0,
             given: Given::Image,
@@ -144,11 +145,16 @@ impl Outgoing {
                 self.advance();
             }
             if let Some(ring) = &mut self.waiting {
-                ring.push(if was_behind { now - slow } else { now }, image);
+                ring.push(now, image);
             }
         }
+        if slow == Nanos::ZERO || was_behind {
+            // The fault or the outage is over: values become current at once, and edges are shown one at a time.
+            take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
+            self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
+        }
         while let Some((taken, next)) = self.waiting.as_ref().and_then(Ring::front) {
-            let due = slow == Nanos::ZERO || taken + slow <= now;
+            let due = self.overtaken > 0 || taken + slow <= now;
             if !due {
                 break;
             }
@@ -159,11 +165,6 @@ impl Outgoing {
                 hurried = true;
             }
             self.advance();
-        }
-        if slow == Nanos::ZERO || was_behind {
-            // The fault or the outage is over: values become current at once, and edges are shown one at a time.
-            take_bits(&mut self.current, &self.newest, |byte| !self.latched[byte]);
-            self.overtaken = self.waiting.as_ref().map_or(0, Ring::len);
         }
         hurried
     }

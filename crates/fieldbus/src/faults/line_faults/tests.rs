@@ -14,6 +14,15 @@ struct Rig {
     tick: u64,
 }
 
+/// A table for the names of two stations.
+fn two_stations() -> SignalTable {
+    let one = SignalTable::of_one_station(2, 2, Vec::new());
+    SignalTable {
+        stations: [&one.stations[..], &one.stations].concat(),
+        ..one
+    }
+}
+
 impl Rig {
     fn new() -> Self {
         Self::of_stations(1)
@@ -49,7 +58,7 @@ impl Rig {
             seed,
         };
         let slots = Slots {
-            table: &SignalTable::default(),
+            table: &two_stations(),
             writes: Area::Input,
             edges: &[],
         };
@@ -78,11 +87,22 @@ impl Rig {
 
     /// One cycle of sending. Returns the bytes sent, and true if the image may regard them as sent.
     fn send(&mut self, now: i64, image: [u8; 2], taken: bool) -> ([u8; 2], bool) {
-        let repeats = self.wires.repeats(0, Nanos(now));
-        let mut confirmed = !repeats && self.wires.takes(0, Nanos(now), &image);
-        let out = self.wires.outgoing(0).try_into().expect("two bytes");
+        self.send_to(0, now, image, taken)
+    }
+
+    fn send_to(
+        &mut self,
+        station: usize,
+        now: i64,
+        image: [u8; 2],
+        taken: bool,
+    ) -> ([u8; 2], bool) {
+        let repeats = self.wires.repeats(station, Nanos(now));
+        let is_given = !repeats && !self.wires.is_cut(station);
+        let mut confirmed = is_given && self.wires.takes(station, Nanos(now), &image);
+        let out = self.wires.outgoing(station).try_into().expect("two bytes");
         if taken {
-            confirmed |= self.wires.sent(0, None);
+            confirmed |= self.wires.sent(station, None);
         }
         (out, confirmed)
     }
@@ -227,6 +247,51 @@ fn the_first_fault_repeats_nothing_of_before_the_line_was_opened_and_nothing_tha
 }
 
 #[test]
+fn latched_bits_of_after_an_outage_are_as_young_as_the_values() {
+    let mut rig = Rig::new();
+    rig.add(LineEffect::SlowAnswers(Nanos(20_000)), 1);
+    rig.send(0, [0, 1], true);
+    rig.send(1, [0, 2], true);
+    let down = rig.add(LineEffect::LinkDown, 1);
+    rig.end(down);
+    assert_eq!(rig.send(1_000, [1, 50], true).0, [1, 50]);
+}
+
+#[test]
+fn a_held_pulse_outlives_a_station_that_is_cut_off() {
+    let mut rig = Rig::new();
+    let slow = rig.add(LineEffect::SlowAnswers(Nanos(10)), 1);
+    rig.send(0, [1, 1], false);
+    rig.send(1, [0, 2], false);
+    assert_eq!(rig.send(20, [0, 2], false).0, [1, 1]);
+    let down = rig.add(LineEffect::StationDown(0), 1);
+    rig.send(21, [0, 2], true);
+    rig.end(down);
+    rig.end(slow);
+    assert_eq!(rig.send(22, [0, 2], true).0, [1, 2], "the pulse");
+    assert_eq!(rig.send(23, [0, 2], true).0, [0, 2]);
+}
+
+#[test]
+fn a_station_that_is_cut_off_repeats_nothing_of_before_and_keeps_no_other_from_it() {
+    let mut rig = Rig::taken(2, Taken::Never);
+    for station in 0..2 {
+        rig.send_to(station, 0, [0, 1], true);
+    }
+    let down = rig.add(LineEffect::StationDown(0), 1);
+    rig.add(LineEffect::Duplicate(1.0, Direction::Out), 1);
+    for cycle in 1..5 {
+        let now = cycle * PATIENCE.0 / 2;
+        rig.send_to(0, now, [0, 2], true);
+        assert_eq!(rig.send_to(1, now, [0, 2], true).0, [0, 1], "{cycle}");
+    }
+    assert_eq!(rig.board.duplicated.load(Ordering::Relaxed), 4);
+    rig.end(down);
+    let now = 3 * PATIENCE.0;
+    assert_eq!(rig.send_to(0, now, [0, 3], true).0, [0, 3]);
+}
+
+#[test]
 fn cycles_without_a_pause_are_repeated_for_as_long_as_the_fault_lasts() {
     let mut rig = Rig::new();
     rig.send(0, [0, 1], true);
@@ -329,6 +394,7 @@ fn a_link_that_is_down_takes_nothing_and_gives_nothing_back() {
     let down = rig.add(LineEffect::LinkDown, 1);
     assert!(rig.wires.is_down() && rig.wires.is_cut(0));
     assert_eq!(rig.receive(1, Some(1)), Vec::<u8>::new());
+    assert!(!rig.wires.repeats(0, Nanos(1)));
     assert_eq!(rig.wires.frozen(0), [1, 2]);
     assert!(!rig.wires.sent(0, None), "nothing counts as sent");
     rig.end(down);

@@ -274,6 +274,31 @@ print("ok")
     assert (result.returncode, result.stdout.strip()) == (0, "ok"), result.stderr
 
 
+def test_a_signal_ends_a_child_from_its_first_moment(python, line_cfg):
+    result = python(
+        """
+import os, signal, sys, time
+import tickbus
+
+line = tickbus.open(sys.argv[1])
+for number in [signal.SIGTERM, signal.SIGHUP] * 5:
+    child = os.fork()
+    if child == 0:
+        never, _ = os.pipe()
+        os.read(never, 1)
+    os.kill(child, number)
+    _, status = os.waitpid(child, 0)
+    assert os.WTERMSIG(status) == number, status
+assert not signal.pthread_sigmask(signal.SIG_BLOCK, [])
+line.exchange(0.002)
+line.close()
+print("ok")
+""",
+        line_cfg,
+    )
+    assert (result.returncode, result.stdout.strip()) == (0, "ok"), result.stderr
+
+
 def test_no_warning_of_a_closed_driver(line_cfg):
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -6,6 +6,7 @@ import itertools
 import os
 import re
 import signal
+import threading
 import time
 import warnings
 import weakref
@@ -217,6 +218,9 @@ def report(
 
 _open: weakref.WeakSet[Driver] = weakref.WeakSet()
 
+# The signals that end a process which does not handle them; there are none on Windows.
+_TERMINATIONS = (signal.SIGTERM, signal.SIGHUP) if os.name == "posix" else ()
+
 
 @atexit.register
 def _close_all() -> None:
@@ -241,14 +245,35 @@ def _terminated(number: int, _frame: FrameType | None) -> None:
 
 def _close_when_terminated() -> None:
     """Closes the drivers on a termination signal that the program does not handle, before the signal ends the process."""
-    if os.name != "posix":
-        return
-    for number in (signal.SIGTERM, signal.SIGHUP):
+    for number in _TERMINATIONS:
         if signal.getsignal(number) is signal.SIG_DFL:
             # Only the main thread can set handlers; a program that opens its drivers elsewhere handles signals itself.
             with contextlib.suppress(ValueError):
                 signal.signal(number, _terminated)
 
 
+# The signal masks of the threads that are in a fork.
+_forking = threading.local()
+
+
+def _before_fork() -> None:
+    """Holds termination signals back: the interpreter of a child forgets those that arrive before it has set itself up."""
+    _forking.mask = signal.pthread_sigmask(signal.SIG_BLOCK, _TERMINATIONS)
+
+
+def _after_fork() -> None:
+    """Lets termination signals through again."""
+    signal.pthread_sigmask(signal.SIG_SETMASK, _forking.mask)
+
+
+def _after_fork_in_child() -> None:
+    """Leaves the parent's drivers to the parent, and has termination signals end the child at once, as before ``open``."""
+    _native.forked()
+    for number in _TERMINATIONS:
+        if signal.getsignal(number) is _terminated:
+            signal.signal(number, signal.SIG_DFL)
+    _after_fork()
+
+
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_native.forked)
+    os.register_at_fork(before=_before_fork, after_in_parent=_after_fork, after_in_child=_after_fork_in_child)

@@ -39,6 +39,14 @@ impl Renewal {
         };
     }
 
+    /// A request of the client was lost at `now`, and perhaps a write: its values count again as after a silence.
+    pub fn lost(&mut self, now: Nanos, max_age: Nanos) {
+        self.asked = now;
+        if let Some(from) = &mut self.counts_from {
+            *from = now + max_age;
+        }
+    }
+
     /// The client sends a request at `now` that writes nothing. Returns true if this renews values that become stale
     /// after `max_age`.
     pub fn counts(&mut self, now: Nanos, max_age: Nanos) -> bool {
@@ -79,6 +87,18 @@ mod tests {
         assert!(!renewal.counts(Nanos(500), MAX_AGE));
         renewal.wrote(Nanos(501));
         assert!(renewal.counts(Nanos(502), MAX_AGE));
+    }
+
+    #[test]
+    fn a_client_whose_request_was_lost_counts_when_it_writes_or_has_asked_for_long_enough() {
+        let mut renewal = Renewal::of_new_client();
+        renewal.wrote(Nanos(0));
+        renewal.lost(Nanos(50), MAX_AGE);
+        let counts = [60, 149, 150].map(|time| renewal.counts(Nanos(time), MAX_AGE));
+        assert_eq!(counts, [false, false, true]);
+        renewal.lost(Nanos(200), MAX_AGE);
+        renewal.wrote(Nanos(210));
+        assert!(renewal.counts(Nanos(211), MAX_AGE));
     }
 
     #[test]

@@ -107,6 +107,7 @@ impl ServedUnits {
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
         // A station that is cut off hears and answers nothing, as if its client were silent.
         if !port.is_station_up(station, now) {
+            source.renewals[station].lost(now, port.max_age());
             return None;
         }
         let receipt = if writes_only {

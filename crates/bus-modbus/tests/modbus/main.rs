@@ -120,19 +120,34 @@ fn each_write_is_one_commit_and_reading_back_gives_it() {
 }
 
 #[test]
-fn a_client_reads_back_what_the_machine_has_after_a_write_to_a_cut_line() {
-    let (mut device, mut stream) = device("");
-    is_served(&mut device, &mut stream, 7);
-    let cut = device.end.driver.inject_text("kind = \"link-down\"");
+fn a_write_to_a_unit_that_is_cut_off_is_lost_and_is_not_read_back() {
+    let text = format!(
+        "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n{TWO_UNITS}"
+    );
+    let mut device = Alone::open(&text, &KINDS);
+    let mut stream = client(device.address());
+    let mut reader = stream.try_clone().expect("a socket");
+    let mut send = |unit, pdu: &[u8]| {
+        let sent = stream.write_all(&request(1, unit, pdu));
+        sent.expect("the server reads");
+    };
+    let (on, off, read) = ([6, 0, 0, 0, 7], [6, 0, 0, 0, 0], [3, 0, 0, 0, 1]);
+    send(3, &on);
+    assert_eq!(answer(&mut reader, 1), on);
+    device.until("it is there", |end| end.get("press") == 7.0);
+    let cut = device
+        .end
+        .driver
+        .inject_text("kind = \"station-down\"\nstation = \"press\"");
     device.end.tick();
-    stream
-        .write_all(&request(2, 1, &[6, 0, 1, 0, 0]))
-        .expect("the server reads");
-    pass(&device.clock, 5);
+    send(3, &off);
+    // The only answer is that of the other unit: by then, the request before it has been served.
+    send(7, &on);
+    assert_eq!(answer(&mut reader, 1), on);
     assert!(device.end.driver.end_fault(cut.expect("a right fault")));
     device.end.tick();
-    let read = ask(&mut stream, 3, &[3, 0, 1, 0, 1]);
-    device.until_speed(i16::from_be_bytes([read[2], read[3]]));
+    send(3, &read);
+    assert_eq!(answer(&mut reader, 1), [3, 2, 0, 7]);
 }
 
 #[test]

@@ -253,6 +253,7 @@ impl Jobs<'_> {
         // A station that is cut off hears and answers nothing, as if its client were silent.
         if !self.port.is_station_up(place.station, self.now) {
             self.lost = true;
+            self.renewals[place.station].lost(self.now, self.port.max_age());
             return Err(ReturnCode::ACCESS);
         }
         let station = &mut self.shared.stations[place.station];

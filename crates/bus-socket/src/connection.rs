@@ -17,6 +17,8 @@ pub(super) struct Connection {
     session: Session,
     /// The receipt for the record on its way.
     receipt: Option<Receipt>,
+    /// True if the rest of a record has to wait: a fault has cut off its stations.
+    is_cut: bool,
     /// True if the peer's presence was reported.
     announced: bool,
     /// The number of skipped cycles that were reported to the port.
@@ -31,6 +33,7 @@ impl Connection {
             peer,
             session: Session::new(terms, port.clock().now()),
             receipt: None,
+            is_cut: false,
             announced: false,
             skipped: 0,
         }
@@ -66,11 +69,14 @@ impl Transfer<'_> {
     /// Makes the record if one is due.
     fn make(&mut self, now: Nanos, port: &mut Port) {
         let session = &mut self.connection.session;
+        let stations = self.frames.stations();
+        let mut is_up = || {
+            let mut all = stations.clone();
+            all.any(|station| port.is_station_up(station, now))
+        };
+        self.connection.is_cut = session.is_within_record() && !is_up();
         if let Some(space) = session.due(now) {
-            let stations = self.frames.stations();
-            let is_up = stations
-                .clone()
-                .any(|station| port.is_station_up(station, now));
+            let is_up = is_up();
             let frames = is_up.then(|| port.look(stations.clone(), now)).flatten();
             let Some(mut frames) = frames else {
                 // The line is down, or all its stations are: the record stays unchanged, and changes are sent when the
@@ -149,6 +155,9 @@ impl Caller for Transfer<'_> {
     }
 
     fn to_write(&self, _now: Nanos) -> &[u8] {
+        if self.connection.is_cut {
+            return &[];
+        }
         self.connection.session.to_write()
     }
 

@@ -245,6 +245,11 @@ impl Session {
         }
     }
 
+    /// Returns true if the system has accepted a part of the record, and not all of it.
+    pub fn is_within_record(&self) -> bool {
+        self.outbox.written > 0
+    }
+
     /// The system accepted `count` bytes of [`to_write`](Self::to_write); returns whether that completed a
     /// record.
     ///

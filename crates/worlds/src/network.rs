@@ -1,6 +1,6 @@
 //! The network of a simulated world: TCP as its ends see it, with everything that may happen to bytes on their way.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, SocketAddr};
 
@@ -86,6 +86,8 @@ pub(crate) struct Network {
     listeners: BTreeMap<u64, Listening>,
     next: u64,
     ports: u16,
+    /// The processes that were killed. One that was suspended meanwhile runs on for a moment: it reaches nobody.
+    killed: BTreeSet<usize>,
     /// The time until which the cable is pulled.
     cut_until: i64,
     /// When the newest connection of each process was made, even if it has ended.
@@ -185,6 +187,9 @@ impl Network {
 
     pub(crate) fn listen(&mut self, process: usize, addresses: &[SocketAddr]) -> io::Result<u64> {
         let address = *addresses.first().ok_or(ErrorKind::InvalidInput)?;
+        if self.killed.contains(&process) {
+            return Err(ErrorKind::AddrNotAvailable.into());
+        }
         let mut taken = self.listeners.values();
         if taken.any(|listening| listening.address.port() == address.port()) {
             return Err(ErrorKind::AddrInUse.into());
@@ -234,7 +239,8 @@ impl Network {
         let listener = self
             .listeners
             .values_mut()
-            .find(|listening| listening.address.port() == address.port());
+            .find(|listening| listening.address.port() == address.port())
+            .filter(|_| !self.killed.contains(&process));
         let Some(listening) = listener else {
             let refused = Some(ErrorKind::ConnectionRefused);
             self.ends
@@ -283,6 +289,7 @@ impl Network {
 
     /// Closes everything that a killed process has left, as the system does.
     pub(crate) fn kill(&mut self, process: usize, now: i64) {
+        self.killed.insert(process);
         self.wire.kill(process);
         self.listeners
             .retain(|_, listening| listening.process != process);
@@ -336,6 +343,9 @@ impl Network {
     /// Opens a port of the serial line.
     pub(crate) fn open_serial(&mut self, process: usize, now: i64) -> u64 {
         let id = self.identity();
+        if self.killed.contains(&process) {
+            return id;
+        }
         self.wire.open(id, process);
         self.last_connected.insert(process, now);
         id

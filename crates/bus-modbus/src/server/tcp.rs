@@ -136,4 +136,8 @@ impl Service for TcpService<'_> {
             self.units.carried(&carried, port);
         }
     }
+
+    fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
+        client.source.unheard(now, port);
+    }
 }

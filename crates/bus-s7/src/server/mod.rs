@@ -190,6 +190,12 @@ impl tcp::Service for Service {
         }
         self.memory.batch = None;
     }
+
+    fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
+        for renewal in &mut client.renewals {
+            renewal.lost(now, port.max_age());
+        }
+    }
 }
 
 impl Shared {

@@ -67,6 +67,9 @@ pub trait Service {
     /// The system has accepted all answers made by the last calls of [`telegram`](Self::telegram) for this
     /// client. Not called for answers that had to wait for a slow client.
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
+
+    /// Bytes of this client were lost at `now`, since the line was down: perhaps requests, and perhaps the client wrote.
+    fn unheard(&mut self, client: &mut Self::Client, now: Nanos, port: &mut Port);
 }
 
 /// Serves all clients until `stop`. No client affects another one.
@@ -304,6 +307,7 @@ impl<S: Service> Server<'_, S> {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
             self.clients.awaited -= usize::from(client.waits_since.take().is_some());
+            self.service.unheard(&mut client.state, now, port);
             return Ok(());
         }
         self.reply.clear();

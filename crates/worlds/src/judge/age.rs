@@ -113,6 +113,15 @@ pub(super) fn judge_young(
             whole.and_then(|delivery| writer.newest_at(delivery.sent - slack))
         }
     };
+    // A client of several units asks one that did not answer who it is before it writes again, and reads meanwhile. After
+    // a silence of `max_age` and reads for as long, a server takes it for a client that writes only changes.
+    let asks_again = matches!(plan.bus, Bus::Modbus | Bus::ModbusRtu)
+        && plan.controller_serves
+        && area == 1
+        && plan.stations > 1;
+    if asks_again && !writer.wrote_after(heard - 2 * plan.max_age.0, stamp) {
+        return Ok(());
+    }
     if let Some(least) = least
         && (life, tick) < least
     {

@@ -57,6 +57,10 @@ impl Service for Echo {
     fn replied(&mut self, _count: &mut usize, port: &mut Port) {
         port.count("test.replied");
     }
+
+    fn unheard(&mut self, _count: &mut usize, _now: Nanos, port: &mut Port) {
+        port.count("test.unheard");
+    }
 }
 
 const MAX_AGE: Nanos = Nanos::from_secs(3600);

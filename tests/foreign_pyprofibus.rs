@@ -2,6 +2,7 @@
 //! crate use profirust.)
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
+#[path = "foreign/harness/mod.rs"]
 mod foreign;
 #[cfg(unix)]
 #[path = "peers/pty.rs"]
@@ -18,14 +19,17 @@ use tickbus::fieldbus::profibus::Gsd;
 use tickbus_conformance::rig::statistic;
 
 fn main() -> ExitCode {
-    foreign::main(&[
-        ("pyprofibus_reads_gsd_files_as_we_do", reads),
-        #[cfg(unix)]
-        (
-            "pyprofibus_takes_our_gsd_files_exchanges_and_reads_diagnoses_at_every_rate_of_user_space",
-            exchanges,
-        ),
-    ])
+    foreign::main(&[(
+        "pyprofibus",
+        &[
+            ("pyprofibus_reads_gsd_files_as_we_do", reads),
+            #[cfg(unix)]
+            (
+                "pyprofibus_takes_our_gsd_files_exchanges_and_reads_diagnoses_at_every_rate_of_user_space",
+                exchanges,
+            ),
+        ],
+    )])
 }
 
 #[cfg(unix)]

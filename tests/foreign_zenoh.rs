@@ -3,6 +3,7 @@
 #![cfg(unix)]
 #![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
 
+#[path = "foreign/harness/mod.rs"]
 mod foreign;
 
 use std::io::{BufRead as _, BufReader, Write as _};
@@ -19,8 +20,11 @@ const PATIENCE: Duration = Duration::from_secs(120);
 
 fn main() -> ExitCode {
     foreign::main(&[(
-        "three_hosts_are_one_laboratory_and_a_partition_heals",
-        three_hosts,
+        "zenoh",
+        &[(
+            "three_hosts_are_one_laboratory_and_a_partition_heals",
+            three_hosts,
+        )],
     )])
 }
 

@@ -1,4 +1,4 @@
-"""python-snap7's client against a tickbus server: tests/foreign_s7.rs describes the image."""
+"""python-snap7's client against a tickbus server: tests/foreign/s7.rs describes the image."""
 
 import datetime
 import struct

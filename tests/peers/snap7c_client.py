@@ -1,4 +1,4 @@
-"""The client of Snap7 in C against a tickbus server: tests/foreign_s7.rs describes the image."""
+"""The client of Snap7 in C against a tickbus server: tests/foreign/s7.rs describes the image."""
 
 import datetime
 import struct

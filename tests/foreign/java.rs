@@ -6,30 +6,26 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-mod foreign;
-
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpListener;
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, ExitCode, Stdio};
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
-use foreign::Absent;
-use foreign::machine::{Machine, SIGNALS};
+use crate::harness::machine::{Machine, SIGNALS};
+use crate::harness::{self, Absent, Test};
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        ("plc4x_drives_the_modbus_server", plc4x_over_modbus),
-        (
-            "plc4x_with_its_defaults_drives_the_s7_server",
-            plc4x_over_s7,
-        ),
-        ("plc4x_drives_the_opcua_server", plc4x_over_opcua),
-        ("milo_drives_the_opcua_server", milo_as_client),
-        ("opcua_client_drives_a_server_of_milo", milo_as_server),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    ("plc4x_drives_the_modbus_server", plc4x_over_modbus),
+    (
+        "plc4x_with_its_defaults_drives_the_s7_server",
+        plc4x_over_s7,
+    ),
+    ("plc4x_drives_the_opcua_server", plc4x_over_opcua),
+    ("milo_drives_the_opcua_server", milo_as_client),
+    ("opcua_client_drives_a_server_of_milo", milo_as_server),
+];
 
 /// A JVM that has just started pauses longer than the 250 ms after which data are stale.
 fn open(fieldbus: &str) -> Machine {
@@ -163,7 +159,7 @@ fn plc4x(machine: &mut Machine, url: &str, tags: &Tags<'_>) -> Result<(), Absent
 }
 
 fn plc4x_version() -> String {
-    let pinned = foreign::stated("tests/peers/java/pom.xml", "<plc4x.version>");
+    let pinned = harness::stated("tests/peers/java/pom.xml", "<plc4x.version>");
     format!("Apache PLC4X {pinned}")
 }
 

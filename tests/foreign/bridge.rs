@@ -1,28 +1,21 @@
 //! `tickbus bridge` with foreign programs: Mosquitto as the broker, and its clients; pyserial on the serial line.
 #![allow(missing_docs, reason = "a test")]
 
-#[cfg(unix)]
-#[path = "peers/commands.rs"]
-mod commands;
-mod foreign;
+use crate::harness::Test;
 
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    foreign::main(&[
-        #[cfg(unix)]
-        (
-            "mosquitto_and_the_dispatcher_exchange_values",
-            unix::exchange,
-        ),
-        #[cfg(unix)]
-        ("the_bridge_outlives_a_restart_of_mosquitto", unix::restart),
-        #[cfg(unix)]
-        ("mosquitto_says_when_the_bridge_is_gone", unix::gone),
-        #[cfg(unix)]
-        ("pyserial_takes_part_through_a_virtual_port", unix::pyserial),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    #[cfg(unix)]
+    (
+        "mosquitto_and_the_dispatcher_exchange_values",
+        unix::exchange,
+    ),
+    #[cfg(unix)]
+    ("the_bridge_outlives_a_restart_of_mosquitto", unix::restart),
+    #[cfg(unix)]
+    ("mosquitto_says_when_the_bridge_is_gone", unix::gone),
+    #[cfg(unix)]
+    ("pyserial_takes_part_through_a_virtual_port", unix::pyserial),
+];
 
 #[cfg(unix)]
 mod unix {
@@ -31,8 +24,8 @@ mod unix {
     use std::path::{Path, PathBuf};
     use std::process::{Child, Command, Stdio};
 
-    use super::commands::{Running, bridge, dispatch};
-    use super::foreign::{self, Absent};
+    use crate::commands::{Running, bridge, dispatch};
+    use crate::harness::{self, Absent};
 
     /// A foreign program, killed at the end.
     struct Peer {
@@ -111,7 +104,7 @@ off = \"shut\"
 
     impl Lab {
         fn new() -> Result<Self, Absent> {
-            foreign::command("mosquitto_sub", "mosquitto-clients")?;
+            harness::command("mosquitto_sub", "mosquitto-clients")?;
             let folder = tempfile::tempdir().expect("a folder");
             let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
             let dispatcher = dispatch.after("dispatch: listening on ");
@@ -182,7 +175,7 @@ off = \"shut\"
 
     fn start_broker(folder: &Path) -> Result<Peer, Absent> {
         // Asked for its version, Mosquitto would start.
-        let mut command = foreign::command_with("mosquitto", "-h", "mosquitto")?;
+        let mut command = harness::command_with("mosquitto", "-h", "mosquitto")?;
         command.arg("-c").arg(folder.join("mosquitto.conf"));
         let mut broker = Peer::start_log(command);
         broker.until(" running");
@@ -313,7 +306,7 @@ say('P Q1=24', 'P I1=24')
 say('nonsense', 'ERR 400')
 say('PING', 'OK PING')
 ";
-        let mut python = foreign::python_with("main", &["serial"])?;
+        let mut python = harness::python_with("main", &["serial"])?;
         let folder = tempfile::tempdir().expect("a folder");
         let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
         let dispatcher = dispatch.after("dispatch: listening on ");

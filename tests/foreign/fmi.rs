@@ -1,16 +1,12 @@
 //! FMUs of tickbus in foreign tools, and foreign FMUs as machines of tickbus.
 #![allow(missing_docs, reason = "a test")]
 
-#[path = "fmi/fixture.rs"]
-mod fixture;
-mod foreign;
-
 use std::path::Path;
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 
-use fixture::{library, tanks};
-use foreign::Absent;
+use crate::fixture::{library, tanks};
+use crate::harness::{self, Absent, Test};
 use tempfile::TempDir;
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
@@ -20,18 +16,16 @@ use tickbus_test_log as logged;
 
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        ("fmpy_validates_and_runs_both_versions", in_fmpy),
-        ("every_misuse_of_the_functions_has_an_answer", misuse),
-        ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
-        ("vdmcheck2_finds_nothing_but_in_a_wrong_one", in_vdmcheck),
-        ("the_example_s_tank_is_one_for_others_too", tank),
-        ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
-        ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
-        ("an_fmu_by_pythonfmu_is_the_machine", by_pythonfmu),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    ("fmpy_validates_and_runs_both_versions", in_fmpy),
+    ("every_misuse_of_the_functions_has_an_answer", misuse),
+    ("the_fmu_manipulation_toolbox_finds_nothing", in_toolbox),
+    ("vdmcheck2_finds_nothing_but_in_a_wrong_one", in_vdmcheck),
+    ("the_example_s_tank_is_one_for_others_too", tank),
+    ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
+    ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
+    ("an_fmu_by_pythonfmu_is_the_machine", by_pythonfmu),
+];
 
 /// A Python with the tools.
 fn python() -> Result<Command, Absent> {
@@ -40,7 +34,7 @@ fn python() -> Result<Command, Absent> {
             "the tools' own libraries are for Linux on x86-64".to_owned(),
         ));
     }
-    foreign::python_with(
+    harness::python_with(
         "fmi",
         &[
             "fmpy",

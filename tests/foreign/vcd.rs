@@ -1,12 +1,9 @@
 //! Recordings, read by third-party software.
 #![allow(missing_docs, reason = "a test")]
 
-mod foreign;
-
 use std::path::Path;
-use std::process::ExitCode;
 
-use foreign::Absent;
+use crate::harness::{self, Absent, Test};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Slot};
@@ -32,15 +29,13 @@ name    = "unsigned"
 address = "%IL24"
 "#;
 
-fn main() -> ExitCode {
-    foreign::main(&[(
-        "readers_that_others_wrote_read_the_same_from_vcd_and_csv",
-        readers_agree,
-    )])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[(
+    "readers_that_others_wrote_read_the_same_from_vcd_and_csv",
+    readers_agree,
+)];
 
 fn readers_agree() -> Result<(), Absent> {
-    let mut python = foreign::python_with("main", &["vcd", "vcdvcd"])?;
+    let mut python = harness::python_with("main", &["vcd", "vcdvcd"])?;
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path(), "run.vcd");
     record(folder.path(), "run.csv");

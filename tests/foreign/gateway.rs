@@ -2,14 +2,12 @@
 //! communication, asyncua by OPC UA.
 #![allow(missing_docs, clippy::unnecessary_wraps, reason = "tests of one shape")]
 
-mod foreign;
-
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
-use std::process::{ExitCode, Stdio};
+use std::process::Stdio;
 use std::thread;
 
-use foreign::Absent;
+use crate::harness::{self, Absent, Test};
 use tickbus::driver_cfg::Config;
 use tickbus::fieldbus::tcp::Address;
 use tickbus::gateway::{Gateway, GatewayOptions};
@@ -73,12 +71,10 @@ const OPC_UA: &str =
 /// waits for its end, and returns the number of its steps.
 type Plc = fn(SocketAddr, u32) -> Result<Box<dyn FnOnce() -> u64>, Absent>;
 
-fn main() -> ExitCode {
-    foreign::main(&[(
-        "plcs_of_other_libraries_are_in_step_whatever_time_they_take",
-        plcs_in_step,
-    )])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[(
+    "plcs_of_other_libraries_are_in_step_whatever_time_they_take",
+    plcs_in_step,
+)];
 
 /// A machine that follows the PLC, with a step of 1 ms.
 struct Machine(u64);
@@ -118,7 +114,7 @@ fn python_plc(
     address: SocketAddr,
     seed: u32,
 ) -> Result<Box<dyn FnOnce() -> u64>, Absent> {
-    let mut python = foreign::python_with("main", &[library])?;
+    let mut python = harness::python_with("main", &[library])?;
     python.arg(format!(
         "{}/tests/peers/{script}",
         env!("CARGO_MANIFEST_DIR")

@@ -7,7 +7,7 @@
 
 pub mod iec2c;
 pub mod machine;
-#[path = "../peers/pcap.rs"]
+#[path = "../../peers/pcap.rs"]
 pub mod pcap;
 pub mod recorder;
 pub mod session;
@@ -26,13 +26,18 @@ pub struct Absent(pub String);
 pub type Test = fn() -> Result<(), Absent>;
 
 /// The number of tests that run at once: they mostly wait for their peers.
-const AT_ONCE: usize = 3;
+const AT_ONCE: usize = 8;
 
-/// Runs the tests selected on the command line.
-pub fn main(tests: &[(&str, Test)]) -> ExitCode {
+/// Runs the tests selected on the command line. Each group has a name, and its tests theirs.
+pub fn main(groups: &[(&str, &[(&str, Test)])]) -> ExitCode {
+    let named = |(group, tests): &(&str, &[(&str, Test)])| {
+        let name = |(name, test): &(&str, Test)| (format!("{group}::{name}"), *test);
+        tests.iter().map(name).collect::<Vec<_>>()
+    };
+    let tests: Vec<_> = groups.iter().flat_map(named).collect();
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.iter().any(|argument| argument == "--list") {
-        for (name, _) in tests {
+        for (name, _) in &tests {
             println!("{name}: test");
         }
         println!("\n{} tests, 0 benchmarks", tests.len());

@@ -6,7 +6,7 @@ use tempfile::TempDir;
 use tickbus::plc::{HostedProgram, Program as _, Scan};
 use tickbus::time::Nanos;
 
-use crate::foreign::iec2c::Compiler;
+use crate::harness::iec2c::Compiler;
 
 /// A small generator of numbers that look random: equal seeds, equal tests.
 pub struct Random(pub u64);

@@ -1,35 +1,30 @@
 //! Exports in Structured Text, checked by a third-party parser: blark.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
-mod foreign;
-#[path = "export/plcopen.rs"]
-mod plcopen;
-
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
-use foreign::Absent;
+use crate::harness::{self, Absent, Test};
+use crate::plcopen;
 use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::prepare::{SOURCES, Settings, Source, plcopen_xml, prepare};
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        (
-            "blark_reads_every_source_in_structured_text",
-            blark_reads_every_source_in_structured_text,
-        ),
-        (
-            "blark_refuses_a_source_that_is_broken",
-            blark_refuses_a_source_that_is_broken,
-        ),
-        (
-            "plcopen_xml_is_valid_under_its_schema",
-            plcopen_xml_is_valid_under_its_schema,
-        ),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    (
+        "blark_reads_every_source_in_structured_text",
+        blark_reads_every_source_in_structured_text,
+    ),
+    (
+        "blark_refuses_a_source_that_is_broken",
+        blark_refuses_a_source_that_is_broken,
+    ),
+    (
+        "plcopen_xml_is_valid_under_its_schema",
+        plcopen_xml_is_valid_under_its_schema,
+    ),
+];
 
 /// Writes the sources for `target` to `folder`; returns their paths.
 fn write(file: &str, target: Target, folder: &Path) -> Vec<PathBuf> {
@@ -60,7 +55,7 @@ fn write(file: &str, target: Target, folder: &Path) -> Vec<PathBuf> {
 }
 
 fn reader(files: &[PathBuf]) -> Result<Command, Absent> {
-    let mut python = foreign::python_with("main", &["blark"])?;
+    let mut python = harness::python_with("main", &["blark"])?;
     python
         .arg(concat!(
             env!("CARGO_MANIFEST_DIR"),
@@ -134,7 +129,7 @@ fn plcopen_xml_is_valid_under_its_schema() -> Result<(), Absent> {
     let why =
         "PLCOPEN_XSD names no tc6_xml_v201.xsd (PLCopen gives it to everybody: plcopen.org, TC6)";
     let schema = schema.ok_or_else(|| Absent(why.to_owned()))?;
-    let mut python = foreign::python_with("main", &["xmlschema"])?;
+    let mut python = harness::python_with("main", &["xmlschema"])?;
     let folder = tempfile::tempdir().expect("a folder");
     let mut files = Vec::new();
     for file in [

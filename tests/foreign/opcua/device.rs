@@ -9,10 +9,10 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 use tickbus::time::Monotonic;
 
-use crate::conformance::rig::{End, logged, patiently};
-use crate::foreign::{self, Absent};
+use crate::harness::{self, Absent};
+use tickbus_conformance::rig::{End, logged, patiently};
 
-pub const SIGNALS: &str = r#"
+pub(super) const SIGNALS: &str = r#"
 [[signal]]
 name    = "run"
 address = "%QX0.0"
@@ -54,19 +54,19 @@ type    = "ULINT"
 "#;
 
 /// A Python program, controlled by lines of text.
-pub struct Peer {
-    pub child: Child,
-    pub stdin: Option<ChildStdin>,
-    pub stdout: BufReader<ChildStdout>,
+pub(super) struct Peer {
+    pub(super) child: Child,
+    pub(super) stdin: Option<ChildStdin>,
+    pub(super) stdout: BufReader<ChildStdout>,
 }
 
 impl Peer {
     /// Starts it; also returns the first line of its output.
-    pub fn start(script: &str, asked: &Value) -> Result<(Self, String), Absent> {
+    pub(super) fn start(script: &str, asked: &Value) -> Result<(Self, String), Absent> {
         let script = Path::new(env!("CARGO_MANIFEST_DIR"))
             .join("tests/peers")
             .join(script);
-        let mut child = foreign::python_with("main", &["asyncua"])?
+        let mut child = harness::python_with("main", &["asyncua"])?
             .arg(script)
             .arg(asked.to_string())
             .stdin(Stdio::piped())
@@ -85,14 +85,14 @@ impl Peer {
         Ok((peer, line.trim().to_owned()))
     }
 
-    pub fn ready(script: &str, asked: &Value) -> Result<Self, Absent> {
+    pub(super) fn ready(script: &str, asked: &Value) -> Result<Self, Absent> {
         let (peer, line) = Self::start(script, asked)?;
         assert_eq!(line, "ready", "{script} {asked}");
         Ok(peer)
     }
 
     #[track_caller]
-    pub fn ask(&mut self, line: &Value) -> Value {
+    pub(super) fn ask(&mut self, line: &Value) -> Value {
         let stdin = self.stdin.as_mut().expect("it lives");
         writeln!(stdin, "{line}").expect("it listens");
         let mut answer = String::new();
@@ -110,13 +110,13 @@ impl Drop for Peer {
 }
 
 /// A free port of this machine.
-pub fn free_address() -> SocketAddr {
+pub(super) fn free_address() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     listener.local_addr().expect("it is bound")
 }
 
 /// The nodes of a PLC for `SIGNALS`.
-pub fn nodes() -> Value {
+pub(super) fn nodes() -> Value {
     json!({
         "run": ["Boolean", false], "speed": ["Int16", 7], "torque": ["Float", 1.5],
         "sensor": ["Boolean", false], "position": ["Int16", 0], "temperature": ["Float", 0.0],
@@ -125,7 +125,7 @@ pub fn nodes() -> Value {
 }
 
 /// An asyncua server with those nodes.
-pub fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
+pub(super) fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
     let mut asked = json!({
         "url": format!("opc.tcp://{address}"), "security": ["None"], "nodes": nodes(),
     });
@@ -136,23 +136,23 @@ pub fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
 }
 
 /// The identity of that server.
-pub const IDENTITY: &str = "urn:test:plc ACME PLC";
+pub(super) const IDENTITY: &str = "urn:test:plc ACME PLC";
 
-pub struct Device {
-    pub end: End,
-    pub folder: tempfile::TempDir,
+pub(super) struct Device {
+    pub(super) end: End,
+    pub(super) folder: tempfile::TempDir,
 }
 
 impl Device {
-    pub fn open(kind: &str, keys: &str) -> Self {
+    pub(super) fn open(kind: &str, keys: &str) -> Self {
         Self::open_in(tempfile::tempdir().expect("a folder"), kind, keys)
     }
 
-    pub fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
+    pub(super) fn open_in(folder: tempfile::TempDir, kind: &str, keys: &str) -> Self {
         Self::open_with(folder, kind, keys, SIGNALS)
     }
 
-    pub fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
+    pub(super) fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
         let clock: Arc<Monotonic> = Monotonic::shared();
         // A new folder has no certificate yet.
         logged::expect("made a certificate for \"tickbus Test rig\"");
@@ -166,7 +166,7 @@ impl Device {
         Self { end, folder }
     }
 
-    pub fn client(address: SocketAddr, keys: &str) -> Self {
+    pub(super) fn client(address: SocketAddr, keys: &str) -> Self {
         Self::open(
             "opcua-client",
             &format!("url = \"opc.tcp://{address}\"\n{keys}"),
@@ -174,25 +174,25 @@ impl Device {
     }
 
     /// A client without protection that may write.
-    pub fn plain(address: SocketAddr) -> Self {
+    pub(super) fn plain(address: SocketAddr) -> Self {
         Self::client(
             address,
             &format!("security = \"None\"\nwrite_to = \"{IDENTITY}\""),
         )
     }
 
-    pub fn pki(&self) -> PathBuf {
+    pub(super) fn pki(&self) -> PathBuf {
         self.folder.path().join("pki")
     }
 
     /// The address on which the device listens.
-    pub fn address(&self) -> SocketAddr {
+    pub(super) fn address(&self) -> SocketAddr {
         self.end.address()
     }
 
     /// Ticks until `done` holds.
     #[track_caller]
-    pub fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
+    pub(super) fn until(&mut self, what: &str, mut done: impl FnMut(&mut End) -> bool) {
         let found = patiently(|| {
             self.end.tick();
             done(&mut self.end).then_some(())
@@ -202,7 +202,7 @@ impl Device {
     }
 
     #[track_caller]
-    pub fn until_reason(&mut self, words: &str) -> String {
+    pub(super) fn until_reason(&mut self, words: &str) -> String {
         let mut all = String::new();
         self.until(words, |end| {
             let reason = end.link().reason;

@@ -2,30 +2,24 @@
 //! reads the metrics.
 #![allow(missing_docs, reason = "a test")]
 
-#[path = "peers/commands.rs"]
-mod commands;
-mod foreign;
-
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::process::{ExitCode, Stdio};
+use std::process::Stdio;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use commands::Running;
-use foreign::Absent;
+use crate::commands::Running;
+use crate::harness::{self, Absent, Test};
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        ("mbpoll_reads_what_is_forced", mbpoll_reads_what_is_forced),
-        (
-            "what_is_forced_for_nobody_is_released_after_the_grace_time",
-            forced_for_nobody,
-        ),
-        ("prometheus_client_reads_the_metrics", metrics),
-        ("a_killed_plc_is_told_with_its_reason", killed_plc),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    ("mbpoll_reads_what_is_forced", mbpoll_reads_what_is_forced),
+    (
+        "what_is_forced_for_nobody_is_released_after_the_grace_time",
+        forced_for_nobody,
+    ),
+    ("prometheus_client_reads_the_metrics", metrics),
+    ("a_killed_plc_is_told_with_its_reason", killed_plc),
+];
 
 const SIGNALS: &str = r#"
 [[signal]]
@@ -110,7 +104,7 @@ impl Machine {
         let mut told = String::new();
         let limit = Instant::now() + Duration::from_secs(20);
         while Instant::now() < limit {
-            let mut mbpoll = foreign::command("mbpoll", "mbpoll")?;
+            let mut mbpoll = harness::command("mbpoll", "mbpoll")?;
             mbpoll.args(["-1", "-q", "-m", "tcp", "-p", &self.port]);
             mbpoll.args(["-t", kind, "-r", reference, "127.0.0.1"]);
             let output = mbpoll.output().expect("mbpoll runs");
@@ -137,7 +131,7 @@ fn eventually(what: &str, mut is_so: impl FnMut() -> bool) {
 const LEVEL: &str = "/force/4711/Level%20%22left%22";
 
 fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
-    foreign::command("mbpoll", "mbpoll")?;
+    harness::command("mbpoll", "mbpoll")?;
     let machine = Machine::start("kind = \"modbus-server\"", "keep_forced = true");
     machine.await_register("3", "2", "0")?;
     let done = machine.ask(&format!("PUT {LEVEL}"), "125.0");
@@ -186,7 +180,7 @@ fn mbpoll_reads_what_is_forced() -> Result<(), Absent> {
 }
 
 fn forced_for_nobody() -> Result<(), Absent> {
-    foreign::command("mbpoll", "mbpoll")?;
+    harness::command("mbpoll", "mbpoll")?;
     let machine = Machine::start("kind = \"modbus-server\"", "grace = \"2s\"");
     // A viewer with the token, who then leaves.
     let mut viewer = TcpStream::connect(&machine.page).expect("it listens");
@@ -210,7 +204,7 @@ fn forced_for_nobody() -> Result<(), Absent> {
 }
 
 fn metrics() -> Result<(), Absent> {
-    let mut python = foreign::python_with("metrics", &["prometheus_client"])?;
+    let mut python = harness::python_with("metrics", &["prometheus_client"])?;
     let machine = Machine::start("kind = \"modbus-server\"", "keep_forced = true");
     machine.ask(&format!("PUT {LEVEL}"), "125.0");
     eventually("it is forced", || machine.signal(2)["value"] == 125);

@@ -1,8 +1,8 @@
 //! The block of actions, with its qualifiers.
 
-use super::foreign::Absent;
 use super::stepped::Random;
 use super::{ACTION, CONFLICT, RAN, TOF, TON, TP, ask, bench};
+use crate::harness::Absent;
 use tickbus::plc::blocks::{ActionControl, Qualifiers};
 use tickbus::time::Nanos;
 

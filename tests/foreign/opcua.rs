@@ -1,89 +1,77 @@
 //! The OPC UA buses with the third-party library asyncua at the other end.
-#![allow(
-    missing_docs,
-    unreachable_pub,
-    dead_code,
-    unused_macros,
-    clippy::float_cmp,
-    reason = "tests; they use a part of the rig"
-)]
+#![allow(clippy::float_cmp, reason = "the values are small whole numbers")]
 
-mod foreign;
-#[path = "peers/opcua.rs"]
-mod opcua;
-#[path = "peers/opcua_served.rs"]
+mod device;
 mod served;
 
 use std::path::{Path, PathBuf};
-use tickbus_conformance as conformance;
 
-use foreign::{Absent, pcap};
-use opcua::{Device, IDENTITY, Peer, free_address, nodes, plc};
+use crate::harness::{self, Absent, Test, pcap};
+use device::{Device, IDENTITY, Peer, free_address, nodes, plc};
 use serde_json::{Value, json};
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;
+use tickbus_conformance::rig::logged;
 
-fn main() -> std::process::ExitCode {
-    foreign::main(&[
-        (
-            "the_client_reads_and_writes_an_asyncua_server",
-            reads_and_writes,
-        ),
-        ("the_client_comes_back_when_the_server_does", comes_back),
-        (
-            "a_client_that_closes_leaves_its_fail_safe_values_behind",
-            closes,
-        ),
-        ("bad_quality_is_told_and_is_not_fresh", bad_quality),
-        ("types_that_differ_are_told_with_the_signal", wrong_types),
-        (
-            "nothing_is_written_into_a_server_that_was_not_named",
-            guarded,
-        ),
-        (
-            "an_unknown_certificate_is_refused_until_it_is_moved",
-            untrusted,
-        ),
-        ("a_wrong_password_is_told", wrong_password),
-        (
-            "an_endpoint_that_is_not_there_is_told_with_those_that_are",
-            no_endpoint,
-        ),
-        (
-            "asyncua_finds_reads_writes_and_subscribes_to_the_server",
-            serves,
-        ),
-        ("one_write_of_asyncua_is_one_commit", one_commit),
-        ("pulses_reach_a_subscriber_that_has_no_queue", pulses),
-        ("a_secured_server_lets_in_whom_it_knows", secured),
-        (
-            "tshark_finds_nothing_malformed_in_what_the_server_says",
-            nothing_malformed,
-        ),
-        (
-            "a_server_that_asks_for_a_user_lets_nobody_else_in",
-            no_anonymous,
-        ),
-        ("a_plc_in_stop_is_stale_until_it_runs_again", in_stop),
-        ("the_nodes_of_fieldbus_at_are_read_and_written", placed),
-        (
-            "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
-            served::ages_apart,
-        ),
-        (
-            "a_client_that_reads_stays_connected_when_another_leaves",
-            served::undisturbed,
-        ),
-        (
-            "the_status_of_the_server_goes_on_and_its_host_is_announced",
-            served::tells_of_itself,
-        ),
-        (
-            "a_client_with_the_certificate_of_another_application_gets_no_values",
-            served::impostor,
-        ),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    (
+        "the_client_reads_and_writes_an_asyncua_server",
+        reads_and_writes,
+    ),
+    ("the_client_comes_back_when_the_server_does", comes_back),
+    (
+        "a_client_that_closes_leaves_its_fail_safe_values_behind",
+        closes,
+    ),
+    ("bad_quality_is_told_and_is_not_fresh", bad_quality),
+    ("types_that_differ_are_told_with_the_signal", wrong_types),
+    (
+        "nothing_is_written_into_a_server_that_was_not_named",
+        guarded,
+    ),
+    (
+        "an_unknown_certificate_is_refused_until_it_is_moved",
+        untrusted,
+    ),
+    ("a_wrong_password_is_told", wrong_password),
+    (
+        "an_endpoint_that_is_not_there_is_told_with_those_that_are",
+        no_endpoint,
+    ),
+    (
+        "asyncua_finds_reads_writes_and_subscribes_to_the_server",
+        serves,
+    ),
+    ("one_write_of_asyncua_is_one_commit", one_commit),
+    ("pulses_reach_a_subscriber_that_has_no_queue", pulses),
+    ("a_secured_server_lets_in_whom_it_knows", secured),
+    (
+        "tshark_finds_nothing_malformed_in_what_the_server_says",
+        nothing_malformed,
+    ),
+    (
+        "a_server_that_asks_for_a_user_lets_nobody_else_in",
+        no_anonymous,
+    ),
+    ("a_plc_in_stop_is_stale_until_it_runs_again", in_stop),
+    ("the_nodes_of_fieldbus_at_are_read_and_written", placed),
+    (
+        "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
+        served::ages_apart,
+    ),
+    (
+        "a_client_that_reads_stays_connected_when_another_leaves",
+        served::undisturbed,
+    ),
+    (
+        "the_status_of_the_server_goes_on_and_its_host_is_announced",
+        served::tells_of_itself,
+    ),
+    (
+        "a_client_with_the_certificate_of_another_application_gets_no_values",
+        served::impostor,
+    ),
+];
 
 fn reads_and_writes() -> Result<(), Absent> {
     let address = free_address();
@@ -259,7 +247,7 @@ fn wrong_types() -> Result<(), Absent> {
 }
 
 fn guarded() -> Result<(), Absent> {
-    conformance::rig::logged::expect("nothing is written into the PLC \"urn:test:plc ACME PLC\"");
+    logged::expect("nothing is written into the PLC \"urn:test:plc ACME PLC\"");
     let address = free_address();
     let mut plc = plc(address, &json!({}))?;
     let mut device = Device::client(address, "security = \"None\"");
@@ -512,7 +500,7 @@ fn pulses() -> Result<(), Absent> {
 
 /// A complete conversation with asyncua, and one of our client, checked by tshark.
 fn nothing_malformed() -> Result<(), Absent> {
-    let tshark = || foreign::command("tshark", "tshark");
+    let tshark = || harness::command("tshark", "tshark");
     tshark()?;
     let mut device = Device::open(
         "opcua-server",
@@ -557,7 +545,7 @@ fn nothing_malformed() -> Result<(), Absent> {
 }
 
 fn secured() -> Result<(), Absent> {
-    conformance::rig::logged::expect("a client with an unknown certificate was turned away");
+    logged::expect("a client with an unknown certificate was turned away");
     let folder = tempfile::tempdir().expect("a folder");
     let uri = "urn:test:client";
     let made = json!({"certificate": folder.path(), "uri": uri});

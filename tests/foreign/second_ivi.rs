@@ -2,34 +2,28 @@
 //! script, since no foreign program speaks it.
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
-mod foreign;
+use crate::harness::Test;
 #[cfg(unix)]
-#[path = "peers/pty.rs"]
-mod pty;
-
-use std::process::ExitCode;
-
+use crate::harness::{self, Absent, machine::Machine};
 #[cfg(unix)]
-use foreign::{Absent, machine::Machine};
+use crate::pty;
 
 #[cfg(unix)]
 const SCRIPT: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/ivi.py");
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        #[cfg(unix)]
-        ("the_script_asks_the_simulated_reader_for_everything", asks),
-        #[cfg(unix)]
-        (
-            "the_client_reads_and_writes_the_carrier_of_the_script",
-            answers,
-        ),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    #[cfg(unix)]
+    ("the_script_asks_the_simulated_reader_for_everything", asks),
+    #[cfg(unix)]
+    (
+        "the_client_reads_and_writes_the_carrier_of_the_script",
+        answers,
+    ),
+];
 
 #[cfg(unix)]
 fn asks() -> Result<(), Absent> {
-    let mut script = foreign::python_with("main", &["serial"])?;
+    let mut script = harness::python_with("main", &["serial"])?;
     let folder = tempfile::tempdir().expect("a folder");
     let port = folder.path().join("reader");
     let mut machine = Machine::open(&format!(
@@ -60,7 +54,7 @@ fn answers() -> Result<(), Absent> {
     use std::io::{BufRead as _, BufReader};
     use std::process::Stdio;
 
-    let mut script = foreign::python_with("main", &["serial"])?;
+    let mut script = harness::python_with("main", &["serial"])?;
     let line = pty::Line::new();
     script.arg(SCRIPT).arg("reader").arg(line.end(1));
     let mut reader = script

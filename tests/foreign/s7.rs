@@ -7,48 +7,44 @@
     reason = "tests of one shape; the values are small whole numbers"
 )]
 
-mod foreign;
-
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{Ipv4Addr, TcpListener};
-use std::process::{Child, ChildStdout, Command, ExitCode, Stdio};
+use std::process::{Child, ChildStdout, Command, Stdio};
 
-use foreign::machine::{Machine, SIGNALS};
-use foreign::{Absent, pcap};
+use crate::harness::machine::{Machine, SIGNALS};
+use crate::harness::{self, Absent, Test, pcap};
 use tickbus_conformance::rig::logged;
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        (
-            "python_snap7_reads_writes_and_asks_the_server",
-            python_snap7_reads_writes_and_asks_the_server,
-        ),
-        (
-            "our_client_reads_and_writes_a_server_of_python_snap7",
-            our_client_reads_and_writes_a_server_of_python_snap7,
-        ),
-        (
-            "snap7_in_c_reads_writes_and_asks_the_server",
-            snap7_in_c_reads_writes_and_asks_the_server,
-        ),
-        (
-            "our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop",
-            our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop,
-        ),
-        (
-            "closing_leaves_the_fail_safe_values_in_snap7_in_c",
-            closing_leaves_the_fail_safe_values_in_snap7_in_c,
-        ),
-        (
-            "rust7_reads_and_writes_the_server",
-            rust7_reads_and_writes_the_server,
-        ),
-        (
-            "tshark_finds_nothing_malformed",
-            tshark_finds_nothing_malformed,
-        ),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    (
+        "python_snap7_reads_writes_and_asks_the_server",
+        python_snap7_reads_writes_and_asks_the_server,
+    ),
+    (
+        "our_client_reads_and_writes_a_server_of_python_snap7",
+        our_client_reads_and_writes_a_server_of_python_snap7,
+    ),
+    (
+        "snap7_in_c_reads_writes_and_asks_the_server",
+        snap7_in_c_reads_writes_and_asks_the_server,
+    ),
+    (
+        "our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop",
+        our_client_writes_signals_alone_into_snap7_in_c_and_sees_its_stop,
+    ),
+    (
+        "closing_leaves_the_fail_safe_values_in_snap7_in_c",
+        closing_leaves_the_fail_safe_values_in_snap7_in_c,
+    ),
+    (
+        "rust7_reads_and_writes_the_server",
+        rust7_reads_and_writes_the_server,
+    ),
+    (
+        "tshark_finds_nothing_malformed",
+        tshark_finds_nothing_malformed,
+    ),
+];
 
 fn open(fieldbus: &str) -> Machine {
     open_with(fieldbus, "")
@@ -74,12 +70,12 @@ const SERVER: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age =
     db = [{ number = 1, area = \"%Q\" }, { number = 2, area = \"%I\", offset = 2, length = 6 }]";
 
 fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
-    let python = foreign::python_with("main", &["snap7"])?;
+    let python = harness::python_with("main", &["snap7"])?;
     let mut end = open(SERVER);
     end.set("sensor", 1.0);
     end.set("position", -2.0);
     end.set("pressure", 1.5);
-    let pinned = foreign::stated("tests/peers/requirements.txt", "python-snap7==");
+    let pinned = harness::stated("tests/peers/requirements.txt", "python-snap7==");
     let address = end.address_for("python-snap7", &format!("python-snap7 {pinned}"));
     let port = address.port().to_string();
     let told = run(&mut end, python, "snap7_client.py", &[port]);
@@ -153,7 +149,7 @@ fn expect_warnings() {
 
 fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> {
     expect_warnings();
-    let cpu = Cpu::start(foreign::python_with("main", &["snap7"])?, "snap7_server.py");
+    let cpu = Cpu::start(harness::python_with("main", &["snap7"])?, "snap7_server.py");
     let who = "6ES7 315-2EH14-0AB0 CPU 315-2 PN/DP S C-C2UR28922012";
     let fieldbus = |further: &str| {
         format!(
@@ -212,7 +208,7 @@ fn our_client_reads_and_writes_a_server_of_python_snap7() -> Result<(), Absent> 
 
 /// The environment of the wheel that brings the C library.
 fn snap7_in_c() -> Result<Command, Absent> {
-    foreign::python_with("snap7", &["snap7.common", "snap7.protocol"])
+    harness::python_with("snap7", &["snap7.common", "snap7.protocol"])
 }
 
 fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
@@ -221,7 +217,7 @@ fn snap7_in_c_reads_writes_and_asks_the_server() -> Result<(), Absent> {
     end.set("sensor", 1.0);
     end.set("position", -2.0);
     end.set("pressure", 1.5);
-    let pinned = foreign::stated("tests/peers/requirements-snap7.txt", "python-snap7==");
+    let pinned = harness::stated("tests/peers/requirements-snap7.txt", "python-snap7==");
     let client = format!("Snap7 in C, of python-snap7 {pinned}");
     let address = end.address_for("snap7", &client);
     let port = address.port().to_string();
@@ -301,7 +297,7 @@ fn closing_leaves_the_fail_safe_values_in_snap7_in_c() -> Result<(), Absent> {
 fn rust7_reads_and_writes_the_server() -> Result<(), Absent> {
     let mut end = open(SERVER);
     end.set("position", 258.0);
-    let stated = foreign::stated("Cargo.toml", "rust7 = \"");
+    let stated = harness::stated("Cargo.toml", "rust7 = \"");
     let port = end.address_for("rust7", &format!("rust7 {stated}")).port();
     end.tick();
     let client = std::thread::spawn(move || {
@@ -334,8 +330,8 @@ fn rust7_reads_and_writes_the_server() -> Result<(), Absent> {
 }
 
 fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
-    let python = foreign::python_with("main", &["snap7"])?;
-    let tshark = || foreign::command("tshark", "tshark");
+    let python = harness::python_with("main", &["snap7"])?;
+    let tshark = || harness::command("tshark", "tshark");
     tshark()?;
     let mut end = open(SERVER);
     end.set("sensor", 1.0);

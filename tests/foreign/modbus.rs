@@ -2,19 +2,16 @@
 //! check our server's data.
 #![allow(missing_docs, clippy::float_cmp, reason = "a test")]
 
-mod foreign;
-#[cfg(unix)]
-#[path = "peers/pty.rs"]
-mod pty;
-
 use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::process::{Child, Command, ExitCode, Stdio};
+use std::process::{Child, Command, Stdio};
 
-use foreign::Absent;
-use foreign::machine::Machine;
-use foreign::pcap::{self, Tap};
+use crate::harness::machine::Machine;
+use crate::harness::pcap::{self, Tap};
+use crate::harness::{self, Absent, Test};
+#[cfg(unix)]
+use crate::pty;
 use tickbus::fieldbus::LinkState;
 use tickbus::signal::Slot;
 use tickbus_conformance::rig::{logged, statistic};
@@ -22,49 +19,47 @@ use tickbus_conformance::rig::{logged, statistic};
 /// Bytes of %I and of %Q.
 const BYTES: usize = 64;
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        ("pymodbus_drives_our_server", pymodbus_drives_our_server),
-        (
-            "pymodbus_drives_our_server_with_rtu_over_tcp",
-            pymodbus_drives_our_server_with_rtu,
-        ),
-        ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
-        ("our_client_drives_pymodbus", our_client_drives_pymodbus),
-        (
-            "our_client_drives_pymodbus_with_rtu_over_tcp",
-            our_client_drives_pymodbus_with_rtu,
-        ),
-        (
-            "our_client_writes_only_into_the_device_that_was_named",
-            our_client_writes_only_where_it_may,
-        ),
-        (
-            "our_client_reads_inputs_of_pymodbus",
-            our_client_reads_inputs,
-        ),
-        ("mbpoll_reads_and_writes_our_server", mbpoll_over_tcp),
-        #[cfg(unix)]
-        (
-            "pymodbus_drives_our_server_on_a_serial_line",
-            pymodbus_drives_our_server_on_a_line,
-        ),
-        #[cfg(unix)]
-        (
-            "our_client_drives_pymodbus_on_a_serial_line",
-            our_client_drives_pymodbus_on_a_line,
-        ),
-        #[cfg(unix)]
-        (
-            "mbpoll_reads_and_writes_our_server_on_a_serial_line",
-            mbpoll_on_a_line,
-        ),
-        (
-            "tshark_finds_no_malformed_packet_of_our_server",
-            tshark_finds_nothing,
-        ),
-    ])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    ("pymodbus_drives_our_server", pymodbus_drives_our_server),
+    (
+        "pymodbus_drives_our_server_with_rtu_over_tcp",
+        pymodbus_drives_our_server_with_rtu,
+    ),
+    ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
+    ("our_client_drives_pymodbus", our_client_drives_pymodbus),
+    (
+        "our_client_drives_pymodbus_with_rtu_over_tcp",
+        our_client_drives_pymodbus_with_rtu,
+    ),
+    (
+        "our_client_writes_only_into_the_device_that_was_named",
+        our_client_writes_only_where_it_may,
+    ),
+    (
+        "our_client_reads_inputs_of_pymodbus",
+        our_client_reads_inputs,
+    ),
+    ("mbpoll_reads_and_writes_our_server", mbpoll_over_tcp),
+    #[cfg(unix)]
+    (
+        "pymodbus_drives_our_server_on_a_serial_line",
+        pymodbus_drives_our_server_on_a_line,
+    ),
+    #[cfg(unix)]
+    (
+        "our_client_drives_pymodbus_on_a_serial_line",
+        our_client_drives_pymodbus_on_a_line,
+    ),
+    #[cfg(unix)]
+    (
+        "mbpoll_reads_and_writes_our_server_on_a_serial_line",
+        mbpoll_on_a_line,
+    ),
+    (
+        "tshark_finds_no_malformed_packet_of_our_server",
+        tshark_finds_nothing,
+    ),
+];
 
 fn open(fieldbus: &str, signals: &str) -> Machine {
     Machine::open(&format!(
@@ -100,7 +95,7 @@ impl Mirror for Machine {
 
 /// The version of pymodbus that is installed for the tests.
 fn pymodbus_version() -> String {
-    let pinned = foreign::stated("tests/peers/requirements.txt", "pymodbus==");
+    let pinned = harness::stated("tests/peers/requirements.txt", "pymodbus==");
     format!("pymodbus {pinned}")
 }
 
@@ -131,7 +126,7 @@ fn signals() -> String {
 }
 
 fn pymodbus(script: &str) -> Result<Command, Absent> {
-    let mut python = foreign::python_with("main", &["pymodbus", "serial"])?;
+    let mut python = harness::python_with("main", &["pymodbus", "serial"])?;
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/");
     python.arg(format!("{folder}{script}"));
     Ok(python)
@@ -162,7 +157,7 @@ fn pymodbus_drives(mode: &str, framing: &str) -> Result<(), Absent> {
 }
 
 fn pymodbus_meets_units() -> Result<(), Absent> {
-    let mut python = foreign::python_with("main", &["pymodbus"])?;
+    let mut python = harness::python_with("main", &["pymodbus"])?;
     let mut text = String::new();
     for (name, unit) in [("press", 3), ("oven", 7)] {
         let _ = write!(text, "[[station]]\nname = \"{name}\"\nunit = {unit}\n");
@@ -373,13 +368,13 @@ fn our_client_reads_inputs() -> Result<(), Absent> {
 
 /// Runs mbpoll once; returns its output.
 fn mbpoll(machine: &mut Machine, arguments: &[&str]) -> Result<String, Absent> {
-    let mut mbpoll = foreign::command("mbpoll", "mbpoll")?;
+    let mut mbpoll = harness::command("mbpoll", "mbpoll")?;
     mbpoll.args(["-1", "-q"]).args(arguments);
     Ok(machine.mirror_until_the_end_of(mbpoll))
 }
 
 fn mbpoll_version() -> Result<String, Absent> {
-    let told = foreign::command("mbpoll", "mbpoll")?.arg("-V").output();
+    let told = harness::command("mbpoll", "mbpoll")?.arg("-V").output();
     let told = String::from_utf8(told.expect("it runs").stdout).expect("UTF-8");
     Ok(told.lines().next().unwrap_or_default().trim().to_owned())
 }
@@ -520,7 +515,7 @@ fn tshark_finds_nothing() -> Result<(), Absent> {
     let file = folder.path().join("modbus.pcap");
     pcap::write(&file, 502, &tap.conversations()).expect("it is written");
     let ask = |filter: &str, field: &str| {
-        let tshark = foreign::command("tshark", "tshark")?;
+        let tshark = harness::command("tshark", "tshark")?;
         Ok(pcap::tshark(
             tshark,
             &file,

@@ -2,108 +2,99 @@
 //! sync prepare`.
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
-#[path = "prepare/actions.rs"]
 mod actions;
-mod foreign;
-#[path = "export/plcopen.rs"]
-#[allow(dead_code, reason = "each test uses a part of it")]
-mod plcopen;
-#[path = "prepare/project.rs"]
 mod project;
-#[path = "prepare/stepped.rs"]
 mod stepped;
 
 use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::process::Command;
 
+use crate::harness::iec2c::Compiler;
+use crate::harness::{Absent, Test};
 use actions::D;
-use foreign::Absent;
-use foreign::iec2c::Compiler;
 use stepped::{Random, Stepped};
 use tickbus::plc::blocks::{Rtc, Tof, Ton, Tp};
 use tickbus::prepare::{Addresses, Settings, Source, prepare, undo};
 use tickbus::time::Nanos;
 
-fn main() -> ExitCode {
-    foreign::main(&[
-        (
-            "timers_follow_the_golden_rows",
-            timers_follow_the_golden_rows,
-        ),
-        (
-            "timers_are_those_of_the_built_in_programs",
-            timers_are_those_of_the_built_in_programs,
-        ),
-        (
-            "actions_follow_the_golden_rows",
-            actions::actions_follow_the_golden_rows,
-        ),
-        (
-            "actions_are_those_of_the_built_in_programs",
-            actions::actions_are_those_of_the_built_in_programs,
-        ),
-        (
-            "time_stands_still_between_steps",
-            time_stands_still_between_steps,
-        ),
-        (
-            "a_prepared_program_is_the_one_synchronised_by_hand",
-            a_prepared_program_is_the_one_synchronised_by_hand,
-        ),
-        (
-            "a_prepared_program_does_what_the_original_does",
-            a_prepared_program_does_what_the_original_does,
-        ),
-        (
-            "a_prepared_project_in_xml_does_what_the_original_does",
-            a_prepared_project_in_xml_does_what_the_original_does,
-        ),
-        ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
-        (
-            "a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ",
-            a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ,
-        ),
-        (
-            "the_clock_of_oscat_is_virtual_time",
-            the_clock_of_oscat_is_virtual_time,
-        ),
-        (
-            "the_example_counts_virtual_time",
-            the_example_counts_virtual_time,
-        ),
-        (
-            "prepared_programs_of_the_exporter_compile",
-            prepared_programs_of_the_exporter_compile,
-        ),
-        (
-            "the_rig_prepared_does_what_the_original_does",
-            the_rig_prepared_does_what_the_original_does,
-        ),
-        (
-            "the_command_writes_beside_its_sources_and_never_over_them",
-            || {
-                the_command_writes_beside_its_sources_and_never_over_them();
-                Ok(())
-            },
-        ),
-        ("the_command_tells_what_is_wrong_and_writes_nothing", || {
-            the_command_tells_what_is_wrong_and_writes_nothing();
+pub(crate) const TESTS: &[(&str, Test)] = &[
+    (
+        "timers_follow_the_golden_rows",
+        timers_follow_the_golden_rows,
+    ),
+    (
+        "timers_are_those_of_the_built_in_programs",
+        timers_are_those_of_the_built_in_programs,
+    ),
+    (
+        "actions_follow_the_golden_rows",
+        actions::actions_follow_the_golden_rows,
+    ),
+    (
+        "actions_are_those_of_the_built_in_programs",
+        actions::actions_are_those_of_the_built_in_programs,
+    ),
+    (
+        "time_stands_still_between_steps",
+        time_stands_still_between_steps,
+    ),
+    (
+        "a_prepared_program_is_the_one_synchronised_by_hand",
+        a_prepared_program_is_the_one_synchronised_by_hand,
+    ),
+    (
+        "a_prepared_program_does_what_the_original_does",
+        a_prepared_program_does_what_the_original_does,
+    ),
+    (
+        "a_prepared_project_in_xml_does_what_the_original_does",
+        a_prepared_project_in_xml_does_what_the_original_does,
+    ),
+    ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
+    (
+        "a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ",
+        a_plc_makes_no_step_at_0_nor_out_of_turn_nor_while_the_copies_of_go_differ,
+    ),
+    (
+        "the_clock_of_oscat_is_virtual_time",
+        the_clock_of_oscat_is_virtual_time,
+    ),
+    (
+        "the_example_counts_virtual_time",
+        the_example_counts_virtual_time,
+    ),
+    (
+        "prepared_programs_of_the_exporter_compile",
+        prepared_programs_of_the_exporter_compile,
+    ),
+    (
+        "the_rig_prepared_does_what_the_original_does",
+        the_rig_prepared_does_what_the_original_does,
+    ),
+    (
+        "the_command_writes_beside_its_sources_and_never_over_them",
+        || {
+            the_command_writes_beside_its_sources_and_never_over_them();
             Ok(())
-        }),
-        ("the_command_writes_all_files_or_none", || {
-            the_command_writes_all_files_or_none();
-            Ok(())
-        }),
-        (
-            "prepared_programs_with_our_names_in_other_places_compile",
-            prepared_programs_with_our_names_in_other_places_compile,
-        ),
-        (
-            "without_a_simulation_a_prepared_program_runs_on_the_plcs_time",
-            without_a_simulation_a_prepared_program_runs_on_the_plcs_time,
-        ),
-    ])
-}
+        },
+    ),
+    ("the_command_tells_what_is_wrong_and_writes_nothing", || {
+        the_command_tells_what_is_wrong_and_writes_nothing();
+        Ok(())
+    }),
+    ("the_command_writes_all_files_or_none", || {
+        the_command_writes_all_files_or_none();
+        Ok(())
+    }),
+    (
+        "prepared_programs_with_our_names_in_other_places_compile",
+        prepared_programs_with_our_names_in_other_places_compile,
+    ),
+    (
+        "without_a_simulation_a_prepared_program_runs_on_the_plcs_time",
+        without_a_simulation_a_prepared_program_runs_on_the_plcs_time,
+    ),
+];
 
 fn text(path: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);

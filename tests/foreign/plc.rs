@@ -1,12 +1,8 @@
 //! The socket bus against a program in another language, as a third party might write it.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
-mod foreign;
-
-use std::process::ExitCode;
-
-use foreign::Absent;
-use foreign::machine::Machine;
+use crate::harness::machine::Machine;
+use crate::harness::{self, Absent, Test};
 use tickbus::time::Manual;
 use tickbus_conformance::rig::SIGNALS;
 
@@ -25,15 +21,13 @@ send    = "reply"
 
 const RECORDS: u32 = 200;
 
-fn main() -> ExitCode {
-    foreign::main(&[(
-        "a_plc_in_python_exchanges_with_a_device_that_replies",
-        exchanges,
-    )])
-}
+pub(crate) const TESTS: &[(&str, Test)] = &[(
+    "a_plc_in_python_exchanges_with_a_device_that_replies",
+    exchanges,
+)];
 
 fn exchanges() -> Result<(), Absent> {
-    let mut python = foreign::python_with("main", &["socket"])?;
+    let mut python = harness::python_with("main", &["socket"])?;
     // A device that replies needs no clock.
     let mut device = Machine::open_on(&Manual::new(), &format!("{DRIVER_CFG}{SIGNALS}"));
     let address = device.address();

@@ -3,9 +3,10 @@
 use serde_json::{Value, json};
 use tickbus::fieldbus::LinkState;
 
-use crate::conformance::rig::logged;
-use crate::foreign::Absent;
-use crate::opcua::{Device, Peer};
+use tickbus_conformance::rig::logged;
+
+use super::device::{Device, Peer};
+use crate::harness::Absent;
 
 const OPEN: &str =
     "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"";
@@ -44,7 +45,7 @@ fn status(client: &mut Peer, node: &str) -> Value {
 }
 
 /// Two PLCs write one station each, and one dies: only its station's data grow old.
-pub fn ages_apart() -> Result<(), Absent> {
+pub(super) fn ages_apart() -> Result<(), Absent> {
     let folder = tempfile::tempdir().expect("a folder");
     let mut device = Device::open_with(folder, "opcua-server", OPEN, STATIONS);
     let (mut one, mut other) = (client(&device)?, client(&device)?);
@@ -84,7 +85,7 @@ pub fn ages_apart() -> Result<(), Absent> {
 
 /// However many items others leave behind, a client that only reads stays connected. The server is recreated
 /// when no client is connected, and new clients do not notice.
-pub fn undisturbed() -> Result<(), Absent> {
+pub(super) fn undisturbed() -> Result<(), Absent> {
     let mut device = Device::open("opcua-server", OPEN);
     let mut reader = client(&device)?;
     let read = |reader: &mut Peer| {
@@ -126,7 +127,7 @@ pub fn undisturbed() -> Result<(), Absent> {
 }
 
 /// The structure `ServerStatus`, and the announced URLs.
-pub fn tells_of_itself() -> Result<(), Absent> {
+pub(super) fn tells_of_itself() -> Result<(), Absent> {
     let device = Device::open(
         "opcua-server",
         &format!("{OPEN}\nhost = \"plc-side.example\""),
@@ -147,7 +148,7 @@ pub fn tells_of_itself() -> Result<(), Absent> {
 }
 
 /// A client with a trusted certificate that claims to be another application than the certificate's.
-pub fn impostor() -> Result<(), Absent> {
+pub(super) fn impostor() -> Result<(), Absent> {
     logged::expect("a client with an unknown certificate was turned away");
     logged::expect("a client gets no values, as its certificate is not its own");
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,0 +1,58 @@
+//! Tests in which third-party software is the other end, in one program with a harness that reports what is not installed.
+#![allow(missing_docs, reason = "tests")]
+
+#[cfg(feature = "mqtt")]
+mod bridge;
+#[cfg(any(feature = "mqtt", feature = "page"))]
+#[path = "../peers/commands.rs"]
+mod commands;
+#[path = "../fmi/fixture.rs"]
+mod fixture;
+mod fmi;
+mod gateway;
+mod harness;
+mod iec2c;
+#[cfg(feature = "opcua")]
+mod java;
+mod modbus;
+#[cfg(feature = "opcua")]
+mod opcua;
+#[cfg(feature = "page")]
+mod page;
+mod plc;
+#[path = "../export/plcopen.rs"]
+mod plcopen;
+mod prepare;
+#[cfg(unix)]
+#[path = "../peers/pty.rs"]
+mod pty;
+mod s7;
+mod second_ivi;
+mod st;
+mod vcd;
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    // The longest first.
+    harness::main(&[
+        #[cfg(feature = "opcua")]
+        ("java", java::TESTS),
+        ("fmi", fmi::TESTS),
+        ("prepare", prepare::TESTS),
+        ("iec2c", iec2c::TESTS),
+        ("s7", s7::TESTS),
+        #[cfg(feature = "opcua")]
+        ("opcua", opcua::TESTS),
+        ("modbus", modbus::TESTS),
+        #[cfg(feature = "mqtt")]
+        ("bridge", bridge::TESTS),
+        #[cfg(feature = "page")]
+        ("page", page::TESTS),
+        ("gateway", gateway::TESTS),
+        ("st", st::TESTS),
+        ("vcd", vcd::TESTS),
+        ("plc", plc::TESTS),
+        ("second_ivi", second_ivi::TESTS),
+    ])
+}

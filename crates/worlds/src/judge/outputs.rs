@@ -100,6 +100,8 @@ impl Reader {
         // unknown. The first cycle of a line that was down is like that of a new one.
         let is_unknown = plan.bus.asks()
             || plan.goes_down(1)
+            // Both ends of a loopback have one line.
+            || plan.bus == Bus::Loopback && plan.goes_down(0)
             || plan.bus == Bus::Dispatcher
             || plan.features.hosted == Some(0)
             || heard > blind.last;

@@ -1,6 +1,6 @@
 //! The effects of faults on their world.
 
-use super::Plan;
+use super::{Event, Misfortune, Plan};
 use crate::faults::{Activity, Effect, Way};
 
 impl Plan {
@@ -22,10 +22,14 @@ impl Plan {
     /// The time for which faults of the line may hold back data that count as young, in ns.
     pub(crate) fn held_by_faults(&self) -> i64 {
         let faults = self.features.faults.iter();
+        let is_suspended = |event: &Event| matches!(event.what, Misfortune::Suspend(..));
+        let stands_still = self.events.iter().any(is_suspended);
         let held = faults.map(|fault| match fault.effect {
-            // A server repeats an answer that is up to a second old, if its client has not asked in between.
+            // What is repeated is up to a second old, if the client of a server has not asked in between, or if the process
+            // was suspended.
             Effect::Duplicate(direction)
-                if self.bus.asks() && direction != "in" && self.serves(fault.end) =>
+                if stands_still
+                    || self.bus.asks() && direction != "in" && self.serves(fault.end) =>
             {
                 1_000_000_000
             }

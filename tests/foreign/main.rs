@@ -6,7 +6,7 @@ mod bridge;
 #[cfg(any(feature = "mqtt", feature = "page"))]
 #[path = "../peers/commands.rs"]
 mod commands;
-#[path = "../fmi/fixture.rs"]
+#[path = "../it/fmi/fixture.rs"]
 mod fixture;
 mod fmi;
 mod gateway;
@@ -20,7 +20,7 @@ mod opcua;
 #[cfg(feature = "page")]
 mod page;
 mod plc;
-#[path = "../export/plcopen.rs"]
+#[path = "../it/export/plcopen.rs"]
 mod plcopen;
 mod prepare;
 #[cfg(unix)]

@@ -152,7 +152,12 @@ impl Device {
         Self::open_with(folder, kind, keys, SIGNALS)
     }
 
-    pub(super) fn open_with(folder: tempfile::TempDir, kind: &str, keys: &str, signals: &str) -> Self {
+    pub(super) fn open_with(
+        folder: tempfile::TempDir,
+        kind: &str,
+        keys: &str,
+        signals: &str,
+    ) -> Self {
         let clock: Arc<Monotonic> = Monotonic::shared();
         // A new folder has no certificate yet.
         logged::expect("made a certificate for \"tickbus Test rig\"");

@@ -7,7 +7,7 @@ use tickbus::import::{ImportOptions, Imported, import};
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-use crate::signals;
+use crate::import::signals;
 
 /// A zip archive of these parts.
 fn zipped(parts: &[(&str, &[u8])]) -> Vec<u8> {

@@ -2,7 +2,7 @@
 
 use tickbus::import::{ImportOptions, Imported, import};
 
-use crate::signals;
+use crate::import::signals;
 
 fn read(file: &str, text: &str) -> Imported {
     import(

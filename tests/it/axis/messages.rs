@@ -4,7 +4,7 @@ use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use crate::machine::Machine;
+use crate::axis::machine::Machine;
 use tickbus_test_log as logged;
 
 /// Three axes, one further signal, and one message per part.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::fixture::{CONFIG, err, misbehaving_as, out, tanks, tickbus};
+use crate::fmi::fixture::{CONFIG, err, misbehaving_as, out, tanks, tickbus};
 use tickbus::fieldbus::tcp::Address;
 use tickbus::time::{Monotonic, Nanos};
 use tickbus::virtual_time::{Controls, Hosting, Logic, Outcome, Settings, StartCondition, tcp};
@@ -170,7 +170,7 @@ fn without_any_name_in_common_a_map_is_asked_for() {
 #[test]
 fn an_fmu_is_the_plc_of_a_machine_in_another_process() {
     let folder = misbehaving_as("print");
-    let text = crate::fixture::CONFIG
+    let text = crate::fmi::fixture::CONFIG
         .replace(
             "kind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\nscan = \"10ms\"\n",
             "kind = \"socket\"\naddress = \"127.0.0.1:0\"\ncycle = \"1ms\"\n",
@@ -418,7 +418,7 @@ fn a_run_on_virtual_time_that_ends_ends_the_fmu_and_its_hash_is_told() {
 /// Our own FMU, in a separate line behind `tickbus run`.
 #[test]
 fn an_exported_fmu_ends_with_its_run_on_virtual_time() {
-    let library = crate::fixture::library();
+    let library = crate::fmi::fixture::library();
     let library = library.to_str().expect("UTF-8");
     for version in ["fmi2", "fmi3"] {
         let folder = misbehaving_as("print");

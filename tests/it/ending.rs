@@ -8,10 +8,8 @@
     reason = "tests; the values are small whole numbers"
 )]
 
-#[path = "peers/commands.rs"]
-mod commands;
 #[allow(dead_code, reason = "each test uses a part of it")]
-#[path = "../crates/bus-modbus/tests/modbus/plc.rs"]
+#[path = "../../crates/bus-modbus/tests/modbus/plc.rs"]
 mod modbus_plc;
 
 use std::io::Read as _;
@@ -19,7 +17,7 @@ use std::net::TcpListener;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
 
-use commands::Running;
+use crate::commands::Running;
 use modbus_plc::{Habit, Plc};
 use rustix::process::Signal;
 use tickbus::driver::Host;

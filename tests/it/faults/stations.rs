@@ -6,7 +6,7 @@ use tickbus::driver::Code;
 use tickbus::time::{Manual, Nanos};
 use tickbus_conformance::rig::{End, await_that, pass};
 
-use crate::Link;
+use crate::faults::Link;
 
 #[test]
 fn one_station_of_two_is_gone() {

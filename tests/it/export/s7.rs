@@ -7,8 +7,8 @@ use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::signal::{Area, ByteOrder, DataType};
 
-use crate::machine::{Machine, Value, units};
-use crate::tables;
+use crate::export::machine::{Machine, Value, units};
+use crate::export::tables;
 
 /// A structure in S7's standard-access layout.
 #[derive(Debug, Default)]

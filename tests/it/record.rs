@@ -5,7 +5,6 @@
     reason = "tests; small whole numbers"
 )]
 
-#[path = "record/file.rs"]
 mod file;
 
 use std::fmt::Write as _;

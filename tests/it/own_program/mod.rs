@@ -691,6 +691,6 @@ fn the_glue_takes_every_type_and_the_loader_names_those_that_have_no_place() {
 /// The C header and its mirror here must not diverge.
 #[test]
 fn the_version_of_the_header_is_the_one_that_is_spoken() {
-    let header = include_str!("../../plc/glue/tickbus_plc.h");
+    let header = include_str!("../../../plc/glue/tickbus_plc.h");
     assert!(header.contains("#define TICKBUS_PLC_VERSION 1u\n"));
 }

@@ -2,7 +2,7 @@
 //! the same, byte for byte.
 #![allow(missing_docs, reason = "a test")]
 
-#[path = "../foreign/harness/mod.rs"]
+#[path = "../../foreign/harness/mod.rs"]
 mod foreign;
 
 use std::collections::BTreeMap;

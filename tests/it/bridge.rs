@@ -2,15 +2,12 @@
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
-#[path = "peers/commands.rs"]
-mod commands;
-
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpStream;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
-use commands::{Running, bridge, dispatch};
+use crate::commands::{Running, bridge, dispatch};
 use tickbus::os::PseudoTerminal;
 
 /// A client that is connected directly with the dispatcher.

@@ -10,7 +10,7 @@ use tickbus::time::{Monotonic, Nanos};
 use tickbus_conformance::rig::Looks;
 use tickbus_test_log as logged;
 
-use crate::parse;
+use crate::axis::parse;
 
 /// A machine whose driver listens, and a PLC that is a bare TCP client.
 pub(crate) struct Pair {

@@ -69,7 +69,7 @@ impl Bus for Link {
     }
 }
 
-conformance!(free, crate::Link::new());
+conformance!(free, crate::loopback::Link::new());
 
 /// A link with faults that never begin.
 struct Spared(Link);
@@ -102,7 +102,7 @@ impl Bus for Spared {
 
 conformance!(
     with_faults_that_never_begin,
-    crate::Spared(crate::Link::new())
+    crate::loopback::Spared(crate::loopback::Link::new())
 );
 
 #[test]

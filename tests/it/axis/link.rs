@@ -1,6 +1,6 @@
 //! The driver's work for axes: acknowledges, commands by number, end switches.
 
-use crate::machine::Pair;
+use crate::axis::machine::Pair;
 
 #[test]
 fn the_machine_acknowledges_so_that_the_edge_may_fall_at_once() {

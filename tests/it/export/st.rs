@@ -5,9 +5,9 @@ use tickbus::driver_cfg::Config;
 use tickbus::export::{Target, export};
 use tickbus::signal::{Area, DataType, Signal};
 
-use crate::machine::{Machine, Value, units};
-use crate::plcopen;
-use crate::tables;
+use crate::export::machine::{Machine, Value, units};
+use crate::export::plcopen;
+use crate::export::tables;
 
 /// Each signal of an area with its first byte in the record of all stations.
 fn placed(config: &Config, area: Area) -> Vec<(usize, &Signal)> {

@@ -6,7 +6,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, Plan, Slot};
 use tickbus::time::Nanos;
 
-use crate::{bytes, parse};
+use crate::axis::{bytes, parse};
 
 /// Drives in place of the machine, and a test in place of the PLC.
 struct Drives {

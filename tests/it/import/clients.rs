@@ -3,7 +3,7 @@
 use tickbus::driver_cfg::Config;
 use tickbus::import::{Client, ImportOptions, import};
 
-use crate::{read, signals, told};
+use crate::import::{read, signals, told};
 
 fn expected(signals: &[(&str, &str, &str)]) -> Vec<(String, String, String)> {
     let own = |text: &str| text.to_owned();

@@ -10,7 +10,7 @@ use tickbus::driver_cfg::Config;
 use tickbus::fmi::{Version, foreign::Model, made};
 use zip::ZipArchive;
 
-use crate::fixture::{err, library, out, repository, tickbus};
+use crate::fmi::fixture::{err, library, out, repository, tickbus};
 
 fn export(folder: &Path, arguments: &[&str]) -> Output {
     let library = library();

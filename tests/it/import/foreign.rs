@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use tickbus::import::{Client, ImportOptions, Imported, condensed, import};
 use tickbus_image::signal::Addressing;
 
-use crate::signals;
+use crate::import::signals;
 
 fn read_as(file: &str, text: &str, reading: ImportOptions) -> Result<Imported, String> {
     import(file, text.as_bytes(), reading, &tickbus::KINDS).map_err(|mistakes| mistakes.to_string())

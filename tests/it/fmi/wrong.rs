@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use zip::{ZipArchive, ZipWriter};
 
-use crate::fixture::{
+use crate::fmi::fixture::{
     CONFIG, Entry, archive, description, err, misbehaving, misbehaving_as, out, tickbus,
 };
 

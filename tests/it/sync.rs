@@ -3,7 +3,6 @@
 #![allow(missing_docs, reason = "tests")]
 
 #[cfg(feature = "page")]
-#[path = "sync/page.rs"]
 mod page;
 
 use std::io::{BufRead as _, BufReader, Lines, Write as _};

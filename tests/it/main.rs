@@ -1,0 +1,27 @@
+//! The tests of whole programs that need no third-party software and no process of their own, in one program.
+#![allow(missing_docs, reason = "tests")]
+
+mod axis;
+mod bridge;
+mod c_api;
+mod check;
+mod codec;
+#[cfg(unix)]
+#[path = "../peers/commands.rs"]
+mod commands;
+mod dispatch;
+mod ending;
+mod export;
+mod exports;
+mod faults;
+mod fmi;
+mod import;
+mod logo;
+mod loopback;
+mod own_program;
+mod peeler;
+mod record;
+mod report;
+mod sessions;
+mod sync;
+mod testing;

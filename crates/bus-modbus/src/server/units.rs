@@ -111,6 +111,19 @@ impl ServedUnits {
         reply: &mut Vec<u8>,
         port: &mut Port,
     ) -> Option<Carried> {
+        // A fault that begins meanwhile meets the whole request or nothing of it.
+        port.together(|port| self.carry_out(station, now, pdu, source, reply, port))
+    }
+
+    fn carry_out(
+        &mut self,
+        station: usize,
+        now: Nanos,
+        pdu: &[u8],
+        source: &mut Source,
+        reply: &mut Vec<u8>,
+        port: &mut Port,
+    ) -> Option<Carried> {
         let unit = &mut self.all[station];
         let writes_only = Function::of(pdu[0])
             .is_some_and(|function| function.writes() && function != Function::ReadWriteRegisters);
@@ -205,9 +218,11 @@ impl ServedUnits {
             return false;
         }
         let mut nobody_hears = Vec::new();
-        for station in 0..self.len() {
-            self.answer(station, now, pdu, source, &mut nobody_hears, port);
-        }
+        port.together(|port| {
+            for station in 0..self.len() {
+                self.carry_out(station, now, pdu, source, &mut nobody_hears, port);
+            }
+        });
         true
     }
 

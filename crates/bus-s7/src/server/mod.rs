@@ -164,24 +164,27 @@ impl tcp::Service for Service {
     ) -> Result<usize, BusError> {
         self.memory.begin(client, now);
         let begin = reply.len();
-        let mut jobs = Jobs {
-            station: self.memory.map.station_of(client.conversation.called()),
-            shared: &mut self.memory,
-            renewals: &mut client.renewals,
-            writer: &client.writer,
-            receipts: &mut client.receipts,
-            port,
-            now,
-            lost: false,
-        };
-        let taken = client
-            .conversation
-            .packet(now, bytes, &self.facts, &mut jobs, reply)
-            .map_err(ProtocolError::into_error)?;
-        if jobs.lost {
-            reply.truncate(begin);
-        }
-        Ok(taken)
+        // A fault that begins meanwhile meets all jobs of the packet or none.
+        port.together(|port| {
+            let mut jobs = Jobs {
+                station: self.memory.map.station_of(client.conversation.called()),
+                shared: &mut self.memory,
+                renewals: &mut client.renewals,
+                writer: &client.writer,
+                receipts: &mut client.receipts,
+                port,
+                now,
+                lost: false,
+            };
+            let taken = client
+                .conversation
+                .packet(now, bytes, &self.facts, &mut jobs, reply)
+                .map_err(ProtocolError::into_error)?;
+            if jobs.lost {
+                reply.truncate(begin);
+            }
+            Ok(taken)
+        })
     }
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {

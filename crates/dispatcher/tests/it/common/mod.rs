@@ -1,5 +1,4 @@
 //! A dispatcher without sockets, and clients that send and receive lines.
-#![allow(dead_code, reason = "each test file uses a part")]
 
 pub(crate) mod hosts;
 

@@ -1,11 +1,8 @@
 //! Several dispatchers as one laboratory, without a network: letters are carried, lost and cut by hand.
-#![allow(missing_docs, reason = "tests")]
-
-mod common;
 
 use std::collections::BTreeMap;
 
-use common::hosts::{Hosts, NAMES, id, number, order, pin};
+use crate::common::hosts::{Hosts, NAMES, id, number, order, pin};
 use proptest::prelude::*;
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::{Device, OnLoss, Order, Pin, Settings};

@@ -1,11 +1,8 @@
 //! The routing table against a model that is too simple to be wrong: no indices, and everything looked up by name.
-#![allow(missing_docs, reason = "tests")]
-
-mod common;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use common::Lab;
+use crate::common::Lab;
 use proptest::prelude::*;
 use tickbus_dispatcher::{OnLoss, Patch, Settings};
 

@@ -1,9 +1,6 @@
 //! The rules, one by one, without sockets.
-#![allow(missing_docs, reason = "tests")]
 
-mod common;
-
-use common::Lab;
+use crate::common::Lab;
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::{OnLoss, Patch, Settings};
 

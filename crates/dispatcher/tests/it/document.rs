@@ -1,11 +1,8 @@
 //! Replays the sessions in docs/dispatcher.md.
-#![allow(missing_docs, reason = "tests")]
-
-mod common;
 
 use std::net::SocketAddr;
 
-use common::Lab;
+use crate::common::Lab;
 
 #[test]
 fn the_first_lesson_goes_as_it_is_written() {

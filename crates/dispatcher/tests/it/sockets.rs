@@ -1,6 +1,5 @@
 //! The dispatcher on a port: real sockets, a foreign client, crowds, and kill -9.
 #![cfg(unix)]
-#![allow(missing_docs, reason = "tests")]
 
 use std::collections::BTreeSet;
 use std::io::{BufRead as _, BufReader, Lines, Read as _, Write as _};
@@ -466,7 +465,11 @@ struct Victim(Child, SocketAddr);
 impl Victim {
     fn start(file: &Path) -> Self {
         let mut child = Command::new(std::env::current_exe().expect("a path"))
-            .args(["--exact", "the_process_that_is_killed", "--nocapture"])
+            .args([
+                "--exact",
+                "sockets::the_process_that_is_killed",
+                "--nocapture",
+            ])
             .env(CHILD, file)
             .stdout(Stdio::piped())
             .spawn()

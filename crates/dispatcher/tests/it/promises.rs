@@ -1,10 +1,7 @@
 //! Clients that promise a line at least every so often, and break that promise.
-#![allow(missing_docs, reason = "tests")]
 
-mod common;
-
-use common::Lab;
-use common::hosts::{Hosts, number, order, pin};
+use crate::common::Lab;
+use crate::common::hosts::{Hosts, number, order, pin};
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::{OnLoss, Order, Patch, Settings};
 

@@ -1,9 +1,6 @@
 //! Every literal example of the paper, as it is printed there, with its stray blanks.
-#![allow(missing_docs, reason = "tests")]
 
-mod common;
-
-use common::Lab;
+use crate::common::Lab;
 use tickbus_dispatcher::{Counts, Device, Role};
 
 const IDENTIFICATION: &str = "VR SIEMENS_LOGO001 Q08 I08 AQ02 AI03";

@@ -1,9 +1,6 @@
 //! The client against the dispatcher, both without sockets.
-#![allow(missing_docs, reason = "tests")]
 
-mod common;
-
-use common::Lab;
+use crate::common::Lab;
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::client::{ASK_AGAIN, Client, ClientError, Event, KEEP_ALIVE, Profile};
 use tickbus_dispatcher::{Cable, Channel, Counts, Number, Role};

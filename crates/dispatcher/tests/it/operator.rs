@@ -1,11 +1,8 @@
 //! An operator's orders on the board, without sockets.
-#![allow(missing_docs, reason = "tests")]
-
-mod common;
 
 use std::sync::mpsc::channel;
 
-use common::Lab;
+use crate::common::Lab;
 use tickbus_dispatcher::{Number, OnLoss, Order, Patch, Pin, Refusal, Reply, Settings};
 
 const NOTHING: [&str; 0] = [];

@@ -1,11 +1,9 @@
 //! The rules that make a run deterministic, with clients in this process.
 
-mod common;
-
 use std::cell::RefCell;
 use std::sync::Mutex;
 
-use common::{client, mixer_settings, mixers, settings};
+use crate::common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{

@@ -1,8 +1,6 @@
 //! The server alone, on a clock that the test sets: refusals with reasons, patience, pace, pause and stop.
 
-mod common;
-
-use common::{client, settings};
+use crate::common::{client, settings};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 use tickbus_virtual_time::server::{Control, Server, ToClient};

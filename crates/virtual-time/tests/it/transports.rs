@@ -1,11 +1,9 @@
 //! A run is the same in this process and over every transport, in any order of arrival.
 
-mod common;
-
 use std::sync::Arc;
 use std::thread;
 
-use common::{client, mixer_settings, mixers, settings};
+use crate::common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::tcp::Address;
 #[cfg(unix)]
@@ -261,7 +259,10 @@ fn a_server_that_crashes_at_shared_memory_is_noticed_and_replaced() {
     let name = fresh_name();
     let own = std::env::current_exe().expect("a path");
     let mut child = std::process::Command::new(own)
-        .args(["--exact", "a_server_that_kills_itself_in_step_5"])
+        .args([
+            "--exact",
+            "transports::a_server_that_kills_itself_in_step_5",
+        ])
         .env("TICKBUS_TEST_SERVER", &name)
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::null())
@@ -320,7 +321,7 @@ fn a_process_that_crashes_at_shared_memory_is_named() {
         let joined = scope.spawn(|| shared_memory::join(&name, &mut good));
         let own = std::env::current_exe().expect("a path");
         let mut child = std::process::Command::new(own)
-            .args(["--exact", "a_child_that_kills_itself_in_step_5"])
+            .args(["--exact", "transports::a_child_that_kills_itself_in_step_5"])
             .env("TICKBUS_TEST_MEMORY", &name)
             .stdout(std::process::Stdio::null())
             .stderr(std::process::Stdio::null())

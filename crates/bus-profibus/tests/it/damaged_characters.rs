@@ -1,6 +1,5 @@
 //! Characters that a serial port reports as damaged: the checksum of a telegram is a sum, and two damaged characters
 //! can leave it unchanged.
-#![allow(missing_docs, reason = "tests")]
 
 use tickbus_base::os::Marks;
 use tickbus_base::time::Nanos;

@@ -1,14 +1,9 @@
 //! Diagnoses that the simulation raises, read by profirust. (The integration tests have pyprofibus read some.)
 #![cfg(unix)]
-#![allow(missing_docs, reason = "tests")]
 
-mod peer;
-#[path = "../../../tests/peers/pty.rs"]
-mod pty;
-mod rig;
-
-use peer::Master;
-use rig::{KINDS, OnPort, device, exchange, project, until, until_exchanging};
+use crate::peer::Master;
+use crate::pty;
+use crate::rig::{KINDS, OnPort, device, exchange, project, until, until_exchanging};
 use tickbus_base::time::Monotonic;
 use tickbus_conformance::rig::{End, config, logged};
 

@@ -1,15 +1,5 @@
 //! A line in trouble: damaged telegrams, noise, a second master, lost tokens. The masters are profirust.
 #![cfg(unix)]
-#![allow(
-    missing_docs,
-    clippy::float_cmp,
-    reason = "tests; the values are small whole numbers"
-)]
-
-mod peer;
-#[path = "../../../tests/peers/pty.rs"]
-mod pty;
-mod rig;
 
 use std::fmt::Write as _;
 use std::fs::OpenOptions;
@@ -17,8 +7,9 @@ use std::io::{Read as _, Write as _};
 use std::path::Path;
 use std::time::Duration;
 
-use peer::{Master, Project, SLOT, Slave};
-use rig::{ADDRESS, KINDS, device, exchange, project, slave, until, until_exchanging};
+use crate::peer::{Master, Project, SLOT, Slave};
+use crate::pty;
+use crate::rig::{ADDRESS, KINDS, device, exchange, project, slave, until, until_exchanging};
 use tickbus_base::time::Monotonic;
 use tickbus_conformance::rig::{End, await_that, logged};
 

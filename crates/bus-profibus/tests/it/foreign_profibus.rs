@@ -1,28 +1,19 @@
 //! The bus `profibus-device` with profirust, an independent DP master, at the other end of a pseudo-terminal, in real
 //! time.
 #![cfg(unix)]
-#![allow(
-    missing_docs,
-    clippy::float_cmp,
-    reason = "tests; the values are small whole numbers"
-)]
-
-mod peer;
-#[path = "../../../tests/peers/pty.rs"]
-mod pty;
-mod rig;
 
 use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::time::Duration;
 
-use peer::{Master, Project, SLOT, Seen, Slave};
-use profirust::dp::PeripheralEvent;
-use rig::{
+use crate::peer::{Master, Project, SLOT, Seen, Slave};
+use crate::pty;
+use crate::rig::{
     ADDRESS, IDENT, KINDS, OnPort, RATES, device, device_at, exchange, project, project_at, slave,
     until, until_exchanging,
 };
+use profirust::dp::PeripheralEvent;
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance as conformance;
 use tickbus_conformance::rig::{End, await_that, config, logged};
@@ -219,11 +210,11 @@ fn many_stations_of_different_devices_share_a_line() {
     for (name, text) in [
         (
             "remote_io.gsd",
-            include_str!("../../../tests/gsd/remote_io.gsd"),
+            include_str!("../../../../tests/gsd/remote_io.gsd"),
         ),
         (
             "encoder.gsd",
-            include_str!("../../../tests/gsd/encoder.gsd"),
+            include_str!("../../../../tests/gsd/encoder.gsd"),
         ),
     ] {
         std::fs::write(folder.path().join(name), text).expect("a file");

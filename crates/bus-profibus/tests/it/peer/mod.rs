@@ -1,7 +1,6 @@
 //! profirust, an independent DP master, on one end of a pseudo-terminal.
-#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
-#[path = "../../../../tests/peers/dp_phy.rs"]
+#[path = "../../../../../tests/peers/dp_phy.rs"]
 mod dp_phy;
 
 use std::path::Path;

@@ -1,10 +1,4 @@
 //! A device with one station for an independent master, and helpers that wait for conditions.
-#![allow(
-    dead_code,
-    unreachable_pub,
-    clippy::float_cmp,
-    reason = "each test uses a part of it; the values are small whole numbers"
-)]
 
 use std::time::Duration;
 

@@ -1,7 +1,4 @@
 //! The rig's PLC program and a machine in lock-step: two runs are equal to the last bit.
-#![allow(missing_docs, reason = "tests")]
-
-mod server;
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
-use server::Server;
+use crate::server::Server;
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos};
 use tickbus_conformance::rig::{End, await_that};
 use tickbus_driver::{Code, Host};

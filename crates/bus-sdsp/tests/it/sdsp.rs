@@ -1,14 +1,12 @@
 //! The bus `sdsp`: machine and PLC in lock-step over TCP, with the server in this process.
-#![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
-
-mod server;
+#![allow(clippy::float_cmp, reason = "tests; small whole numbers")]
 
 use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
-use server::Server;
+use crate::server::Server;
 use tickbus_base::time::{Clock as _, Manual, Monotonic, Nanos, Stop};
 use tickbus_conformance::rig::{End, SIGNALS};
 use tickbus_driver::{Code, Exchange, Host};

@@ -8,6 +8,10 @@ use tickbus_base::time::Manual;
 
 use tickbus_conformance::peers::{Alone, Ending, leave, own_address};
 use tickbus_conformance::rig::{Bus, Liar, config};
+use tickbus_driver_cfg::{Kind, Kinds};
+
+/// The kind of this crate.
+pub static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_socket::Options>()]);
 
 /// The size of a record of the conformance suite's signals, in both directions.
 pub const RECORD: usize = 6;
@@ -32,8 +36,8 @@ impl Tcp {
 }
 
 impl Bus for Tcp {
-    fn kinds(&self) -> &'static tickbus_driver_cfg::Kinds {
-        &crate::KINDS
+    fn kinds(&self) -> &'static Kinds {
+        &KINDS
     }
 
     fn fieldbus(&self, role: &str) -> String {
@@ -122,7 +126,7 @@ pub fn device(further: &str) -> (Alone, SocketAddr) {
         device: "",
         controller: "",
     };
-    let alone = Alone::open(&config(&bus, "device", further), &crate::KINDS);
+    let alone = Alone::open(&config(&bus, "device", further), &KINDS);
     let address = alone.address();
     (alone, address)
 }

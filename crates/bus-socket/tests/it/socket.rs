@@ -1,12 +1,4 @@
 //! The socket bus: the conformance suite, and its own tests with foreign peers.
-#![allow(
-    missing_docs,
-    unreachable_pub,
-    clippy::float_cmp,
-    reason = "tests; the values are small whole numbers"
-)]
-
-mod ends;
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
@@ -14,17 +6,13 @@ use std::time::Duration;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
+use crate::ends::{KINDS, RECORD, Tcp, device, record};
 use conformance::peers::{Alone, client, is_closed, leave};
 use conformance::rig::{CYCLE, End, MAX_AGE, await_that, config, logged, pass};
-use ends::{RECORD, Tcp, device, record};
 use socket2::SockRef;
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_driver::Code;
-use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::LinkState;
-
-/// The kind of this crate.
-static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_socket::Options>()]);
 
 conformance!(cyclic, crate::ends::Tcp::new("", ""));
 conformance!(

@@ -1,11 +1,5 @@
 //! One driver with a peer for each of its stations: an event at one peer does not affect the others.
 #![cfg(unix)]
-#![allow(
-    missing_docs,
-    unreachable_pub,
-    clippy::float_cmp,
-    reason = "tests; the values are small whole numbers"
-)]
 
 use std::fmt::Write as _;
 use std::fs::File;
@@ -14,15 +8,12 @@ use std::net::{SocketAddr, TcpStream};
 use std::os::fd::AsRawFd as _;
 use tickbus_conformance as conformance;
 
+use crate::ends::KINDS;
 use conformance::peers::{Alone, client, is_closed, leave};
 use conformance::resources;
 use conformance::rig::{await_that, logged};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
-use tickbus_driver_cfg::{Kind, Kinds};
 use tickbus_fieldbus::{Cause, LinkState};
-
-/// The kind of this crate.
-static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_socket::Options>()]);
 
 /// A device that listens for the peers of its two stations.
 fn device() -> (Alone, [SocketAddr; 2]) {

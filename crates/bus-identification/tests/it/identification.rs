@@ -1,13 +1,5 @@
 //! A controller and a machine at the two ends of a pseudo-terminal: the bus `ivi-client` and the bus `ivi-reader`.
 #![cfg(unix)]
-#![allow(
-    missing_docs,
-    clippy::float_cmp,
-    clippy::format_push_string,
-    reason = "tests; the values are small whole numbers"
-)]
-
-mod ends;
 
 use std::io::{Read as _, Write as _};
 
@@ -21,7 +13,7 @@ use tickbus_conformance::rig::await_that;
 use tickbus_driver::Code;
 use tickbus_fieldbus::{Cause, LinkState};
 
-use ends::{Line, Pair};
+use crate::ends::{Line, Pair};
 
 #[test]
 fn a_carrier_is_read_changed_and_written_and_leaves_with_what_was_written() {

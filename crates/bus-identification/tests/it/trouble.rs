@@ -1,14 +1,6 @@
 //! Faults between a controller and a machine at the two ends of a pseudo-terminal, and the damage that they must not
 //! do.
 #![cfg(unix)]
-#![allow(
-    missing_docs,
-    clippy::float_cmp,
-    clippy::format_push_string,
-    reason = "tests; the values are small whole numbers"
-)]
-
-mod ends;
 
 use std::io::{Read as _, Write as _};
 
@@ -19,7 +11,7 @@ use tickbus_conformance::rig::{await_that, statistic};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::LinkState;
 
-use ends::{KINDS, Line, Pair, command};
+use crate::ends::{KINDS, Line, Pair, command};
 
 const READ: Access<'_> = Access::Read {
     address: 0,

@@ -1,5 +1,4 @@
 //! A controller and a machine at the two ends of a pseudo-terminal.
-#![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
 use std::path::PathBuf;
 use std::sync::Arc;

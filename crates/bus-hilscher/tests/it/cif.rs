@@ -1,6 +1,5 @@
 //! The bus `hilscher-cif` against a library that stands in for the vendor's.
 #![cfg(target_os = "linux")]
-#![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
 use std::sync::Arc;
 
@@ -74,7 +73,7 @@ impl Bus for Cards {
     }
 }
 
-conformance!(suite, crate::Cards::new());
+conformance!(suite, crate::cif::Cards::new());
 
 const OPENING: [&str; 7] = [
     "DevOpenDriver(0)",

@@ -1,6 +1,5 @@
 //! The bus `hilscher-cifx` against a library that stands in for the vendor's.
 #![cfg(target_os = "linux")]
-#![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
 use std::path::Path;
 use std::sync::Arc;
@@ -82,7 +81,7 @@ impl Bus for Cards {
     }
 }
 
-conformance!(suite, crate::Cards::new());
+conformance!(suite, crate::cifx::Cards::new());
 
 /// The calls in their order, and the calls that undo each, with the arguments of the first card.
 const OPENING: [&str; 6] = [

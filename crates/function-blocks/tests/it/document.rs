@@ -1,5 +1,4 @@
 //! The examples in docs/virtual-lab.md: the behaviour of each block, and whole programs.
-#![allow(missing_docs, reason = "tests")]
 
 use std::collections::BTreeSet;
 

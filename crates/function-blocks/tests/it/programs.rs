@@ -1,5 +1,4 @@
 //! Whole programs: mistakes and their places, loops, deadlines.
-#![allow(missing_docs, reason = "tests")]
 
 use tickbus_base::time::Nanos;
 use tickbus_function_blocks::{Controller, Program, Terminals, WallTime};

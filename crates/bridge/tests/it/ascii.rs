@@ -1,5 +1,4 @@
 //! The bridge for ASCII clients, with the real dispatcher at its other end: both without I/O, in the same time.
-#![allow(missing_docs, reason = "tests")]
 
 use std::net::SocketAddr;
 

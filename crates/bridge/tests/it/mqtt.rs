@@ -1,5 +1,4 @@
 //! Topics as channels, with the real dispatcher at the other end: no broker, no sockets.
-#![allow(missing_docs, reason = "tests")]
 
 use std::net::SocketAddr;
 

@@ -1,7 +1,7 @@
 //! The gateway: a PLC that knows only two signals and a clock of virtual time, in lock-step.
 #![allow(missing_docs, clippy::float_cmp, reason = "tests; small whole numbers")]
 
-#[path = "../../bus-sdsp/tests/server/mod.rs"]
+#[path = "../../bus-sdsp/tests/it/server/mod.rs"]
 mod server;
 
 use std::num::NonZeroU32;

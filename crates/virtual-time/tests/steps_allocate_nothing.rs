@@ -3,6 +3,7 @@
 //! The count covers all threads of the process, so this test is alone in its file.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
+#[path = "it/common/mod.rs"]
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};

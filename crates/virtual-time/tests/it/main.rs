@@ -1,0 +1,9 @@
+//! The tests of this crate, in one program.
+
+mod common;
+mod example;
+mod model_check;
+mod rules;
+mod sequences;
+mod server;
+mod transports;

@@ -332,6 +332,15 @@ mod tests {
     }
 
     #[test]
+    fn an_echo_that_never_came_is_not_expected_any_more_when_something_else_is_sent() {
+        let mut echo = Echo::new(9_600);
+        echo.sent(Nanos(0), &READ);
+        let later = Nanos::from_secs(1);
+        echo.sent(later, &[9, 8]);
+        assert_eq!(echo.strip(later, &[9, 8]), 2);
+    }
+
+    #[test]
     fn the_echo_of_what_was_sent_is_dropped_and_what_follows_it_is_not() {
         let mut echo = Echo::new(9_600);
         echo.sent(Nanos(0), &READ);

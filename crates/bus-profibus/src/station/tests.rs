@@ -570,6 +570,19 @@ fn outputs_from_before_clear_do_not_come_back_under_sync() {
 }
 
 #[test]
+fn outputs_that_sync_held_before_clear_are_never_released() {
+    let mut rig = Rig::exchanging(identity(), 0x20, 0);
+    rig.control(0x20, 0);
+    rig.exchange(&[3, 4]);
+    rig.control(0x20, 0);
+    rig.exchange(&[5, 6]);
+    for command in [0x02, 0x00, 0x20] {
+        rig.control(command, 0);
+    }
+    assert_eq!(rig.machine.outputs, [[0, 0], [3, 4]], "and never [5, 6]");
+}
+
+#[test]
 fn outputs_after_clear_are_served_though_the_master_never_toggles_its_bit() {
     let mut rig = Rig::exchanging(identity(), 0, 0);
     rig.raw(None, 0x5D, &[1, 2]);

@@ -88,3 +88,28 @@ impl Dialler {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::net::TcpListener;
+
+    use super::*;
+
+    #[test]
+    fn the_next_attempt_after_one_that_failed_is_made_after_a_pause() {
+        let taken = TcpListener::bind("127.0.0.1:0").expect("a free port");
+        let address = taken.local_addr().expect("an address").to_string();
+        drop(taken);
+        let mut dialler = Dialler::new(&address.parse().expect("an address"), &Stop::new());
+        let now = Nanos::from_secs(5);
+        assert!(dialler.turn(now).is_none() && dialler.deadline() == Nanos::MAX);
+        let ended = std::iter::repeat_with(|| dialler.turn(now)).find_map(|ended| {
+            std::thread::yield_now();
+            ended
+        });
+        assert!(ended.is_some_and(|ended| ended.is_err()), "nobody listens");
+        assert_eq!(dialler.deadline(), now + PAUSE);
+        assert!(dialler.turn(now).is_none());
+        assert_eq!(dialler.deadline(), now + PAUSE, "nothing has begun");
+    }
+}

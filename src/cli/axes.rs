@@ -9,13 +9,13 @@ use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
 use tickbus_fieldbus::Role;
 use tickbus_plc::Axes;
 
-/// Stand in for the machine: every axis that FILE describes is an ideal drive that follows its commands.
+/// Simulate the machine: each axis in FILE is an ideal drive that follows its commands.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the device.
     file: PathBuf,
 
-    /// How often the drives go on.
+    /// The interval at which the drives are updated.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = span)]
     tick: Nanos,
 

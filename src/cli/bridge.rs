@@ -9,7 +9,7 @@ use clap::Subcommand;
 use super::Outcome;
 use super::lab;
 
-/// Let others take part in a virtual laboratory: a program at a serial line, or the topics of an MQTT broker.
+/// Connect a serial line or an MQTT broker to a virtual laboratory.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]

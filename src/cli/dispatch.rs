@@ -14,53 +14,53 @@ use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PORT, PatchFile, Po
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_fieldbus::tcp::Address;
 
-/// Serve a virtual laboratory: controllers and machines join over lines of text, and are patched together.
+/// Run a virtual laboratory: controllers and machines connect by a text protocol, and their channels are patched.
 ///
-/// Clients are programs of your own, or telnet; docs/dispatcher.md tells what they may say.
+/// Clients are your own programs, or telnet; docs/dispatcher.md describes the protocol.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// Where clients connect; port 0 lets the system choose one. 127.0.0.1 is this machine alone, 0.0.0.0 all of its
+    /// The address to listen on; port 0 lets the system choose one. 127.0.0.1 accepts this machine only, 0.0.0.0 all
     /// networks.
     #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = address)]
     listen: Address,
 
-    /// The file in which connections survive a restart; it is made with the first one.
+    /// The file that keeps the connections over a restart; it is created with the first one.
     #[arg(long, value_name = "FILE", default_value = "patch.toml")]
     patch: PathBuf,
 
-    /// Leave an input its last value when its source is gone; without this it gets 0.
+    /// Keep the last value of an input whose source is gone [default: set it to 0].
     #[arg(long)]
     hold: bool,
 
-    /// Disconnect a client after this time without a line from it.
+    /// Disconnect a client that has sent no line for this time.
     #[arg(long, value_name = "TIME", default_value = "60s", value_parser = span)]
     idle: Nanos,
 
-    /// Stop after this time; without it, on Ctrl-C.
+    /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 
-    /// Join the dispatchers of other hosts into one laboratory, over Zenoh: clients and patches span hosts by name.
+    /// Join dispatchers on other hosts into one laboratory, over Zenoh; patches name the clients of any host.
     #[arg(long)]
     zenoh: bool,
 
-    /// Where a Zenoh router or another dispatcher listens, such as tcp/192.168.0.10:7447; may be given several times.
-    /// Others in the local network are found by multicast.
+    /// The address of a Zenoh router or another dispatcher, such as tcp/192.168.0.10:7447; may be given several times.
+    /// Dispatchers in the local network are found by multicast.
     #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
     zenoh_connect: Vec<String>,
 
-    /// Where Zenoh listens for other dispatchers, such as tcp/0.0.0.0:7447; without this, on a port that it chooses.
+    /// The address on which Zenoh listens for other dispatchers, such as tcp/0.0.0.0:7447 [default: a free port].
     #[arg(long, value_name = "ENDPOINT", requires = "zenoh")]
     zenoh_listen: Vec<String>,
 
-    /// The name of the laboratory; dispatchers of other laboratories on the same network are not seen.
+    /// The name of the laboratory; dispatchers of other laboratories are ignored.
     #[arg(long, value_name = "NAME", requires = "zenoh", default_value = "lab")]
     lab: String,
-    /// Serve the patch bay, a page on which the laboratory is seen and patched, and print its address.
+    /// Serve the patch bay, a web page that shows and patches the laboratory, and print its address.
     #[cfg(feature = "page")]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
     page: Option<Address>,
-    /// The file in which the token of the page survives a restart; it is made if there is none.
+    /// The file that keeps the page's token over a restart; it is created if it is missing.
     #[cfg(feature = "page")]
     #[arg(long, value_name = "FILE", requires = "page")]
     page_token_file: Option<PathBuf>,

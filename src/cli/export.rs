@@ -12,28 +12,29 @@ use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_export::{Export, Target, export};
 use tickbus_fmi::{Version, made};
 
-/// Write the PLC's half of a driver.cfg: sources for the editor of the PLC, and a symbol table. For fmi2 and fmi3, write an FMU:
+/// Export a driver.cfg for the PLC: source files for its editor, and a symbol table. For fmi2 and fmi3, write an FMU:
 /// the driver for simulators that import co-simulation models.
 ///
-/// docs/which-bus.md tells which bus suits which PLC, and what is to be set there; docs/fmi.md tells of FMUs.
+/// docs/which-bus.md says which bus suits which PLC, and how to set it up; docs/fmi.md describes FMUs.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the simulated machine.
     file: PathBuf,
 
-    /// The editor that the sources are for, or the version of FMI.
+    /// The PLC editor, or the version of FMI.
     #[arg(long = "for", value_name = "EDITOR", value_parser = formats())]
     format: Format,
 
-    /// Folder for the files [default: beside FILE, called like it and the editor]; of an FMU, the file.
+    /// The folder for the files [default: beside FILE, named after it and the editor]; for an FMU, the file.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
 
-    /// For an FMU: the native library to put inside, one for each platform [default: beside this command, or in the jar there].
+    /// For an FMU: the native library to include, once for each platform [default: the one beside this command, or in
+    /// the jar there].
     #[arg(long, value_name = "FILE")]
     library: Vec<PathBuf>,
 
-    /// Overwrite files that are there.
+    /// Overwrite existing files.
     #[arg(long)]
     force: bool,
 }

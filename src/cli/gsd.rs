@@ -9,7 +9,7 @@ use tickbus_base::toml_text::Mistakes;
 use tickbus_bus_profibus as profibus;
 use tickbus_driver_cfg::{Config, Kinds};
 
-/// Print the GSD file for the PLC's project, of the PROFIBUS stations that have none of a maker.
+/// Print the GSD file for PROFIBUS stations that have none from a manufacturer.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The driver.cfg of the simulated machine.

@@ -27,15 +27,15 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "HOST:PORT")]
     address: Option<String>,
 
-    /// Inject the faults of this file, its `[[fault]]` sections.
+    /// Inject the faults in the `[[fault]]` sections of this file.
     #[arg(long, value_name = "FILE")]
     faults: Option<std::path::PathBuf>,
 
-    /// Serve the live page, and print its address. Without HOST:PORT it is that of FILE's table page, or 127.0.0.1:20080.
+    /// Serve the live page, and print its address [default: that of the page table in FILE, or 127.0.0.1:20080].
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 
-    /// Stop after this time; without it, on Ctrl-C.
+    /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 

@@ -25,11 +25,11 @@ pub(super) struct Arguments {
     /// The list.
     table: PathBuf,
 
-    /// Where the driver.cfg goes [default: standard output].
+    /// The output file [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Overwrite the file if it is there.
+    /// Overwrite an existing file.
     #[arg(long)]
     force: bool,
 
@@ -37,16 +37,16 @@ pub(super) struct Arguments {
     #[arg(long)]
     lenient: bool,
 
-    /// The numbers of the addresses count elements, as CODESYS and OpenPLC have it, not bytes [default: as the program
-    /// that wrote the list, where the list tells which].
+    /// Addresses count elements, as in CODESYS and OpenPLC [default: as in the program that wrote the list, if the list
+    /// shows which].
     #[arg(long)]
     iec: bool,
 
-    /// The numbers of the addresses count bytes, as TIA Portal and TwinCAT have it.
+    /// Addresses count bytes, as in TIA Portal and TwinCAT.
     #[arg(long, conflicts_with = "iec")]
     bytes: bool,
 
-    /// The client bus whose addresses the list has, where the list alone does not tell: %MW20 can be of either.
+    /// The client bus to which the addresses belong, if the list does not show it: %MW20 exists in Modbus and in S7.
     #[arg(long, value_name = "KIND", value_parser = clients())]
     bus: Option<Client>,
 }

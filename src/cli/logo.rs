@@ -26,39 +26,39 @@ pub(super) struct Arguments {
     /// The program.
     file: PathBuf,
 
-    /// Where the dispatcher listens.
+    /// The address of the dispatcher.
     #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
 
-    /// The name by which others know this controller.
+    /// The name of this controller in the laboratory.
     #[arg(long)]
     name: String,
 
-    /// A text with the CONNECT lines of this controller; they are sent whenever the dispatcher has taken it.
+    /// A file with CONNECT lines, which are sent each time the dispatcher accepts this controller.
     #[arg(long, value_name = "FILE")]
     patch: Option<PathBuf>,
 
-    /// The number of inputs, I1 and on.
+    /// The number of inputs, from I1.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(0..=256))]
     inputs: u16,
 
-    /// The number of outputs, Q1 and on.
+    /// The number of outputs, from Q1.
     #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u16).range(0..=256))]
     outputs: u16,
 
-    /// The number of analog inputs, AI1 and on.
+    /// The number of analog inputs, from AI1.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=256))]
     analog_inputs: u16,
 
-    /// The number of analog outputs, AQ1 and on.
+    /// The number of analog outputs, from AQ1.
     #[arg(long, value_name = "N", default_value_t = 2, value_parser = clap::value_parser!(u16).range(0..=256))]
     analog_outputs: u16,
 
-    /// The time from scan to scan.
+    /// The scan interval.
     #[arg(long, value_name = "TIME", default_value = "10ms", value_parser = span)]
     cycle: Nanos,
 
-    /// Stop after this time; without it, on Ctrl-C.
+    /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 }

@@ -9,7 +9,7 @@ use tickbus_driver_cfg::Kinds;
 use tickbus_fieldbus::Role;
 use tickbus_programs::Mirror;
 
-/// Stand in for the machine: every %Q byte comes back on the %I byte of the same offset.
+/// Simulate a machine that copies each %Q byte to the %I byte at the same offset.
 ///
 /// When the PLC is gone, %Q signals with a `fail_safe` take that value. The others stay as they are, and the page marks them as stale.
 #[derive(Debug, clap::Args)]
@@ -17,7 +17,7 @@ pub(super) struct Arguments {
     /// The driver.cfg of the device.
     file: PathBuf,
 
-    /// How often the bytes are taken over.
+    /// The interval at which the bytes are copied.
     #[arg(long, value_name = "TIME", default_value = "1ms", value_parser = span)]
     tick: Nanos,
 

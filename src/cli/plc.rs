@@ -18,11 +18,11 @@ use tickbus_plc as plc;
 /// iec2c (its options are addressing, alive and order); docs/own-plc-program.md tells how to build one.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// Which program: a name, or the path of your own.
+    /// The name of a built-in program, or the path of your own.
     #[arg(value_name = "PROGRAM")]
     program: String,
 
-    /// The driver.cfg of the line; one that states no role serves both ends.
+    /// The driver.cfg of the line; without a role, the same file serves both ends.
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
 

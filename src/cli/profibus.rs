@@ -8,7 +8,7 @@ use clap::Subcommand;
 use super::Outcome;
 use tickbus_driver_cfg::Kinds;
 
-/// Look at a PROFIBUS line.
+/// Inspect a PROFIBUS line.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     #[command(subcommand)]

@@ -11,13 +11,13 @@ use tickbus_report::{Contents, DEFAULT_BUDGET, Run, RunStatistics};
 
 /// Make an HTML page from a recording: chart, steps, faults, states of the line, distributions.
 ///
-/// The page is one file that loads nothing; any browser of 2023 or later shows it.
+/// The page is a single file without external resources; any browser of 2023 or later shows it.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The recording, VCD or CSV.
     recording: PathBuf,
 
-    /// Where the page goes [default: beside the recording, ending with .html].
+    /// The output file [default: beside the recording, with the ending .html].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
@@ -25,23 +25,23 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TEXT")]
     title: Option<String>,
 
-    /// The signal whose values are numbers of steps; 0 means no step.
+    /// The signal with the number of the current step; 0 means no step.
     #[arg(long, value_name = "SIGNAL")]
     steps: Option<String>,
 
-    /// A signal that says, while it is on, that there is a fault; may be given several times.
+    /// A signal that is on during a fault; may be given several times.
     #[arg(long = "fault", value_name = "SIGNAL")]
     faults: Vec<String>,
 
-    /// Statistics, as a driver or `tickbus plc --stats` writes them; other lines in the file do no harm.
+    /// A file with statistics, as a driver or `tickbus plc --stats` writes them; other lines are ignored.
     #[arg(long, value_name = "FILE")]
     stats: Option<PathBuf>,
 
-    /// A text to be shown as it is, such as a demo's report; may be given several times.
+    /// A text file to include, such as a demo's report; may be given several times.
     #[arg(long = "text", value_name = "FILE")]
     texts: Vec<PathBuf>,
 
-    /// How many changes of values the page may hold; the busiest signals are thinned beyond that.
+    /// The largest number of value changes in the page; beyond it, the busiest signals are thinned out.
     #[arg(long, value_name = "COUNT", default_value_t = DEFAULT_BUDGET)]
     changes: usize,
 }

@@ -29,18 +29,18 @@ const LISTED: usize = 20;
 
 /// Run an FMU (FMI 2.0 or 3.0, co-simulation) as the machine on a bus, or as the PLC.
 ///
-/// Its variables are the signals of the same names; --map joins the others. docs/fmi.md tells more.
+/// Variables and signals of the same name are connected; --map connects others. docs/fmi.md has the details.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The FMU.
     #[arg(value_name = "MODEL.fmu")]
     model: PathBuf,
 
-    /// The driver.cfg of the line; one that states no role serves both ends.
+    /// The driver.cfg of the line; without a role, the same file serves both ends.
     #[arg(long, value_name = "FILE")]
     config: PathBuf,
 
-    /// Which variables are which signals, where their names differ, and parameters: a TOML file.
+    /// A TOML file with parameters, and with the variables whose names differ from those of their signals.
     #[arg(long, value_name = "FILE")]
     map: Option<PathBuf>,
 
@@ -52,12 +52,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "TIME", value_parser = span)]
     step: Option<Nanos>,
 
-    /// Seconds of simulation in one of the clock on the wall: 1 for real time, 0 for as fast as possible [default: 1; 0 on a
-    /// stepped bus].
+    /// Seconds of simulation in one second of real time; 0 is as fast as possible [default: 1; 0 on a stepped bus].
     #[arg(long, value_name = "NUMBER", value_parser = pace)]
     pace: Option<f64>,
 
-    /// Stop after this much simulation time; without it, on Ctrl-C.
+    /// Stop after this simulation time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 
@@ -65,7 +64,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "NUMBER", value_parser = tolerance)]
     tolerance: Option<f64>,
 
-    /// Run the FMU in a process of its own, which it may crash.
+    /// Run the FMU in a separate process, so that a crash of it does not end this one.
     #[arg(long)]
     isolated: bool,
 
@@ -73,7 +72,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "HOST:PORT")]
     address: Option<String>,
 
-    /// Inject the faults of this file, its `[[fault]]` sections.
+    /// Inject the faults in the `[[fault]]` sections of this file.
     #[arg(long, value_name = "FILE")]
     faults: Option<PathBuf>,
 

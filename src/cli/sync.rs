@@ -18,25 +18,25 @@ use virtual_time::server::Control;
 use virtual_time::shared_memory;
 use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp};
 
-/// Hand out virtual time: the clients of a run go on in lock-step, and every run is the same.
+/// Serve virtual time: clients advance in lock-step, and every run gives the same result.
 ///
-/// While it runs, it takes commands on stdin, one a line: pause, step (or step 10), run, stop. docs/sdsp.md has the rules, and the
-/// format for clients of your own.
+/// It reads commands from stdin, one per line: pause, step (or step 10), run, stop. docs/sdsp.md describes the rules,
+/// and the protocol for your own clients.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct Arguments {
     #[command(subcommand)]
     other: Option<Other>,
 
-    /// The file of the run: what its table "sync" says is in docs/sdsp.md.
+    /// The file of the run; docs/sdsp.md describes its table "sync".
     #[arg(required = true)]
     file: Option<PathBuf>,
 
-    /// Begin paused, and wait for commands on stdin.
+    /// Start paused, and wait for commands on stdin.
     #[arg(long)]
     paused: bool,
 
-    /// Serve the live page of the run, and print its address. Without HOST:PORT it is 127.0.0.1:20080.
+    /// Serve the live page of the run, and print its address [default: 127.0.0.1:20080].
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 }

@@ -12,8 +12,8 @@ use tickbus_testing::{Case, Group, Suite, Test, Verdict, junit_xml};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///
-/// Every *.toml in DIR and in its folders that has a config or a [[test]] is a test file; docs/testing.md tells what one looks like. Exit code 0
-/// when all tests pass, 1 when one fails or a file is wrong.
+/// Each *.toml in DIR and its subfolders with a config or a [[test]] is a test file; docs/testing.md describes them.
+/// Exit code 0 when all tests pass, 1 when one fails or a file is wrong.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// Folders with test files, or test files.
@@ -24,15 +24,15 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
-    /// Keep a recording of each failed test in DIR, as VCD, and a page about it.
+    /// Write a recording of each failed test, as VCD, and a report about it to DIR.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
 
-    /// Run only the tests with this text in their name or in that of their file.
+    /// Run only tests whose name or file name contains this text.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
 
-    /// List the tests, and run none.
+    /// List the tests without running them.
     #[arg(long)]
     list: bool,
 }

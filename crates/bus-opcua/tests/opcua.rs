@@ -8,14 +8,12 @@
 )]
 
 use std::io::Write;
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
 use tickbus_conformance as conformance;
 use tickbus_conformance::conformance;
 
-use conformance::peers::{leave, own_address};
+use conformance::peers::{leave, lying, own_address};
 use conformance::rig::{Bus, End, Liar, await_that, logged, pass, statistic};
 use tickbus_base::time::Manual;
 use tickbus_bus_opcua::{ClientOptions, ServerOptions};
@@ -65,29 +63,7 @@ impl Bus for OpcUa {
 
     /// The peer sends bytes that are not OPC UA.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        let over = Arc::new(AtomicBool::new(false));
-        let address = self.address;
-        let listener = (self.server == "controller").then(|| {
-            let listener = TcpListener::bind(address).expect("its own address");
-            listener.set_nonblocking(true).expect("an option");
-            listener
-        });
-        let listens = listener.is_some();
-        let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            move || {
-                while !over.load(Ordering::Relaxed) {
-                    let met = match &listener {
-                        Some(listener) => listener.accept().map(|met| met.0),
-                        None => TcpStream::connect(address),
-                    };
-                    match met {
-                        Ok(stream) => lie(stream),
-                        Err(_) => std::thread::yield_now(),
-                    }
-                }
-            }
-        });
+        let listens = self.server == "controller";
         let (cause, words) = if listens {
             ("protocol", "does not answer as an OPC UA server")
         } else {
@@ -95,10 +71,7 @@ impl Bus for OpcUa {
             ("waiting", "nobody has written yet")
         };
         Liar {
-            peer: Box::new(Ending {
-                over,
-                thread: Some(thread),
-            }),
+            peer: lying(self.address, listens, lie),
             cause,
             words,
         }
@@ -249,19 +222,4 @@ fn lie(mut stream: TcpStream) {
     let _ = stream.set_nonblocking(false);
     let _ = stream.write_all(b"HTTP/1.1 400 Bad Request\r\n\r\n");
     leave(stream);
-}
-
-/// A thread that can be stopped and joined.
-struct Ending {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.join().expect("the peer did not panic");
-        }
-    }
 }

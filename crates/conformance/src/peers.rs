@@ -1,5 +1,6 @@
 //! Shared by tests with foreign ends: unique addresses, and ways to open and close connections.
 
+use std::any::Any;
 use std::io::{ErrorKind, Read};
 use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
@@ -35,9 +36,9 @@ pub fn leave(mut stream: TcpStream) {
 }
 
 /// A thread that can be stopped and joined.
-pub struct Ending {
-    pub over: Arc<AtomicBool>,
-    pub thread: Option<JoinHandle<()>>,
+struct Ending {
+    over: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
 }
 
 impl Drop for Ending {
@@ -47,6 +48,39 @@ impl Drop for Ending {
             thread.join().expect("the peer did not panic");
         }
     }
+}
+
+/// A peer for [`Liar`](crate::rig::Liar): passes each of its connections to `lie`. It listens on `address`, or connects to it.
+pub fn lying(
+    address: SocketAddr,
+    listens: bool,
+    lie: impl Fn(TcpStream) + Send + 'static,
+) -> Box<dyn Any> {
+    let over = Arc::new(AtomicBool::new(false));
+    let listener = listens.then(|| {
+        let listener = TcpListener::bind(address).expect("its own address");
+        listener.set_nonblocking(true).expect("an option");
+        listener
+    });
+    let thread = std::thread::spawn({
+        let over = Arc::clone(&over);
+        move || {
+            while !over.load(Ordering::Relaxed) {
+                let met = match &listener {
+                    Some(listener) => listener.accept().map(|met| met.0),
+                    None => TcpStream::connect(address),
+                };
+                match met {
+                    Ok(stream) => lie(stream),
+                    Err(_) => std::thread::yield_now(),
+                }
+            }
+        }
+    });
+    Box::new(Ending {
+        over,
+        thread: Some(thread),
+    })
 }
 
 pub fn client(address: SocketAddr) -> TcpStream {

@@ -398,7 +398,7 @@ impl Caller for Line {
     fn hear(&mut self, _now: Nanos, bytes: &[u8], _port: &mut Port) -> Result<(), BusError> {
         let characters = self.marks.read(bytes);
         self.characters.heard.extend(characters.bytes);
-        // A telegram with a damaged character is none.
+        // A telegram with a damaged character is lost.
         if !characters.damaged.is_empty() {
             self.characters.heard.clear();
         }

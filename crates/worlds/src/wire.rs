@@ -12,7 +12,7 @@ pub(crate) const BAUD: u32 = 500_000;
 /// The bits of a character: start bit, eight data bits, parity, stop bit.
 const CHARACTER: u32 = 11;
 
-/// The time that so many bits take.
+/// The time that a number of bits takes.
 pub(crate) fn bits(count: u32) -> i64 {
     i64::from(count) * 1_000_000_000 / i64::from(BAUD)
 }

@@ -9,8 +9,8 @@ use tickbus_bridge::mqtt::Map;
 
 /// Publish inputs to an MQTT broker, and set outputs from it.
 ///
-/// The file says which channel goes with which topic; docs/dispatcher.md has an example. When the broker or the dispatcher
-/// goes away, the bridge goes on calling.
+/// The map file assigns channels to topics; docs/dispatcher.md has an example. The bridge reconnects when the broker or
+/// the dispatcher was gone.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The map file: broker, dispatcher, and a topic for each channel.

@@ -12,21 +12,21 @@ use tickbus_bridge::{AsciiBridge, LineEnd};
 use tickbus_dispatcher::PORT;
 use tickbus_fieldbus::tcp::Address;
 
-/// Carry lines both ways between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
+/// Pass lines of text between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
 ///
-/// The program at the serial line says what a client says; docs/dispatcher.md has that. When the dispatcher or the port
-/// goes away, the bridge goes on calling, and introduces the client again.
+/// The program at the serial line uses the protocol of clients in docs/dispatcher.md. The bridge reconnects when the
+/// dispatcher or the port was gone, and joins the client again.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// The system's name of the serial port.
+    /// The name of the serial port in the system.
     #[arg(required_unless_present = "pty", conflicts_with = "pty")]
     device: Option<String>,
 
-    /// Make a virtual serial port instead, for a driver on this machine: it opens this name.
+    /// Create a virtual serial port of this name instead, for a driver on this machine.
     #[arg(long, value_name = "LINK")]
     pty: Option<PathBuf>,
 
-    /// Where the dispatcher listens.
+    /// The address of the dispatcher.
     #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
 
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, conflicts_with = "pty", default_value_t = ParityBit::None)]
     parity: ParityBit,
 
-    /// How lines to the serial side end; those from there may end in any of these ways.
+    /// The end of lines to the serial side; any of these is accepted from there.
     #[arg(long, value_enum, default_value_t = End::Crlf)]
     line_end: End,
 }

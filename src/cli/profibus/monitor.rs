@@ -24,7 +24,7 @@ const LINKTYPE_USER0: u32 = 147;
 /// were missing, repeated or late, and how long answers took, as this machine saw it.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
-    /// The system's name of the serial port.
+    /// The name of the serial port in the system.
     device: PathBuf,
 
     /// Bits per second.
@@ -43,7 +43,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     pcap: Option<PathBuf>,
 
-    /// Stop after this time; without it, on Ctrl-C.
+    /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
 }

@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     in_place: bool,
 
-    /// Overwrite files that are there.
+    /// Overwrite existing files.
     #[arg(long, conflicts_with = "in_place")]
     force: bool,
 

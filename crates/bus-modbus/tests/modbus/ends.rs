@@ -1,14 +1,13 @@
 //! Modbus buses for tests, and the bytes of telegrams.
 
 use std::io::{Read as _, Write as _};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 use tickbus_base::time::Manual;
 use tickbus_bus_modbus::rtu;
 
-use tickbus_conformance::peers::{Ending, leave, own_address};
+use tickbus_conformance::peers::{leave, lying, own_address};
 use tickbus_conformance::rig::{Bus, Liar, logged};
 
 /// Modbus TCP, or RTU over TCP, at an address used by one test only.
@@ -69,14 +68,7 @@ impl Bus for Tcp {
     /// Half a telegram from a client, or half an answer from a server, and nothing more.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
         logged::expect("nothing is written into the PLC \"modbus device at ");
-        let over = Arc::new(AtomicBool::new(false));
-        let address = self.address;
-        let listener = (self.server == "controller").then(|| {
-            let listener = TcpListener::bind(address).expect("its own address");
-            listener.set_nonblocking(true).expect("an option");
-            listener
-        });
-        let serves = listener.is_some();
+        let serves = self.server == "controller";
         let (half, begun) = match self.framing {
             "rtu" => (
                 rtu_request(1, &[3, 0, 0, 0, 1])[..5].to_vec(),
@@ -87,34 +79,20 @@ impl Bus for Tcp {
                 "left in the middle of a telegram, after 9 bytes of it",
             ),
         };
-        let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            move || {
-                while !over.load(Ordering::Relaxed) {
-                    let met = match &listener {
-                        Some(listener) => listener.accept().map(|met| met.0),
-                        None => TcpStream::connect(address),
-                    };
-                    match (met, serves) {
-                        (Ok(stream), false) => ask_half(stream, &half),
-                        (Ok(stream), true) => answer_with_too_little(stream),
-                        (Err(_), _) => std::thread::yield_now(),
-                    }
-                }
-            }
-        });
-        let words = if serves {
-            "its answer has 3 bytes behind the function code"
-        } else {
-            begun
-        };
         Liar {
-            peer: Box::new(Ending {
-                over,
-                thread: Some(thread),
+            peer: lying(self.address, serves, move |stream| {
+                if serves {
+                    answer_with_too_little(stream);
+                } else {
+                    ask_half(stream, &half);
+                }
             }),
             cause: "protocol",
-            words,
+            words: if serves {
+                "its answer has 3 bytes behind the function code"
+            } else {
+                begun
+            },
         }
     }
 

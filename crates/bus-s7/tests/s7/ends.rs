@@ -3,14 +3,12 @@
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
 use std::time::Duration;
 
 use tickbus_base::time::Manual;
 
-use tickbus_conformance::peers::{leave, own_address};
+use tickbus_conformance::peers::{leave, lying, own_address};
 use tickbus_conformance::rig::{Bus, Liar, logged};
 
 /// A server and a client of ours, at an address used by one test only.
@@ -76,35 +74,9 @@ impl Bus for Pair {
 
     /// A client, or a server, that starts properly and then sends something that is not S7.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        let over = Arc::new(AtomicBool::new(false));
-        let address = self.address;
-        let listener = (self.serves != "device").then(|| {
-            let listener = TcpListener::bind(address).expect("its own address");
-            listener.set_nonblocking(true).expect("an option");
-            listener
-        });
-        let dials = listener.is_some();
-        let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            move || {
-                while !over.load(Ordering::Relaxed) {
-                    let meet = |listener: &TcpListener| listener.accept().map(|met| met.0);
-                    let met = match &listener {
-                        Some(listener) => meet(listener),
-                        None => TcpStream::connect(address),
-                    };
-                    match met {
-                        Ok(stream) => lie(stream, dials),
-                        Err(_) => std::thread::yield_now(),
-                    }
-                }
-            }
-        });
+        let listens = self.serves != "device";
         Liar {
-            peer: Box::new(Ending {
-                over,
-                thread: Some(thread),
-            }),
+            peer: lying(self.address, listens, move |stream| lie(stream, listens)),
             cause: "protocol",
             words: "a message of it begins with 0x11, where S7 has 0x32",
         }
@@ -180,21 +152,6 @@ fn lie(mut stream: TcpStream, serves: bool) {
     // All ones would be a valid speed, if accepted.
     let _ = stream.write_all(&packet(&[0x11; 20]));
     leave(stream);
-}
-
-/// A thread that can be stopped and joined.
-struct Ending {
-    over: Arc<AtomicBool>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Drop for Ending {
-    fn drop(&mut self) {
-        self.over.store(true, Ordering::Relaxed);
-        if let Some(thread) = self.thread.take() {
-            thread.join().expect("the peer did not panic");
-        }
-    }
 }
 
 /// A connect request to rack 0, slot 1.

@@ -1,12 +1,11 @@
 //! Foreign ends of a socket bus: TCP from the standard library, hand-written records.
 
 use std::io::Write;
-use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use tickbus_base::time::Manual;
 
-use tickbus_conformance::peers::{Alone, Ending, leave, own_address};
+use tickbus_conformance::peers::{Alone, leave, lying, own_address};
 use tickbus_conformance::rig::{Bus, Liar, config};
 use tickbus_driver_cfg::{Kind, Kinds};
 
@@ -53,35 +52,8 @@ impl Bus for Tcp {
 
     /// A client, or a server, that sends half a record and leaves.
     fn liar(&self, _clock: &Arc<Manual>) -> Liar {
-        let over = Arc::new(AtomicBool::new(false));
-        let address = self.address;
-        let listens = self.device.contains("connect");
-        let listener = listens.then(|| {
-            let listener = TcpListener::bind(address).expect("its own address");
-            listener.set_nonblocking(true).expect("an option");
-            listener
-        });
-        let thread = std::thread::spawn({
-            let over = Arc::clone(&over);
-            move || {
-                while !over.load(Ordering::Relaxed) {
-                    let meet = |listener: &TcpListener| listener.accept().map(|met| met.0);
-                    let met = match &listener {
-                        Some(listener) => meet(listener),
-                        None => TcpStream::connect(address),
-                    };
-                    match met {
-                        Ok(stream) => lie(stream),
-                        Err(_) => std::thread::yield_now(),
-                    }
-                }
-            }
-        });
         Liar {
-            peer: Box::new(Ending {
-                over,
-                thread: Some(thread),
-            }),
+            peer: lying(self.address, self.device.contains("connect"), lie),
             cause: "protocol",
             words: "left in the middle of a record: 3 of 6 bytes had come",
         }

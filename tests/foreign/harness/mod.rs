@@ -26,7 +26,7 @@ pub struct Absent(pub String);
 pub type Test = fn() -> Result<(), Absent>;
 
 /// The number of tests that run at once: they mostly wait for their peers.
-const AT_ONCE: usize = 8;
+const AT_ONCE: usize = 5;
 
 /// Runs the tests selected on the command line. Each group has a name, and its tests theirs.
 pub fn main(groups: &[(&str, &[(&str, Test)])]) -> ExitCode {

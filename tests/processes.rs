@@ -13,7 +13,7 @@ use tickbus::driver::{Code, Driver};
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Monotonic, Nanos};
-use tickbus_conformance::rig::await_that;
+use tickbus_conformance::rig::{await_that, patiently};
 use tickbus_test_log as logged;
 
 const SIGNALS: &str = r#"
@@ -151,11 +151,16 @@ fn a_killed_plc_is_stale_and_its_successor_is_served() {
             "1ms",
         ]);
         let value = Slot::from_real(f64::from(kill));
-        await_that("the PLC mirrors the value", || {
+        let mirrored = patiently(|| {
             slots[3] = value;
             driver.exchange(Nanos::ZERO, &mut slots);
-            slots[2] == value
+            (slots[2] == value).then_some(())
         });
+        assert!(
+            mirrored.is_some(),
+            "PLC {kill} mirrors the value:\n{}",
+            driver.statistics()
+        );
         plc.signal("KILL");
         await_that("the data are stale", || {
             driver.exchange(Nanos::ZERO, &mut slots).code == Code::Stale

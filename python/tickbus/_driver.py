@@ -218,7 +218,7 @@ def report(
 
 _open: weakref.WeakSet[Driver] = weakref.WeakSet()
 
-# The signals that end a process which does not handle them; there are none on Windows.
+# The signals that end a process by default; Windows has none.
 _TERMINATIONS = (signal.SIGTERM, signal.SIGHUP) if os.name == "posix" else ()
 
 

@@ -56,7 +56,8 @@ pub(super) struct Arguments {
     /// The name of the laboratory; dispatchers of other laboratories are ignored.
     #[arg(long, value_name = "NAME", requires = "zenoh", default_value = "lab")]
     lab: String,
-    /// Serve the patch bay, a web page that shows and patches the laboratory, and print its address.
+    /// Serve the patch bay, a web page that shows and patches the laboratory, and print its address; without HOST:PORT,
+    /// at 127.0.0.1:20080.
     #[cfg(feature = "page")]
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "127.0.0.1:20080", value_parser = address)]
     page: Option<Address>,

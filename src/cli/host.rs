@@ -31,7 +31,8 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "FILE")]
     faults: Option<std::path::PathBuf>,
 
-    /// Serve the live page, and print its address [default: that of the page table in FILE, or 127.0.0.1:20080].
+    /// Serve the live page, and print its address; without HOST:PORT, at the address in the page table of FILE, or at
+    /// 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 

@@ -20,8 +20,8 @@ use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp
 
 /// Serve virtual time: clients advance in lock-step, and every run gives the same result.
 ///
-/// It reads commands from stdin, one per line: pause, step (or step 10), run, stop. docs/sdsp.md describes the rules,
-/// and the protocol for your own clients.
+/// Type a command per line while it runs: pause, step (or step 10), run, stop. docs/sdsp.md describes the rules, and the
+/// protocol for your own clients.
 #[derive(Debug, clap::Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(super) struct Arguments {
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     paused: bool,
 
-    /// Serve the live page of the run, and print its address [default: 127.0.0.1:20080].
+    /// Serve the live page of the run, and print its address; without HOST:PORT, at 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 }

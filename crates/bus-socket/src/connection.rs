@@ -75,6 +75,9 @@ impl Transfer<'_> {
             all.any(|station| port.is_station_up(station, now))
         };
         self.connection.is_cut = session.is_within_record() && !is_up();
+        if self.connection.is_cut {
+            session.held_back(now);
+        }
         if let Some(space) = session.due(now) {
             let is_up = is_up();
             let frames = is_up.then(|| port.look(stations.clone(), now)).flatten();

@@ -272,6 +272,14 @@ impl Session {
         whole
     }
 
+    /// A fault of the line holds back the rest of the record at `now`: the time that the peer has to read it begins
+    /// anew.
+    pub fn held_back(&mut self, now: Nanos) {
+        if let Some(since) = &mut self.outbox.waiting_since {
+            *since = now;
+        }
+    }
+
     /// Checks that the connection may continue at `now`.
     ///
     /// # Errors

@@ -447,7 +447,8 @@ mod tests {
     use super::*;
     use crate::frames::directions;
     use std::sync::Arc;
-    use tickbus_base::time::{Clock, Manual};
+    use std::time::Duration;
+    use tickbus_base::time::{Clock, Manual, Stop};
     use tickbus_driver_cfg::Config;
     use tickbus_fieldbus::loopback::End;
     use tickbus_fieldbus::{LinkStatus, Port, Role};
@@ -506,6 +507,55 @@ mod tests {
             while !self.clock.is_settled(1) {
                 std::thread::yield_now();
             }
+        }
+    }
+
+    /// A clock that is 1 ms later at each look.
+    #[derive(Debug)]
+    struct Looked(Arc<Manual>);
+
+    impl Clock for Looked {
+        fn now(&self) -> Nanos {
+            self.0.advance(Nanos::from_millis(1));
+            self.0.now()
+        }
+
+        fn wait_until(&self, deadline: Nanos, stop: &Stop) {
+            self.0.wait_until(deadline, stop);
+        }
+
+        fn wait_with(&self, deadline: Nanos, stop: &Stop, sleep: &mut dyn FnMut(Option<Duration>)) {
+            self.0.wait_with(deadline, stop, sleep);
+        }
+    }
+
+    #[test]
+    fn the_time_of_a_whole_tick_is_measured_also_in_halves() {
+        for halves in [false, true] {
+            let text = format!(
+                "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"timed {halves}\"\n\
+                 [[signal]]\nname = \"a\"\naddress = \"%IB0\"\n"
+            );
+            let config = Config::parse("driver.cfg", &text, &crate::KINDS)
+                .unwrap_or_else(|why| panic!("{why}"));
+            let clock = Arc::new(Looked(Manual::new()));
+            let mut driver = Driver::open(config, clock).expect("opens");
+            let mut slots = driver.initial_slots();
+            for _ in 0..1_000 {
+                if halves {
+                    driver.receive(None, &mut slots);
+                    driver.send(&mut slots);
+                } else {
+                    driver.exchange(None, &mut slots);
+                }
+            }
+            let shortest = driver.statistics().lines().find_map(|line| {
+                let text = line.strip_prefix("exchange.min_us=")?;
+                text.parse::<f64>().ok()
+            });
+            // The bus thread looks at the clock, too, but not during each tick.
+            let expected = if halves { 2_000.0 } else { 1_000.0 };
+            assert_eq!(shortest, Some(expected), "in halves: {halves}");
         }
     }
 

@@ -47,6 +47,13 @@ impl Renewal {
         }
     }
 
+    /// Requests of the client to any station were perhaps lost at `now`; `renewals` are those of its stations.
+    pub fn lost_all(renewals: &mut [Self], now: Nanos, max_age: Nanos) {
+        for renewal in renewals {
+            renewal.lost(now, max_age);
+        }
+    }
+
     /// The client sends a request at `now` that writes nothing. Returns true if this renews values that become stale
     /// after `max_age`.
     pub fn counts(&mut self, now: Nanos, max_age: Nanos) -> bool {

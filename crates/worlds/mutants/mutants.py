@@ -37,6 +37,8 @@ pub fn mutant(number: u32) -> bool {
 WHOLE = {"it": ["loopback::", "faults::", "record::", "ending::"], "log": [], "profibus": []}
 # Crates whose lines are changed at random.
 CRATES = ["image", "fieldbus", "driver", "bus-socket", "bus-modbus", "bus-s7", "bus-profibus"]
+# Crates whose tests run if neither the tests above nor worlds have found a change.
+FURTHER = ["axis", "binding", "bus-dispatcher", "bus-hilscher", "bus-interbus", "bus-plugin", "plc", "record"]
 
 
 def write_tree(texts):
@@ -176,11 +178,16 @@ def by_chance(count, seconds):
     texts = changed(files, changes)
     build(texts, ["-p", "tickbus-worlds"])
     whole = [word for name in WHOLE for word in ("--test", name)]
-    tests = test_programs(["--lib", "--tests", *packages]) + test_programs(["-p", "tickbus", *whole])
+    roots = [(*program, WHOLE[program[1]]) for program in test_programs(["-p", "tickbus", *whole])]
+    tests = [(*program, []) for program in test_programs(["--lib", "--tests", *packages])] + roots
+    further = [word for crate in FURTHER for word in ("-p", f"tickbus-{crate}")]
+    rest = [(*program, []) for program in test_programs(["--lib", "--tests", *further])]
+    rest += [(folder, name, binary, []) for folder, name, binary, parts in roots if parts]
     # A program that fails here without any change judges none.
-    broken = [test for test in tests if by_tests([test], "", 0)]
-    tests = [test for test in tests if test not in broken]
-    print(f"mutants: tests={len(tests)} left_out={','.join(name for _, name, _ in broken) or '-'}", flush=True)
+    broken = [test for test in tests + rest if by_tests([test], "", 0)]
+    tests, rest = ([test for test in some if test not in broken] for some in (tests, rest))
+    names = [f"{folder.name}/{name}" for folder, name, _, _ in broken]
+    print(f"mutants: tests={len(tests) + len(rest)} left_out={','.join(names) or '-'}", flush=True)
     killed = 0
     for change in changes:
         crate = change["file"].split("/")[1]
@@ -189,6 +196,8 @@ def by_chance(count, seconds):
         took = time.monotonic() - begun
         if not verdict:
             took, verdict, seed = by_worlds(change["number"], seconds)
+        if not verdict:
+            verdict, seed = by_tests(rest, crate, change["number"]), ""
         killed += bool(verdict)
         place = f"{change['file'].removeprefix('crates/')}:{change['line'] + 1}"
         print(f"{place}: {change['what'][:60]}\n    {took:6.1f} s  {verdict or 'LIVES'} {seed}", flush=True)
@@ -240,8 +249,7 @@ def test_programs(arguments):
 
 def by_tests(tests, crate, number):
     """The test program that finds a change, its own crate's first."""
-    for folder, name, binary in sorted(tests, key=lambda test: test[0].name != crate):
-        parts = [] if folder.parent.name == "crates" else WHOLE[name]
+    for folder, name, binary, parts in sorted(tests, key=lambda test: test[0].name != crate):
         try:
             done = subprocess.run([binary, "-q", *parts], cwd=folder, env=chosen(number), capture_output=True, timeout=180, check=False)
         except subprocess.TimeoutExpired:

@@ -13,7 +13,7 @@ use crate::clock::SimulatedClock;
 use crate::config::{NAMES, PORT};
 use crate::delivery::Delivery;
 use crate::judge::{Known, Seen, Writer, held, promise, slack};
-use crate::network::Network;
+use crate::network::{self, Network};
 use crate::plan::{BETWEEN, FAIL_SAFE, Misfortune, Plan};
 use crate::scheduler;
 use crate::stamp::Stamp;
@@ -212,8 +212,8 @@ pub(crate) fn judge_silence(plan: &Plan, known: Known, seen: &Seen<'_>) -> Resul
 
 fn serve(settings: Settings, patch: Patch, stop: &Stop) {
     let clock = SimulatedClock;
-    // Nobody else listens there; only a process that was killed before it listened gets an error.
-    let Ok(listener) = Listener::bind_in(&Address::local(PORT), clock.simulation()) else {
+    let listener = Listener::bind_in(&Address::local(PORT), clock.simulation());
+    let Some(listener) = network::unless_killed(listener) else {
         return;
     };
     let mut dispatcher = Dispatcher::new(settings, patch);

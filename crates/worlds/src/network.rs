@@ -10,6 +10,19 @@ use crate::delivery::Delivery;
 use crate::random::Random;
 use crate::wire::{self, Wire};
 
+/// What a process listens with; `None` if the process was killed before it listened.
+///
+/// # Panics
+///
+/// If it cannot listen for another reason, such as an address in use: no course of a world permits that.
+pub(crate) fn unless_killed<L>(bound: io::Result<L>) -> Option<L> {
+    match bound {
+        Ok(listener) => Some(listener),
+        Err(error) if error.kind() == ErrorKind::AddrNotAvailable => None,
+        Err(error) => panic!("nobody else listens there: {error}"),
+    }
+}
+
 /// The behaviour of a world's network.
 #[derive(Clone, Copy, Debug)]
 pub struct Conditions {

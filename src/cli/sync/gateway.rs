@@ -38,7 +38,8 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "NUMBER", default_value = "1")]
     multiple: NonZeroU32,
 
-    /// Serve the live page, and print its address [default: that of the page table in FILE, or 127.0.0.1:20080].
+    /// Serve the live page, and print its address; without HOST:PORT, at the address in the page table of FILE, or at
+    /// 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
 

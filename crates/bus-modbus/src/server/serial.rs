@@ -82,7 +82,7 @@ impl Server<'_> {
                 return;
             };
             if !port.is_up(now) {
-                source.unheard(now, port);
+                Renewal::lost_all(&mut source.renewals, now, port.max_age());
                 return;
             }
             // Requests never have this bit: it is another unit's answer, or the echo of an answer.

@@ -138,6 +138,6 @@ impl Service for TcpService<'_> {
     }
 
     fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
-        client.source.unheard(now, port);
+        Renewal::lost_all(&mut client.source.renewals, now, port.max_age());
     }
 }

@@ -46,15 +46,6 @@ pub(super) struct Source {
     pub(super) writer: Option<Writer>,
 }
 
-impl Source {
-    /// Requests to any station were perhaps lost at `now`.
-    pub(super) fn unheard(&mut self, now: Nanos, port: &Port) {
-        for renewal in &mut self.renewals {
-            renewal.lost(now, port.max_age());
-        }
-    }
-}
-
 /// The values of a station's frame in an answer: they count as sent once the client has the answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Carried {

@@ -195,9 +195,7 @@ impl tcp::Service for Service {
     }
 
     fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
-        for renewal in &mut client.renewals {
-            renewal.lost(now, port.max_age());
-        }
+        Renewal::lost_all(&mut client.renewals, now, port.max_age());
     }
 }
 

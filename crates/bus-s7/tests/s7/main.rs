@@ -143,6 +143,31 @@ fn what_is_read_is_the_latest_and_a_pulse_elsewhere_is_not_taken_as_seen() {
 }
 
 #[test]
+fn a_pulse_behind_the_first_byte_is_over_once_its_own_bit_was_read() {
+    let signals = "[[signal]]\nname = \"far\"\naddress = \"%IX3.2\"\nlatch = \"rising\"\n";
+    let text = format!(
+        "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n{signals}"
+    );
+    let mut device = Alone::open(&text, &KINDS);
+    let mut client = Client::new(device.address());
+    let bit = |bit: u8| {
+        job(
+            &[4, 1, 0x12, 0x0A, 0x10, 1, 0, 1, 0, 0, INPUTS, 0, 0, bit],
+            &[],
+        )
+    };
+    for level in [1.0, 0.0] {
+        device.end.set("far", level);
+        device.end.tick();
+    }
+    for other in [2, 25, 27] {
+        client.ask(&bit(other));
+    }
+    assert_eq!(client.ask(&bit(26)).last(), Some(&1));
+    await_that("it is over", || client.ask(&bit(26)).last() == Some(&0));
+}
+
+#[test]
 fn pulses_are_seen_by_a_client_that_asks_for_several_pieces_at_once() {
     let (mut device, at) = server("");
     let mut client = Client::new(at);

@@ -229,6 +229,16 @@ fn the_rest_of_one_read_begins_the_next_record_now() {
 }
 
 #[test]
+fn a_record_held_back_by_the_line_is_no_fault_of_the_peer() {
+    let mut session = session(Sending::Cyclic);
+    session.hear(0, &[0; 4]);
+    session.speak(10, 1, 1);
+    session.held_back(Nanos(200));
+    assert_eq!(session.check(Nanos(500)), Ok(()));
+    assert!(session.check(Nanos(501)).is_err());
+}
+
+#[test]
 fn a_peer_that_never_reads_is_a_fault_after_max_age() {
     let mut session = session(Sending::Cyclic);
     session.hear(0, &[0; 4]);

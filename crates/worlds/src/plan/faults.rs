@@ -25,8 +25,8 @@ impl Plan {
         let is_suspended = |event: &Event| matches!(event.what, Misfortune::Suspend(..));
         let stands_still = self.events.iter().any(is_suspended);
         let held = faults.map(|fault| match fault.effect {
-            // What is repeated is up to a second old, if the client of a server has not asked in between, or if the process
-            // was suspended.
+            // A repeated frame is up to a second old if the server's client has not asked in between, or if the process was
+            // suspended.
             Effect::Duplicate(direction)
                 if stands_still
                     || self.bus.asks() && direction != "in" && self.serves(fault.end) =>

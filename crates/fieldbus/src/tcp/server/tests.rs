@@ -5,9 +5,11 @@ use std::thread::{JoinHandle, yield_now};
 use std::time::Duration;
 
 use super::*;
+use crate::faults::{Begin, Effect, Fault, FaultBoard, Faults, Lasts, LineEffect, Slots, TickTime};
 use crate::{LinkState, LinkStatus, Role};
 use tickbus_base::time::{Clock, Manual, Monotonic};
 use tickbus_image::image;
+use tickbus_image::signal::{Area, SignalTable};
 use tickbus_test_log as logged;
 
 /// A protocol whose telegrams are a length byte and that many bytes, which are echoed. A length of 255 violates the
@@ -71,6 +73,7 @@ struct Running {
     stop: Stop,
     status: LinkStatus,
     address: SocketAddr,
+    faults: Faults,
     thread: Option<JoinHandle<Result<(), BusError>>>,
     /// Checks the log once the thread has ended.
     _logged: logged::Watch,
@@ -102,13 +105,15 @@ impl Running {
         let stop = Stop::new();
         let status = LinkStatus::new("test", MAX_AGE);
         let (_, end) = image(Vec::new());
+        let board = Arc::<FaultBoard>::default();
         let mut port = Port::new(
             end,
             Arc::clone(&clock) as _,
             Role::Device,
             None,
             status.clone(),
-        );
+        )
+        .with_faults(Arc::clone(&board));
         let thread = std::thread::spawn({
             let stop = stop.clone();
             move || serve(&Address::local(0), &mut Echo, &mut port, &stop)
@@ -118,6 +123,7 @@ impl Running {
             stop,
             status,
             address: "127.0.0.1:0".parse().expect("an address"),
+            faults: Faults::new(board),
             thread: Some(thread),
             _logged: logged,
         };
@@ -151,6 +157,39 @@ impl Running {
     fn pass(&self, span: Nanos) {
         self.until(|server| server.clock.is_settled(1));
         self.clock.advance(span);
+    }
+
+    /// Takes the line down. Returns the fault.
+    fn take_down(&mut self) -> u32 {
+        let fault = Fault {
+            name: "cable".to_owned(),
+            effect: Effect::Line(LineEffect::LinkDown),
+            begin: Begin::AtOnce,
+            lasts: Lasts::UntilEnded,
+            times: 1,
+            seed: 1,
+        };
+        let slots = Slots {
+            table: &SignalTable::default(),
+            writes: Area::Input,
+            edges: &[],
+        };
+        let id = self.faults.add(&fault, slots).expect("there is room");
+        self.begin_tick();
+        id
+    }
+
+    fn bring_up(&mut self, fault: u32) {
+        assert!(self.faults.end(fault));
+        self.begin_tick();
+    }
+
+    fn begin_tick(&mut self) {
+        let moment = TickTime {
+            time: Nanos::ZERO,
+            tick: 1,
+        };
+        self.faults.begin_tick(moment, &mut []);
     }
 
     fn client(&self) -> TcpStream {
@@ -249,6 +288,22 @@ fn who_breaks_the_protocol_is_dropped_and_nobody_else_is() {
     ask(&mut good, &[1, 2]);
     assert_eq!(server.fact("clients.dropped").as_deref(), Some("1"));
     assert_eq!(server.status.state(), LinkState::Running);
+}
+
+#[test]
+fn what_a_client_sends_while_the_line_is_down_is_unheard_and_half_a_telegram_is_forgotten() {
+    let mut server = Running::new();
+    let mut client = server.client();
+    ask(&mut client, &[1, 1]);
+    client.write_all(&[5, 1]).expect("the server reads");
+    server.pass(LIMITS.patience - Nanos(1));
+    let down = server.take_down();
+    client.write_all(&[2, 3]).expect("the server reads");
+    server.until(|server| server.fact("test.unheard").as_deref() == Some("1"));
+    server.bring_up(down);
+    server.pass(LIMITS.patience);
+    ask(&mut client, &[1, 2]);
+    assert_eq!(server.fact("test.unheard").as_deref(), Some("1"));
 }
 
 #[test]

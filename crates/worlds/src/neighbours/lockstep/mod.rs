@@ -20,6 +20,7 @@ use tickbus_virtual_time::{Controls, Ended, Hosting, Logic, Outcome, Settings, S
 use crate::broken::{Broken, broken};
 use crate::clock::SimulatedClock;
 use crate::config::PORT;
+use crate::network;
 use crate::random::scramble;
 use crate::scheduler;
 use crate::seed::Seed;
@@ -212,8 +213,8 @@ fn befall(shared: &Shared, what: What) {
 
 fn serve(shared: &Shared) {
     let clock = SimulatedClock;
-    // Nobody else listens there; only a process that was killed before it listened gets an error.
-    let Ok(listener) = Listener::bind_in(&Address::local(PORT), clock.simulation()) else {
+    let listener = Listener::bind_in(&Address::local(PORT), clock.simulation());
+    let Some(listener) = network::unless_killed(listener) else {
         return;
     };
     let settings = Settings {

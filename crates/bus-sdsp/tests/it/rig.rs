@@ -119,5 +119,4 @@ fn two_runs_of_the_rig_are_equal_to_the_last_bit_however_busy_the_machine_is() {
         assert!(one.len() > 50_000, "{end}: {} bytes", one.len());
         assert!(one == other, "{end}: the recordings differ");
     }
-    println!("20 s of virtual time took {}", took.rounded());
 }

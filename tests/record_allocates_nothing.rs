@@ -2,38 +2,15 @@
 //!
 //! The count covers all threads of the process, so this test is alone in its file.
 #![allow(missing_docs, reason = "a test")]
-#![allow(unsafe_code, reason = "a global allocator that counts")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::time::Manual;
+use tickbus_conformance::resources::allocations;
 use tickbus_test_log as logged;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-struct Counting;
-
-// SAFETY: all calls are passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(memory, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn a_record_and_its_reply() {
@@ -65,13 +42,9 @@ fn a_record_and_its_reply() {
         }
     };
     exchange(100);
-    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    let before = allocations();
     exchange(1_000);
-    assert_eq!(ALLOCATIONS.load(Ordering::SeqCst) - before, 0);
+    assert_eq!(allocations() - before, 0);
     driver.close();
-    assert_ne!(
-        ALLOCATIONS.load(Ordering::SeqCst),
-        before,
-        "the counter counts"
-    );
+    assert_ne!(allocations(), before, "the counter counts");
 }

@@ -1,37 +1,12 @@
 //! The tick allocates nothing, as counted by the allocator of this program.
-#![allow(unsafe_code, reason = "a global allocator that counts")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
 use std::sync::Arc;
 
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
-
-thread_local! {
-    static ALLOCATIONS: Cell<u64> = const { Cell::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: all calls are passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller's promises are those of `System`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+use tickbus_conformance::resources::allocations_of_thread;
 
 /// Every type in both directions, latched bits that change, values that saturate, a NaN.
 fn config(fieldbus: &str, faults: &str) -> Config {
@@ -91,7 +66,7 @@ fn allocations(fieldbus: &str, faults: &str) -> u64 {
     let mut before = 0;
     for tick in 0..11_000_i32 {
         if tick == 1_000 {
-            before = ALLOCATIONS.get();
+            before = allocations_of_thread();
         }
         for (index, slot) in slots.iter_mut().enumerate().take(52) {
             let value = if (tick + i32::try_from(index).expect("small")) % 97 == 0 {
@@ -109,7 +84,7 @@ fn allocations(fieldbus: &str, faults: &str) -> u64 {
             driver.send(&mut slots);
         }
     }
-    ALLOCATIONS.get() - before
+    allocations_of_thread() - before
 }
 
 const FREE: &str = "kind = \"loopback\"\nprogram = \"mirror\"\nscan = \"1ms\"";
@@ -142,10 +117,10 @@ fn a_driver_that_is_watched_and_forced() {
                 }
             }
             let time = Nanos::from_millis(tick.try_into().expect("small"));
-            let before = ALLOCATIONS.get();
+            let before = allocations_of_thread();
             driver.exchange(time, &mut slots);
             if tick >= 100 {
-                count += ALLOCATIONS.get() - before;
+                count += allocations_of_thread() - before;
             }
             assert!(watch.update(), "a copy came with its tick");
         }
@@ -213,7 +188,7 @@ fn a_recording() {
 
 #[test]
 fn the_counter_counts() {
-    let before = ALLOCATIONS.get();
+    let before = allocations_of_thread();
     drop(std::hint::black_box(Box::new(1)));
-    assert_eq!(ALLOCATIONS.get() - before, 1);
+    assert_eq!(allocations_of_thread() - before, 1);
 }

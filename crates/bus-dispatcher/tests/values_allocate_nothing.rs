@@ -2,40 +2,17 @@
 //!
 //! The count covers all threads of the process, so this test is alone in its file.
 #![allow(missing_docs, reason = "a test")]
-#![allow(unsafe_code, reason = "a global allocator that counts")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::io::{BufRead as _, BufReader, Write as _};
 use std::net::TcpListener;
-use std::sync::atomic::{AtomicU64, Ordering};
 
 use tickbus_base::time::Monotonic;
+use tickbus_conformance::resources::allocations;
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_image::signal::Slot;
 
 static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_dispatcher::Options>()]);
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-struct Counting;
-
-// SAFETY: all calls are passed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
-        // SAFETY: the caller's promise.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, memory: *mut u8, layout: Layout) {
-        // SAFETY: the caller's promise.
-        unsafe { System.dealloc(memory, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn values_go_both_ways() {
@@ -88,7 +65,7 @@ fn values_go_both_ways() {
         }
     };
     exchange(50);
-    let before = ALLOCATIONS.load(Ordering::SeqCst);
+    let before = allocations();
     exchange(200);
-    assert_eq!(ALLOCATIONS.load(Ordering::SeqCst) - before, 0);
+    assert_eq!(allocations() - before, 0);
 }

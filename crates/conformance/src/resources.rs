@@ -1,13 +1,31 @@
-//! Counts threads, descriptors and memory of the process.
+//! Counts threads, descriptors, memory and allocations of the process.
 #![allow(unsafe_code, reason = "a global allocator that counts")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::cell::Cell;
 use std::process::Command;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 /// The number of bytes allocated at this moment.
 static LIVE: AtomicUsize = AtomicUsize::new(0);
+
+/// The number of allocations so far, in all threads.
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+thread_local! {
+    static OF_THREAD: Cell<u64> = const { Cell::new(0) };
+}
+
+/// The number of allocations so far, in all threads of the process.
+pub fn allocations() -> u64 {
+    ALLOCATIONS.load(Ordering::SeqCst)
+}
+
+/// The number of allocations so far, in this thread.
+pub fn allocations_of_thread() -> u64 {
+    OF_THREAD.get()
+}
 
 struct Counting;
 
@@ -18,6 +36,8 @@ static ALLOCATOR: Counting = Counting;
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LIVE.fetch_add(layout.size(), Ordering::Relaxed);
+        ALLOCATIONS.fetch_add(1, Ordering::SeqCst);
+        OF_THREAD.set(OF_THREAD.get() + 1);
         // SAFETY: the caller's promise.
         unsafe { System.alloc(layout) }
     }

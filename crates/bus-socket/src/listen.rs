@@ -6,10 +6,9 @@ use std::net::SocketAddr;
 use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{
-    self, Address, Call, close_gracefully, is_of_the_client, no_wait, not_accepted, prepare,
-};
+use tickbus_fieldbus::tcp::{self, Call, no_wait, not_accepted};
 use tickbus_fieldbus::{BusError, Port};
+use tickbus_net::{Address, close_gracefully, is_of_the_client, prepare};
 
 use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;

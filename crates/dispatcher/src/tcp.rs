@@ -8,7 +8,7 @@ use std::thread;
 use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet, Ready, peer_silence};
 use tickbus_base::time::{Clock, Nanos, Simulation, Stop};
-use tickbus_fieldbus::tcp::{
+use tickbus_net::{
     Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare, watch_peer,
 };
 

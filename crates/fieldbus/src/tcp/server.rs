@@ -8,10 +8,11 @@ use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::{
-    Address, close_by_reset, close_gracefully, is_for_later, is_of_the_client, listen, no_wait,
-    not_accepted, prepare,
+use tickbus_net::{
+    Address, close_by_reset, close_gracefully, is_for_later, is_of_the_client, prepare,
 };
+
+use super::{listen, no_wait, not_accepted};
 
 /// The key of the listener in the poll set; a client's key is its place.
 const LISTENER: usize = usize::MAX - 1;

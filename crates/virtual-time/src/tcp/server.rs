@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use tickbus_base::net::TcpListener;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Simulation};
-use tickbus_fieldbus::tcp::{Address, bind, is_of_the_client};
+use tickbus_net::{Address, bind, is_of_the_client};
 
 use super::connection::{Arrived, BLOCKED, Connection};
 use crate::hosting::{Hosting, hear};

@@ -8,6 +8,7 @@
 //! | [`prepare`], [`close_gracefully`], … | what every connection needs from the system |
 //! | [`begins_like_browser`] | distinguishing a web browser from a peer |
 //! | [`serial`] | serial ports |
+//! | [`Message`], [`Inbox`] | the messages of helper processes, over any stream |
 //!
 //! The sockets themselves, of the system or of a simulation, are those of [`tickbus_base::net`].
 
@@ -17,6 +18,7 @@ mod connect;
 mod dialler;
 mod error;
 mod listen;
+mod message;
 mod resolve;
 pub mod serial;
 mod stream;
@@ -27,4 +29,5 @@ pub use connect::{connect, reach, reach_in};
 pub use dialler::Dialler;
 pub use error::Error;
 pub use listen::{bind, is_of_the_client, listen};
+pub use message::{Inbox, Message, WireError};
 pub use stream::{Stream, close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};

@@ -9,8 +9,8 @@ use tickbus_base::time::{Clock, Simulation, Stop};
 use crate::resolve::resolve;
 use crate::{Address, Error};
 
-/// Listens on `address`, without blocking, on the network of the clock's simulation if there is one; returns the listener
-/// and its bound address, or `None` if `stop` came first.
+/// Listens on `address`, without blocking, on the network of the clock's simulation if there is one. Returns the
+/// listener and its bound address, or `None` if `stop` came first.
 ///
 /// # Errors
 ///
@@ -42,7 +42,8 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
-/// As [`listen`], but the look-up of the host blocks, on the network of `simulation` if there is one. Returns the listener and its bound address. Port 0 lets the system choose a port.
+/// As [`listen`], but on the network of `simulation` if there is one, and a look-up of the host blocks. Port 0 lets the
+/// system choose a port.
 ///
 /// # Errors
 ///
@@ -55,15 +56,4 @@ pub fn bind(
     let listener = TcpListener::bind(&addresses, simulation)?;
     let bound = listener.local_addr()?;
     Ok((listener, bound))
-}
-
-/// Returns true if accepting failed for a reason that concerns only this client.
-pub fn is_of_the_client(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        ErrorKind::WouldBlock
-            | ErrorKind::Interrupted
-            | ErrorKind::ConnectionAborted
-            | ErrorKind::ConnectionReset
-    )
 }

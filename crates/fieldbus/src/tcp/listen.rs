@@ -1,11 +1,10 @@
 //! Listening, as the state of the line shows it.
 
-use std::io;
 use std::net::SocketAddr;
 
 use tickbus_base::net::TcpListener;
 use tickbus_base::time::Stop;
-use tickbus_net::Address;
+use tickbus_net::{Address, Error};
 
 use crate::{BusError, Port};
 
@@ -31,13 +30,7 @@ pub fn listen(
 }
 
 /// Counts and logs a client for which the system had no socket.
-pub fn not_accepted(error: &io::Error, port: &Port) {
+pub fn not_accepted(error: &Error, port: &Port) {
     port.count("clients.not_accepted");
-    port.log(
-        log::Level::Warn,
-        "not accepted",
-        format_args!(
-            "a client could not be accepted ({error}); close other programs or raise the limit of open files"
-        ),
-    );
+    port.log(log::Level::Warn, "not accepted", format_args!("{error}"));
 }

@@ -18,8 +18,8 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Clock as _, Monotonic, Nanos, Pace, Stop, TimeHistogram};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_net::Address;
 use tickbus_web::{Limits, Room, Serving};
 
 /// The time between two ticks.

@@ -11,6 +11,7 @@
 //! | [`os`] | the work of the operating system: waiting for sockets, and time |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
+//! | [`net`] | addresses, dialling and listening, serial lines, the messages of helper processes |
 //! | [`signal`] | IEC addresses and types, scaling, byte order; the codec plan made from them |
 //! | [`axis`] | axes: their command and feedback structures, motion profiles, the meaning of a command |
 //! | [`faults`] | injected faults: wrong values, and trouble on the line |
@@ -63,6 +64,7 @@ pub use tickbus_image as image;
 pub use tickbus_image::signal;
 pub use tickbus_import as import;
 pub use tickbus_kinds::KINDS;
+pub use tickbus_net as net;
 pub use tickbus_plc as plc;
 pub use tickbus_prepare as prepare;
 pub use tickbus_programs as programs;

@@ -4,7 +4,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use tickbus_bus_plugin::{Answer, Inbox, Message, WireError};
+use tickbus_bus_plugin::Answer;
+use tickbus_net::{Inbox, Message, WireError};
 
 fuzz_target!(|data: (u8, &[u8])| {
     let (piece, bytes) = data;

@@ -12,7 +12,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PORT, PatchFile, Post, Settings};
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// Run a virtual laboratory: controllers and machines connect by a text protocol, and their channels are patched.
 ///

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use super::Outcome;
 use tickbus_base::Mistake;
 use tickbus_base::time::Stop;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// Parses an address to listen on.
 pub(super) fn address(text: &str) -> Result<Address, String> {

@@ -12,8 +12,8 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::client::{Client, Profile};
 use tickbus_dispatcher::{Counts, PORT, Role};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_function_blocks::{Controller, Program, Terminals};
+use tickbus_net::Address;
 
 /// The time without news after which the client checks that the dispatcher is alive.
 const KEEP_ALIVE: Nanos = Nanos::from_secs(5);

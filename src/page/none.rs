@@ -2,7 +2,7 @@
 
 use tickbus_driver::Watch;
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_virtual_time::Controls;
 
 use super::PageError;

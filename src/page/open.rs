@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tickbus_base::time::Monotonic;
 use tickbus_driver::Watch;
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::tcp::Address;
 use tickbus_live_page::picture::{self, Picture};
 use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_net::Address;
 use tickbus_virtual_time::Controls;
 use tickbus_web::{Limits, Room, Serving};
 

@@ -37,6 +37,7 @@ const CORE: &[&str] = &[
     "driver-cfg",
     "fieldbus",
     "image",
+    "net",
     "plc",
     "record",
     "test-log",

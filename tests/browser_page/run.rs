@@ -35,7 +35,7 @@ impl Run {
         let mut lines = BufReader::new(child.stdout.take().expect("it is piped")).lines();
         let url = find(&mut lines, "sync: page at ");
         let address = find(&mut lines, "sync: listening on ");
-        let address: tickbus::fieldbus::tcp::Address = address.parse().expect("an address");
+        let address: tickbus::net::Address = address.parse().expect("an address");
         // Nobody reads later output; it must not block the program.
         thread::spawn(move || lines.count());
         for mut client in [Client::plc(), Client::robot()] {

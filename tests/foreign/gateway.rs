@@ -9,8 +9,8 @@ use std::thread;
 
 use crate::harness::{self, Absent, Test};
 use tickbus::driver_cfg::Config;
-use tickbus::fieldbus::tcp::Address;
 use tickbus::gateway::{Gateway, GatewayOptions};
+use tickbus::net::Address;
 use tickbus::signal::DataType;
 use tickbus::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus::virtual_time::{

@@ -76,7 +76,7 @@ impl Sync {
     }
 
     /// The address on which it listens.
-    fn address(&mut self) -> tickbus::fieldbus::tcp::Address {
+    fn address(&mut self) -> tickbus::net::Address {
         let line = self.line();
         let address = line.strip_prefix("sync: listening on ").expect(&line);
         address.parse().expect("an address")

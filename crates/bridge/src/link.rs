@@ -5,7 +5,7 @@ use std::net::TcpStream;
 
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, Dialler, Stream, is_for_later};
+use tickbus_net::{Address, Dialler, Stream, is_for_later};
 
 use crate::speaker::Speaker;
 

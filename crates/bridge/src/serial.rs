@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 
 use tickbus_base::os::{LinkedTerminal, PollSet, Ready, SerialSettings};
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::serial::{gone, open};
-use tickbus_fieldbus::tcp::{Address, Stream, is_for_later};
+use tickbus_net::serial::{gone, open};
+use tickbus_net::{Address, Stream, is_for_later};
 
 use crate::ascii::AsciiBridge;
 use crate::link::{BUFFER, Link, Watched};
@@ -93,7 +92,7 @@ impl Device {
         match self {
             Self::Port(name, settings) => match open(name, *settings) {
                 Ok(port) => Ok(Box::new(port)),
-                Err(error) => Err(reason(error)),
+                Err(error) => Err(error.to_string()),
             },
             Self::Virtual(port) => {
                 let port = port.port.take();
@@ -110,14 +109,6 @@ impl Device {
             Self::Port(name, _) => name.clone(),
             Self::Virtual(port) => port.link.display().to_string(),
         }
-    }
-}
-
-/// The text of an error alone; its kind need not be mentioned here.
-fn reason(error: BusError) -> String {
-    match error {
-        BusError::Link(why) => why,
-        other => other.to_string(),
     }
 }
 
@@ -189,7 +180,7 @@ impl Host<'_, '_> {
         if let Some(port) = self.port.take() {
             port.close(&mut self.set);
             let device = self.device.name();
-            (self.hosting.news)(&reason(gone(&device, why)));
+            (self.hosting.news)(&gone(&device, why).to_string());
             self.next_look = now + LOOK;
             self.bridge.unplugged();
             self.link.close(&mut self.set);

@@ -6,8 +6,9 @@ use std::net::SocketAddr;
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_dispatcher::client::{Client, ClientError, Event, KEEP_ALIVE, PATIENCE};
-use tickbus_fieldbus::tcp::{Address, Caller, dial};
+use tickbus_fieldbus::tcp::{Caller, dial};
 use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Free, Port, Receipt};
+use tickbus_net::Address;
 
 use super::Options;
 use super::inputs::Inputs;

@@ -9,9 +9,9 @@ use tickbus_dispatcher::{
     Cable, Channel, Kind, LEAST_PROMISE, LONGEST_NAME, LONGEST_PROMISE, MOST_CHANNELS, PORT,
     Role as Part, is_name,
 };
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::SignalTable;
+use tickbus_net::Address;
 
 use super::channels::{Channels, kind_of};
 

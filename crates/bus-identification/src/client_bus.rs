@@ -8,10 +8,12 @@ mod session;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::{BusError, Free, Port};
 #[cfg(unix)]
-use tickbus_fieldbus::{serial, tcp::Call};
+use tickbus_fieldbus::tcp::Call;
+use tickbus_fieldbus::{BusError, Free, Port};
 use tickbus_image::signal::SignalTable;
+#[cfg(unix)]
+use tickbus_net::serial;
 
 use crate::LineOptions;
 use crate::heads::HeadNumbers;

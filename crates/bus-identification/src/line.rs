@@ -8,7 +8,8 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
 #[cfg(not(unix))]
 use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::{CYCLE, serial};
+use tickbus_fieldbus::CYCLE;
+use tickbus_net::serial;
 
 use crate::{CarrierType, Timing};
 

@@ -8,12 +8,14 @@ use std::io;
 
 use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::serial::gone;
+#[cfg(unix)]
+use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Free, Port};
-#[cfg(unix)]
-use tickbus_fieldbus::{serial, tcp::Call};
 use tickbus_image::signal::SignalTable;
+#[cfg(unix)]
+use tickbus_net::serial;
+use tickbus_net::serial::gone;
 
 use crate::heads::HeadNumbers;
 use crate::{Carrier, CarrierType, HEADS, Head, LineOptions, Reader, Status};
@@ -127,7 +129,7 @@ impl Free for IviReader {
 
 #[cfg(unix)]
 impl IviReader {
-    fn serve<S: tickbus_fieldbus::tcp::Stream>(
+    fn serve<S: tickbus_net::Stream>(
         &mut self,
         mut call: Call<S>,
         port: &mut Port,
@@ -280,10 +282,10 @@ impl Caller for Serving<'_> {
     }
 
     fn left(&mut self) -> BusError {
-        gone(self.line.port(), "it was closed")
+        gone(self.line.port(), "it was closed").into()
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        gone(self.line.port(), error)
+        gone(self.line.port(), error).into()
     }
 }

@@ -3,9 +3,9 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
+use tickbus_net::Address;
 
 use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
 

@@ -6,8 +6,8 @@ use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
-use tickbus_fieldbus::serial as serial_port;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
+use tickbus_net::serial as serial_port;
 
 use super::rtu;
 

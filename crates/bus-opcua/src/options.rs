@@ -6,8 +6,9 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::At;
-use tickbus_fieldbus::tcp::{Address, Host, Writers};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::{Signal, SignalTable, Station};
+use tickbus_net::{Address, Host};
 
 use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::shown;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// The port of OPC UA.
 pub(super) const PORT: u16 = 4840;

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::Outcome;
-use super::wire::Message;
 use tickbus_fieldbus::BusError;
+use tickbus_net::Message;
 
 /// The longest text in an answer, in bytes.
 const TEXT_LIMIT: usize = 8000;
@@ -62,9 +62,9 @@ impl Message for Answer {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wire::{Inbox, WireError};
     use super::*;
     use proptest::prelude::*;
+    use tickbus_net::{Inbox, WireError};
 
     fn answers() -> impl Strategy<Value = Answer> {
         prop_oneof![

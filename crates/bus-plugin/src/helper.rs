@@ -18,10 +18,10 @@ use super::answer::Answer;
 use super::library::{Bus, Library};
 use super::request::Request;
 use super::setup::Setup;
-use super::wire::{Inbox, Message};
 use tickbus_base::os::{SharedMemory, flush_log};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
+use tickbus_net::{Inbox, Message};
 
 /// Serves the host on stdin until it ends.
 ///

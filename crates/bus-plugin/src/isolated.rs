@@ -17,11 +17,11 @@ use super::answer::Answer;
 use super::helper::{memory_bytes, out_word};
 use super::request::Request;
 use super::setup::Setup;
-use super::wire::{Inbox, Message as _};
 use super::{Limits, VERSION};
 use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Exchange, Exchanged, Free, Port};
+use tickbus_net::{Inbox, Message as _};
 
 /// The time for a killed helper to end.
 const END: Nanos = Nanos::from_secs(1);

@@ -20,8 +20,6 @@ mod outcome;
 #[cfg(unix)]
 mod request;
 mod setup;
-#[cfg(unix)]
-mod wire;
 
 use std::path::{Path, PathBuf};
 
@@ -32,8 +30,6 @@ pub use helper::serve as serve_host;
 pub use options::Options;
 pub use outcome::Outcome;
 pub use setup::{Setup, Station};
-#[cfg(unix)]
-pub use wire::{Inbox, Message, WireError};
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;

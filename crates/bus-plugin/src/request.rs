@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::setup::Setup;
-use super::wire::Message;
+use tickbus_net::Message;
 
 /// A request from a host to its helper. The end of the stream asks it to close and end.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -24,12 +24,12 @@ impl Message for Request {
 
 #[cfg(test)]
 mod tests {
-    use super::super::wire::Inbox;
     use super::*;
     use crate::setup::Station;
     use std::ffi::OsStr;
     use std::os::unix::ffi::OsStrExt as _;
     use tickbus_fieldbus::Role;
+    use tickbus_net::Inbox;
 
     #[test]
     fn requests_arrive_as_they_were_sent() {

@@ -10,10 +10,9 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Table, Value};
-use tickbus_fieldbus::{
-    At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role, serial,
-};
+use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
+use tickbus_net::serial;
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
 use crate::layout::{Layout, Place};

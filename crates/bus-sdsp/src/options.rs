@@ -6,9 +6,9 @@ use std::num::NonZeroU32;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::{Signal, SignalTable};
+use tickbus_net::Address;
 use tickbus_virtual_time::{Declaration, Meeting};
 
 use super::Variables;

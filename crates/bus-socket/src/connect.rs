@@ -1,8 +1,9 @@
 //! The end that connects.
 
 use tickbus_base::time::Stop;
-use tickbus_fieldbus::tcp::{self, Address};
+use tickbus_fieldbus::tcp;
 use tickbus_fieldbus::{BusError, Port};
+use tickbus_net::Address;
 
 use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;

@@ -4,8 +4,9 @@ use std::io;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{Caller, begins_like_browser};
+use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Port, Receipt};
+use tickbus_net::begins_like_browser;
 
 use super::connection_states::ConnectionStates;
 use super::{ConnectionFrames, EndReason, Session, SessionParameters};

@@ -4,7 +4,7 @@ use std::fmt;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
-use tickbus_fieldbus::tcp::IS_BROWSER;
+use tickbus_net::IS_BROWSER;
 
 use super::Partial;
 

@@ -3,20 +3,16 @@
 use std::io;
 use std::net::SocketAddr;
 
-use tickbus_base::net::{TcpListener, TcpStream};
+use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{
-    self, Address, Call, close_gracefully, is_of_the_client, no_wait, not_accepted, prepare,
-};
+use tickbus_fieldbus::tcp::{self, Call, no_wait, not_accepted};
 use tickbus_fieldbus::{BusError, Port};
+use tickbus_net::{Acceptor, Address, close_gracefully, prepare};
 
 use super::connection::{Connection, Transfer};
 use super::connection_states::ConnectionStates;
 use super::{ConnectionFrames, Session, SessionParameters};
-
-/// The pause in accepting after the system had no free socket.
-const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// One address to listen on, and its stations.
 #[derive(Debug)]
@@ -49,15 +45,13 @@ pub(super) fn listen(
         };
         servers.push(Server {
             line,
-            listener,
+            acceptor: Acceptor::new(listener, key(line) + 1).one_per_turn(),
             bound,
             waiting: format!("listening on {bound}"),
             terms: place.terms,
             frames: place.frames,
             served: None,
             watched: None,
-            hears: false,
-            accept_paused_until: Nanos(i64::MIN),
         });
     }
     let bound: Vec<String> = servers
@@ -96,17 +90,15 @@ fn turn(
         if let Some((_, served)) = &server.served {
             deadline = deadline.min(served.deadline());
         }
-        if server.is_deaf(now) {
-            deadline = deadline.min(server.accept_paused_until);
-        }
+        deadline = deadline.min(server.acceptor.deadline());
     }
     set.wait(&**port.clock(), deadline)
         .map_err(|error| no_wait(&error))?;
     port.look_at_line(port.clock().now());
     for server in servers {
         let ready = |key| set.ready().iter().find(|ready| ready.key == key);
-        let readable = ready(server.key()).is_some_and(|ready| ready.is_readable);
-        let knocked = ready(server.key() + 1).is_some();
+        let readable = ready(key(server.line)).is_some_and(|ready| ready.is_readable);
+        let knocked = ready(key(server.line) + 1).is_some();
         server.serve(readable, knocked, lines, set, port);
         if knocked {
             server.accept(lines, set, port);
@@ -116,31 +108,28 @@ fn turn(
     Ok(())
 }
 
+/// The key of a connection in the poll set; its listener's is the next one.
+const fn key(line: usize) -> usize {
+    2 * line
+}
+
 struct Server<'a> {
     /// The index among the lines.
     line: usize,
-    listener: TcpListener,
+    acceptor: Acceptor,
     bound: SocketAddr,
     waiting: String,
     terms: SessionParameters,
     frames: &'a mut ConnectionFrames,
     served: Option<(Call<TcpStream>, Connection)>,
-    /// The interest in the connection, if there is one; and whether the set waits for the listener.
+    /// The interest in the connection, if there is one.
     watched: Option<Interest>,
-    hears: bool,
-    /// The end of the pause in accepting, after the system had no free socket.
-    accept_paused_until: Nanos,
 }
 
 impl Server<'_> {
-    /// The key of the connection in the poll set; the listener's is the next one.
-    fn key(&self) -> usize {
-        2 * self.line
-    }
-
     /// Makes `set` wait for what this server needs.
     fn watch(&mut self, now: Nanos, set: &mut PollSet) -> io::Result<()> {
-        let key = self.key();
+        let key = key(self.line);
         if let Some((call, _)) = &self.served {
             let interest = Some(call.interest());
             if self.watched.is_none() {
@@ -150,16 +139,7 @@ impl Server<'_> {
             }
             self.watched = interest;
         }
-        let hears = !self.is_deaf(now);
-        if hears != self.hears {
-            if hears {
-                set.add(key + 1, &self.listener, Interest::Read)?;
-            } else {
-                set.remove(key + 1, &self.listener);
-            }
-            self.hears = hears;
-        }
-        Ok(())
+        self.acceptor.watch(now, set)
     }
 
     /// Closes the current connection.
@@ -167,12 +147,8 @@ impl Server<'_> {
         if let Some((call, _)) = self.served.take()
             && self.watched.take().is_some()
         {
-            set.remove(self.key(), call.stream());
+            set.remove(key(self.line), call.stream());
         }
-    }
-
-    fn is_deaf(&self, now: Nanos) -> bool {
-        now < self.accept_paused_until
     }
 
     /// Lets the connection do its due work.
@@ -208,16 +184,24 @@ impl Server<'_> {
     /// Takes the next client from the queue: serves it, or turns it away.
     fn accept(&mut self, lines: &mut ConnectionStates, set: &mut PollSet, port: &mut Port) {
         let now = port.clock().now();
-        let (stream, peer) = match self.listener.accept() {
-            Ok(accepted) => accepted,
-            Err(error) if is_of_the_client(&error) => return,
-            Err(error) => {
+        while let Some(accepted) = self.acceptor.accept(now, set) {
+            match accepted {
+                Ok((stream, peer)) => self.welcome(stream, peer, now, lines, set, port),
                 // Peers at other addresses are not affected.
-                not_accepted(&error, port);
-                self.accept_paused_until = now + PAUSE;
-                return;
+                Err(error) => not_accepted(&error, port),
             }
-        };
+        }
+    }
+
+    fn welcome(
+        &mut self,
+        stream: TcpStream,
+        peer: SocketAddr,
+        now: Nanos,
+        lines: &mut ConnectionStates,
+        set: &mut PollSet,
+        port: &mut Port,
+    ) {
         if let Some((_, served)) = &self.served {
             let Some(silence) = served.stale_for(now) else {
                 let served = served.peer();

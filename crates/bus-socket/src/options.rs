@@ -4,8 +4,8 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::SignalTable;
+use tickbus_net::Address;
 
 use super::Sending;
 

@@ -9,7 +9,7 @@ mod silence;
 use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser, may_become_browser};
+use tickbus_net::{IS_BROWSER, begins_like_browser, may_become_browser};
 
 use crate::board::{Board, OnLoss, Traffic};
 use crate::channel::{Channel, Counts};

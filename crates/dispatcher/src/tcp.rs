@@ -8,9 +8,7 @@ use std::thread;
 use tickbus_base::net::{TcpListener, TcpStream};
 use tickbus_base::os::{Interest, PollSet, Ready, peer_silence};
 use tickbus_base::time::{Clock, Nanos, Simulation, Stop};
-use tickbus_fieldbus::tcp::{
-    Address, bind, close_gracefully, is_for_later, is_of_the_client, prepare, watch_peer,
-};
+use tickbus_net::{Acceptor, Address, bind, close_gracefully, is_for_later, prepare, watch_peer};
 
 use crate::dispatcher::Dispatcher;
 use crate::door::Door;
@@ -19,17 +17,8 @@ use crate::post::Post;
 use crate::saver::Saver;
 use crate::trickle::Trickle;
 
-/// The key of the listener in the poll set; a client's key is its seat.
-const LISTENER: usize = usize::MAX - 1;
-
-/// At most this many clients are accepted per turn.
-const ACCEPTS: usize = 64;
-
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 64 * 1024;
-
-/// The pause in accepting after the system had no free socket.
-const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// How often to check for peers that have not confirmed sent bytes.
 const LOOK: Nanos = Nanos::from_secs(1);
@@ -114,17 +103,17 @@ impl Listener {
     /// The system cannot wait for sockets.
     pub fn run(self, dispatcher: &mut Dispatcher, hosting: Hosting<'_>) -> io::Result<()> {
         let mut set = PollSet::new(hosting.stop);
-        set.add(LISTENER, &self.socket, Interest::Read)?;
+        let mut acceptor = Acceptor::new(self.socket, Acceptor::KEY);
+        acceptor.watch(Nanos::ZERO, &mut set)?;
         let mut host = Host {
             dispatcher,
             hosting,
-            listener: self.socket,
+            acceptor,
             post: self.post,
             set,
             connections: Vec::new(),
             buffer: vec![0; BUFFER].into(),
             ready: Vec::new(),
-            accept_paused_until: None,
             trickle: Trickle::default(),
             next_look: Nanos::MAX,
             saver: None,
@@ -179,15 +168,14 @@ impl Connection {
 struct Host<'d, 'h> {
     dispatcher: &'d mut Dispatcher,
     hosting: Hosting<'h>,
-    listener: TcpListener,
+    acceptor: Acceptor,
     post: Option<Box<dyn Post>>,
     set: PollSet,
-    /// By seats.
+    /// By seats, which are their keys in the set.
     connections: Vec<Option<Connection>>,
     /// The receive buffer, shared by all clients.
     buffer: Box<[u8]>,
     ready: Vec<Ready>,
-    accept_paused_until: Option<Nanos>,
     trickle: Trickle,
     /// When to check next for peers that have not confirmed sent bytes.
     next_look: Nanos,
@@ -198,7 +186,7 @@ struct Host<'d, 'h> {
 
 impl Host<'_, '_> {
     fn turn(&mut self) -> io::Result<()> {
-        let accept = self.accept_paused_until.unwrap_or(Nanos::MAX);
+        let accept = self.acceptor.deadline();
         let deadline = self.dispatcher.deadline().min(accept).min(self.next_look);
         self.set.wait(self.hosting.clock, deadline)?;
         let now = self.hosting.clock.now();
@@ -207,7 +195,7 @@ impl Host<'_, '_> {
         self.ready.extend_from_slice(self.set.ready());
         for at in 0..self.ready.len() {
             let ready = self.ready[at];
-            if ready.key == LISTENER {
+            if ready.key == Acceptor::KEY {
                 self.accept(now)?;
                 continue;
             }
@@ -239,10 +227,7 @@ impl Host<'_, '_> {
         while let Some(news) = self.dispatcher.next_news() {
             (self.hosting.news)(&news);
         }
-        if self.accept_paused_until.is_some_and(|until| now >= until) {
-            self.accept_paused_until = None;
-            self.set.add(LISTENER, &self.listener, Interest::Read)?;
-        }
+        self.acceptor.watch(now, &mut self.set)?;
         if self.trickle.turn(now, self.dispatcher.traffic().lines) {
             thread::yield_now();
         }
@@ -400,19 +385,12 @@ impl Host<'_, '_> {
     }
 
     fn accept(&mut self, now: Nanos) -> io::Result<()> {
-        for _ in 0..ACCEPTS {
-            let (stream, peer) = match self.listener.accept() {
+        while let Some(accepted) = self.acceptor.accept(now, &mut self.set) {
+            let (stream, peer) = match accepted {
                 Ok(accepted) => accepted,
-                Err(error) if is_for_later(&error) => return Ok(()),
-                Err(error) if is_of_the_client(&error) => continue,
                 Err(error) => {
-                    (self.hosting.news)(&format!(
-                        "a client could not be accepted ({error}); close other programs or raise the limit of open \
-                         files"
-                    ));
-                    self.set.remove(LISTENER, &self.listener);
-                    self.accept_paused_until = Some(now + PAUSE);
-                    return Ok(());
+                    (self.hosting.news)(&error.to_string());
+                    continue;
                 }
             };
             // A client whose connection broke at once will connect again.

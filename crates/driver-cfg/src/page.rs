@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// The default port of a page.
 const PORT: u16 = 20080;

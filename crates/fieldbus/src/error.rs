@@ -16,3 +16,9 @@ pub enum BusError {
     #[error("refused: {0}")]
     Refused(String),
 }
+
+impl From<tickbus_net::Error> for BusError {
+    fn from(error: tickbus_net::Error) -> Self {
+        Self::Link(error.to_string())
+    }
+}

@@ -20,7 +20,6 @@ mod write_guard;
 
 pub mod faults;
 pub mod loopback;
-pub mod serial;
 pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};

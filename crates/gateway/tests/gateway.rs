@@ -13,9 +13,9 @@ use server::Server;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_conformance::rig::End;
 use tickbus_driver_cfg::{Config, Kinds};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_gateway::{Gateway, GatewayOptions};
 use tickbus_image::signal::DataType;
+use tickbus_net::Address;
 use tickbus_virtual_time::{
     Declaration, Ended, Meeting, Outcome, Participant, Settings, StartCondition, Step, Variable,
     tcp,

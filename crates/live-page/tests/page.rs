@@ -17,9 +17,9 @@ use serde_json::Value;
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::{Config, Kinds};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::Slot;
 use tickbus_live_page::{LivePage, Member, Options};
+use tickbus_net::Address;
 use tickbus_web::{Limits, Room, Serving};
 
 static KINDS: Kinds = Kinds::LOOPBACK.with_programs(tickbus_programs::PROGRAMS);

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Door, Patch, Settings};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_patch_bay::PatchBay;
 use tickbus_web::{Limits, Room};
 

@@ -15,8 +15,8 @@ use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use tickbus_base::time::{Monotonic, Nanos};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::DataType;
+use tickbus_net::Address;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tickbus_base::time::{Clock, Stop};
 use tickbus_base::toml_text::Value;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 use crate::client::{Client, Connection};
 use crate::{Ended, tcp};

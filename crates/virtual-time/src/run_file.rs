@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;

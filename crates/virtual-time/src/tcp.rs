@@ -6,7 +6,7 @@ mod server;
 
 use std::io::{self, ErrorKind};
 
-use tickbus_fieldbus::tcp::is_for_later;
+use tickbus_net::is_for_later;
 
 pub use client::{connect, join};
 pub use server::Listener;

@@ -12,7 +12,7 @@ use std::thread;
 
 use common::{Mixer, mixer_settings, mixers};
 use tickbus_base::time::Monotonic;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{

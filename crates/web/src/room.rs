@@ -13,7 +13,7 @@ use hyper::server::conn::http1;
 use hyper::service::service_fn;
 use hyper_util::rt::{TokioIo, TokioTimer};
 use tickbus_base::time::{Clock, Nanos};
-use tickbus_fieldbus::tcp::{Address, bind, prepare};
+use tickbus_net::{Address, bind, prepare};
 use tokio::net::TcpStream;
 use tokio::sync::oneshot;
 

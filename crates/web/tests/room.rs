@@ -9,7 +9,7 @@ use std::thread;
 use std::time::Duration;
 
 use tickbus_base::time::{Manual, Nanos};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_web::{
     Answer, Asset, Change, Limits, Outcome, Refused, Room, Serving, Site, State, Verb,
 };

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use tickbus_base::time::{Clock as _, Nanos, Stop};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, OnLoss, Patch, Pin, Settings};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 use crate::broken::Broken;
 use crate::clock::SimulatedClock;

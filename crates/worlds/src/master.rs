@@ -13,13 +13,13 @@ use profirust::time::{Duration, Instant};
 use tickbus_base::os::{Marks, Parity, SerialSettings};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_base::toml_text::Table;
-use tickbus_fieldbus::serial::{gone, open_marking};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{
     Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Free, NamedFile, OpenError, Port, Receipt,
     Role,
 };
 use tickbus_image::signal::SignalTable;
+use tickbus_net::serial::{gone, open_marking};
 
 use crate::wire;
 
@@ -426,10 +426,10 @@ impl Caller for Line {
     }
 
     fn left(&mut self) -> BusError {
-        gone(DEVICE, "it was unplugged")
+        gone(DEVICE, "it was unplugged").into()
     }
 
     fn broke(&mut self, error: &std::io::Error) -> BusError {
-        gone(DEVICE, error)
+        gone(DEVICE, error).into()
     }
 }

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use std::thread;
 
 use tickbus_base::time::{Monotonic, Nanos};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
 use tickbus_robot::metrics::Run;

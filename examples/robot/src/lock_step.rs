@@ -3,7 +3,7 @@
 use std::io;
 
 use tickbus_base::time::{Monotonic, Nanos};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_robot::lock_step;
 use tickbus_robot::participants::{Machine, Program};
 use tickbus_virtual_time::{Meeting, Participant};

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
 use tickbus_robot::lock_step;

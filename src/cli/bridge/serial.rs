@@ -10,7 +10,7 @@ use tickbus_base::time::{Monotonic, Stop};
 use tickbus_bridge::serial::{Device, Hosting, VirtualPort, run as carry};
 use tickbus_bridge::{AsciiBridge, LineEnd};
 use tickbus_dispatcher::PORT;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// Pass lines of text between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
 ///

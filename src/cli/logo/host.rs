@@ -12,8 +12,8 @@ use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Clock, Nanos, Pace, Stop, system_time};
 use tickbus_dispatcher::client::{Client, Event};
 use tickbus_dispatcher::{Channel, Kind, Number, ON_VOLTS, level};
-use tickbus_fieldbus::tcp::{Address, Dialler, close_gracefully, is_for_later};
 use tickbus_function_blocks::{Controller, WallTime};
+use tickbus_net::{Address, Dialler, close_gracefully, is_for_later};
 
 /// The key of the socket in the poll set.
 const SOCKET: usize = 0;

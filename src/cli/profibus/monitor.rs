@@ -9,7 +9,8 @@ use crate::cli::host::span;
 use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialLine, SerialSettings};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
-use tickbus_fieldbus::serial;
+use tickbus_fieldbus::BusError;
+use tickbus_net::serial;
 
 /// The interval at which the table is printed.
 const EVERY: Nanos = Nanos::from_secs(1);
@@ -76,8 +77,9 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
         return Err("a line has a speed; write --baud 19200".to_owned());
     }
     let device = arguments.device.display().to_string();
-    let mut port = serial::open_marking(&device, settings, &*Monotonic::shared())
-        .map_err(|error| error.to_string())?;
+    let failed = |error| BusError::from(error).to_string();
+    let mut port =
+        serial::open_marking(&device, settings, &*Monotonic::shared()).map_err(failed)?;
     let create = |file: &Option<PathBuf>| file.as_deref().map(create).transpose();
     let mut keep = Keep {
         prints: arguments.telegrams,
@@ -92,7 +94,7 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
     };
     ctrlc::set_handler(handler).map_err(|error| format!("Ctrl-C cannot be caught: {error}"))?;
     match watch(arguments, &mut port, &mut keep, &stop) {
-        Err(Ending::Port(error)) => Err(serial::gone(&device, error).to_string()),
+        Err(Ending::Port(error)) => Err(failed(serial::gone(&device, error))),
         // The reader is gone: end as after Ctrl-C.
         Err(Ending::Output(error)) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
         Err(Ending::Output(error)) => Err(format!("cannot write any more: {error}")),

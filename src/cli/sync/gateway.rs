@@ -9,9 +9,9 @@ use crate::cli::Outcome;
 use crate::cli::host::{PageAddress, page_address, show, span};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{LinkState, Role};
 use tickbus_gateway::{Gateway, GatewayOptions};
+use tickbus_net::Address;
 use tickbus_virtual_time::Meeting;
 
 /// The interval at which the state of the PLC's line is checked until there is one.

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::fmi::fixture::{CONFIG, err, misbehaving_as, out, tanks, tickbus};
-use tickbus::fieldbus::tcp::Address;
+use tickbus::net::Address;
 use tickbus::time::{Monotonic, Nanos};
 use tickbus::virtual_time::{Controls, Hosting, Logic, Outcome, Settings, StartCondition, tcp};
 

@@ -4,7 +4,7 @@ use std::thread;
 
 use tickbus::driver::{Driver, Host};
 use tickbus::driver_cfg::Config;
-use tickbus::fieldbus::tcp::Address;
+use tickbus::net::Address;
 use tickbus::plc::HostedProgram;
 use tickbus::signal::{Area, Slot};
 use tickbus::time::{Monotonic, Nanos};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
 use tickbus_dispatcher::{Channel, Counts, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role, is_name};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// The description of a bridge between MQTT and the dispatcher.
 #[derive(Clone, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use rumqttc::{
 };
 use tickbus_base::os::PollSet;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::tcp::Host;
+use tickbus_net::Host;
 
 use super::mapping::Mapping;
 use crate::link::Link;

@@ -10,7 +10,7 @@ use tickbus_conformance::rig::{self, Bus, Liar, eventually};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Patch, Pin, Settings};
 use tickbus_driver_cfg::{Kind, Kinds};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 pub static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_dispatcher::Options>()]);
 

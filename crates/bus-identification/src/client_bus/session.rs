@@ -3,9 +3,9 @@
 use std::io;
 
 use tickbus_base::time::{Nanos, Pace};
-use tickbus_fieldbus::serial::gone;
 use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Cause, PlcState, Port, Receipt};
+use tickbus_net::serial::gone;
 
 use super::{ClientOptions, INPUTS, NO_ANSWER};
 use crate::{Access, Answer, CarrierType, Client, Command, Outcome, PAGE, Status};
@@ -370,10 +370,10 @@ impl Caller for Session<'_> {
     }
 
     fn left(&mut self) -> BusError {
-        gone(self.device(), "it was closed")
+        gone(self.device(), "it was closed").into()
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        gone(self.device(), error)
+        gone(self.device(), error).into()
     }
 }

@@ -10,11 +10,13 @@ mod session;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::WriteGuard;
+#[cfg(unix)]
+use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::tcp::dial;
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
-#[cfg(unix)]
-use tickbus_fieldbus::{serial, tcp::Call};
 use tickbus_image::signal::SignalTable;
+#[cfg(unix)]
+use tickbus_net::serial;
 
 use super::Line;
 pub use area_mapping::Block;

@@ -10,8 +10,8 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::tcp::Address;
 use tickbus_image::signal::{Area, Signal, SignalTable};
+use tickbus_net::Address;
 
 use super::area_mapping::AreaMapping;
 use super::plan::{Capabilities, queries};

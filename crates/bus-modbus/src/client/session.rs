@@ -15,9 +15,9 @@ use crate::rtu;
 use crate::{Function, Identification};
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::WriteGuard;
-use tickbus_fieldbus::serial::gone;
 use tickbus_fieldbus::tcp::Caller;
 use tickbus_fieldbus::{BusError, Port};
+use tickbus_net::serial::gone;
 
 use super::plan::Capabilities;
 use super::request::{AnswerError, length};
@@ -232,7 +232,7 @@ impl Caller for ClientSession<'_> {
         let asked_identity = self.hung_up();
         let peer = &self.peer;
         match self.framing {
-            Framing::Rtu { .. } => gone(peer, "it was closed"),
+            Framing::Rtu { .. } => gone(peer, "it was closed").into(),
             _ if asked_identity => BusError::Left(format!(
                 "{peer} closed the connection when it was asked who it is (function 43); if it does so again, it is \
                  not asked for some time"
@@ -250,7 +250,7 @@ impl Caller for ClientSession<'_> {
         }
         let peer = &self.peer;
         match self.framing {
-            Framing::Rtu { .. } => gone(peer, error),
+            Framing::Rtu { .. } => gone(peer, error).into(),
             _ => BusError::Link(format!(
                 "the connection with {peer} broke ({error}); see whether the server still runs"
             )),

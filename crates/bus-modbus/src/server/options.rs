@@ -5,8 +5,9 @@ use crate::stations::{Stations, UnitRange};
 use crate::{ElementAddress, INPUTS, Map, Side, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::tcp::{Address, Writers};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::SignalTable;
+use tickbus_net::Address;
 
 use super::super::element_address::SHAPE;
 

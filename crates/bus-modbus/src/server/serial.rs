@@ -6,9 +6,9 @@ use crate::function::EXCEPTION_BIT;
 use crate::line::Serial;
 use crate::rtu::{self, Echo, Framer};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::serial::{gone, open};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port, Renewal};
+use tickbus_net::serial::{gone, open};
 
 use super::units::{BROADCAST, Carried, ServedUnits, Source};
 
@@ -161,11 +161,11 @@ impl Caller for Server<'_> {
     }
 
     fn left(&mut self) -> BusError {
-        gone(&self.line.device, "it was closed")
+        gone(&self.line.device, "it was closed").into()
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        gone(&self.line.device, error)
+        gone(&self.line.device, error).into()
     }
 }
 

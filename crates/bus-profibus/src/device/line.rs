@@ -4,9 +4,9 @@ use std::io;
 
 use tickbus_base::os::Marks;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_fieldbus::serial::{gone, open_marking};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Port};
+use tickbus_net::serial::{gone, open_marking};
 
 use super::diagnosis::diagnosed;
 use super::{LineOptions, Machine, StationSetup, Stations};
@@ -191,10 +191,10 @@ impl Caller for Line<'_> {
     }
 
     fn left(&mut self) -> BusError {
-        gone(&self.options.device, "it was closed")
+        gone(&self.options.device, "it was closed").into()
     }
 
     fn broke(&mut self, error: &io::Error) -> BusError {
-        gone(&self.options.device, error)
+        gone(&self.options.device, error).into()
     }
 }

@@ -10,9 +10,9 @@ use crate::{Start, Tsap, Variable};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::both_ways;
-use tickbus_fieldbus::tcp::Address;
 use tickbus_fieldbus::{At, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
+use tickbus_net::Address;
 
 /// The local TSAP, as of libraries and programming devices.
 const CALLING: [u8; 2] = [1, 0];

@@ -8,9 +8,10 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_fieldbus::tcp::{self, Address, Limits, Writer, Writers};
+use tickbus_fieldbus::tcp::{self, Limits, Writer, Writers};
 use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Renewal, Role};
 use tickbus_image::signal::fail_safe_frame;
+use tickbus_net::Address;
 
 use super::item::{Object, ReturnCode};
 use super::szl::{Facts, Identity};

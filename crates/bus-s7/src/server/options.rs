@@ -4,8 +4,9 @@ use crate::length::{LONGEST, read_length};
 use crate::tsap::{RACK, SLOT};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::tcp::{Address, Writers};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
+use tickbus_net::Address;
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1102);

@@ -10,7 +10,7 @@ use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Monotonic, Nanos, Stop, TimeHistogram};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
 use tickbus_dispatcher::{Dispatcher, Patch, Settings, Traffic};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 use crate::hub;
 use crate::mosquitto::{self, Mosquitto};

@@ -17,7 +17,7 @@ use tickbus_dispatcher::{
     Dispatcher, Door, HostId, Identity, Order, Patch, PatchFile, Pin, Post, Reply, Settings,
     Traffic,
 };
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 
 /// Runs `test` with a dispatcher on a free port; returns its traffic.
 fn serve(settings: Settings, test: impl FnOnce(SocketAddr)) -> Traffic {

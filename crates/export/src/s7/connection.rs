@@ -2,7 +2,7 @@
 
 use std::net::IpAddr;
 
-use tickbus_fieldbus::tcp::{Address, Host};
+use tickbus_net::{Address, Host};
 
 /// A placeholder for the address of the simulator's computer, which the user has to replace.
 const SOMEBODY: [u8; 4] = [192, 168, 0, 20];

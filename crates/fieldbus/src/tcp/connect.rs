@@ -1,21 +1,13 @@
-//! Connecting.
+//! Connecting, as the state of the line shows it.
 
-use std::io::{self, ErrorKind};
-use std::net::{self, SocketAddr, ToSocketAddrs as _};
+use std::net::SocketAddr;
 
-use rustix::io::Errno;
-use socket2::{Domain, Protocol, Socket, Type};
-
-use crate::{BusError, Port};
 use tickbus_base::net::TcpStream;
-use tickbus_base::os::{Interest, PollSet};
-use tickbus_base::time::{Nanos, Simulation, Stop};
+use tickbus_base::time::{Nanos, Stop};
+use tickbus_net::{Address, prepare};
 
-use super::resolve::resolve;
-use super::{Address, no_wait, prepare};
-
-/// The time in which an address must answer. The system itself would try for minutes.
-const PATIENCE: Nanos = Nanos::from_secs(5);
+use super::no_wait;
+use crate::{BusError, Port};
 
 /// Connects without blocking, within a few seconds; `None` if `stop` came first.
 ///
@@ -30,12 +22,8 @@ pub fn connect(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<Option<(TcpStream, SocketAddr)>, BusError> {
-    let mut set = PollSet::new(stop);
     port.opening(&format!("connecting to {address}"));
-    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
-        return Ok(None);
-    };
-    let Some(stream) = reach_any(&addresses, &mut set, port, stop)? else {
+    let Some(stream) = tickbus_net::connect(address, &**port.clock(), stop)? else {
         return Ok(None);
     };
     let peer = stream.peer_addr().map_err(|error| no_wait(&error))?;
@@ -44,133 +32,4 @@ pub fn connect(
         BusError::Link(format!("the connection with {peer} broke at once: {error}"))
     })?;
     Ok(Some((stream, peer)))
-}
-
-/// As [`reach`], but on the network of `simulation` if there is one.
-///
-/// # Errors
-///
-/// As [`reach`].
-pub fn reach_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<TcpStream> {
-    let Some(simulation) = simulation else {
-        return reach(address).map(TcpStream::from);
-    };
-    let mut addresses = address.to_string().to_socket_addrs()?;
-    let stream = simulation.connect(addresses.next().ok_or(ErrorKind::NotFound)?)?;
-    if !stream.wait(Interest::Write, PATIENCE) {
-        return Err(ErrorKind::TimedOut.into());
-    }
-    match stream.take_error()? {
-        Some(error) => Err(error),
-        None => Ok(TcpStream::Simulated(stream)),
-    }
-}
-
-/// Connects for a client that has no [`Port`]; blocks for a few seconds per address of the host.
-///
-/// # Errors
-///
-/// The host is unknown, or does not answer.
-pub fn reach(address: &Address) -> io::Result<net::TcpStream> {
-    let mut failed = io::Error::other("the host has no address");
-    let mut connect = |address: SocketAddr| {
-        let reached = net::TcpStream::connect_timeout(&address, PATIENCE.to_duration());
-        let reached = reached.and_then(|stream| {
-            not_itself(stream.local_addr()?, stream.peer_addr()?).map(|()| stream)
-        });
-        reached.map_err(|error| failed = error).ok()
-    };
-    let reached = address
-        .to_string()
-        .to_socket_addrs()?
-        .find_map(&mut connect);
-    reached.ok_or(failed)
-}
-
-/// Tries the addresses of a host one after another; `None` if `stop` came first.
-fn reach_any(
-    addresses: &[SocketAddr],
-    set: &mut PollSet,
-    port: &Port,
-    stop: &Stop,
-) -> Result<Option<TcpStream>, BusError> {
-    let mut failed = None;
-    for address in addresses {
-        match reach_one(*address, set, port, stop) {
-            Ok(reached) => return Ok(reached),
-            Err(error) => failed = Some((address, error)),
-        }
-    }
-    let (address, error) = failed.expect("a host has an address");
-    Err(BusError::Link(match error.kind() {
-        ErrorKind::TimedOut => format!(
-            "no answer from {address} within {PATIENCE}; check \"address\", the cable, and the firewalls \
-             on the way"
-        ),
-        _ => format!(
-            "cannot connect to {address} ({error}); start the program that listens there, or correct \
-             \"address\""
-        ),
-    }))
-}
-
-fn reach_one(
-    address: SocketAddr,
-    set: &mut PollSet,
-    port: &Port,
-    stop: &Stop,
-) -> io::Result<Option<TcpStream>> {
-    let stream = match port.clock().simulation() {
-        Some(simulation) => TcpStream::Simulated(simulation.connect(address)?),
-        None => begin(address)?.into(),
-    };
-    set.add(0, &stream, Interest::Write)?;
-    let connected = wait(&stream, set, port, stop);
-    set.remove(0, &stream);
-    Ok(connected?.then_some(stream))
-}
-
-/// Waits until the only socket of `set` is connected; false if `stop` came first.
-fn wait(stream: &TcpStream, set: &mut PollSet, port: &Port, stop: &Stop) -> io::Result<bool> {
-    let limit = port.clock().now() + PATIENCE;
-    while !stop.is_stopped() {
-        set.wait(&**port.clock(), limit)?;
-        if !set.ready().is_empty() {
-            if let Some(error) = stream.take_error()? {
-                return Err(error);
-            }
-            not_itself(stream.local_addr()?, stream.peer_addr()?)?;
-            return Ok(true);
-        }
-        if port.clock().now() >= limit {
-            return Err(ErrorKind::TimedOut.into());
-        }
-    }
-    Ok(false)
-}
-
-/// Refuses a socket that connected to itself, which happens if the system chooses the destination port for this end.
-fn not_itself(own: SocketAddr, peer: SocketAddr) -> io::Result<()> {
-    if own == peer {
-        return Err(ErrorKind::ConnectionRefused.into());
-    }
-    Ok(())
-}
-
-/// Starts to connect; does not wait.
-fn begin(address: SocketAddr) -> io::Result<net::TcpStream> {
-    let socket = Socket::new(
-        Domain::for_address(address),
-        Type::STREAM,
-        Some(Protocol::TCP),
-    )?;
-    socket.set_nonblocking(true)?;
-    match socket.connect(&address.into()) {
-        Err(error) if !is_under_way(&error) => Err(error),
-        _ => Ok(socket.into()),
-    }
-}
-
-fn is_under_way(error: &io::Error) -> bool {
-    error.kind() == ErrorKind::WouldBlock || Errno::from_io_error(error) == Some(Errno::INPROGRESS)
 }

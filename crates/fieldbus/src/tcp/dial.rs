@@ -1,16 +1,16 @@
 //! A connection with one peer, for any protocol that implements [`Caller`].
 
-use std::io::{self, Read, Write};
-use std::net::{self, SocketAddr};
+use std::io;
+use std::net::SocketAddr;
 
 use crate::{BusError, Port};
 use tickbus_base::net::TcpStream;
-use tickbus_base::os::{Interest, PollSet, Pollable};
-#[cfg(unix)]
-use tickbus_base::os::{LinkedTerminal, SerialLine, SerialPort};
+use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::{Address, close_by_reset, close_gracefully, connect, is_for_later, no_wait};
+use tickbus_net::{Address, Stream, is_for_later};
+
+use super::{connect, no_wait};
 
 /// At most this many bytes are read at once.
 const BUFFER: usize = 16 * 1024;
@@ -68,53 +68,6 @@ pub trait Caller {
     /// The error that ends the connection, now that reading or writing has failed.
     fn broke(&mut self, error: &io::Error) -> BusError;
 }
-
-/// A stream of bytes that never blocks.
-pub trait Stream: Read + Write + Pollable {
-    /// Called when the stream is about to be dropped.
-    fn close(&mut self) {}
-
-    /// Called when the stream is about to be dropped together with the bytes that the peer has not received yet. A
-    /// stream that cannot drop these is closed.
-    fn close_by_reset(&mut self) {
-        self.close();
-    }
-}
-
-impl Stream for TcpStream {
-    fn close(&mut self) {
-        close_gracefully(self);
-    }
-
-    fn close_by_reset(&mut self) {
-        close_by_reset(self);
-    }
-}
-
-impl Stream for net::TcpStream {
-    fn close(&mut self) {
-        close_gracefully(self);
-    }
-}
-
-impl<S: Stream + ?Sized> Stream for Box<S> {
-    fn close(&mut self) {
-        (**self).close();
-    }
-
-    fn close_by_reset(&mut self) {
-        (**self).close_by_reset();
-    }
-}
-
-#[cfg(unix)]
-impl Stream for SerialPort {}
-
-#[cfg(unix)]
-impl Stream for SerialLine {}
-
-#[cfg(unix)]
-impl Stream for LinkedTerminal {}
 
 /// Connects to `address`, for a [`Caller`] that is made once the peer is known; `None` if `stop` came first. The peer
 /// may leave sent data unacknowledged for `patience`.

@@ -1,14 +1,12 @@
-//! Listening for connections.
+//! Listening, as the state of the line shows it.
 
-use std::io::{self, ErrorKind};
-use std::net::{SocketAddr, ToSocketAddrs as _};
+use std::net::SocketAddr;
+
+use tickbus_base::net::TcpListener;
+use tickbus_base::time::Stop;
+use tickbus_net::{Address, Error};
 
 use crate::{BusError, Port};
-use tickbus_base::net::TcpListener;
-use tickbus_base::time::{Simulation, Stop};
-
-use super::Address;
-use super::resolve::resolve;
 
 /// Listens on `address`, without blocking; returns the listener and its bound address, or `None` if `stop` came first.
 ///
@@ -21,25 +19,9 @@ pub fn listen(
     stop: &Stop,
 ) -> Result<Option<(TcpListener, SocketAddr)>, BusError> {
     port.opening(&format!("beginning to listen on {address}"));
-    let Some(addresses) = resolve(address, &**port.clock(), stop)? else {
+    let Some((listener, bound)) = tickbus_net::listen(address, &**port.clock(), stop)? else {
         return Ok(None);
     };
-    let cannot = |error: io::Error| {
-        let right = match error.kind() {
-            ErrorKind::AddrNotAvailable => {
-                "write an \"address\" that this computer has, or 0.0.0.0 for all of them"
-            }
-            ErrorKind::PermissionDenied => {
-                "write a port above 1023, or get the right to use this one: on Linux by sysctl \
-                 net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
-                 by nft; docs/s7.md has the lines for port 102"
-            }
-            _ => "end the program that has this port, or write another \"address\"",
-        };
-        BusError::Link(format!("cannot listen on {address} ({error}); {right}"))
-    };
-    let listener = TcpListener::bind(&addresses, port.clock().simulation()).map_err(cannot)?;
-    let bound = listener.local_addr().map_err(cannot)?;
     port.tell("address", &bound.to_string());
     if !bound.ip().is_loopback() {
         log::info!("listening on {bound}: any computer that reaches this port can act as the peer");
@@ -47,41 +29,8 @@ pub fn listen(
     Ok(Some((listener, bound)))
 }
 
-/// Listens on `address` at once, without blocking, for a server that has no [`Port`], on the network of `simulation` if
-/// there is one. Returns the listener and its bound address. Port 0 lets the system choose a port.
-///
-/// # Errors
-///
-/// The host is unknown, or the address cannot be listened on.
-pub fn bind(
-    address: &Address,
-    simulation: Option<&dyn Simulation>,
-) -> io::Result<(TcpListener, SocketAddr)> {
-    let addresses: Vec<SocketAddr> = address.to_string().to_socket_addrs()?.collect();
-    let listener = TcpListener::bind(&addresses, simulation)?;
-    let bound = listener.local_addr()?;
-    Ok((listener, bound))
-}
-
 /// Counts and logs a client for which the system had no socket.
-pub fn not_accepted(error: &io::Error, port: &Port) {
+pub fn not_accepted(error: &Error, port: &Port) {
     port.count("clients.not_accepted");
-    port.log(
-        log::Level::Warn,
-        "not accepted",
-        format_args!(
-            "a client could not be accepted ({error}); close other programs or raise the limit of open files"
-        ),
-    );
-}
-
-/// Returns true if accepting failed for a reason that concerns only this client.
-pub fn is_of_the_client(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        ErrorKind::WouldBlock
-            | ErrorKind::Interrupted
-            | ErrorKind::ConnectionAborted
-            | ErrorKind::ConnectionReset
-    )
+    port.log(log::Level::Warn, "not accepted", format_args!("{error}"));
 }

@@ -4,23 +4,13 @@ use std::io::{self, Read as _, Write as _};
 use std::net::SocketAddr;
 
 use crate::{BusError, Port};
-use tickbus_base::net::{TcpListener, TcpStream};
+use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet, Ready};
 use tickbus_base::time::{Nanos, Stop};
 
-use super::{
-    Address, close_by_reset, close_gracefully, is_for_later, is_of_the_client, listen, no_wait,
-    not_accepted, prepare,
-};
+use tickbus_net::{Acceptor, Address, close_by_reset, close_gracefully, is_for_later, prepare};
 
-/// The key of the listener in the poll set; a client's key is its place.
-const LISTENER: usize = usize::MAX - 1;
-
-/// At most this many clients are accepted per turn, before others are served.
-const ACCEPTS: usize = 32;
-
-/// How long the server accepts no client after the system had no socket.
-const PAUSE: Nanos = Nanos::from_secs(1);
+use super::{listen, no_wait, not_accepted};
 
 /// The limits that a server sets for its clients.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,19 +83,18 @@ pub fn serve<S: Service>(
         limits: service.limits(),
         service,
         waiting: format!("listening on {bound}"),
-        listener,
+        acceptor: Acceptor::new(listener, Acceptor::KEY),
         set,
         clients: Clients::default(),
         buffer: vec![0; BUFFER].into(),
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
-        accept_paused_until: None,
         gone: None,
     };
     let limit = server.limits.telegram;
     assert!(limit <= BUFFER, "a telegram fits into one read");
     port.opening(&server.waiting);
-    server.listen(true).map_err(|error| no_wait(&error))?;
+    server.watch(since)?;
     port.begin_to_look(since);
     while !stop.is_stopped() {
         server.turn(port)?;
@@ -125,16 +114,15 @@ struct Server<'a, S: Service> {
     limits: Limits,
     service: &'a mut S,
     waiting: String,
-    listener: TcpListener,
+    acceptor: Acceptor,
     set: PollSet,
+    /// A client's key in the set is its place.
     clients: Clients<S::Client>,
     /// The receive buffer, shared by all clients.
     buffer: Box<[u8]>,
     /// The answer to the current client.
     reply: Vec<u8>,
     ready: Vec<Ready>,
-    /// The time until which no client is accepted, after the system had no socket.
-    accept_paused_until: Option<Nanos>,
     /// When and why the last client that had spoken left, for as long as it may come back: some clients reconnect for
     /// every request, and that is no broken line.
     gone: Option<(Nanos, BusError)>,
@@ -212,13 +200,10 @@ impl<C> Clients<C> {
 }
 
 impl<S: Service> Server<'_, S> {
-    fn listen(&mut self, hears: bool) -> io::Result<()> {
-        if hears {
-            self.accept_paused_until = None;
-            return self.set.add(LISTENER, &self.listener, Interest::Read);
-        }
-        self.set.remove(LISTENER, &self.listener);
-        Ok(())
+    /// Waits for clients, except during a pause.
+    fn watch(&mut self, now: Nanos) -> Result<(), BusError> {
+        let watched = self.acceptor.watch(now, &mut self.set);
+        watched.map_err(|error| no_wait(&error))
     }
 
     fn turn(&mut self, port: &mut Port) -> Result<(), BusError> {
@@ -233,16 +218,14 @@ impl<S: Service> Server<'_, S> {
             let Ready {
                 key, is_writable, ..
             } = self.ready[index];
-            if key == LISTENER {
+            if key == Acceptor::KEY {
                 self.accept(now, port);
             } else if let Err(error) = self.serve_client(key, is_writable, now, port) {
                 self.drop_client(key, &error, port);
             }
         }
         self.check_timeouts(now, port);
-        if self.accept_paused_until.is_some_and(|until| now >= until) {
-            self.listen(true).map_err(|error| no_wait(&error))?;
-        }
+        self.watch(now)?;
         let max_age = port.max_age();
         if let Some((_, error)) = self.gone.take_if(|(since, _)| now - *since >= max_age) {
             port.lost(&error, &self.waiting);
@@ -256,7 +239,7 @@ impl<S: Service> Server<'_, S> {
         let mut deadline = port
             .due()
             .min(port.next_look())
-            .min(self.accept_paused_until.unwrap_or(Nanos::MAX));
+            .min(self.acceptor.deadline());
         if self.clients.speakers > 0 {
             deadline = deadline.min(port.stale_at(port.clock().now()));
         }
@@ -393,17 +376,12 @@ impl<S: Service> Server<'_, S> {
     }
 
     fn accept(&mut self, now: Nanos, port: &mut Port) {
-        for _ in 0..ACCEPTS {
-            let (stream, peer) = match self.listener.accept() {
+        while let Some(accepted) = self.acceptor.accept(now, &mut self.set) {
+            let (stream, peer) = match accepted {
                 Ok(accepted) => accepted,
-                Err(error) if is_for_later(&error) => return,
-                Err(error) if is_of_the_client(&error) => continue,
                 Err(error) => {
                     not_accepted(&error, port);
-                    self.accept_paused_until = Some(now + PAUSE);
-                    // Removing from the set cannot fail.
-                    let _ = self.listen(false);
-                    return;
+                    continue;
                 }
             };
             if self.clients.count >= self.limits.clients && !self.make_room(now, port) {

@@ -5,7 +5,7 @@ use std::io::{self, Read as _, Write as _};
 use std::os::fd::AsFd as _;
 use std::os::unix::net::UnixStream;
 
-use tickbus_bus_plugin::{Inbox, Message};
+use tickbus_net::{Inbox, Message};
 
 use super::slave::{Direct, Slave as _, Stepped};
 use super::talk::{Answer, Request};

@@ -7,7 +7,7 @@ use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
 use std::process::{Child, Command, ExitStatus, Stdio};
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_bus_plugin::{Inbox, Message as _};
+use tickbus_net::{Inbox, Message as _};
 
 use super::helper::next;
 use super::slave::{Failure, Setup, Slave, Stepped};

@@ -1,7 +1,7 @@
 //! The messages between host and helper, in the frames of isolated plug-ins.
 
 use serde::{Deserialize, Serialize};
-use tickbus_bus_plugin::Message;
+use tickbus_net::Message;
 
 use super::slave::{Failure, Setup, Stepped};
 use crate::value::Value;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tickbus_base::net::BlockingStream;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::{Address, prepare, reach_in};
+use tickbus_net::{Address, prepare, reach_in};
 
 use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, silent};

@@ -4,7 +4,7 @@ use std::io::{self, Read as _, Write as _};
 
 use tickbus_base::net::{BlockingStream, TcpStream};
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{IS_BROWSER, begins_like_browser, close_gracefully, prepare};
+use tickbus_net::{IS_BROWSER, begins_like_browser, close_gracefully, prepare};
 
 use super::is_later;
 use crate::server::ToClient;

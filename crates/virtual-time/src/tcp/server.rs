@@ -6,7 +6,7 @@ use std::net::SocketAddr;
 use tickbus_base::net::TcpListener;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Simulation};
-use tickbus_fieldbus::tcp::{Address, bind, is_of_the_client};
+use tickbus_net::{Acceptor, Address, bind};
 
 use super::connection::{Arrived, BLOCKED, Connection};
 use crate::hosting::{Hosting, hear};
@@ -14,20 +14,11 @@ use crate::local::Locals;
 use crate::server::ToClient;
 use crate::{Cause, Ended, Logic, Outcome, Participant, Settings, server};
 
-/// The key of the listener in the poll set; a client's key is its seat.
-const LISTENER: usize = usize::MAX - 1;
-
 /// The most connections at a time; further ones are closed at once.
 const MOST: usize = if cfg!(test) { 3 } else { 1100 };
 
-/// At most this many clients are accepted per turn.
-const ACCEPTS: usize = 32;
-
 /// How often to do everything else while steps follow each other.
 const ROUND: Nanos = Nanos::from_millis(10);
-
-/// The pause in accepting after the system had no free socket.
-const PAUSE: Nanos = Nanos::from_secs(1);
 
 /// The least time for a client's machine to acknowledge data: the system repeats lost packets.
 const ACKNOWLEDGED: Nanos = Nanos::from_secs(10);
@@ -104,18 +95,17 @@ impl Listener {
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
         let locals = Locals::join(&mut server, now, locals);
         let mut set = PollSet::new(hosting.controls.stop());
-        set.add(LISTENER, &self.listener, Interest::Read)
-            .map_err(cannot)?;
+        let mut acceptor = Acceptor::new(self.listener, Acceptor::KEY);
+        acceptor.watch(now, &mut set).map_err(cannot)?;
         let mut host = Host {
             server,
             hosting,
             locals,
-            listener: self.listener,
+            acceptor,
             set,
             patience,
             connections: Vec::new(),
             leaving: Vec::new(),
-            accept_paused_until: None,
             was_full: false,
             looked: now,
         };
@@ -131,14 +121,13 @@ struct Host<'l, 'h, 'p> {
     server: server::Server<'l>,
     hosting: Hosting<'h>,
     locals: Locals<'p>,
-    listener: TcpListener,
+    acceptor: Acceptor,
     set: PollSet,
     patience: Nanos,
-    /// By seats.
+    /// By seats, which are their keys in the set.
     connections: Vec<Option<Connection>>,
     /// Connections with last words to write, and the time when the server gives up.
     leaving: Vec<(Connection, Nanos)>,
-    accept_paused_until: Option<Nanos>,
     /// The last client that came was turned away.
     was_full: bool,
     /// When all sockets were last checked.
@@ -246,8 +235,7 @@ impl Host<'_, '_, '_> {
         } else if blocked || !self.leaving.is_empty() {
             now + ROUND
         } else {
-            let accept = self.accept_paused_until.unwrap_or(Nanos::MAX);
-            self.server.deadline().min(accept)
+            self.server.deadline().min(self.acceptor.deadline())
         };
         self.set.wait(clock, deadline)?;
         let now = clock.now();
@@ -257,15 +245,12 @@ impl Host<'_, '_, '_> {
                 break;
             };
             match ready.key {
-                LISTENER => self.accept(now)?,
+                Acceptor::KEY => self.accept(now)?,
                 seat => self.read(seat),
             }
         }
         self.looked = now;
-        if self.accept_paused_until.is_some_and(|until| now >= until) {
-            self.accept_paused_until = None;
-            self.set.add(LISTENER, &self.listener, Interest::Read)?;
-        }
+        self.acceptor.watch(now, &mut self.set)?;
         for seat in 0..self.connections.len() {
             if let Some(connection) = &mut self.connections[seat]
                 && let Err(error) = connection.write()
@@ -282,18 +267,12 @@ impl Host<'_, '_, '_> {
     }
 
     fn accept(&mut self, now: Nanos) -> io::Result<()> {
-        for _ in 0..ACCEPTS {
-            let stream = match self.listener.accept() {
+        while let Some(accepted) = self.acceptor.accept(now, &mut self.set) {
+            let stream = match accepted {
                 Ok((stream, _)) => stream,
-                Err(error) if is_of_the_client(&error) => return Ok(()),
                 Err(error) => {
-                    (self.hosting.news)(&format!(
-                        "a client could not be accepted ({error}); close other programs or raise the limit of open \
-                         files"
-                    ));
-                    self.set.remove(LISTENER, &self.listener);
-                    self.accept_paused_until = Some(now + PAUSE);
-                    return Ok(());
+                    (self.hosting.news)(&error.to_string());
+                    continue;
                 }
             };
             let is_full = self.connections.iter().flatten().count() + self.leaving.len() >= MOST;

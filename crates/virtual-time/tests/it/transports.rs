@@ -5,7 +5,7 @@ use std::thread;
 
 use crate::common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{

@@ -5,7 +5,7 @@ use std::sync::mpsc;
 use std::thread::{self, JoinHandle};
 
 use tickbus_base::time::Monotonic;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_virtual_time::{Controls, Ended, Hosting, Logic, Outcome, Settings, tcp};
 
 /// A server on a separate thread.

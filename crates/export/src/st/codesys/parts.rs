@@ -3,7 +3,7 @@
 use crate::plcopen::{Kind, Variable, variable};
 use crate::st::life::{ALIVE, time};
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::tcp::{Address, Host};
+use tickbus_net::{Address, Host};
 
 /// Statements, and the variables that they need.
 #[derive(Clone, Debug, Default)]

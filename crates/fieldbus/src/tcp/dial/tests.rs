@@ -1,3 +1,4 @@
+use std::io::{Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::sync::Arc;
 use std::thread::{scope, yield_now};
@@ -6,10 +7,10 @@ use std::time::Duration;
 use socket2::SockRef;
 
 use super::*;
-use crate::tcp::prepare;
 use crate::{LinkStatus, Role};
 use tickbus_base::time::{Clock, Manual, Monotonic};
 use tickbus_image::image;
+use tickbus_net::prepare;
 
 const SECOND: Nanos = Nanos::from_secs(1);
 

@@ -12,7 +12,7 @@ use std::rc::Rc;
 
 use tickbus_base::time::{Clock as _, Nanos};
 use tickbus_driver::Code;
-use tickbus_fieldbus::tcp::Address;
+use tickbus_net::Address;
 use tickbus_virtual_time::server::Control;
 use tickbus_virtual_time::tcp::Listener;
 use tickbus_virtual_time::{Controls, Ended, Hosting, Logic, Outcome, Settings, StartCondition};

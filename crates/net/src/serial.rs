@@ -12,7 +12,7 @@ use tickbus_base::os::{SerialLine, SerialPort, SerialSettings};
 use tickbus_base::time::Clock;
 use tickbus_base::toml_text::Value;
 
-use super::BusError;
+use crate::Error;
 
 /// The longest name of a serial port, in characters.
 const DEVICE_LIMIT: usize = 1000;
@@ -29,7 +29,7 @@ pub fn read_device(value: &Value<'_>) -> Option<String> {
 ///
 /// The port does not exist, is not a serial port, or does not support the settings.
 #[cfg(unix)]
-pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, BusError> {
+pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, Error> {
     SerialPort::open(Path::new(device), settings).map_err(|error| no_port(device, settings, &error))
 }
 
@@ -44,13 +44,13 @@ pub fn open_marking(
     device: &str,
     settings: SerialSettings,
     clock: &dyn Clock,
-) -> Result<SerialLine, BusError> {
+) -> Result<SerialLine, Error> {
     SerialLine::open(device, settings, clock.simulation())
         .map_err(|error| no_port(device, settings, &error))
 }
 
 #[cfg(unix)]
-fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> BusError {
+fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> Error {
     let right = match error.kind() {
         ErrorKind::NotFound => {
             "plug it in, or correct \"device\"; ls /dev/serial/by-id shows what is there"
@@ -65,14 +65,14 @@ fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> BusErro
         }
         _ => "check that it is a serial port that can be set so",
     };
-    BusError::Link(format!(
+    Error(format!(
         "cannot open {device} at {settings} ({error}); {right}"
     ))
 }
 
 /// The error when the serial port `device` is gone.
-pub fn gone(device: &str, why: impl fmt::Display) -> BusError {
-    BusError::Link(format!(
+pub fn gone(device: &str, why: impl fmt::Display) -> Error {
+    Error(format!(
         "the serial port {device} is gone ({why}); see whether it is still plugged in"
     ))
 }

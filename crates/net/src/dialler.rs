@@ -4,7 +4,7 @@ use std::io;
 use std::net::TcpStream;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 
-use super::{Address, prepare, reach};
+use crate::{Address, prepare, reach};
 use tickbus_base::time::{Nanos, Stop};
 
 /// The pause after a failed attempt or a lost connection, before the next attempt.

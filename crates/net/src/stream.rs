@@ -1,12 +1,15 @@
-//! System settings that every connection needs.
+//! Streams of bytes, and the system settings that every connection needs.
 
-use std::io::{self, ErrorKind, Read};
+use std::io::{self, ErrorKind, Read, Write};
 use std::net;
 use std::time::Duration;
 
 use socket2::SockRef;
 
 use tickbus_base::net::{HalfClose, TcpStream};
+use tickbus_base::os::Pollable;
+#[cfg(unix)]
+use tickbus_base::os::{LinkedTerminal, SerialLine, SerialPort};
 use tickbus_base::time::Nanos;
 
 /// The maximum number of reads from a socket while it is being closed.
@@ -14,6 +17,53 @@ const READS: usize = 64;
 
 /// The longest time-out to set: systems accept no more than some hours.
 const LONGEST: Nanos = Nanos::from_secs(3600);
+
+/// A stream of bytes that never blocks.
+pub trait Stream: Read + Write + Pollable {
+    /// Called when the stream is about to be dropped.
+    fn close(&mut self) {}
+
+    /// Called when the stream is about to be dropped together with the bytes that the peer has not received yet. A
+    /// stream that cannot drop these is closed.
+    fn close_by_reset(&mut self) {
+        self.close();
+    }
+}
+
+impl Stream for TcpStream {
+    fn close(&mut self) {
+        close_gracefully(self);
+    }
+
+    fn close_by_reset(&mut self) {
+        close_by_reset(self);
+    }
+}
+
+impl Stream for net::TcpStream {
+    fn close(&mut self) {
+        close_gracefully(self);
+    }
+}
+
+impl<S: Stream + ?Sized> Stream for Box<S> {
+    fn close(&mut self) {
+        (**self).close();
+    }
+
+    fn close_by_reset(&mut self) {
+        (**self).close_by_reset();
+    }
+}
+
+#[cfg(unix)]
+impl Stream for SerialPort {}
+
+#[cfg(unix)]
+impl Stream for SerialLine {}
+
+#[cfg(unix)]
+impl Stream for LinkedTerminal {}
 
 /// Closes the sending direction before a connection is closed. With unread bytes the system would reset the connection,
 /// and the peer would lose the bytes that it has not read yet.

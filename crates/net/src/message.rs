@@ -1,7 +1,8 @@
-//! The format of messages between host and helper: a little-endian 32-bit length, and as many bytes of `postcard`.
+//! The format of messages between a host and its helper process: a little-endian 32-bit length, and as many bytes of
+//! `postcard`.
 //!
-//! Both ends are the same program on the same computer; messages are checked because a library may have
-//! damaged its helper.
+//! Both ends are the same program on the same computer; messages are checked because a library may have damaged its
+//! helper.
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -25,7 +26,7 @@ pub enum WireError {
     LeftOver,
 }
 
-/// A message of one direction.
+/// A message of one direction, between a host and its helper process.
 pub trait Message: Serialize + DeserializeOwned {
     /// The longest message in bytes, without its length.
     const MOST: usize;

@@ -4,10 +4,9 @@ use std::io;
 use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::sync::mpsc::{self, TryRecvError};
 
-use crate::BusError;
 use tickbus_base::time::{Clock, Nanos, Stop};
 
-use super::{Address, Host};
+use crate::{Address, Error, Host};
 
 /// All addresses of a host, with its port; `None` if `stop` came first.
 ///
@@ -17,17 +16,17 @@ use super::{Address, Host};
 /// # Errors
 ///
 /// The name is unknown, or cannot be looked up.
-pub(super) fn resolve(
+pub(crate) fn resolve(
     address: &Address,
     clock: &dyn Clock,
     stop: &Stop,
-) -> Result<Option<Vec<SocketAddr>>, BusError> {
+) -> Result<Option<Vec<SocketAddr>>, Error> {
     let name = match &address.host {
         Host::Ip(ip) => return Ok(Some(vec![SocketAddr::new(*ip, address.port)])),
         Host::Name(name) => name.clone(),
     };
     let refused = |error: io::Error| {
-        BusError::Link(format!(
+        Error(format!(
             "the host \"{name}\" cannot be looked up ({error}); correct \"address\", or write an IP \
              address there"
         ))

@@ -96,7 +96,7 @@ fn open_hosted(
         program,
         interval: scan,
         has_watchdog: true,
-        tape: None,
+        recorder: None,
     };
     let clock = Arc::clone(clock);
     let bus_of_program = bus(controller);

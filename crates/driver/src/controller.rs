@@ -10,9 +10,9 @@ use tickbus_plc::Program;
 
 use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
-use super::recording::ScanRecorder;
+use super::recording::recorder;
 use super::watch::Watch;
-use super::{DriverError, bus};
+use super::{DriverError, SlotMap, bus};
 use tickbus_driver_cfg::Config;
 
 /// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
@@ -96,7 +96,13 @@ impl Host {
             program,
             interval,
             has_watchdog,
-            tape: ScanRecorder::start(config, role, is_stepped, &clock)?,
+            recorder: recorder(
+                config,
+                &SlotMap::new(&config.table, role),
+                None,
+                is_stepped,
+                &clock,
+            )?,
         };
         let thread = match bus {
             Bus::Free(bus) => HostThread::start(hosted, &title, config, role, bus, clock),
@@ -109,14 +115,15 @@ impl Host {
 
     /// Returns the state of the line.
     pub fn link(&self) -> Link {
-        self.0.status.observe_call(self.0.counters.clock.now());
-        self.0.status.link()
+        let status = &self.0.figures.status;
+        status.observe_call(self.0.counters.clock.now());
+        status.link()
     }
 
     /// Returns the counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
         let now = self.0.counters.clock.now();
-        self.0.figures().statistics(now).to_string()
+        self.0.figures.statistics(now, None).to_string()
     }
 
     /// Lets another thread look at the program's image and force its signals. Returns `None` if the watch has been
@@ -128,7 +135,7 @@ impl Host {
 
     /// Returns the injected faults of this end.
     pub fn injected_faults(&self) -> Vec<FaultStatus> {
-        self.0.board.list()
+        self.0.figures.board.list()
     }
 
     /// Returns the number of scans so far, and how many of them had stale data.
@@ -149,12 +156,12 @@ impl Host {
 
     /// Returns true if the line has failed and has never come up.
     pub fn has_only_failed(&self) -> bool {
-        self.0.status.has_only_failed()
+        self.0.figures.status.has_only_failed()
     }
 
     /// Returns what the bus reported under this key of the statistics.
     pub fn fact(&self, key: &'static str) -> Option<String> {
-        self.0.status.fact(key)
+        self.0.figures.status.fact(key)
     }
 
     /// Stops scanning and closes the bus. If the program did not end, returns why.

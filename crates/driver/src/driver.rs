@@ -14,9 +14,10 @@ use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::host::Program;
 use super::station::Station;
+use super::statistics::{Figures, TickFigures};
+use super::tap::Tap;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
-use super::watched::Watched;
 use super::{Exchange, SlotMap, Snapshot, TickCounters};
 use tickbus_driver_cfg::Config;
 
@@ -45,14 +46,14 @@ pub struct Driver {
     /// The result of the last tick.
     pub(super) last: Exchange,
     /// The extra work around every exchange; most drivers have none.
-    pub(super) extras: Option<Box<Extras>>,
-    /// True for a free bus with one station, no extras and no recorder.
+    pub(super) extras: Extras,
+    /// True for a free bus with one station, no extra work and no recorder.
     pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<Program>,
     pub(super) recorder: Option<Recorder>,
     /// Lets another thread look at the driver.
-    pub(super) watched: Option<Box<Watched>>,
+    pub(super) tap: Option<Tap>,
 }
 
 impl Driver {
@@ -110,19 +111,26 @@ impl Driver {
     pub fn snapshot(&self) -> Snapshot {
         let now = self.clock.now();
         Snapshot {
-            config: Arc::clone(&self.config),
-            counters: self.counters,
-            stations: self.told(now).collect(),
-            events_lost: self.image.events.lost(),
+            figures: self.figures(),
+            ticks: TickFigures {
+                config: Arc::clone(&self.config),
+                counters: self.counters,
+                stations: self.told(now).collect(),
+                events_lost: self.image.events.lost(),
+                samples: self.samples.clone(),
+            },
             now,
-            samples: self.samples.clone(),
+        }
+    }
+
+    /// Returns the sources of the statistics that are not in the ticks.
+    pub(super) fn figures(&self) -> Figures {
+        let recorder = self.recorder.as_ref();
+        Figures {
             status: self.status.clone(),
             board: Arc::clone(&self.board),
             program: self.program.as_ref().map(Program::counters),
-            record: self
-                .recorder
-                .as_ref()
-                .map(|recorder| Arc::clone(recorder.counters())),
+            record: recorder.map(|recorder| Arc::clone(recorder.counters())),
         }
     }
 

@@ -1,13 +1,12 @@
 //! A PLC program behind a process image: scanned by its own thread, or by the simulation's tick.
 
 mod cpu;
-mod faults;
 mod fit;
+mod own_end;
 mod program;
 mod scan_counters;
 mod stepped;
 mod thread;
-mod watched;
 
 pub(super) use fit::{check_fit, program_error};
 pub(super) use program::{Program, ProgramCounters};

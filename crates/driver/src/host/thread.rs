@@ -4,14 +4,11 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::recording::ScanRecorder;
+use crate::statistics::Figures;
 use crate::supervise::{BusThread, panic_text};
-use crate::tap::Handle;
-use crate::tick_counters::TickTimes;
-use crate::view::View;
-use crate::watch::{Figures, Watch};
+use crate::watch::Watch;
 use crate::{DriverError, SlotMap};
-use tickbus_base::os::{dropped_log_lines, wake_on_time};
+use tickbus_base::os::wake_on_time;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
@@ -19,12 +16,11 @@ use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
 use tickbus_plc::{Program, Report};
-use tickbus_record as record;
+use tickbus_record::Recorder;
 
-use super::ScanCounters;
 use super::cpu::{Cpu, half};
-use super::faults::FrameFaults;
-use super::watched::WatchedScans;
+use super::own_end::OwnEnd;
+use super::{ProgramCounters, ScanCounters};
 
 /// The longest time that a scan can take before it counts as hung. A real PLC's watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -56,8 +52,8 @@ pub(crate) struct ScanSetup {
     pub(crate) interval: Nanos,
     /// True if a late scan counts as a broken line, so that fail-safe values replace the outputs.
     pub(crate) has_watchdog: bool,
-    /// The recording of its scans.
-    pub(crate) tape: Option<ScanRecorder>,
+    /// Records its scans.
+    pub(crate) recorder: Option<Recorder>,
 }
 
 /// The counters and the state that a program's thread publishes.
@@ -69,7 +65,6 @@ pub(crate) struct HostCounters {
     /// True if a scan that takes too long is a fault.
     can_hang: bool,
     report: Option<Arc<dyn Report>>,
-    record: Option<Arc<record::RecorderCounters>>,
     /// The clock of the line.
     pub(crate) clock: Arc<dyn Clock>,
     /// The clock that measures hung scans.
@@ -80,8 +75,7 @@ pub(crate) struct HostCounters {
 #[derive(Debug)]
 pub(crate) struct HostThread {
     pub(crate) counters: HostCounters,
-    pub(crate) status: LinkStatus,
-    pub(crate) board: Arc<FaultBoard>,
+    pub(crate) figures: Figures,
     /// Looks at the program's image, until someone takes it.
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
@@ -139,9 +133,9 @@ impl HostThread {
     ) -> Result<Self, DriverError> {
         let (max_age, interval) = (config.timing.max_age, hosted.interval);
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
+        let record = hosted.recorder.as_ref();
+        let record = record.map(|recorder| Arc::clone(recorder.counters()));
         let (mut cpu, bus_end) = half(hosted.program, config, role);
-        cpu.tape = hosted.tape;
-        let record = cpu.tape.as_ref().map(ScanRecorder::counters);
         let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
         // `Watch`.
@@ -154,7 +148,6 @@ impl HostThread {
             Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
         let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
@@ -167,12 +160,24 @@ impl HostThread {
             scanning: Arc::clone(&scanning),
             can_hang,
             report,
-            record,
             clock: Arc::clone(&clock),
             wall,
         };
-        let figures = HostFigures::of(&counters, &status, &board);
-        let watch = seen.map(|(config, handle)| watch(config, handle, figures));
+        let figures = Figures {
+            status: status.clone(),
+            board: Arc::clone(&board),
+            program: Some(ProgramCounters::Thread(counters.clone())),
+            record,
+        };
+        let watch = is_own.then(|| {
+            let config = Arc::new(config.clone());
+            // The faults of a program have no slots that count edges.
+            let (slots, figures) = (SlotMap::default(), figures.clone());
+            let (tap, watch) =
+                Watch::new(Arc::clone(&config), slots, clock.clone(), figures, false);
+            cpu.own = Some(OwnEnd::new(config, &board, tap, hosted.recorder));
+            watch
+        });
         let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
             match scanned {
                 Scanned::Freely { bus, .. } => {
@@ -231,8 +236,7 @@ impl HostThread {
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
             counters,
-            status,
-            board,
+            figures,
             watch: Mutex::new(watch),
             stop,
             thread: Some(thread),
@@ -262,78 +266,6 @@ fn timing(config: &Config, is_own_end: bool) -> Timing {
     timing
 }
 
-/// The sources of the statistics of a program and its line.
-#[derive(Clone, Debug)]
-pub(crate) struct HostFigures {
-    pub(crate) counters: HostCounters,
-    pub(crate) status: LinkStatus,
-    pub(crate) board: Arc<FaultBoard>,
-}
-
-impl HostFigures {
-    fn of(counters: &HostCounters, status: &LinkStatus, board: &Arc<FaultBoard>) -> Self {
-        Self {
-            counters: counters.clone(),
-            status: status.clone(),
-            board: Arc::clone(board),
-        }
-    }
-
-    /// Returns the statistics at this moment.
-    pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
-        let mut statistics = Statistics::default();
-        self.status.observe_call(now);
-        self.status.write(now, &mut statistics);
-        self.board.tell(self.status.driver());
-        self.board.write(&mut statistics);
-        self.counters.write(&mut statistics);
-        statistics.count("log.dropped", dropped_log_lines());
-        statistics
-    }
-}
-
-impl Figures for HostFigures {
-    fn statistics(&self, now: Nanos, _: &View, _: &TickTimes) -> Statistics {
-        Self::statistics(self, now)
-    }
-
-    fn is_driver(&self) -> bool {
-        false
-    }
-}
-
-/// Gives the end that a driver.cfg describes its faults, and lets another thread look at this end.
-fn prepare_own_end(
-    cpu: &mut Cpu,
-    config: &Config,
-    board: &Arc<FaultBoard>,
-) -> (Arc<Config>, Handle) {
-    let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
-    let (table, shared) = (&config.table, Arc::clone(board));
-    cpu.faults = FrameFaults::of_list(&config.faults, table, cpu.areas, inputs, shared);
-    let config = Arc::new(config.clone());
-    let (watched, handle) = WatchedScans::new(&config, config.role, Arc::clone(board));
-    cpu.watched = Some(watched);
-    (config, handle)
-}
-
-/// Creates the watch of a program.
-fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
-    Watch {
-        role: config.role,
-        config,
-        // A program works on frames: its faults have no slots that count edges.
-        slots: SlotMap::default(),
-        handle,
-        status: figures.status.clone(),
-        board: Arc::clone(&figures.board),
-        clock: Arc::clone(&figures.counters.clock),
-        figures: Box::new(figures),
-        times: TickTimes::default(),
-        asked: None,
-    }
-}
-
 impl HostCounters {
     /// Adds the program's counters, and its fault.
     pub(crate) fn write(&self, statistics: &mut Statistics) {
@@ -343,9 +275,6 @@ impl HostCounters {
         }
         if let Some(fault) = self.fault() {
             statistics.text("plc.fault", &fault);
-        }
-        if let Some(record) = &self.record {
-            record.write(statistics);
         }
     }
 
@@ -363,11 +292,6 @@ impl HostCounters {
 }
 
 impl HostThread {
-    /// Returns the sources of the program's statistics.
-    pub(crate) fn figures(&self) -> HostFigures {
-        HostFigures::of(&self.counters, &self.status, &self.board)
-    }
-
     /// Returns true if the program is no longer scanned, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
         !self.thread.as_ref().is_some_and(Thread::is_running)

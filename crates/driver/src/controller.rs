@@ -115,14 +115,14 @@ impl Host {
 
     /// Returns the state of the line.
     pub fn link(&self) -> Link {
-        let status = &self.0.figures.status;
-        status.observe_call(self.0.counters.clock.now());
-        status.link()
+        let now = self.0.observe();
+        self.0.figures.status.observe_call(now);
+        self.0.figures.status.link()
     }
 
     /// Returns the counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
-        let now = self.0.counters.clock.now();
+        let now = self.0.observe();
         self.0.figures.statistics(now, None).to_string()
     }
 

@@ -93,7 +93,10 @@ impl Driver {
 
     /// Returns the state of the line.
     pub fn link(&self) -> Link {
-        self.observe();
+        // In case the bus itself cannot check its line.
+        let now = self.clock.now();
+        self.status.observe(now, self.image.peers.ages(now));
+        self.status.observe_call(now);
         self.status.link()
     }
 
@@ -109,13 +112,15 @@ impl Driver {
 
     /// Copies the data for the statistics, so that the caller can format them after releasing its lock on the driver.
     pub fn snapshot(&self) -> Snapshot {
-        let now = self.clock.now();
+        let (now, peers) = (self.clock.now(), &self.image.peers);
+        let stations = peers.ages(now).enumerate();
+        let stations = stations.map(|(at, age)| (age, peers.is_valid(at), peers.received(at)));
         Snapshot {
             figures: self.figures(),
             ticks: TickFigures {
                 config: Arc::clone(&self.config),
                 counters: self.counters,
-                stations: self.told(now).collect(),
+                stations: stations.collect(),
                 events_lost: self.image.events.lost(),
                 samples: self.samples.clone(),
             },
@@ -132,27 +137,6 @@ impl Driver {
             program: self.program.as_ref().map(Program::counters),
             record: recorder.map(|recorder| Arc::clone(recorder.counters())),
         }
-    }
-
-    /// Returns what the bus reports about each station: the time since its peer was last heard, whether its data are
-    /// valid, and the number of frames received.
-    fn told(&self, now: Nanos) -> impl Iterator<Item = (Nanos, bool, u64)> + Clone {
-        let image = &self.image;
-        (0..image.stations()).map(move |station| {
-            (
-                image.peer_age(station, now),
-                image.is_valid(station),
-                image.received(station),
-            )
-        })
-    }
-
-    /// Checks the state of the line, in case the bus itself cannot.
-    fn observe(&self) {
-        let now = self.clock.now();
-        let ages = self.told(now).map(|(age, ..)| age);
-        self.status.observe(now, ages);
-        self.status.observe_call(now);
     }
 
     /// Moves the oldest events into `into`, as many as fit, and returns their number.

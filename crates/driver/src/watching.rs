@@ -56,10 +56,10 @@ impl Driver {
         for (index, (seen, station)) in stations.enumerate() {
             *seen = StationView {
                 status: station.status,
-                age: self.image.peer_age(index, now),
-                is_valid: self.image.is_valid(index),
+                age: self.image.peers.age(index, now),
+                is_valid: self.image.peers.is_valid(index),
                 is_fail_safe: station.stale,
-                cycles: self.image.received(index),
+                cycles: self.image.peers.received(index),
             };
             self.image
                 .edges(index, |signal, count| view.edges[signal] = count);

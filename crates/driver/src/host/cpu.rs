@@ -8,7 +8,7 @@ use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, Signal, fail_safe_frame};
-use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, copy_frame, image};
+use tickbus_image::{Arrival, BusEnd, Peers, Receiver, TickEnd, copy_frame, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
@@ -249,6 +249,11 @@ impl Receiver for Taking<'_> {
 }
 
 impl Cpu {
+    /// Returns what the bus noted about each peer.
+    pub(super) fn peers(&self) -> &Peers {
+        &self.tick.peers
+    }
+
     /// Runs one scan at `now`: inputs, program, outputs. `in_time` is false when the scan is so late that the peer has
     /// received fail-safe values in the meantime: the program must then start over as after a broken line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {

@@ -238,7 +238,8 @@ impl OwnEnd {
             for (index, ((unit, station), seen)) in units.enumerate() {
                 station.reads.decode(unit.inputs(), &mut view.slots);
                 station.writes.decode(unit.outputs(), &mut view.slots);
-                let (age, is_valid) = (image.peer_age(index, now), image.is_valid(index));
+                let peers = &image.peers;
+                let (age, is_valid) = (peers.age(index, now), peers.is_valid(index));
                 *seen = StationView {
                     // A late scan sees the line as down although its data are good.
                     status: if is_stale(age, max_age, is_valid) {
@@ -249,7 +250,7 @@ impl OwnEnd {
                     age,
                     is_valid,
                     is_fail_safe: unit.is_fail_safe(),
-                    cycles: image.received(index),
+                    cycles: peers.received(index),
                 };
                 code = code.worse(seen.status);
                 image.edges(index, |signal, count| view.edges[signal] = count);

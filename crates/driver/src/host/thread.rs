@@ -15,6 +15,7 @@ use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
+use tickbus_image::Peers;
 use tickbus_plc::{Program, Report};
 use tickbus_record::Recorder;
 
@@ -76,11 +77,12 @@ pub(crate) struct HostCounters {
 pub(crate) struct HostThread {
     pub(crate) counters: HostCounters,
     pub(crate) figures: Figures,
+    peers: Peers,
     /// Looks at the program's image, until someone takes it.
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<Thread>,
-    #[expect(dead_code, reason = "kept for its drop")]
+    /// Kept for its drop; `None` if the program's thread steps the bus.
     bus: Option<BusThread>,
 }
 
@@ -163,6 +165,7 @@ impl HostThread {
             clock: Arc::clone(&clock),
             wall,
         };
+        let peers = cpu.peers().clone();
         let figures = Figures {
             status: status.clone(),
             board: Arc::clone(&board),
@@ -237,6 +240,7 @@ impl HostThread {
         Ok(Self {
             counters,
             figures,
+            peers,
             watch: Mutex::new(watch),
             stop,
             thread: Some(thread),
@@ -292,6 +296,16 @@ impl HostCounters {
 }
 
 impl HostThread {
+    /// Checks the state of the line, in case the bus itself cannot, and returns the time. In the steps of a bus, only the
+    /// bus knows whether data are late.
+    pub(crate) fn observe(&self) -> Nanos {
+        let now = self.counters.clock.now();
+        if self.bus.is_some() {
+            self.figures.status.observe(now, self.peers.ages(now));
+        }
+        now
+    }
+
     /// Returns true if the program is no longer scanned, for whatever reason.
     pub(crate) fn is_over(&self) -> bool {
         !self.thread.as_ref().is_some_and(Thread::is_running)

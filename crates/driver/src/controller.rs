@@ -89,28 +89,15 @@ impl Host {
                 ));
             }
         };
-        let title = format!("plc {}", program.name());
-        let role = config.role;
+        let map = SlotMap::new(&config.table, config.role);
         let is_stepped = matches!(bus, Bus::Stepped(_));
         let hosted = ScanSetup {
             program,
             interval,
             has_watchdog,
-            recorder: recorder(
-                config,
-                &SlotMap::new(&config.table, role),
-                None,
-                is_stepped,
-                &clock,
-            )?,
+            recorder: recorder(config, &map, None, is_stepped, &clock)?,
         };
-        let thread = match bus {
-            Bus::Free(bus) => HostThread::start(hosted, &title, config, role, bus, clock),
-            Bus::Stepped(bus) => {
-                HostThread::start_in_steps(hosted, &title, (config, role), (bus, stop), clock)
-            }
-        };
-        thread.map(Self)
+        HostThread::start(hosted, (config, config.role), (bus, stop), clock).map(Self)
     }
 
     /// Returns the state of the line.

@@ -12,7 +12,7 @@ use tickbus_record::Recorder;
 
 use super::bus_handle::BusHandle;
 use super::extras::Extras;
-use super::host::Program;
+use super::host::OtherEnd;
 use super::station::Station;
 use super::statistics::{Figures, TickFigures};
 use super::tap::Tap;
@@ -50,7 +50,7 @@ pub struct Driver {
     /// True for a free bus with one station, no extra work and no recorder.
     pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
-    pub(super) program: Option<Program>,
+    pub(super) program: Option<OtherEnd>,
     pub(super) recorder: Option<Recorder>,
     /// Lets another thread look at the driver.
     pub(super) tap: Option<Tap>,
@@ -84,11 +84,7 @@ impl Driver {
 
     /// Returns the slots before the first exchange: every signal has its fail-safe value.
     pub fn initial_slots(&self) -> Vec<Slot> {
-        let mut slots = vec![Slot::default(); self.slots.count];
-        for (slot, signal) in slots.iter_mut().zip(&self.config.table.signals) {
-            *slot = signal.fail_safe;
-        }
-        slots
+        self.slots.initial(&self.config.table)
     }
 
     /// Returns the state of the line.
@@ -134,7 +130,7 @@ impl Driver {
         Figures {
             status: self.status.clone(),
             board: Arc::clone(&self.board),
-            program: self.program.as_ref().map(Program::counters),
+            program: self.program.as_ref().map(|end| Arc::clone(&end.counters)),
             record: recorder.map(|recorder| Arc::clone(recorder.counters())),
         }
     }

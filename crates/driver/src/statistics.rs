@@ -3,7 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::host::ProgramCounters;
 use super::tick_counters::{TickCounters, TickTimes};
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::statistics::{Key, Statistics};
@@ -13,13 +12,19 @@ use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{LinkStatus, is_stale};
 use tickbus_record::RecorderCounters;
 
+/// Counters that any thread can read.
+pub(crate) trait Counters: fmt::Debug + Send + Sync {
+    /// Adds the counters.
+    fn write(&self, statistics: &mut Statistics);
+}
+
 /// The sources of the statistics of one end of a line, all readable from any thread.
 #[derive(Clone, Debug)]
 pub(super) struct Figures {
     pub(super) status: LinkStatus,
     pub(super) board: Arc<FaultBoard>,
     /// The counters of the program at this end or at the other one, and those of the recording.
-    pub(super) program: Option<ProgramCounters>,
+    pub(super) program: Option<Arc<dyn Counters>>,
     pub(super) record: Option<Arc<RecorderCounters>>,
 }
 

@@ -39,16 +39,15 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Creates a watch on the end that `config` describes, and the tap for its ticks. Faults change the values in
-    /// `slots`.
+    /// Creates a watch on the end that `config` describes, and the tap for its ticks.
     pub(super) fn new(
         config: Arc<Config>,
-        slots: SlotMap,
         clock: Arc<dyn Clock>,
         figures: Figures,
         is_driver: bool,
     ) -> (Tap, Self) {
         let table = &config.table;
+        let slots = SlotMap::new(table, config.role);
         let initial = table.signals.iter().map(|signal| signal.fail_safe);
         let (tap, handle) = tap(&View::new(initial.collect(), table.stations.len()));
         let watch = Self {
@@ -260,16 +259,14 @@ mod tests {
         driver.exchange(Nanos::from_millis(400), &mut slots);
         let now = watch.clock().now();
         let (state, cause) = (LinkState::Stale, Cause::Silent);
-        watch
-            .figures
-            .status
-            .enter(now, state, cause, "nothing has come");
+        let status = watch.figures.status.clone();
+        status.enter(now, state, cause, "nothing has come");
         assert!(watch.update());
-        assert_eq!(watch.figures.status.state(), LinkState::Stale);
+        assert_eq!(status.state(), LinkState::Stale);
         // A newer copy does.
         watch.ask(false);
         driver.exchange(Nanos::from_millis(401), &mut slots);
         assert!(watch.update());
-        assert_eq!(watch.figures.status.state(), LinkState::Running);
+        assert_eq!(status.state(), LinkState::Running);
     }
 }

@@ -17,7 +17,7 @@ impl Driver {
     pub fn watch(&mut self) -> Watch {
         self.extras.make_room(&self.board);
         let (config, clock) = (Arc::clone(&self.config), Arc::clone(&self.clock));
-        let (tap, watch) = Watch::new(config, self.slots.clone(), clock, self.figures(), true);
+        let (tap, watch) = Watch::new(config, clock, self.figures(), true);
         self.tap = Some(tap);
         watch
     }

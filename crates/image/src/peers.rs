@@ -1,4 +1,4 @@
-//! What the bus notes about its peers beside the frames.
+//! The bus's notes about its peers, beside the frames.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};

@@ -20,7 +20,7 @@ pub struct TickEnd {
     shown: Vec<Shown>,
     /// Of the frame taken over last.
     cycles: u64,
-    /// What the bus noted about each peer, for statistics: a tick reads the same from its frame.
+    /// The bus's notes about each peer, for statistics: a tick reads the same from its frame.
     pub peers: Peers,
     /// The peer's writes, for applications to which every write matters.
     pub events: Consumer,

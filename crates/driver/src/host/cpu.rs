@@ -249,7 +249,7 @@ impl Receiver for Taking<'_> {
 }
 
 impl Cpu {
-    /// Returns what the bus noted about each peer.
+    /// Returns the bus's notes about each peer.
     pub(super) fn peers(&self) -> &Peers {
         &self.tick.peers
     }

@@ -9,7 +9,7 @@ mod stepped;
 mod thread;
 
 pub(super) use fit::{check_fit, program_error};
-pub(super) use program::{Program, ProgramCounters};
-pub(super) use scan_counters::ScanCounters;
+pub(super) use program::OtherEnd;
+use scan_counters::ScanCounters;
 pub(super) use stepped::SteppedHost;
-pub(super) use thread::{HostCounters, HostThread, ScanSetup};
+pub(super) use thread::{HostThread, ScanSetup};

@@ -60,20 +60,16 @@ impl OwnEnd {
         let (writes, reads) = config.role.areas();
         let mut extras = Extras::new(None, Beat::all(&config, config.role));
         extras.make_room(board);
+        let map = SlotMap::new(table, config.role);
         for fault in &config.faults {
             let slots = Slots {
                 table,
                 writes,
-                edges: &[],
+                edges: &map.edges,
             };
             extras
                 .inject(fault, slots, board)
                 .expect("a driver.cfg has no more faults than a driver");
-        }
-        let map = SlotMap::new(table, config.role);
-        let mut slots = vec![Slot::default(); map.count];
-        for (slot, signal) in slots.iter_mut().zip(&table.signals) {
-            *slot = signal.fail_safe;
         }
         let frame = |bytes| vec![0; bytes].into();
         let stations = table.stations.iter().enumerate();
@@ -88,7 +84,7 @@ impl OwnEnd {
             extras,
             recorder,
             tap,
-            slots,
+            slots: map.initial(table),
             edges: map.edges,
             stations: stations.collect(),
             is_bent: false,
@@ -324,7 +320,7 @@ mod tests {
         };
         let (config, board) = (Arc::new(config), Arc::clone(&figures.board));
         let shared = Arc::clone(&config);
-        let (tap, _watch) = Watch::new(shared, SlotMap::default(), Manual::new(), figures, false);
+        let (tap, _watch) = Watch::new(shared, Manual::new(), figures, false);
         cpu.own = Some(OwnEnd::new(config, &board, tap, None));
         for (millis, expected) in [(0, [0xff, 0xf4, 1, 0]), (1, [0xff, 0xf0, 2, 0])] {
             let now = Nanos::from_millis(millis);

@@ -2,26 +2,26 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::statistics::Figures;
+use crate::DriverError;
+use crate::statistics::{Counters, Figures};
 use crate::supervise::{BusThread, panic_text};
 use crate::watch::Watch;
-use crate::{DriverError, SlotMap};
 use tickbus_base::os::wake_on_time;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
+use tickbus_fieldbus::{Bus, BusError, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
 use tickbus_image::Peers;
 use tickbus_plc::{Program, Report};
 use tickbus_record::Recorder;
 
+use super::ScanCounters;
 use super::cpu::{Cpu, half};
 use super::own_end::OwnEnd;
-use super::{ProgramCounters, ScanCounters};
 
 /// The longest time that a scan can take before it counts as hung. A real PLC's watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -58,11 +58,11 @@ pub(crate) struct ScanSetup {
 }
 
 /// The counters and the state that a program's thread publishes.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct HostCounters {
     pub(crate) scan_counters: Arc<ScanCounters>,
-    fault: Arc<Mutex<Option<String>>>,
-    scanning: Arc<Scanning>,
+    fault: Mutex<Option<String>>,
+    scanning: Scanning,
     /// True if a scan that takes too long is a fault.
     can_hang: bool,
     report: Option<Arc<dyn Report>>,
@@ -75,7 +75,7 @@ pub(crate) struct HostCounters {
 /// A program on its own thread, with the bus thread of its end of the line; dropping this stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
-    pub(crate) counters: HostCounters,
+    pub(crate) counters: Arc<HostCounters>,
     pub(crate) figures: Figures,
     peers: Peers,
     /// Looks at the program's image, until someone takes it.
@@ -86,53 +86,17 @@ pub(crate) struct HostThread {
     bus: Option<BusThread>,
 }
 
-/// Says how a program is scanned.
-enum Scanned {
-    /// Scans at a fixed interval of the clock; the bus has its own thread.
-    Freely {
-        bus: Box<dyn Free>,
-        clock: Arc<dyn Clock>,
-    },
-    /// Scans in the steps of a bus that hands out the time.
-    InSteps { bus: Box<dyn Stepped>, stop: Stop },
-}
-
 impl HostThread {
-    /// Starts scanning the `hosted` program as the end with `role`; `bus` connects it to its peer. The thread is called
-    /// `name`.
+    /// Starts scanning the `hosted` program as the end with `role`; the bus connects it to its peer. A free bus has a
+    /// thread of its own, and scans have a fixed interval. A stepped one hands out the time, and waits no longer once the
+    /// stop is stopped; `wall` then only detects a hung scan.
     pub(crate) fn start(
         hosted: ScanSetup,
-        name: &str,
-        config: &Config,
-        role: Role,
-        bus: Box<dyn Free>,
-        clock: Arc<dyn Clock>,
-    ) -> Result<Self, DriverError> {
-        let wall = Arc::clone(&clock);
-        let scanned = Scanned::Freely { bus, clock };
-        Self::start_scanned(hosted, name, (config, role), scanned, wall)
-    }
-
-    /// As `start`, but scans in the steps of a bus that hands out the time, and that waits no longer once `stop` is
-    /// stopped. The clock `wall` detects a hung scan.
-    pub(crate) fn start_in_steps(
-        hosted: ScanSetup,
-        name: &str,
         (config, role): (&Config, Role),
-        (bus, stop): (Box<dyn Stepped>, Stop),
+        (bus, stop): (Bus, Stop),
         wall: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
-        let scanned = Scanned::InSteps { bus, stop };
-        Self::start_scanned(hosted, name, (config, role), scanned, wall)
-    }
-
-    fn start_scanned(
-        hosted: ScanSetup,
-        name: &str,
-        (config, role): (&Config, Role),
-        scanned: Scanned,
-        wall: Arc<dyn Clock>,
-    ) -> Result<Self, DriverError> {
+        let name = &format!("plc {}", hosted.program.name());
         let (max_age, interval) = (config.timing.max_age, hosted.interval);
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
         let record = hosted.recorder.as_ref();
@@ -145,84 +109,69 @@ impl HostThread {
         let watchdog = watchdog(config, (is_own, role), interval);
         let watchdog = watchdog.filter(|_| hosted.has_watchdog);
         let virtual_time = Manual::new();
-        let (clock, limit) = match &scanned {
-            Scanned::Freely { clock, .. } => (Arc::clone(clock), watchdog),
-            Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
+        let (clock, limit) = match &bus {
+            Bus::Free(_) => (Arc::clone(&wall), watchdog),
+            Bus::Stepped(_) => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
         let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        let fault = Arc::new(Mutex::new(None));
-        let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
-        let counters = HostCounters {
+        let counters = Arc::new(HostCounters {
             scan_counters: Arc::clone(&cpu.scan_counters),
-            fault: Arc::clone(&fault),
-            scanning: Arc::clone(&scanning),
+            fault: Mutex::new(None),
+            scanning: Scanning(AtomicI64::new(Scanning::NONE)),
             can_hang,
             report,
-            clock: Arc::clone(&clock),
+            clock,
             wall,
-        };
+        });
         let peers = cpu.peers().clone();
         let figures = Figures {
             status: status.clone(),
             board: Arc::clone(&board),
-            program: Some(ProgramCounters::Thread(counters.clone())),
+            program: Some(Arc::clone(&counters) as _),
             record,
         };
         let watch = is_own.then(|| {
-            let config = Arc::new(config.clone());
-            // The faults of a program have no slots that count edges.
-            let (slots, figures) = (SlotMap::default(), figures.clone());
-            let (tap, watch) =
-                Watch::new(Arc::clone(&config), slots, clock.clone(), figures, false);
+            let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
+            let (tap, watch) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
             cpu.own = Some(OwnEnd::new(config, &board, tap, hosted.recorder));
             watch
         });
-        let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
-            match scanned {
-                Scanned::Freely { bus, .. } => {
-                    let timing = timing(config, is_own);
-                    let bus = BusThread::start(bus, port, &timing, status.clone(), name);
-                    let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
-                    let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
-                    let scans = {
-                        let stop = stop.clone();
-                        move || {
-                            let times = (interval, watchdog);
-                            wake_on_time();
-                            scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
-                            Ok(())
-                        }
-                    };
-                    (stop, Some(bus), Box::new(scans))
-                }
-                Scanned::InSteps { mut bus, stop } => {
-                    let mut port = port;
-                    let scans = {
-                        let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
-                        let wall = Arc::clone(&counters.wall);
-                        let status = status.clone();
-                        move || {
-                            let line = (&mut *bus, &mut port, &*virtual_time);
-                            let watch = (&*scanning, &*wall);
-                            let ended = scan_in_steps(&mut cpu, line, watch, &stop);
-                            ended.map_err(|error| {
-                                let reason = error.to_string();
-                                let (now, cause) = (virtual_time.now(), (&error).into());
-                                status.enter(now, LinkState::Failed, cause, &reason);
-                                reason
-                            })
-                        }
-                    };
-                    (stop, None, Box::new(scans))
-                }
-            };
+        let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
+        let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
+            Bus::Free(bus) => {
+                let timing = timing(config, is_own);
+                let bus = BusThread::start(bus, port, &timing, status, name);
+                let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
+                let scans = move || {
+                    wake_on_time();
+                    scan_until_stopped(&mut cpu, (interval, watchdog), &stopped, &scanned);
+                    Ok(())
+                };
+                (Some(bus), Box::new(scans))
+            }
+            Bus::Stepped(mut bus) => {
+                let mut port = port;
+                let scans = move || {
+                    let line = (&mut *bus, &mut port, &*virtual_time);
+                    let ended = scan_in_steps(&mut cpu, line, &scanned, &stopped);
+                    ended.map_err(|error| {
+                        let reason = error.to_string();
+                        let (now, cause) = (virtual_time.now(), (&error).into());
+                        status.enter(now, LinkState::Failed, cause, &reason);
+                        reason
+                    })
+                };
+                (None, Box::new(scans))
+            }
+        };
+        let scanned = Arc::clone(&counters);
         let spawned = Thread::spawn(&*counters.wall, name, move || {
             let result = catch_unwind(AssertUnwindSafe(&mut scans));
-            scanning.set(None);
+            scanned.scanning.set(None);
             // Dropping the bus can send a farewell to the peer, and closing waits for that.
             drop(scans);
             let text = match result {
@@ -234,7 +183,7 @@ impl HostThread {
                     text
                 }
             };
-            *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+            *scanned.lock_fault() = Some(text);
         });
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
@@ -270,9 +219,9 @@ fn timing(config: &Config, is_own_end: bool) -> Timing {
     timing
 }
 
-impl HostCounters {
+impl Counters for HostCounters {
     /// Adds the program's counters, and its fault.
-    pub(crate) fn write(&self, statistics: &mut Statistics) {
+    fn write(&self, statistics: &mut Statistics) {
         self.scan_counters.write(statistics);
         if let Some(report) = &self.report {
             report.write(statistics);
@@ -281,17 +230,20 @@ impl HostCounters {
             statistics.text("plc.fault", &fault);
         }
     }
+}
 
+impl HostCounters {
     pub(crate) fn fault(&self) -> Option<String> {
         let too_long = self.scanning.too_long(self.wall.now());
         if let Some(span) = too_long.filter(|_| self.can_hang) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
         }
-        self.fault
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.lock_fault().clone()
+    }
+
+    fn lock_fault(&self) -> MutexGuard<'_, Option<String>> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -333,9 +285,10 @@ impl Drop for HostThread {
 fn scan_until_stopped(
     cpu: &mut Cpu,
     (interval, watchdog): (Nanos, Option<Nanos>),
-    clock: &dyn Clock,
     stop: &Stop,
-    scanning: &Scanning,
+    HostCounters {
+        clock, scanning, ..
+    }: &HostCounters,
 ) {
     // As in a PLC: a late scan stays late, and missed scans are not made up for.
     let mut pace = Pace::new(clock.now(), interval);
@@ -360,7 +313,7 @@ fn scan_until_stopped(
 fn scan_in_steps(
     cpu: &mut Cpu,
     (bus, port, time): (&mut (dyn Stepped + 'static), &mut Port, &Manual),
-    (scanning, wall): (&Scanning, &dyn Clock),
+    HostCounters { wall, scanning, .. }: &HostCounters,
     stop: &Stop,
 ) -> Result<(), BusError> {
     while !stop.is_stopped() {

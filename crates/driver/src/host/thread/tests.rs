@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use tickbus_base::time::Manual;
-use tickbus_fieldbus::Cause;
+use tickbus_fieldbus::{Cause, Free};
 use tickbus_plc::Scan;
 
 use crate::Host;
@@ -107,14 +107,8 @@ fn a_bus_that_is_stuck_cannot_hide_it_from_who_asks_for_the_state_of_the_line() 
         recorder: None,
     };
     let (role, wall) = (Role::Controller, Arc::clone(&clock) as Arc<dyn Clock>);
-    let host = HostThread::start(
-        hosted,
-        "plc slow",
-        &config,
-        role,
-        Box::new(Stuck(end)),
-        wall,
-    );
+    let bus = Bus::Free(Box::new(Stuck(end)));
+    let host = HostThread::start(hosted, (&config, role), (bus, Stop::new()), wall);
     let mut host = host.expect("starts");
     while host.figures.status.state() != LinkState::Running {
         std::thread::yield_now();

@@ -3,17 +3,17 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use tickbus_base::time::{Clock, Nanos};
+use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::loopback::{Mode, Options, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
-use tickbus_fieldbus::{BusSetup, Hosted, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
 use super::DriverError;
 use super::bus_handle::{OpenBus, SteppedBus};
 use super::frames::area_bytes;
-use super::host::{HostThread, Program, ScanSetup, SteppedHost, check_fit, program_error};
+use super::host::{HostThread, OtherEnd, ScanSetup, SteppedHost, check_fit, program_error};
 use super::replay::Replay;
 use tickbus_driver_cfg::Config;
 
@@ -23,7 +23,7 @@ pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
     hosted: Option<Hosted<'_>>,
-) -> Result<(OpenBus, Option<Program>), DriverError> {
+) -> Result<(OpenBus, Option<OtherEnd>), DriverError> {
     if let Some(options) = config.bus.downcast_ref::<Options>() {
         match &options.peer {
             Peer::Link(_) => {}
@@ -31,7 +31,7 @@ pub(super) fn open(
                 let (replay, scan_counters) = Replay::open(config, &config.folder().join(file))?;
                 return Ok((
                     OpenBus::Stepped(SteppedBus::Replay(Box::new(replay))),
-                    Some(Program::Replay(scan_counters)),
+                    Some(OtherEnd::stepped(scan_counters)),
                 ));
             }
             Peer::Program {
@@ -69,7 +69,7 @@ fn open_hosted(
     mode: Mode,
     (name, options, scan): (&str, &[(String, String)], Option<Nanos>),
     clock: &Arc<dyn Clock>,
-) -> Result<(OpenBus, Option<Program>), DriverError> {
+) -> Result<(OpenBus, Option<OtherEnd>), DriverError> {
     let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
     let folder = config.path.parent().unwrap_or(Path::new(""));
     let programs = config.kinds.programs();
@@ -82,7 +82,7 @@ fn open_hosted(
         let (host, scan_counters) = SteppedHost::new(program, config, scan);
         return Ok((
             OpenBus::Stepped(SteppedBus::Any(Box::new(host))),
-            Some(Program::Stepped(scan_counters)),
+            Some(OtherEnd::stepped(scan_counters)),
         ));
     }
     let sizes =
@@ -91,25 +91,13 @@ fn open_hosted(
     let sizes: Vec<(usize, usize)> = stations.map(|station| sizes(station).into()).collect();
     let (device, controller) = private_link(&sizes);
     let bus = |end| Box::new(FreeLoopback::over(end, cycle));
-    let title = format!("plc {}", program.name());
     let hosted = ScanSetup {
         program,
         interval: scan,
         has_watchdog: true,
-        tape: None,
+        recorder: None,
     };
-    let clock = Arc::clone(clock);
-    let bus_of_program = bus(controller);
-    let host = HostThread::start(
-        hosted,
-        &title,
-        config,
-        Role::Controller,
-        bus_of_program,
-        clock,
-    )?;
-    Ok((
-        OpenBus::Free(bus(device)),
-        Some(Program::Thread(Box::new(host))),
-    ))
+    let line = (Bus::Free(bus(controller)), Stop::new());
+    let host = HostThread::start(hosted, (config, Role::Controller), line, Arc::clone(clock))?;
+    Ok((OpenBus::Free(bus(device)), Some(OtherEnd::on_thread(host))))
 }

@@ -10,9 +10,9 @@ use tickbus_plc::Program;
 
 use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
-use super::recording::ScanRecorder;
+use super::recording::recorder;
 use super::watch::Watch;
-use super::{DriverError, bus};
+use super::{DriverError, SlotMap, bus};
 use tickbus_driver_cfg::Config;
 
 /// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
@@ -89,34 +89,28 @@ impl Host {
                 ));
             }
         };
-        let title = format!("plc {}", program.name());
-        let role = config.role;
+        let map = SlotMap::new(&config.table, config.role);
         let is_stepped = matches!(bus, Bus::Stepped(_));
         let hosted = ScanSetup {
             program,
             interval,
             has_watchdog,
-            tape: ScanRecorder::start(config, role, is_stepped, &clock)?,
+            recorder: recorder(config, &map, None, is_stepped, &clock)?,
         };
-        let thread = match bus {
-            Bus::Free(bus) => HostThread::start(hosted, &title, config, role, bus, clock),
-            Bus::Stepped(bus) => {
-                HostThread::start_in_steps(hosted, &title, (config, role), (bus, stop), clock)
-            }
-        };
-        thread.map(Self)
+        HostThread::start(hosted, (config, config.role), (bus, stop), clock).map(Self)
     }
 
     /// Returns the state of the line.
     pub fn link(&self) -> Link {
-        self.0.status.observe_call(self.0.counters.clock.now());
-        self.0.status.link()
+        let now = self.0.observe();
+        self.0.figures.status.observe_call(now);
+        self.0.figures.status.link()
     }
 
     /// Returns the counters and the state of the line, one `key=value` per line.
     pub fn statistics(&self) -> String {
-        let now = self.0.counters.clock.now();
-        self.0.figures().statistics(now).to_string()
+        let now = self.0.observe();
+        self.0.figures.statistics(now, None).to_string()
     }
 
     /// Lets another thread look at the program's image and force its signals. Returns `None` if the watch has been
@@ -128,7 +122,7 @@ impl Host {
 
     /// Returns the injected faults of this end.
     pub fn injected_faults(&self) -> Vec<FaultStatus> {
-        self.0.board.list()
+        self.0.figures.board.list()
     }
 
     /// Returns the number of scans so far, and how many of them had stale data.
@@ -149,12 +143,12 @@ impl Host {
 
     /// Returns true if the line has failed and has never come up.
     pub fn has_only_failed(&self) -> bool {
-        self.0.status.has_only_failed()
+        self.0.figures.status.has_only_failed()
     }
 
     /// Returns what the bus reported under this key of the statistics.
     pub fn fact(&self, key: &'static str) -> Option<String> {
-        self.0.status.fact(key)
+        self.0.figures.status.fact(key)
     }
 
     /// Stops scanning and closes the bus. If the program did not end, returns why.

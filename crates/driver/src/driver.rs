@@ -12,11 +12,12 @@ use tickbus_record::Recorder;
 
 use super::bus_handle::BusHandle;
 use super::extras::Extras;
-use super::host::Program;
+use super::host::OtherEnd;
 use super::station::Station;
+use super::statistics::{Figures, TickFigures};
+use super::tap::Tap;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
-use super::watched::Watched;
 use super::{Exchange, SlotMap, Snapshot, TickCounters};
 use tickbus_driver_cfg::Config;
 
@@ -45,14 +46,14 @@ pub struct Driver {
     /// The result of the last tick.
     pub(super) last: Exchange,
     /// The extra work around every exchange; most drivers have none.
-    pub(super) extras: Option<Box<Extras>>,
-    /// True for a free bus with one station, no extras and no recorder.
+    pub(super) extras: Extras,
+    /// True for a free bus with one station, no extra work and no recorder.
     pub(super) is_simple: bool,
     pub(super) board: Arc<FaultBoard>,
-    pub(super) program: Option<Program>,
+    pub(super) program: Option<OtherEnd>,
     pub(super) recorder: Option<Recorder>,
     /// Lets another thread look at the driver.
-    pub(super) watched: Option<Box<Watched>>,
+    pub(super) tap: Option<Tap>,
 }
 
 impl Driver {
@@ -83,16 +84,15 @@ impl Driver {
 
     /// Returns the slots before the first exchange: every signal has its fail-safe value.
     pub fn initial_slots(&self) -> Vec<Slot> {
-        let mut slots = vec![Slot::default(); self.slots.count];
-        for (slot, signal) in slots.iter_mut().zip(&self.config.table.signals) {
-            *slot = signal.fail_safe;
-        }
-        slots
+        self.slots.initial(&self.config.table)
     }
 
     /// Returns the state of the line.
     pub fn link(&self) -> Link {
-        self.observe();
+        // In case the bus itself cannot check its line.
+        let now = self.clock.now();
+        self.status.observe(now, self.image.peers.ages(now));
+        self.status.observe_call(now);
         self.status.link()
     }
 
@@ -108,43 +108,31 @@ impl Driver {
 
     /// Copies the data for the statistics, so that the caller can format them after releasing its lock on the driver.
     pub fn snapshot(&self) -> Snapshot {
-        let now = self.clock.now();
+        let (now, peers) = (self.clock.now(), &self.image.peers);
+        let stations = peers.ages(now).enumerate();
+        let stations = stations.map(|(at, age)| (age, peers.is_valid(at), peers.received(at)));
         Snapshot {
-            config: Arc::clone(&self.config),
-            counters: self.counters,
-            stations: self.told(now).collect(),
-            events_lost: self.image.events.lost(),
+            figures: self.figures(),
+            ticks: TickFigures {
+                config: Arc::clone(&self.config),
+                counters: self.counters,
+                stations: stations.collect(),
+                events_lost: self.image.events.lost(),
+                samples: self.samples.clone(),
+            },
             now,
-            samples: self.samples.clone(),
-            status: self.status.clone(),
-            board: Arc::clone(&self.board),
-            program: self.program.as_ref().map(Program::counters),
-            record: self
-                .recorder
-                .as_ref()
-                .map(|recorder| Arc::clone(recorder.counters())),
         }
     }
 
-    /// Returns what the bus reports about each station: the time since its peer was last heard, whether its data are
-    /// valid, and the number of frames received.
-    fn told(&self, now: Nanos) -> impl Iterator<Item = (Nanos, bool, u64)> + Clone {
-        let image = &self.image;
-        (0..image.stations()).map(move |station| {
-            (
-                image.peer_age(station, now),
-                image.is_valid(station),
-                image.received(station),
-            )
-        })
-    }
-
-    /// Checks the state of the line, in case the bus itself cannot.
-    fn observe(&self) {
-        let now = self.clock.now();
-        let ages = self.told(now).map(|(age, ..)| age);
-        self.status.observe(now, ages);
-        self.status.observe_call(now);
+    /// Returns the sources of the statistics that are not in the ticks.
+    pub(super) fn figures(&self) -> Figures {
+        let recorder = self.recorder.as_ref();
+        Figures {
+            status: self.status.clone(),
+            board: Arc::clone(&self.board),
+            program: self.program.as_ref().map(|end| Arc::clone(&end.counters)),
+            record: recorder.map(|recorder| Arc::clone(recorder.counters())),
+        }
     }
 
     /// Moves the oldest events into `into`, as many as fit, and returns their number.

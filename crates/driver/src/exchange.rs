@@ -19,6 +19,7 @@ use tickbus_image::signal::{Conversions, Slot};
 
 use super::bus_handle::{BusHandle, SteppedBus};
 use super::station::Station;
+use super::tap::Tap;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
 use super::{Code, Driver, Exchange, TickCounters};
@@ -49,10 +50,7 @@ impl Driver {
     #[inline(always)]
     fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
         let tick = self.counters.ticks + 1;
-        let is_watched = self
-            .watched
-            .as_ref()
-            .is_some_and(|watched| watched.is_wanted());
+        let is_watched = self.tap.as_ref().is_some_and(Tap::is_wanted);
         if !self.is_simple || self.tick.is_some() || is_watched || tick == 1 {
             return None;
         }
@@ -100,15 +98,15 @@ impl Driver {
     pub(super) fn simplify(&mut self) {
         self.is_simple = matches!(self.line, BusHandle::Free(_))
             && self.stations.len() == 1
-            && self.extras.is_none()
+            && !self.extras.is_busy()
             && self.recorder.is_none();
     }
 
     fn exchange_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
         let (found, done) = match self.begin(time, slots) {
             Ok(now) => {
-                if let Some(extras) = &mut self.extras {
-                    extras.handed_over(slots);
+                if self.extras.is_busy() {
+                    self.extras.handed_over(slots);
                 }
                 self.begin_extras(slots);
                 let sent = self.put(now, slots);
@@ -186,8 +184,8 @@ impl Driver {
             return self.last;
         }
         let now = self.now();
-        if let Some(extras) = &mut self.extras {
-            extras.handed_over(slots);
+        if self.extras.is_busy() {
+            self.extras.handed_over(slots);
         }
         let sent = self.put(now, slots);
         self.lap(now);
@@ -274,24 +272,28 @@ impl Driver {
 
     #[inline]
     fn begin_extras(&mut self, slots: &mut [Slot]) {
-        if let (Some(extras), Some(tick)) = (&mut self.extras, &self.tick) {
+        if self.extras.is_busy()
+            && let Some(tick) = &self.tick
+        {
             let moment = TickTime {
                 time: tick.time - self.first_time,
                 tick: self.counters.ticks,
             };
-            extras.begin_tick(moment, slots);
+            self.extras.begin_tick(moment, slots);
         }
     }
 
     /// Sends: the first half.
     #[inline(always)]
     fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
-        if let Some(extras) = &mut self.extras {
-            extras.sending(now, slots);
+        let is_busy = self.extras.is_busy();
+        if is_busy {
+            self.extras.beat(now, slots);
+            self.extras.sending(slots);
         }
         self.write(now, slots);
-        if let Some(extras) = &mut self.extras {
-            extras.sent(slots);
+        if is_busy {
+            self.extras.sent(slots);
         }
         match &mut self.line {
             BusHandle::Free(_) => Ok(()),
@@ -346,8 +348,8 @@ impl Driver {
         {
             (code, age) = replay.show(age, image, &mut self.stations, slots);
         }
-        if let Some(extras) = &mut self.extras {
-            extras.received(slots);
+        if self.extras.is_busy() {
+            self.extras.received(slots);
         }
         let found = Exchange {
             code,
@@ -400,9 +402,11 @@ impl Driver {
         if matches!(self.line, BusHandle::Free(_)) && TickTimes::takes(self.counters.ticks) {
             self.samples.add(tick.taken, self.last.age);
         }
-        if let Some(watched) = &self.watched
-            && watched.is_wanted()
-        {
+        if self.extras.is_busy() {
+            self.extras.rest();
+            self.simplify();
+        }
+        if self.tap.as_ref().is_some_and(Tap::is_wanted) {
             self.serve_watch(tick, found.code, slots);
         }
     }

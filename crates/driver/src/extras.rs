@@ -1,34 +1,92 @@
-//! The extra work of some drivers around every exchange.
+//! The extra work of some ends of a line around every exchange: of a driver's tick, and of a program's scan.
+
+use std::sync::Arc;
 
 use tickbus_axis::Reflexes;
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_fieldbus::faults::{Faults, TickTime};
+use tickbus_fieldbus::faults::{Fault, FaultBoard, Faults, Slots, TickTime};
 use tickbus_image::signal::Slot;
 
 use super::heartbeat::Beat;
+use super::tap::Tap;
 
-/// Changes the slots around an exchange. A driver without extra work has no `Extras`, and its tick pays for one check.
+/// Changes the slots around an exchange.
 #[derive(Debug, Default)]
 pub(super) struct Extras {
     /// The axes' work on every tick.
-    pub(super) reflexes: Option<Reflexes>,
-    /// Faults to inject.
-    pub(super) faults: Option<Faults>,
+    reflexes: Option<Reflexes>,
     /// The heartbeats of this end.
-    pub(super) beats: Box<[Beat]>,
+    beats: Box<[Beat]>,
+    /// Faults to inject; `None` until one can come.
+    faults: Option<Faults>,
+    /// True if there is anything to do; an end without extra work pays for this check only.
+    is_busy: bool,
 }
 
 impl Extras {
-    /// Returns `None` if there is nothing to do.
-    pub(super) fn new(reflexes: Option<Reflexes>, beats: Box<[Beat]>) -> Option<Box<Self>> {
-        let any = reflexes.is_some() || !beats.is_empty();
-        any.then(|| {
-            Box::new(Self {
-                reflexes,
-                faults: None,
-                beats,
-            })
-        })
+    pub(super) fn new(reflexes: Option<Reflexes>, beats: Box<[Beat]>) -> Self {
+        let mut extras = Self {
+            reflexes,
+            beats,
+            ..Self::default()
+        };
+        extras.rest();
+        extras
+    }
+
+    #[inline]
+    pub(super) const fn is_busy(&self) -> bool {
+        self.is_busy
+    }
+
+    /// Notes whether there is anything left to do: called at the end of a busy tick, whose faults may be over.
+    #[cold]
+    pub(super) fn rest(&mut self) {
+        let is_faulty = self.faults.as_ref().is_some_and(|faults| !faults.is_idle());
+        self.is_busy = is_faulty || self.reflexes.is_some() || !self.beats.is_empty();
+    }
+
+    /// Makes room for faults, so that a tick need not allocate memory for them.
+    pub(super) fn make_room(&mut self, board: &Arc<FaultBoard>) -> &mut Faults {
+        self.faults
+            .get_or_insert_with(|| Faults::new(Arc::clone(board)))
+    }
+
+    /// Injects a fault, which can begin at the next tick. Returns the fault's number.
+    pub(super) fn inject(
+        &mut self,
+        fault: &Fault,
+        slots: Slots<'_>,
+        board: &Arc<FaultBoard>,
+    ) -> Result<u32, Mistake> {
+        let id = self.make_room(board).add(fault, slots)?;
+        self.is_busy = true;
+        Ok(id)
+    }
+
+    /// Ends a fault at the next tick. Returns false if no fault has this number.
+    pub(super) fn end_fault(&mut self, id: u32) -> bool {
+        self.faults.as_mut().is_some_and(|faults| faults.end(id))
+    }
+
+    /// Takes over the faults that another thread has ordered; needs [room](Self::make_room).
+    pub(super) fn obey(&mut self, tap: &mut Tap) {
+        if let Some(faults) = &mut self.faults {
+            tap.obey(faults);
+            self.is_busy = true;
+        }
+    }
+
+    /// Returns the signals that a fault changes at this moment: those that this end writes, or those that it reads.
+    pub(super) fn bent(&self, written: bool) -> impl Iterator<Item = usize> {
+        let faults = self.faults.iter();
+        faults.flat_map(move |faults| faults.active(written))
+    }
+
+    /// Returns the signals that are heartbeats.
+    pub(super) fn beating(&self) -> impl Iterator<Item = usize> {
+        self.beats.iter().map(Beat::signal)
     }
 
     /// Runs first in the sending half, when the simulation hands its values over.
@@ -47,12 +105,17 @@ impl Extras {
         }
     }
 
-    /// Runs just before the slots are sent.
+    /// Runs just before [`sending`](Self::sending): counts up the heartbeats that are due.
     #[cold]
-    pub(super) fn sending(&mut self, now: Nanos, slots: &mut [Slot]) {
+    pub(super) fn beat(&mut self, now: Nanos, slots: &mut [Slot]) {
         for beat in &mut self.beats {
             beat.beat(now, slots);
         }
+    }
+
+    /// Runs just before the slots are sent.
+    #[cold]
+    pub(super) fn sending(&mut self, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
             faults.sending(slots);
         }

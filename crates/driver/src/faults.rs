@@ -6,7 +6,7 @@ use super::Driver;
 use super::bus_handle::BusHandle;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Faults, Slots};
+use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Slots};
 
 impl Driver {
     /// Injects a fault, which can begin at the next exchange. Returns the fault's number.
@@ -15,25 +15,13 @@ impl Driver {
     ///
     /// Too many faults are waiting or active.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
-        self.is_simple = false;
-        // Use the spare that a tick put away when all faults were over: it holds only faults, and can be put away
-        // again.
-        if self.extras.is_none()
-            && let Some(watched) = &mut self.watched
-        {
-            self.extras = watched.spare.take();
-        }
-        let board = &self.board;
-        let extras = self.extras.get_or_insert_default();
-        let faults = extras
-            .faults
-            .get_or_insert_with(|| Faults::new(Arc::clone(board)));
         let slots = Slots {
             table: &self.config.table,
             writes: self.config.role.areas().0,
             edges: &self.slots.edges,
         };
-        let id = faults.add(fault, slots)?;
+        let id = self.extras.inject(fault, slots, &self.board)?;
+        self.is_simple = false;
         // Adopt the fault now, so that the tick need not allocate memory.
         if let BusHandle::Stepped { port, .. } = &mut self.line {
             let now = port.clock().now();
@@ -64,9 +52,7 @@ impl Driver {
 
     /// Ends a fault at the next exchange. Returns false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
-        let extras = self.extras.as_mut();
-        let faults = extras.and_then(|extras| extras.faults.as_mut());
-        faults.is_some_and(|faults| faults.end(id))
+        self.extras.end_fault(id)
     }
 
     /// Returns the board where the faults publish their state, readable from any thread.
@@ -117,6 +103,30 @@ mod tests {
             assert!(!tick(&mut driver, &mut watch), "it is injected");
             assert!(driver.end_fault(fault));
             assert!((0..3).any(|_| tick(&mut driver, &mut watch)), "it is over");
+        }
+        driver.close();
+    }
+
+    #[test]
+    fn a_fault_from_before_anyone_looked_at_the_driver_does_not_keep_it_from_the_quick_way() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                    scan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n";
+        let config =
+            Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
+        let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+        let mut slots = driver.initial_slots();
+        for is_watched in [false, true] {
+            let text = "kind = \"stuck\"\nsignal = \"a\"\nvalue = 7\nticks = 2\n";
+            driver
+                .inject_text(text)
+                .unwrap_or_else(|why| panic!("{why}"));
+            let _watch = is_watched.then(|| driver.watch());
+            driver.exchange(None, &mut slots);
+            assert!(!driver.is_simple, "it is injected");
+            for _ in 0..3 {
+                driver.exchange(None, &mut slots);
+            }
+            assert!(driver.is_simple, "it is over");
         }
         driver.close();
     }

@@ -2,7 +2,7 @@
 
 use tickbus_base::time::{Nanos, Pace};
 use tickbus_fieldbus::{Heartbeat, Role};
-use tickbus_image::signal::{DataType, Plan, Signal, SignalTable, Slot};
+use tickbus_image::signal::{DataType, Signal, Slot};
 
 use tickbus_driver_cfg::Config;
 
@@ -45,6 +45,11 @@ impl Beat {
             .collect()
     }
 
+    /// Returns the index of the signal, which is that of its slot.
+    pub(super) fn signal(&self) -> usize {
+        self.slot
+    }
+
     /// Runs in a tick at `now`: counts up if due, and puts the count into its slot.
     pub(super) fn beat(&mut self, now: Nanos, slots: &mut [Slot]) {
         let every = self.every;
@@ -69,64 +74,6 @@ impl Beat {
             let count = self.count as f64;
             Slot::from_real(count)
         };
-    }
-}
-
-/// The heartbeats of a PLC program, which writes its outputs as bytes.
-#[derive(Debug)]
-pub(super) struct FrameBeats(Vec<FrameBeat>);
-
-#[derive(Debug)]
-struct FrameBeat {
-    beat: Beat,
-    plan: Plan,
-    signal: Signal,
-    scratch: Box<[u8]>,
-}
-
-impl FrameBeats {
-    /// Returns the heartbeats that the end with `role` sends from one of its stations.
-    pub(super) fn new(config: &Config, role: Role, station: usize) -> Self {
-        let (writes, _) = role.areas();
-        let beats = config.life_signs.beats(&config.table, role);
-        let here = beats.filter(|beat| config.table.signals[beat.signal].station == station);
-        let beats = here.map(|Heartbeat { signal, every }| {
-            let signal = config.table.signals[signal].clone();
-            let alone = SignalTable {
-                stations: config.table.stations.clone(),
-                signals: vec![signal.clone()],
-                structures: Vec::new(),
-            };
-            FrameBeat {
-                beat: Beat::new(&signal, 0, every),
-                plan: Plan::new(&alone, signal.station, writes),
-                scratch: vec![0; config.table.stations[signal.station].bytes(writes)].into(),
-                signal,
-            }
-        });
-        Self(beats.collect())
-    }
-
-    /// Runs in a scan at `now`: counts up the heartbeats that are due, and puts them into `frame`.
-    pub(super) fn beat(&mut self, now: Nanos, frame: &mut [u8]) {
-        for FrameBeat {
-            beat,
-            plan,
-            signal,
-            scratch,
-        } in &mut self.0
-        {
-            let mut slots = [Slot::default()];
-            beat.beat(now, &mut slots);
-            plan.encode(&slots, scratch);
-            let mask = match signal.data_type {
-                DataType::Bool => 1 << signal.bit,
-                _ => u8::MAX,
-            };
-            for byte in signal.byte..signal.byte + signal.data_type.size_bytes() {
-                frame[byte] = frame[byte] & !mask | scratch[byte] & mask;
-            }
-        }
     }
 }
 
@@ -184,19 +131,6 @@ mod tests {
             assert_eq!(slots[1].real().to_bits(), f64::to_bits(toggles));
         }
         assert_eq!(slots[2].unsigned(), 3);
-    }
-
-    #[test]
-    fn the_heartbeat_of_a_program_leaves_its_other_outputs_alone() {
-        let signals = "[[signal]]\nname = \"life\"\naddress = \"%QX1.2\"\n[[signal]]\nname = \"n\"\naddress = \"%QW2\"\norder = \"DCBA\"\n";
-        let both = "[{ signal = \"life\", every = \"1ms\" }, { signal = \"n\", every = \"1ms\" }]\nrole = \"controller\"";
-        let config = beats(signals, both);
-        let mut beats = FrameBeats::new(&config, Role::Controller, 0);
-        let mut frame = [0xff, 0xf0, 0, 0];
-        beats.beat(Nanos(0), &mut frame);
-        assert_eq!(frame, [0xff, 0xf4, 1, 0]);
-        beats.beat(Nanos::from_millis(1), &mut frame);
-        assert_eq!(frame, [0xff, 0xf0, 2, 0]);
     }
 
     #[test]

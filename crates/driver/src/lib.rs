@@ -24,7 +24,6 @@ mod tick;
 mod tick_counters;
 mod view;
 mod watch;
-mod watched;
 mod watching;
 
 /// The kinds that this crate's tests use.

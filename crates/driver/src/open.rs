@@ -115,7 +115,7 @@ impl Driver {
             is_simple: false,
             board,
             program,
-            watched: None,
+            tap: None,
             config: Arc::new(config),
         };
         for fault in &list {

@@ -17,6 +17,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use self::differences::Differences;
 use self::station::Station;
+use super::statistics::Counters;
 use super::{Code, DriverError};
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
@@ -44,9 +45,8 @@ pub(super) struct ReplayCounters {
     ended: AtomicBool,
 }
 
-impl ReplayCounters {
-    /// Adds the results to the statistics.
-    pub(super) fn write(&self, statistics: &mut Statistics) {
+impl Counters for ReplayCounters {
+    fn write(&self, statistics: &mut Statistics) {
         let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
         statistics.text("replay.file", &self.file);
         statistics.count("replay.ticks", count(&self.ticks));

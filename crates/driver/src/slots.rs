@@ -1,7 +1,7 @@
 //! The arrangement of values in the slots of an exchange.
 
 use tickbus_fieldbus::Role;
-use tickbus_image::signal::SignalTable;
+use tickbus_image::signal::{SignalTable, Slot};
 
 /// The arrangement of values in the slots that an exchange works on.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -29,5 +29,12 @@ impl SlotMap {
             })
             .collect();
         Self { count, edges }
+    }
+
+    /// Returns the slots before the first exchange: every signal of `table` has its fail-safe value.
+    pub(super) fn initial(&self, table: &SignalTable) -> Vec<Slot> {
+        let signals = table.signals.iter().map(|signal| signal.fail_safe);
+        let edges = std::iter::repeat(Slot::default());
+        signals.chain(edges).take(self.count).collect()
     }
 }

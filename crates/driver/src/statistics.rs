@@ -3,7 +3,6 @@
 use std::fmt;
 use std::sync::Arc;
 
-use super::host::ProgramCounters;
 use super::tick_counters::{TickCounters, TickTimes};
 use tickbus_base::os::dropped_log_lines;
 use tickbus_base::statistics::{Key, Statistics};
@@ -13,51 +12,73 @@ use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{LinkStatus, is_stale};
 use tickbus_record::RecorderCounters;
 
+/// Counters that any thread can read.
+pub(crate) trait Counters: fmt::Debug + Send + Sync {
+    /// Adds the counters.
+    fn write(&self, statistics: &mut Statistics);
+}
+
+/// The sources of the statistics of one end of a line, all readable from any thread.
+#[derive(Clone, Debug)]
+pub(super) struct Figures {
+    pub(super) status: LinkStatus,
+    pub(super) board: Arc<FaultBoard>,
+    /// The counters of the program at this end or at the other one, and those of the recording.
+    pub(super) program: Option<Arc<dyn Counters>>,
+    pub(super) record: Option<Arc<RecorderCounters>>,
+}
+
+/// The figures that only the ticks of a driver know, copied.
+#[derive(Clone, Debug)]
+pub(super) struct TickFigures {
+    pub(super) config: Arc<Config>,
+    pub(super) counters: TickCounters,
+    /// Per station: time since its peer was last heard from, whether its data are valid, and its bus cycles.
+    pub(super) stations: Vec<(Nanos, bool, u64)>,
+    pub(super) events_lost: u64,
+    pub(super) samples: TickTimes,
+}
+
 /// The data of a driver's statistics at one moment.
 ///
 /// Copying them takes a microsecond or two, formatting them can take a hundred times as long: a caller that has locked
 /// the driver releases it in between.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    pub(super) config: Arc<Config>,
-    pub(super) counters: TickCounters,
-    /// Per station: time since its peer was last heard from, whether its data are valid, and its bus cycles.
-    pub(super) stations: Vec<(Nanos, bool, u64)>,
-    pub(super) events_lost: u64,
+    pub(super) figures: Figures,
+    pub(super) ticks: TickFigures,
     pub(super) now: Nanos,
-    pub(super) samples: TickTimes,
-    pub(super) status: LinkStatus,
-    pub(super) board: Arc<FaultBoard>,
-    pub(super) program: Option<ProgramCounters>,
-    pub(super) record: Option<Arc<RecorderCounters>>,
 }
 
 impl Snapshot {
     /// Adds the saturated values and the NaN values that the simulator's language binding has converted.
     pub fn add_conversions(&mut self, [saturated, not_a_number]: [u64; 2]) {
-        let counters = &mut self.counters;
+        let counters = &mut self.ticks.counters;
         counters.saturated = counters.saturated.wrapping_add(saturated);
         counters.not_a_number = counters.not_a_number.wrapping_add(not_a_number);
     }
 
     /// Returns the statistics.
     pub fn statistics(&self) -> Statistics {
-        let ages = self.stations.iter().map(|(age, _, _)| *age);
-        self.status.observe(self.now, ages);
-        self.gather()
+        let ages = self.ticks.stations.iter().map(|(age, _, _)| *age);
+        self.figures.status.observe(self.now, ages);
+        self.figures.statistics(self.now, Some(&self.ticks))
     }
+}
 
-    /// Returns the statistics, without checking how old the stations' data are.
-    pub(super) fn gather(&self) -> Statistics {
-        self.status.observe_call(self.now);
+impl Figures {
+    /// Returns the statistics, without checking how old the stations' data are; `ticks` are a driver's.
+    pub(super) fn statistics(&self, now: Nanos, ticks: Option<&TickFigures>) -> Statistics {
+        self.status.observe_call(now);
         let mut statistics = Statistics::default();
-        self.counters.write(&mut statistics);
-        let cycles = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
-        statistics.count("bus_cycles", cycles);
-        statistics.count("events_lost", self.events_lost);
-        self.status.write(self.now, &mut statistics);
-        self.write_stations(&mut statistics);
-        self.samples.write(&mut statistics);
+        if let Some(ticks) = ticks {
+            ticks.write_counters(&mut statistics);
+        }
+        self.status.write(now, &mut statistics);
+        if let Some(ticks) = ticks {
+            ticks.write_stations(&mut statistics);
+            ticks.samples.write(&mut statistics);
+        }
         self.board.tell(self.status.driver());
         self.board.write(&mut statistics);
         if let Some(program) = &self.program {
@@ -68,6 +89,15 @@ impl Snapshot {
         }
         statistics.count("log.dropped", dropped_log_lines());
         statistics
+    }
+}
+
+impl TickFigures {
+    fn write_counters(&self, statistics: &mut Statistics) {
+        self.counters.write(statistics);
+        let cycles = self.stations.iter().map(|(_, _, cycles)| cycles).sum();
+        statistics.count("bus_cycles", cycles);
+        statistics.count("events_lost", self.events_lost);
     }
 
     /// Adds the age of each station's data and its number of bus cycles; adds nothing for a single station.

@@ -1,6 +1,5 @@
 //! A driver, as another thread sees it.
 
-use std::fmt;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
@@ -8,13 +7,14 @@ use tickbus_base::statistics::Statistics;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{
-    Begin, Effect, Fault, FaultBoard, FaultStatus, Lasts, Phase, Prepared, SignalEffect, Slots,
+    Begin, Effect, Fault, FaultStatus, Lasts, Phase, Prepared, SignalEffect, Slots,
 };
-use tickbus_fieldbus::{Link, LinkStatus, Role};
+use tickbus_fieldbus::{Link, Role};
 use tickbus_image::signal::{Area, Slot};
 
 use super::SlotMap;
-use super::tap::Handle;
+use super::statistics::{Figures, TickFigures};
+use super::tap::{Handle, Tap, tap};
 use super::tick_counters::TickTimes;
 use super::view::View;
 
@@ -24,31 +24,45 @@ use super::view::View;
 /// The watch sees a copy that a tick made at its end, after a [request](Self::ask).
 #[derive(Debug)]
 pub struct Watch {
-    pub(super) config: Arc<Config>,
-    pub(super) role: Role,
+    config: Arc<Config>,
     /// The slots that count edges.
-    pub(super) slots: SlotMap,
-    pub(super) handle: Handle,
-    pub(super) status: LinkStatus,
-    pub(super) board: Arc<FaultBoard>,
-    pub(super) clock: Arc<dyn Clock>,
-    pub(super) figures: Box<dyn Figures>,
+    slots: SlotMap,
+    handle: Handle,
+    clock: Arc<dyn Clock>,
+    /// The data that the copies of the ticks do not contain.
+    figures: Figures,
+    is_driver: bool,
     /// The distributions that arrived last.
-    pub(super) times: TickTimes,
+    times: TickTimes,
     /// The time of the request for a copy that has not arrived yet.
-    pub(super) asked: Option<Nanos>,
-}
-
-/// The data that the copies of the ticks do not contain.
-pub(super) trait Figures: fmt::Debug + Send {
-    /// Returns the statistics at this moment.
-    fn statistics(&self, now: Nanos, view: &View, times: &TickTimes) -> Statistics;
-
-    /// Returns true if the figures are a driver's.
-    fn is_driver(&self) -> bool;
+    asked: Option<Nanos>,
 }
 
 impl Watch {
+    /// Creates a watch on the end that `config` describes, and the tap for its ticks.
+    pub(super) fn new(
+        config: Arc<Config>,
+        clock: Arc<dyn Clock>,
+        figures: Figures,
+        is_driver: bool,
+    ) -> (Tap, Self) {
+        let table = &config.table;
+        let slots = SlotMap::new(table, config.role);
+        let initial = table.signals.iter().map(|signal| signal.fail_safe);
+        let (tap, handle) = tap(&View::new(initial.collect(), table.stations.len()));
+        let watch = Self {
+            config,
+            slots,
+            handle,
+            clock,
+            figures,
+            is_driver,
+            times: TickTimes::default(),
+            asked: None,
+        };
+        (tap, watch)
+    }
+
     /// Returns the configuration that the driver or program was opened with.
     pub fn config(&self) -> &Arc<Config> {
         &self.config
@@ -56,17 +70,17 @@ impl Watch {
 
     /// Returns the end of the line that is watched.
     pub fn role(&self) -> Role {
-        self.role
+        self.config.role
     }
 
     /// Returns the area that this end writes.
     pub fn writes(&self) -> Area {
-        self.role.areas().0
+        self.role().areas().0
     }
 
     /// Returns true for a simulation's driver, and false for a PLC program.
     pub fn is_driver(&self) -> bool {
-        self.figures.is_driver()
+        self.is_driver
     }
 
     /// Returns the clock of the line, on which [`View::now`] and [`Link::since`] are. On a stepped bus that is
@@ -89,7 +103,8 @@ impl Watch {
             return false;
         }
         self.asked = None;
-        let since = self.status.link().since;
+        let status = &self.figures.status;
+        let since = status.link().since;
         let times = &mut self.times;
         self.handle.with(|view| {
             if view.has_times {
@@ -99,7 +114,7 @@ impl Watch {
             // change the state.
             if view.now >= since {
                 let ages = view.stations.iter().map(|station| station.age);
-                self.status.observe(view.now, ages);
+                status.observe(view.now, ages);
             }
         });
         true
@@ -112,24 +127,35 @@ impl Watch {
 
     /// Returns the state of the line at this moment.
     pub fn link(&self) -> Link {
-        self.status.observe_call(self.clock.now());
-        self.status.link()
+        self.figures.status.observe_call(self.clock.now());
+        self.figures.status.link()
     }
 
     /// Returns the statistics: the line's at this moment, the tick's as of the last copy.
     pub fn statistics(&self) -> Statistics {
         let now = self.clock.now();
-        self.view(|view| self.figures.statistics(now, view, &self.times))
+        self.view(|view| {
+            let ticks = self.is_driver.then(|| TickFigures {
+                config: Arc::clone(&self.config),
+                counters: view.counters,
+                stations: (view.stations.iter())
+                    .map(|station| (station.age, station.is_valid, station.cycles))
+                    .collect(),
+                events_lost: view.events_lost,
+                samples: self.times.clone(),
+            });
+            self.figures.statistics(now, ticks.as_ref())
+        })
     }
 
     /// Returns the injected faults in order of injection; faults that ended long ago may be missing.
     pub fn faults(&self) -> Vec<FaultStatus> {
-        self.board.list()
+        self.figures.board.list()
     }
 
     /// Returns true if a fault is waiting or active.
     pub fn is_fault_on(&self, id: u32) -> bool {
-        let faults = self.board.list();
+        let faults = self.figures.board.list();
         faults
             .iter()
             .any(|fault| fault.id == id && fault.phase != Phase::Over)
@@ -161,7 +187,7 @@ impl Watch {
             writes: self.writes(),
             edges: &self.slots.edges,
         };
-        let prepared = Prepared::new(&fault, slots, &self.board)?;
+        let prepared = Prepared::new(&fault, slots, &self.figures.board)?;
         let id = prepared.id();
         self.handle.inject(prepared)?;
         Ok(id)
@@ -233,13 +259,14 @@ mod tests {
         driver.exchange(Nanos::from_millis(400), &mut slots);
         let now = watch.clock().now();
         let (state, cause) = (LinkState::Stale, Cause::Silent);
-        watch.status.enter(now, state, cause, "nothing has come");
+        let status = watch.figures.status.clone();
+        status.enter(now, state, cause, "nothing has come");
         assert!(watch.update());
-        assert_eq!(watch.status.state(), LinkState::Stale);
+        assert_eq!(status.state(), LinkState::Stale);
         // A newer copy does.
         watch.ask(false);
         driver.exchange(Nanos::from_millis(401), &mut slots);
         assert!(watch.update());
-        assert_eq!(watch.status.state(), LinkState::Running);
+        assert_eq!(status.state(), LinkState::Running);
     }
 }

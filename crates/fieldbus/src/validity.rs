@@ -291,13 +291,13 @@ mod tests {
             port.received(station, at(1), &[1]);
         }
         port.station_left(1, at(2), Cause::Link, "its master is silent");
-        assert!(tick.is_valid(0) && !tick.is_valid(1));
+        assert!(tick.peers.is_valid(0) && !tick.peers.is_valid(1));
         let link = status.link();
         assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Link));
         assert_eq!(link.reason, "its master is silent");
         port.plc_state(1, at(3), PlcState::Run);
         port.received(1, at(3), &[2]);
-        assert!(tick.is_valid(1));
+        assert!(tick.peers.is_valid(1));
         assert_eq!(status.link().state, LinkState::Running);
         port.plc_state(1, at(4), PlcState::Stop);
         assert!(
@@ -312,21 +312,24 @@ mod tests {
         port.running("the peer is there");
         port.plc_state(0, at(0), PlcState::Run);
         port.received(0, at(1), &[1]);
-        assert!(tick.is_valid(0) && is_told(&status, "cpu=run"));
+        assert!(tick.peers.is_valid(0) && is_told(&status, "cpu=run"));
         port.plc_state(0, at(2), PlcState::Stop);
-        assert!(!tick.is_valid(0), "at once");
+        assert!(!tick.peers.is_valid(0), "at once");
         port.received(0, at(3), &[0]);
         port.observe(at(3));
-        assert!(!tick.is_valid(0) && is_told(&status, "cpu=stop"));
+        assert!(!tick.peers.is_valid(0) && is_told(&status, "cpu=stop"));
         let link = status.link();
         assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Stopped));
         let right = "the PLC is in STOP; put it into RUN, and its next data count";
         assert_eq!(link.reason, right);
         port.plc_state(0, at(4), PlcState::Run);
-        assert!(!tick.is_valid(0), "the frame that is there is from STOP");
+        assert!(
+            !tick.peers.is_valid(0),
+            "the frame that is there is from STOP"
+        );
         port.received(0, at(5), &[1]);
         let link = status.link();
-        assert!(tick.is_valid(0) && is_told(&status, "cpu=run"));
+        assert!(tick.peers.is_valid(0) && is_told(&status, "cpu=run"));
         assert_eq!(link.state, LinkState::Running);
         assert_eq!(link.reason, "the peer is there");
     }
@@ -336,7 +339,7 @@ mod tests {
         let (tick, mut port, status) = line(&["charger", "lathe"]);
         port.running("both are there");
         port.plc_state(1, at(0), PlcState::Stop);
-        assert!(tick.is_valid(0) && !tick.is_valid(1));
+        assert!(tick.peers.is_valid(0) && !tick.peers.is_valid(1));
         assert!(is_told(&status, "cpu=stop") && is_told(&status, "cpu.lathe=stop"));
         assert!(
             !is_told(&status, "cpu.charger=run"),
@@ -377,14 +380,14 @@ mod tests {
             port.plc_state(station, at(1), PlcState::Stop);
             port.touch(station, at(2));
         }
-        assert!(!tick.is_valid(1), "it is in STOP");
+        assert!(!tick.peers.is_valid(1), "it is in STOP");
         for station in 0..2 {
             port.plc_state(station, at(3), PlcState::Run);
         }
         port.received(0, at(4), &[1]);
         assert_eq!(status.link().cause, Cause::Stopped);
         port.touch(1, at(4));
-        assert!(tick.is_valid(0) && tick.is_valid(1));
+        assert!(tick.peers.is_valid(0) && tick.peers.is_valid(1));
         let link = status.link();
         assert_eq!(
             (link.state, &*link.reason),
@@ -464,9 +467,9 @@ mod tests {
         port.received(1, at(5), &[1]);
         assert_eq!(port.due(), at(15) + Nanos(1), "it changed");
         port.observe(at(15));
-        assert!(tick.is_valid(1), "just in time");
+        assert!(tick.peers.is_valid(1), "just in time");
         port.observe(at(15) + Nanos(1));
-        assert!(tick.is_valid(0) && !tick.is_valid(1));
+        assert!(tick.peers.is_valid(0) && !tick.peers.is_valid(1));
         assert_eq!(port.due(), Nanos::MAX, "nothing to look for any more");
         let link = status.link();
         assert_eq!((link.state, link.cause), (LinkState::Stale, Cause::Frozen));
@@ -476,9 +479,9 @@ mod tests {
              program that changes it runs"
         );
         port.received(1, at(20), &[3]);
-        assert!(!tick.is_valid(1), "another bit of its byte changed");
+        assert!(!tick.peers.is_valid(1), "another bit of its byte changed");
         port.received(1, at(21), &[2]);
-        assert!(tick.is_valid(1));
+        assert!(tick.peers.is_valid(1));
         assert_eq!(status.link().reason, "both are there");
     }
 
@@ -488,7 +491,7 @@ mod tests {
         port = watch(port, 0);
         port.received(0, at(0), &[1]);
         port.received(0, at(50), &[1]);
-        assert!(!tick.is_valid(0));
+        assert!(!tick.peers.is_valid(0));
     }
 
     #[test]
@@ -504,9 +507,9 @@ mod tests {
         port.plc_state(0, at(13), PlcState::Run);
         port.received(0, at(13), &[1]);
         assert_eq!(status.link().cause, Cause::Frozen);
-        assert!(!tick.is_valid(0));
+        assert!(!tick.peers.is_valid(0));
         port.received(0, at(14), &[0]);
         assert_eq!(status.link().cause, Cause::Running);
-        assert!(tick.is_valid(0));
+        assert!(tick.peers.is_valid(0));
     }
 }

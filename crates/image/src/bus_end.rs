@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-use super::frame::{Frame, Head, Place, StationStreams, age};
+use super::frame::{Frame, Place, StationStreams, age};
 use super::sync::{Arc, AtomicI64, Ordering};
-use super::{EdgeCounter, LatchedBit, Producer, PulseShaper, Reader, Told, Writer, copy_frame};
+use super::{EdgeCounter, LatchedBit, Peers, Producer, PulseShaper, Reader, Writer, copy_frame};
 use tickbus_base::time::Nanos;
 
 /// The bus's end of a driver's image, for all its stations. The effects of [`received`](Self::received),
@@ -25,7 +25,7 @@ pub struct BusEnd {
     ticked: i64,
     is_dead: bool,
     stations: Vec<BusStation>,
-    told: Told,
+    peers: Peers,
     /// Where a bus reports the peer's writes.
     pub events: Producer,
 }
@@ -47,7 +47,7 @@ impl BusEnd {
         stations: Vec<StationStreams>,
         (tx, sent): (Reader<Frame>, Vec<Place>),
         (rx, received, staged): (Writer<Frame>, Vec<Place>, Frame),
-        (alive, told, events): (Arc<AtomicI64>, Told, Producer),
+        (alive, peers, events): (Arc<AtomicI64>, Peers, Producer),
     ) -> Self {
         let stations = stations.into_iter().zip(sent).zip(received);
         let stations = stations.map(|((streams, tx), rx)| BusStation {
@@ -68,7 +68,7 @@ impl BusEnd {
             is_dead: false,
             alive,
             stations: stations.collect(),
-            told,
+            peers,
             events,
         }
     }
@@ -212,16 +212,7 @@ impl BusEnd {
             }
         });
         self.rx.publish();
-        for (told, head) in self.told.iter().zip(&self.staged.heads) {
-            let Head {
-                heard,
-                sequence,
-                is_valid,
-            } = *head;
-            told.heard.store(heard, Ordering::Relaxed);
-            told.sequence.store(sequence, Ordering::Relaxed);
-            told.is_valid.store(is_valid, Ordering::Relaxed);
-        }
+        self.peers.note(&self.staged.heads);
     }
 
     /// The latched bits of a station's outgoing bytes.

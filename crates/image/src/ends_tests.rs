@@ -278,7 +278,7 @@ fn touch_keeps_the_age_down_without_new_data() {
         (arrival.fresh, arrival.age, shown),
         (false, Nanos(10), None)
     );
-    assert_eq!(tick.peer_age(0, Nanos(101)), Nanos(11));
+    assert_eq!(tick.peers.age(0, Nanos(101)), Nanos(11));
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn one_message_of_several_stations_is_one_cycle_and_is_seen_whole() {
         assert_eq!(tick.latest(station), [5]);
         let arrival = tick.read(station, (Nanos(1), ANY_AGE), &mut Seen::default());
         assert_eq!((arrival.fresh, arrival.sequence), (true, 1));
-        assert_eq!(tick.received(station), 1);
+        assert_eq!(tick.peers.received(station), 1);
     }
     // A change of one station leaves the others unchanged.
     bus.received(1, Nanos(2), &[6], true);

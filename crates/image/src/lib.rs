@@ -20,6 +20,7 @@ mod direct;
 mod edges;
 mod event_ring;
 mod frame;
+mod peers;
 mod row_ring;
 mod sync;
 mod tick_end;
@@ -34,13 +35,14 @@ mod model_tests;
 
 pub mod signal;
 
-use frame::{NEVER, Place};
+use frame::Place;
 
 pub use bus_end::BusEnd;
 pub use direct::DirectStream;
 pub use edges::{EdgeCounter, LatchedBit, PulseShaper, latched_bits};
 pub use event_ring::{Consumer, Event, Producer, event_ring};
 pub use frame::{StationStreams, is_stale};
+pub use peers::Peers;
 pub use row_ring::{RowReader, RowWriter, row_ring};
 pub use tick_end::{Arrival, Receiver, TickEnd};
 pub use triple::{Reader, Writer, triple_buffer};
@@ -75,17 +77,6 @@ pub fn copy_frame(to: &mut [u8], from: &[u8]) {
 /// Capacity of a driver's event ring.
 pub const EVENT_CAPACITY: usize = 4096;
 
-/// The bus's state of each station, for statistics, which are read between ticks. A tick reads the same from its frame.
-type Told = std::sync::Arc<[ToldStation]>;
-
-/// See [`Told`].
-#[derive(Debug)]
-struct ToldStation {
-    heard: std::sync::atomic::AtomicI64,
-    sequence: std::sync::atomic::AtomicU64,
-    is_valid: std::sync::atomic::AtomicBool,
-}
-
 /// Creates the two ends of a driver's image, given the streams of each station.
 pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
     let (producer, consumer) = event_ring(EVENT_CAPACITY);
@@ -93,27 +84,18 @@ pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
     let (received, rx) = Place::all(stations.iter().map(|s| (&*s.rx_fail_safe, &*s.rx_latched)));
     let (tx_writer, tx_reader) = triple_buffer(&tx);
     let (rx_writer, rx_reader) = triple_buffer(&rx);
-    let told = stations.iter().map(|_| ToldStation {
-        heard: NEVER.into(),
-        sequence: 0.into(),
-        is_valid: true.into(),
-    });
-    let (alive, told) = (tick_end::never(), told.collect::<Told>());
+    let (alive, peers) = (tick_end::never(), Peers::new(stations.len()));
     let tick = TickEnd::new(
         &stations,
         (tx_writer, sent.clone()),
         (rx_reader, received.clone()),
-        (
-            sync::Arc::clone(&alive),
-            std::sync::Arc::clone(&told),
-            consumer,
-        ),
+        (sync::Arc::clone(&alive), peers.clone(), consumer),
     );
     let bus = BusEnd::new(
         stations,
         (tx_reader, sent),
         (rx_writer, received, rx),
-        (alive, told, producer),
+        (alive, peers, producer),
     );
     (tick, bus)
 }

@@ -2,7 +2,7 @@
 
 use super::frame::{Frame, Head, NEVER, Place, StationStreams, age, is_stale};
 use super::sync::{Arc, AtomicI64, Ordering};
-use super::{Consumer, EdgeCounter, PulseShaper, Reader, Told, Writer};
+use super::{Consumer, EdgeCounter, Peers, PulseShaper, Reader, Writer};
 use tickbus_base::time::Nanos;
 
 /// The number of bytes below which a memory comparison does not pay off.
@@ -20,7 +20,8 @@ pub struct TickEnd {
     shown: Vec<Shown>,
     /// Of the frame taken over last.
     cycles: u64,
-    told: Told,
+    /// The bus's notes about each peer, for statistics: a tick reads the same from its frame.
+    pub peers: Peers,
     /// The peer's writes, for applications to which every write matters.
     pub events: Consumer,
 }
@@ -100,7 +101,7 @@ impl TickEnd {
         stations: &[StationStreams],
         (tx, sent): (Writer<Frame>, Vec<Place>),
         (rx, shown): (Reader<Frame>, Vec<Place>),
-        (alive, told, events): (Arc<AtomicI64>, Told, Consumer),
+        (alive, peers, events): (Arc<AtomicI64>, Peers, Consumer),
     ) -> Self {
         let sent = stations.iter().zip(sent).map(|(streams, place)| Sent {
             place,
@@ -124,7 +125,7 @@ impl TickEnd {
             rx,
             shown: shown.collect(),
             cycles: 0,
-            told,
+            peers,
             events,
         }
     }
@@ -341,22 +342,6 @@ impl TickEnd {
     /// The last bytes of a station, stale or not.
     pub fn latest(&self, station: usize) -> &[u8] {
         &self.rx.value().bytes[self.shown[station].place.bytes.clone()]
-    }
-
-    /// Time since the peer of a station was last heard; [`Nanos::MAX`] if it never was. For statistics: the age of the
-    /// data that a tick shows is in its [`Arrival`].
-    pub fn peer_age(&self, station: usize, now: Nanos) -> Nanos {
-        age(now, self.told[station].heard.load(Ordering::Relaxed))
-    }
-
-    /// True if the data of a station's peer are valid, for statistics.
-    pub fn is_valid(&self, station: usize) -> bool {
-        self.told[station].is_valid.load(Ordering::Relaxed)
-    }
-
-    /// Frames received for a station so far, for statistics.
-    pub fn received(&self, station: usize) -> u64 {
-        self.told[station].sequence.load(Ordering::Relaxed)
     }
 
     /// Bus cycles whose data arrived up to the frame taken over last: a cycle counts once for all stations that it

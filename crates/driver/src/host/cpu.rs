@@ -4,49 +4,39 @@ use std::sync::Arc;
 
 use crate::Code;
 use crate::frames::{area_bytes, directions};
-use crate::heartbeat::FrameBeats;
-use crate::recording::ScanRecorder;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, Signal, fail_safe_frame};
-use tickbus_image::{Arrival, BusEnd, Receiver, TickEnd, copy_frame, image};
+use tickbus_image::{Arrival, BusEnd, Peers, Receiver, TickEnd, copy_frame, image};
 use tickbus_plc::{Program, Scan};
 
 use super::ScanCounters;
-use super::faults::{FrameFaults, take_over};
+use super::own_end::{OwnEnd, take_over};
 use super::scan_counters::CountedArea;
-use super::watched::{ScannedStation, WatchedScans};
 
 /// A program with the tick's end of its process image: a PLC without its bus.
 pub(super) struct Cpu {
     /// The program of the first station, and a further instance for each other station.
-    pub(super) units: Vec<Unit>,
+    units: Vec<Unit>,
     tick: TickEnd,
     max_age: Nanos,
-    /// The areas that the program writes and reads.
-    pub(super) areas: (Area, Area),
     pub(super) scan_counters: Arc<ScanCounters>,
-    /// The faults injected at this end, into the first station.
-    pub(super) faults: Option<FrameFaults>,
-    /// The recording of the first station.
-    pub(super) tape: Option<ScanRecorder>,
-    /// Lets another thread look at the program.
-    pub(super) watched: Option<WatchedScans>,
+    /// The end that a driver.cfg describes; `None` for a program behind the bus of one.
+    pub(super) own: Option<OwnEnd>,
 }
 
 /// The program of one station, with its inputs and outputs.
 pub(super) struct Unit {
-    pub(super) program: Box<dyn Program>,
+    program: Box<dyn Program>,
     station: usize,
     /// The places where the edges of outputs and inputs are counted.
     counted: (Option<CountedArea>, Option<CountedArea>),
     pub(super) inputs: Inputs,
     /// The values that a machine uses when its PLC is absent; `None` at a PLC's end.
     fail_safe: Option<FailSafe>,
-    outputs: Box<[u8]>,
+    pub(super) outputs: Box<[u8]>,
     outputs_before: Box<[u8]>,
-    beats: FrameBeats,
     /// The arrival for the present scan.
     arrival: Option<Arrival>,
     /// True if the program saw its peer in the last scan.
@@ -74,7 +64,6 @@ impl Unit {
             fail_safe: (role == Role::Device).then(|| FailSafe::new(config, station, reads)),
             outputs_before: outputs.clone(),
             outputs,
-            beats: FrameBeats::new(config, role, station),
             arrival: None,
             is_alive: false,
         }
@@ -85,11 +74,11 @@ impl Unit {
         &mut self,
         (now, max_age): (Nanos, Nanos),
         image: &mut TickEnd,
-        tape: Option<&mut ScanRecorder>,
+        own: Option<&mut OwnEnd>,
     ) {
         let station = self.station;
         self.take(|inputs| {
-            let mut taking = Taking { inputs, tape };
+            let mut taking = Taking { inputs, own };
             let arrival = image.read(station, (now, max_age), &mut taking);
             if arrival.stale {
                 image.shown_instead(station, &mut taking);
@@ -117,7 +106,6 @@ impl Unit {
             fail_safe,
             outputs,
             outputs_before,
-            beats,
             ..
         } = self;
         let Some(arrival) = self.arrival else {
@@ -136,12 +124,16 @@ impl Unit {
             },
             outputs,
         });
-        beats.beat(now, outputs);
-        scan_counters.count(*written, outputs_before, outputs);
+    }
+
+    /// Counts the edges of the outputs.
+    #[inline]
+    pub(super) fn count_outputs(&self, scan_counters: &ScanCounters) {
+        scan_counters.count(self.counted.0, &self.outputs_before, &self.outputs);
     }
 
     /// Returns the inputs as the program saw them.
-    fn inputs(&self) -> &[u8] {
+    pub(super) fn inputs(&self) -> &[u8] {
         match &self.fail_safe {
             Some(fail_safe) if !self.is_alive => &fail_safe.seen,
             _ => &self.inputs.bytes,
@@ -149,7 +141,7 @@ impl Unit {
     }
 
     /// Returns true if all of these were fail-safe values.
-    fn is_fail_safe(&self) -> bool {
+    pub(super) fn is_fail_safe(&self) -> bool {
         let is_whole = self.fail_safe.as_ref().is_some_and(|it| it.is_whole);
         is_whole && !self.is_alive
     }
@@ -173,7 +165,7 @@ impl Unit {
     }
 
     /// Returns the status of the last scan.
-    fn code(&self) -> Code {
+    pub(super) fn code(&self) -> Code {
         match self.arrival {
             _ if !self.is_alive => Code::Stale,
             Some(Arrival { fresh: true, .. }) => Code::Fresh,
@@ -238,10 +230,10 @@ impl Inputs {
     }
 }
 
-/// Takes over the inputs, and their edges if a recording needs them.
+/// Takes over the inputs, and their edges for a recording.
 struct Taking<'a> {
     inputs: &'a mut Inputs,
-    tape: Option<&'a mut ScanRecorder>,
+    own: Option<&'a mut OwnEnd>,
 }
 
 impl Receiver for Taking<'_> {
@@ -250,102 +242,56 @@ impl Receiver for Taking<'_> {
     }
 
     fn edges(&mut self, signal: usize, count: u32) {
-        if let Some(tape) = &mut self.tape {
-            tape.edges(signal, count);
+        if let Some(own) = &mut self.own {
+            own.edges(signal, count);
         }
     }
 }
 
 impl Cpu {
+    /// Returns the bus's notes about each peer.
+    pub(super) fn peers(&self) -> &Peers {
+        &self.tick.peers
+    }
+
     /// Runs one scan at `now`: inputs, program, outputs. `in_time` is false when the scan is so late that the peer has
     /// received fail-safe values in the meantime: the program must then start over as after a broken line.
     pub(super) fn scan(&mut self, now: Nanos, in_time: bool) {
-        let (mut age, mut alive) = (Nanos::ZERO, true);
-        if self.faults.is_some() {
-            self.scan_with_faults(now, in_time);
-            for unit in &self.units {
-                age = age.max(unit.age());
-                alive &= unit.is_alive;
-            }
-        } else {
-            self.tick.update();
-            for unit in &mut self.units {
-                let tape = self.tape.as_mut().filter(|_| unit.station == 0);
-                unit.read((now, self.max_age), &mut self.tick, tape);
-                unit.run(now, in_time, &self.scan_counters);
-                age = age.max(unit.age());
-                alive &= unit.is_alive;
-            }
-            self.write(now);
+        let (units, own) = (&mut self.units, &mut self.own);
+        // A fault looks at all stations together, before and after each part of the scan.
+        if let Some(own) = own {
+            own.begin(now, units);
         }
-        self.scan_counters.scanned(age, alive);
-        self.serve_watch(now);
-    }
-
-    /// Scans once faults have been injected: they look at all stations together, before and after each part of the
-    /// scan.
-    fn scan_with_faults(&mut self, now: Nanos, in_time: bool) {
-        let Some(faults) = &mut self.faults else {
-            return;
-        };
-        let (units, tape) = (&mut self.units, &mut self.tape);
-        let frames = units.iter_mut();
-        faults.begin_scan(
-            now,
-            frames.map(|unit| (&mut *unit.inputs.bytes, &*unit.outputs)),
-        );
         self.tick.update();
         for unit in &mut *units {
-            let tape = tape.as_mut().filter(|_| unit.station == 0);
-            unit.read((now, self.max_age), &mut self.tick, tape);
+            unit.read((now, self.max_age), &mut self.tick, own.as_mut());
         }
-        faults.received(units.iter_mut().map(|unit| &mut *unit.inputs.bytes));
+        if let Some(own) = own {
+            own.received(units);
+        }
         for unit in &mut *units {
             unit.run(now, in_time, &self.scan_counters);
         }
-        faults.sending(units.iter().map(|unit| &*unit.outputs));
-        self.write(now);
-        if let Some(faults) = &mut self.faults {
-            faults.sent();
+        if let Some(own) = own {
+            own.sending(now, units);
         }
-    }
-
-    /// Hands over the outputs of all stations, bent by injected faults, and records the scan.
-    fn write(&mut self, now: Nanos) {
-        let (units, faults) = (&self.units, &mut self.faults);
+        let (mut age, mut alive) = (Nanos::ZERO, true);
+        for unit in &*units {
+            unit.count_outputs(&self.scan_counters);
+            age = age.max(unit.age());
+            alive &= unit.is_alive;
+        }
         self.tick.write(now, |station, frame| {
             if let Some(unit) = units.get(station) {
                 copy_frame(frame, &unit.outputs);
-                if let Some(faults) = faults {
-                    faults.bend_outputs(station, frame);
+                if let Some(own) = own {
+                    own.bend_outputs(station, frame);
                 }
             }
         });
-        if let (Some(tape), Some(unit)) = (&mut self.tape, units.first()) {
-            tape.scan(now, unit.code(), unit.inputs(), &unit.outputs);
-        }
-    }
-
-    /// Serves the requests of another thread that looks at the image.
-    fn serve_watch(&mut self, now: Nanos) {
-        let Some(watched) = self.watched.as_mut().filter(|watched| watched.is_wanted()) else {
-            return;
-        };
-        let wanted = watched.take_wanted();
-        if wanted.orders() {
-            let inputs = self.units.iter().map(|unit| &*unit.inputs.bytes);
-            watched.obey(&mut self.faults, inputs);
-        }
-        if wanted.values() {
-            let stations = self.units.iter().map(|unit| ScannedStation {
-                station: unit.station,
-                status: unit.code(),
-                inputs: unit.inputs(),
-                outputs: &unit.outputs,
-                is_fail_safe: unit.is_fail_safe(),
-            });
-            let (scans, _) = self.scan_counters.scans();
-            watched.show((now, scans), &self.tick, stations);
+        self.scan_counters.scanned(age, alive);
+        if let Some(own) = own {
+            own.end(now, &self.tick, units);
         }
     }
 }
@@ -374,11 +320,8 @@ pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (C
         units: units(program, (config, role), &scan_counters),
         tick,
         max_age: config.timing.max_age,
-        areas: role.areas(),
         scan_counters,
-        faults: None,
-        tape: None,
-        watched: None,
+        own: None,
     };
     (cpu, bus)
 }

@@ -1,46 +1,31 @@
-//! The other end of a bus within this process, and its counters.
+//! The other end of a bus within this process.
 
 use std::sync::Arc;
 
-use tickbus_base::statistics::Statistics;
+use crate::statistics::Counters;
 
-use crate::replay::ReplayCounters;
-
-use super::{HostCounters, HostThread, ScanCounters};
+use super::HostThread;
 
 /// The other end of a bus within this process: a PLC program or a recording.
 #[derive(Debug)]
-pub(crate) enum Program {
-    Thread(Box<HostThread>),
-    Stepped(Arc<ScanCounters>),
-    Replay(Arc<ReplayCounters>),
+pub(crate) struct OtherEnd {
+    pub(crate) counters: Arc<dyn Counters>,
+    #[expect(dead_code, reason = "kept for its drop")]
+    thread: Option<HostThread>,
 }
 
-/// The counters of the other end, readable from any thread.
-#[derive(Clone, Debug)]
-pub(crate) enum ProgramCounters {
-    Thread(HostCounters),
-    Stepped(Arc<ScanCounters>),
-    Replay(Arc<ReplayCounters>),
-}
-
-impl Program {
-    pub(crate) fn counters(&self) -> ProgramCounters {
-        match self {
-            Self::Thread(host) => ProgramCounters::Thread(host.counters.clone()),
-            Self::Stepped(scan_counters) => ProgramCounters::Stepped(Arc::clone(scan_counters)),
-            Self::Replay(scan_counters) => ProgramCounters::Replay(Arc::clone(scan_counters)),
-        }
+impl OtherEnd {
+    /// The other end that the tick steps.
+    pub(crate) fn stepped(counters: Arc<dyn Counters>) -> Self {
+        let thread = None;
+        Self { counters, thread }
     }
-}
 
-impl ProgramCounters {
-    /// Adds the counters.
-    pub(crate) fn write(&self, statistics: &mut Statistics) {
-        match self {
-            Self::Thread(host) => host.write(statistics),
-            Self::Stepped(scan_counters) => scan_counters.write(statistics),
-            Self::Replay(scan_counters) => scan_counters.write(statistics),
+    /// A program on a thread of its own.
+    pub(crate) fn on_thread(host: HostThread) -> Self {
+        Self {
+            counters: Arc::clone(&host.counters) as _,
+            thread: Some(host),
         }
     }
 }

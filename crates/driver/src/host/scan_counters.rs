@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::statistics::Counters;
 use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::{Nanos, SharedHistogram};
 use tickbus_image::copy_frame;
@@ -160,9 +161,10 @@ impl ScanCounters {
         let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         (count(&self.scans), count(&self.stale))
     }
+}
 
-    /// Adds the counts to the statistics.
-    pub(crate) fn write(&self, statistics: &mut Statistics) {
+impl Counters for ScanCounters {
+    fn write(&self, statistics: &mut Statistics) {
         statistics.count("plc.scans", self.scans.load(Ordering::Relaxed));
         statistics.count("plc.stale", self.stale.load(Ordering::Relaxed));
         statistics.distribution("plc.age", &self.age.read());

@@ -111,6 +111,7 @@ impl SteppedHost {
                 Arrival { stale, ..arrival }
             });
             unit.run(now, true, &self.scan_counters);
+            unit.count_outputs(&self.scan_counters);
             line.outputs
                 .write(|frame| copy_frame(frame, unit.outputs()));
             alive &= unit.is_alive();

@@ -2,29 +2,26 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicI64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::recording::ScanRecorder;
+use crate::DriverError;
+use crate::statistics::{Counters, Figures};
 use crate::supervise::{BusThread, panic_text};
-use crate::tap::Handle;
-use crate::tick_counters::TickTimes;
-use crate::view::View;
-use crate::watch::{Figures, Watch};
-use crate::{DriverError, SlotMap};
-use tickbus_base::os::{dropped_log_lines, wake_on_time};
+use crate::watch::Watch;
+use tickbus_base::os::wake_on_time;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{BusError, Free, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
+use tickbus_fieldbus::{Bus, BusError, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
+use tickbus_image::Peers;
 use tickbus_plc::{Program, Report};
-use tickbus_record as record;
+use tickbus_record::Recorder;
 
 use super::ScanCounters;
 use super::cpu::{Cpu, half};
-use super::faults::FrameFaults;
-use super::watched::WatchedScans;
+use super::own_end::OwnEnd;
 
 /// The longest time that a scan can take before it counts as hung. A real PLC's watchdog trips far earlier.
 const LONGEST_SCAN: Nanos = Nanos::from_secs(3);
@@ -56,20 +53,19 @@ pub(crate) struct ScanSetup {
     pub(crate) interval: Nanos,
     /// True if a late scan counts as a broken line, so that fail-safe values replace the outputs.
     pub(crate) has_watchdog: bool,
-    /// The recording of its scans.
-    pub(crate) tape: Option<ScanRecorder>,
+    /// Records its scans.
+    pub(crate) recorder: Option<Recorder>,
 }
 
 /// The counters and the state that a program's thread publishes.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct HostCounters {
     pub(crate) scan_counters: Arc<ScanCounters>,
-    fault: Arc<Mutex<Option<String>>>,
-    scanning: Arc<Scanning>,
+    fault: Mutex<Option<String>>,
+    scanning: Scanning,
     /// True if a scan that takes too long is a fault.
     can_hang: bool,
     report: Option<Arc<dyn Report>>,
-    record: Option<Arc<record::RecorderCounters>>,
     /// The clock of the line.
     pub(crate) clock: Arc<dyn Clock>,
     /// The clock that measures hung scans.
@@ -79,69 +75,33 @@ pub(crate) struct HostCounters {
 /// A program on its own thread, with the bus thread of its end of the line; dropping this stops both.
 #[derive(Debug)]
 pub(crate) struct HostThread {
-    pub(crate) counters: HostCounters,
-    pub(crate) status: LinkStatus,
-    pub(crate) board: Arc<FaultBoard>,
+    pub(crate) counters: Arc<HostCounters>,
+    pub(crate) figures: Figures,
+    peers: Peers,
     /// Looks at the program's image, until someone takes it.
     pub(crate) watch: Mutex<Option<Watch>>,
     stop: Stop,
     thread: Option<Thread>,
-    #[expect(dead_code, reason = "kept for its drop")]
+    /// Kept for its drop; `None` if the program's thread steps the bus.
     bus: Option<BusThread>,
 }
 
-/// Says how a program is scanned.
-enum Scanned {
-    /// Scans at a fixed interval of the clock; the bus has its own thread.
-    Freely {
-        bus: Box<dyn Free>,
-        clock: Arc<dyn Clock>,
-    },
-    /// Scans in the steps of a bus that hands out the time.
-    InSteps { bus: Box<dyn Stepped>, stop: Stop },
-}
-
 impl HostThread {
-    /// Starts scanning the `hosted` program as the end with `role`; `bus` connects it to its peer. The thread is called
-    /// `name`.
+    /// Starts scanning the `hosted` program as the end with `role`; the bus connects it to its peer. A free bus has a
+    /// thread of its own, and scans have a fixed interval. A stepped one hands out the time, and waits no longer once the
+    /// stop is stopped; `wall` then only detects a hung scan.
     pub(crate) fn start(
         hosted: ScanSetup,
-        name: &str,
-        config: &Config,
-        role: Role,
-        bus: Box<dyn Free>,
-        clock: Arc<dyn Clock>,
-    ) -> Result<Self, DriverError> {
-        let wall = Arc::clone(&clock);
-        let scanned = Scanned::Freely { bus, clock };
-        Self::start_scanned(hosted, name, (config, role), scanned, wall)
-    }
-
-    /// As `start`, but scans in the steps of a bus that hands out the time, and that waits no longer once `stop` is
-    /// stopped. The clock `wall` detects a hung scan.
-    pub(crate) fn start_in_steps(
-        hosted: ScanSetup,
-        name: &str,
         (config, role): (&Config, Role),
-        (bus, stop): (Box<dyn Stepped>, Stop),
+        (bus, stop): (Bus, Stop),
         wall: Arc<dyn Clock>,
     ) -> Result<Self, DriverError> {
-        let scanned = Scanned::InSteps { bus, stop };
-        Self::start_scanned(hosted, name, (config, role), scanned, wall)
-    }
-
-    fn start_scanned(
-        hosted: ScanSetup,
-        name: &str,
-        (config, role): (&Config, Role),
-        scanned: Scanned,
-        wall: Arc<dyn Clock>,
-    ) -> Result<Self, DriverError> {
+        let name = &format!("plc {}", hosted.program.name());
         let (max_age, interval) = (config.timing.max_age, hosted.interval);
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
+        let record = hosted.recorder.as_ref();
+        let record = record.map(|recorder| Arc::clone(recorder.counters()));
         let (mut cpu, bus_end) = half(hosted.program, config, role);
-        cpu.tape = hosted.tape;
-        let record = cpu.tape.as_ref().map(ScanRecorder::counters);
         let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
         // `Watch`.
@@ -149,72 +109,69 @@ impl HostThread {
         let watchdog = watchdog(config, (is_own, role), interval);
         let watchdog = watchdog.filter(|_| hosted.has_watchdog);
         let virtual_time = Manual::new();
-        let (clock, limit) = match &scanned {
-            Scanned::Freely { clock, .. } => (Arc::clone(clock), watchdog),
-            Scanned::InSteps { .. } => (Arc::clone(&virtual_time) as _, None),
+        let (clock, limit) = match &bus {
+            Bus::Free(_) => (Arc::clone(&wall), watchdog),
+            Bus::Stepped(_) => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        let seen = is_own.then(|| prepare_own_end(&mut cpu, config, &board));
         let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        let fault = Arc::new(Mutex::new(None));
-        let scanning = Arc::new(Scanning(AtomicI64::new(Scanning::NONE)));
-        let counters = HostCounters {
+        let counters = Arc::new(HostCounters {
             scan_counters: Arc::clone(&cpu.scan_counters),
-            fault: Arc::clone(&fault),
-            scanning: Arc::clone(&scanning),
+            fault: Mutex::new(None),
+            scanning: Scanning(AtomicI64::new(Scanning::NONE)),
             can_hang,
             report,
-            record,
-            clock: Arc::clone(&clock),
+            clock,
             wall,
+        });
+        let peers = cpu.peers().clone();
+        let figures = Figures {
+            status: status.clone(),
+            board: Arc::clone(&board),
+            program: Some(Arc::clone(&counters) as _),
+            record,
         };
-        let figures = HostFigures::of(&counters, &status, &board);
-        let watch = seen.map(|(config, handle)| watch(config, handle, figures));
-        let (stop, bus, mut scans): (_, _, Box<dyn FnMut() -> Result<(), String> + Send>) =
-            match scanned {
-                Scanned::Freely { bus, .. } => {
-                    let timing = timing(config, is_own);
-                    let bus = BusThread::start(bus, port, &timing, status.clone(), name);
-                    let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
-                    let (stop, scanning) = (Stop::new(), Arc::clone(&scanning));
-                    let scans = {
-                        let stop = stop.clone();
-                        move || {
-                            let times = (interval, watchdog);
-                            wake_on_time();
-                            scan_until_stopped(&mut cpu, times, &*clock, &stop, &scanning);
-                            Ok(())
-                        }
-                    };
-                    (stop, Some(bus), Box::new(scans))
-                }
-                Scanned::InSteps { mut bus, stop } => {
-                    let mut port = port;
-                    let scans = {
-                        let (stop, scanning) = (stop.clone(), Arc::clone(&scanning));
-                        let wall = Arc::clone(&counters.wall);
-                        let status = status.clone();
-                        move || {
-                            let line = (&mut *bus, &mut port, &*virtual_time);
-                            let watch = (&*scanning, &*wall);
-                            let ended = scan_in_steps(&mut cpu, line, watch, &stop);
-                            ended.map_err(|error| {
-                                let reason = error.to_string();
-                                let (now, cause) = (virtual_time.now(), (&error).into());
-                                status.enter(now, LinkState::Failed, cause, &reason);
-                                reason
-                            })
-                        }
-                    };
-                    (stop, None, Box::new(scans))
-                }
-            };
+        let watch = is_own.then(|| {
+            let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
+            let (tap, watch) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
+            cpu.own = Some(OwnEnd::new(config, &board, tap, hosted.recorder));
+            watch
+        });
+        let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
+        let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
+            Bus::Free(bus) => {
+                let timing = timing(config, is_own);
+                let bus = BusThread::start(bus, port, &timing, status, name);
+                let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
+                let scans = move || {
+                    wake_on_time();
+                    scan_until_stopped(&mut cpu, (interval, watchdog), &stopped, &scanned);
+                    Ok(())
+                };
+                (Some(bus), Box::new(scans))
+            }
+            Bus::Stepped(mut bus) => {
+                let mut port = port;
+                let scans = move || {
+                    let line = (&mut *bus, &mut port, &*virtual_time);
+                    let ended = scan_in_steps(&mut cpu, line, &scanned, &stopped);
+                    ended.map_err(|error| {
+                        let reason = error.to_string();
+                        let (now, cause) = (virtual_time.now(), (&error).into());
+                        status.enter(now, LinkState::Failed, cause, &reason);
+                        reason
+                    })
+                };
+                (None, Box::new(scans))
+            }
+        };
+        let scanned = Arc::clone(&counters);
         let spawned = Thread::spawn(&*counters.wall, name, move || {
             let result = catch_unwind(AssertUnwindSafe(&mut scans));
-            scanning.set(None);
+            scanned.scanning.set(None);
             // Dropping the bus can send a farewell to the peer, and closing waits for that.
             drop(scans);
             let text = match result {
@@ -226,13 +183,13 @@ impl HostThread {
                     text
                 }
             };
-            *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(text);
+            *scanned.lock_fault() = Some(text);
         });
         let thread = spawned.map_err(|source| DriverError::no_thread("the PLC program", source))?;
         Ok(Self {
             counters,
-            status,
-            board,
+            figures,
+            peers,
             watch: Mutex::new(watch),
             stop,
             thread: Some(thread),
@@ -262,81 +219,9 @@ fn timing(config: &Config, is_own_end: bool) -> Timing {
     timing
 }
 
-/// The sources of the statistics of a program and its line.
-#[derive(Clone, Debug)]
-pub(crate) struct HostFigures {
-    pub(crate) counters: HostCounters,
-    pub(crate) status: LinkStatus,
-    pub(crate) board: Arc<FaultBoard>,
-}
-
-impl HostFigures {
-    fn of(counters: &HostCounters, status: &LinkStatus, board: &Arc<FaultBoard>) -> Self {
-        Self {
-            counters: counters.clone(),
-            status: status.clone(),
-            board: Arc::clone(board),
-        }
-    }
-
-    /// Returns the statistics at this moment.
-    pub(crate) fn statistics(&self, now: Nanos) -> Statistics {
-        let mut statistics = Statistics::default();
-        self.status.observe_call(now);
-        self.status.write(now, &mut statistics);
-        self.board.tell(self.status.driver());
-        self.board.write(&mut statistics);
-        self.counters.write(&mut statistics);
-        statistics.count("log.dropped", dropped_log_lines());
-        statistics
-    }
-}
-
-impl Figures for HostFigures {
-    fn statistics(&self, now: Nanos, _: &View, _: &TickTimes) -> Statistics {
-        Self::statistics(self, now)
-    }
-
-    fn is_driver(&self) -> bool {
-        false
-    }
-}
-
-/// Gives the end that a driver.cfg describes its faults, and lets another thread look at this end.
-fn prepare_own_end(
-    cpu: &mut Cpu,
-    config: &Config,
-    board: &Arc<FaultBoard>,
-) -> (Arc<Config>, Handle) {
-    let inputs = cpu.units.iter().map(|unit| &*unit.inputs.bytes);
-    let (table, shared) = (&config.table, Arc::clone(board));
-    cpu.faults = FrameFaults::of_list(&config.faults, table, cpu.areas, inputs, shared);
-    let config = Arc::new(config.clone());
-    let (watched, handle) = WatchedScans::new(&config, config.role, Arc::clone(board));
-    cpu.watched = Some(watched);
-    (config, handle)
-}
-
-/// Creates the watch of a program.
-fn watch(config: Arc<Config>, handle: Handle, figures: HostFigures) -> Watch {
-    Watch {
-        role: config.role,
-        config,
-        // A program works on frames: its faults have no slots that count edges.
-        slots: SlotMap::default(),
-        handle,
-        status: figures.status.clone(),
-        board: Arc::clone(&figures.board),
-        clock: Arc::clone(&figures.counters.clock),
-        figures: Box::new(figures),
-        times: TickTimes::default(),
-        asked: None,
-    }
-}
-
-impl HostCounters {
+impl Counters for HostCounters {
     /// Adds the program's counters, and its fault.
-    pub(crate) fn write(&self, statistics: &mut Statistics) {
+    fn write(&self, statistics: &mut Statistics) {
         self.scan_counters.write(statistics);
         if let Some(report) = &self.report {
             report.write(statistics);
@@ -344,28 +229,33 @@ impl HostCounters {
         if let Some(fault) = self.fault() {
             statistics.text("plc.fault", &fault);
         }
-        if let Some(record) = &self.record {
-            record.write(statistics);
-        }
     }
+}
 
+impl HostCounters {
     pub(crate) fn fault(&self) -> Option<String> {
         let too_long = self.scanning.too_long(self.wall.now());
         if let Some(span) = too_long.filter(|_| self.can_hang) {
             let span = span.rounded();
             return Some(format!("the PLC program has been in one scan for {span}"));
         }
-        self.fault
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .clone()
+        self.lock_fault().clone()
+    }
+
+    fn lock_fault(&self) -> MutexGuard<'_, Option<String>> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl HostThread {
-    /// Returns the sources of the program's statistics.
-    pub(crate) fn figures(&self) -> HostFigures {
-        HostFigures::of(&self.counters, &self.status, &self.board)
+    /// Checks the state of the line, in case the bus itself cannot, and returns the time. In the steps of a bus, only the
+    /// bus knows whether data are late.
+    pub(crate) fn observe(&self) -> Nanos {
+        let now = self.counters.clock.now();
+        if self.bus.is_some() {
+            self.figures.status.observe(now, self.peers.ages(now));
+        }
+        now
     }
 
     /// Returns true if the program is no longer scanned, for whatever reason.
@@ -395,9 +285,10 @@ impl Drop for HostThread {
 fn scan_until_stopped(
     cpu: &mut Cpu,
     (interval, watchdog): (Nanos, Option<Nanos>),
-    clock: &dyn Clock,
     stop: &Stop,
-    scanning: &Scanning,
+    HostCounters {
+        clock, scanning, ..
+    }: &HostCounters,
 ) {
     // As in a PLC: a late scan stays late, and missed scans are not made up for.
     let mut pace = Pace::new(clock.now(), interval);
@@ -422,7 +313,7 @@ fn scan_until_stopped(
 fn scan_in_steps(
     cpu: &mut Cpu,
     (bus, port, time): (&mut (dyn Stepped + 'static), &mut Port, &Manual),
-    (scanning, wall): (&Scanning, &dyn Clock),
+    HostCounters { wall, scanning, .. }: &HostCounters,
     stop: &Stop,
 ) -> Result<(), BusError> {
     while !stop.is_stopped() {

@@ -4,7 +4,7 @@
 .DEFAULT_GOAL := help
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
+	@awk -F ':.*## ' '/^[a-z%-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
 
 demo: ## build, then watch the PLC program run the rig: three cycles, one jam, one PLC killed
 	@exec tools/demo
@@ -26,6 +26,9 @@ demo-cell: ## build, then watch Petri nets make twelve cylinders in the manufact
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test
+
+test-%: setup ## the tests in Rust of one folder of crates/, such as make test-lab
+	@cargo test --locked $$(sed -n 's/^name = "\(tickbus-.*\)"/-p \1/p' crates/$*/*/Cargo.toml)
 
 python: setup ## the wheel of the Python package, built and tested
 	@tools/peers --python && exec tools/python

@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::package;
 use super::rules::File;
 use super::source::{Token, texts, tokens};
 
@@ -61,11 +62,10 @@ pub(crate) fn circles(files: &[File<'_>]) -> Vec<String> {
     found
 }
 
-/// The module of a file: `crates/a/src/b/c.rs` and `crates/a/src/b/c/mod.rs` are `tickbus_a::b::c`.
+/// The module of a file: `crates/core/a/src/b/c.rs` and `crates/core/a/src/b/c/mod.rs` are `tickbus_a::b::c`.
 fn module(file: &str) -> Path {
     let (folder, inner) = file.split_once("src/").unwrap_or(("", file));
-    let folder = folder.trim_start_matches("crates/").trim_end_matches('/');
-    let name = format!("tickbus_{}", folder.replace('-', "_"));
+    let name = format!("tickbus_{}", package(folder).replace('-', "_"));
     let mut path = vec![name.trim_end_matches('_').to_owned()];
     path.extend(inner.trim_end_matches(".rs").split('/').map(str::to_owned));
     if ["mod", "lib"].contains(&path.last().map_or("", String::as_str)) {

@@ -53,14 +53,33 @@ fn files(sources: &[(String, String)]) -> Vec<File<'_>> {
 
 /// The folders with the sources of a crate, from the project's root.
 fn crates(root: &Path) -> Vec<String> {
-    let entries = fs::read_dir(root.join("crates")).expect("there are crates");
-    let names = entries.map(|entry| entry.expect("readable").file_name());
-    let mut found: Vec<String> = names
-        .map(|name| format!("crates/{}/src", name.to_str().expect("UTF-8")))
-        .collect();
-    found.extend(["src".to_owned(), "python/src".to_owned()]);
+    let mut found = vec!["src".to_owned(), "python/src".to_owned()];
+    // A crate is a folder of a house; `crates/kinds` is one by itself.
+    let mut open = vec!["crates".to_owned()];
+    while let Some(folder) = open.pop() {
+        let entries = fs::read_dir(root.join(&folder)).expect("the folder can be read");
+        for entry in entries {
+            let entry = entry.expect("readable");
+            let below = format!("{folder}/{}", entry.file_name().to_str().expect("UTF-8"));
+            if entry.path().join("Cargo.toml").exists() {
+                found.push(format!("{below}/src"));
+            } else if entry.path().is_dir() {
+                open.push(below);
+            }
+        }
+    }
     found.sort();
     found
+}
+
+/// The name of the package in a folder, without `tickbus-`: `crates/bus/s7` has `bus-s7`.
+fn package(folder: &str) -> String {
+    let below = folder.trim_start_matches("crates/").trim_end_matches('/');
+    match below.split_once('/') {
+        Some(("bus", name)) => format!("bus-{name}"),
+        Some((_, name)) => name.to_owned(),
+        None => below.to_owned(),
+    }
 }
 
 #[test]
@@ -83,36 +102,46 @@ fn every_crate_has_its_row_in_the_table_of_rooms() {
     }
 }
 
-/// The manifests of all crates, by their folders below `crates`.
+/// The manifests of all crates, by the names of their packages.
 fn manifests() -> BTreeMap<String, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let read = |folder: &String| {
         let folder = folder.trim_end_matches("src");
         let manifest = fs::read_to_string(root.join(folder).join("Cargo.toml"));
-        let name = folder.trim_start_matches("crates/").trim_end_matches('/');
-        let name = if name.is_empty() { "src" } else { name };
-        (name.to_owned(), manifest.expect("a crate has a manifest"))
+        let name = package(folder);
+        let name = if name.is_empty() {
+            "src".to_owned()
+        } else {
+            name
+        };
+        (name, manifest.expect("a crate has a manifest"))
     };
     crates(root).iter().map(read).collect()
 }
 
 #[test]
 fn the_core_knows_no_bus() {
-    let manifests = manifests();
-    let named = manifests.iter();
-    let found: Vec<String> = named
-        .flat_map(|(name, manifest)| buses_of_core(name, manifest))
-        .collect();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut found = Vec::new();
+    for folder in crates(root) {
+        let file = format!("{}Cargo.toml", folder.trim_end_matches("src"));
+        let manifest = fs::read_to_string(root.join(&file)).expect("a crate has a manifest");
+        found.extend(buses_of_core(&file, &manifest));
+    }
     assert!(found.is_empty(), "{}", found.join("\n"));
     let manifest = "[dependencies]\ntickbus-base.workspace = true\n[dev-dependencies]\n\
                     tickbus-bus-s7.workspace = true\n";
-    assert_eq!(buses_of_core("driver-cfg", manifest).len(), 1);
-    assert_eq!(buses_of_core("export", manifest), Vec::<String>::new());
+    assert_eq!(
+        buses_of_core("crates/core/driver-cfg/Cargo.toml", manifest).len(),
+        1
+    );
+    let elsewhere = buses_of_core("crates/tools/export/Cargo.toml", manifest);
+    assert_eq!(elsewhere, Vec::<String>::new());
     let text =
         "use tickbus_fieldbus::Bus;\nuse tickbus_bus_s7 as s7;\nfn f() { tickbus_kinds::KINDS }";
     let found = [(2, "tickbus_bus_s7"), (3, "tickbus_kinds")];
-    finds("crates/driver-cfg/src/config.rs", text, &found);
-    finds("crates/export/src/lib.rs", text, &[]);
+    finds("crates/core/driver-cfg/src/config.rs", text, &found);
+    finds("crates/tools/export/src/lib.rs", text, &[]);
 }
 
 #[test]
@@ -163,7 +192,7 @@ fn the_glossary_names_what_there_is() {
     // build.rs generates this enum from the table of status codes.
     let codes = sources
         .iter_mut()
-        .find(|(path, _)| path == "crates/driver/src/status.rs");
+        .find(|(path, _)| path == "crates/core/driver/src/status.rs");
     codes.expect("it is there").1 += "pub enum Code { Fresh, Unchanged, Stale }";
     let modules = circles::modules(&files(&sources));
     assert_eq!(unknown(&text, &modules), Vec::<String>::new());
@@ -246,7 +275,7 @@ fn comments_and_literals_do_not_count() {
                 const C: [u8; 3] = [b'\"', b'\\'', b'u'];\n\
                 fn f<'a>(c: char) -> &'a str { if c == '\"' { \"SystemTime\" } else { br\"\" } }\n\
                 unsafe fn g() {}";
-    finds("crates/base/src/time/mod.rs", text, &[(7, "unsafe")]);
+    finds("crates/core/base/src/time/mod.rs", text, &[(7, "unsafe")]);
 }
 
 #[test]
@@ -255,12 +284,12 @@ fn unsafe_code_away_from_home_is_found() {
     for home in [
         "src/jni.rs",
         "src/jni/shared.rs",
-        "crates/base/src/os/linux.rs",
-        "crates/image/src/triple.rs",
+        "crates/core/base/src/os/linux.rs",
+        "crates/core/image/src/triple.rs",
     ] {
         finds_no_unsafe(home, text);
     }
-    finds("crates/image/src/ring.rs", text, &[(2, "unsafe code")]);
+    finds("crates/core/image/src/ring.rs", text, &[(2, "unsafe code")]);
     finds("src/jnix/mod.rs", text, &[(2, "unsafe code")]);
 }
 
@@ -279,22 +308,22 @@ fn a_wall_clock_away_from_home_is_found() {
                 fn f() { Instant::now(); }\n\
                 fn g() { std::thread::sleep(Duration::ZERO); }";
     let found = [(1, "SystemTime"), (2, "Instant::now"), (3, "thread::sleep")];
-    finds("crates/driver/src/open.rs", text, &found);
+    finds("crates/core/driver/src/open.rs", text, &found);
     let text = "use opcua_types::DateTime;\n\
                 fn f() { DateTime::now(); }\n\
                 fn g() { chrono::Utc::now(); Self::now(); clock.now(); yield_now() }\n\
                 fn h() { time::OffsetDateTime::now_utc(); thread::yield_now(); }";
     let found = [(2, "DateTime::now"), (3, "Utc::now"), (4, "now_utc")];
-    finds("crates/bus-opcua/src/pki.rs", text, &found);
-    finds("crates/base/src/time/clock.rs", text, &[]);
+    finds("crates/bus/opcua/src/pki.rs", text, &found);
+    finds("crates/core/base/src/time/clock.rs", text, &[]);
     finds("src/cli/mirror.rs", text, &[]);
 }
 
 #[test]
 fn a_file_without_end_is_found() {
-    finds("crates/base/src/time/nanos.rs", &"\n".repeat(700), &[]);
+    finds("crates/core/base/src/time/nanos.rs", &"\n".repeat(700), &[]);
     finds(
-        "crates/base/src/time/nanos.rs",
+        "crates/core/base/src/time/nanos.rs",
         &"\n".repeat(701),
         &[(701, "701 lines")],
     );

@@ -9,7 +9,7 @@
 )]
 
 #[allow(dead_code, reason = "each test uses a part of it")]
-#[path = "../../crates/bus-modbus/tests/modbus/plc.rs"]
+#[path = "../../crates/bus/modbus/tests/modbus/plc.rs"]
 mod modbus_plc;
 
 use std::io::Read as _;

@@ -219,7 +219,7 @@ fn a_million_changes_that_follow_a_rule_take_little_room() {
 /// The colours of the style sheet, by name, for light and for dark mode.
 fn colours() -> [Vec<(String, [f64; 3])>; 2] {
     let style = fs::read_to_string(
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/report/src/style.css"),
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("crates/tools/report/src/style.css"),
     );
     let style = style.expect("the style sheet is there");
     let (light, dark) = style

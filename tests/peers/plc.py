@@ -12,7 +12,7 @@ import socket
 import struct
 import sys
 
-# Big-endian, as the addresses of crates/conformance/src/rig.rs say:
+# Big-endian, as the addresses of crates/core/conformance/src/rig.rs say:
 # %QX0.0 run, %QW2 speed, %QW4 echo; %IX0.0 sensor, %IW2 position, %IW4 copy.
 OUTPUTS = struct.Struct(">Bxhh")
 INPUTS = struct.Struct(">Bxhh")

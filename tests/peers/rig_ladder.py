@@ -3,7 +3,7 @@
 
     rig_ladder.py --address 127.0.0.1:1502
 
-crates/programs/src/rig/mod.rs describes the program, and docs/ARCHITECTURE.md why it also exists in ladder. The PLC reads
+crates/machines/programs/src/rig/mod.rs describes the program, and docs/ARCHITECTURE.md why it also exists in ladder. The PLC reads
 the machine's %I as input registers 0 to 3 and writes its %Q as holding registers 0 to 3: with kind = "modbus-server",
 driver.cfg needs no other change. It runs until a signal ends it, and prints each change of its phase to standard output.
 """

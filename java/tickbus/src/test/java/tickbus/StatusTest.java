@@ -12,7 +12,7 @@ import org.junit.jupiter.api.Test;
 class StatusTest {
     @Test
     void enumAndTableOfTheNativeSideAreTheSame() throws IOException {
-        Path table = Path.of(System.getProperty("tickbus.root"), "crates", "driver", "src", "status.tsv");
+        Path table = Path.of(System.getProperty("tickbus.root"), "crates", "core", "driver", "src", "status.tsv");
         List<String> expected = Files.readAllLines(table).stream()
             .filter(line -> !line.startsWith("#") && !line.isEmpty())
             .toList();

@@ -159,7 +159,7 @@ impl Free for Client {
             let session =
                 connect::open(&client, dialled.0, dialled.1, login, pki, inbox.clone()).await?;
             let server = nodes::ask(&session).await?;
-            Ok((session, server))
+            Ok::<_, BusError>((session, server))
         };
         let (session, server) = match reactor.drive(&*clock, deadline, opened) {
             Driven::Done(opened) => opened?,

@@ -224,7 +224,9 @@ class Judge:
         if since is None:
             return
         self.judged["ages"] += 1
-        truth = tick.began - since
+        # The last data of a process that was killed while the network was cut arrive when TCP sends them again.
+        ended = [(life.ended, self.arrived(life, tick)) for life in peers if life.ended]
+        truth = tick.began - max([since, *(arrived for at, arrived in ended if arrived > at)])
         allowed = self.allowed() + self.slack(since, tick.began)
         if self.plan.bus == "dispatcher":
             # The dispatcher lives, and reports a lost source after the time that its `max_age` promises.

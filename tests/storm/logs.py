@@ -17,6 +17,7 @@ KNOWN = [
     (STATE + r"opening: \S+ has connected; waiting for its first (record|telegram)", ALWAYS),
     (STATE + r"(stale|opening|failed): nothing has come from ", SILENT),
     (STATE + r"(opening|failed): the peer left: (the dispatcher at )?\S+ closed the connection; (listening on|next attempt|if it )", ALWAYS),
+    (STATE + r"failed: the peer left: \S+ closed the connection when it was asked who it is", DEATHS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \(Connection refused", ALWAYS),
     (STATE + r"failed: the link failed: cannot connect to \S+ \((Network is unreachable|No route to host|.*timed out)", {"cut"}),
     (STATE + r"(opening|failed): the link failed: \S+ has (been silent|not answered) for ", SILENT),

@@ -70,6 +70,11 @@ class TheJudge(unittest.TestCase):
             tick.stations = [stamped(2, 0, 700, 0)]
         self.assertIn("age", self.found())
 
+        # Its last data can have waited in a network that was cut when it was killed.
+        ended = self.controller.ended
+        self.controller.downs = [(ended - SECOND // 10, ended + 10 * SECOND)]
+        self.assertNotIn("age", self.found())
+
     def test_outputs_that_are_left_on_are_found(self):
         self.controller.ticks = self.controller.ticks[:700]
         self.controller.ended, self.controller.closed = self.controller.ticks[-1].ended, True

@@ -12,7 +12,7 @@ use tickbus_driver_cfg::{Kind, Kinds};
 
 static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_plugin::Options>()]);
 
-const SHIM: &str = "../../../examples/interbus-hli-shim/shim.c";
+const SHIM: &str = "../../examples/interbus-hli-shim/shim.c";
 const HEADER: &str = concat!(
     "-DHLI_CELL=\"",
     env!("CARGO_MANIFEST_DIR"),

@@ -10,7 +10,7 @@ use crate::delivery::Delivery;
 use crate::random::Random;
 use crate::wire::{self, Wire};
 
-/// What a process listens with; `None` if the process was killed before it listened.
+/// Returns the listener of a process, or `None` if the process was killed before it listened.
 ///
 /// # Panics
 ///

@@ -272,8 +272,8 @@ impl Session {
         whole
     }
 
-    /// A fault of the line holds back the rest of the record at `now`: the time that the peer has to read it begins
-    /// anew.
+    /// A fault of the line holds back the rest of the record at `now`: the time that the peer has to read it starts
+    /// again.
     pub fn held_back(&mut self, now: Nanos) {
         if let Some(since) = &mut self.outbox.waiting_since {
             *since = now;

@@ -43,8 +43,8 @@ impl Extras {
     /// Notes whether there is anything left to do: called at the end of a busy tick, whose faults may be over.
     #[cold]
     pub(super) fn rest(&mut self) {
-        let is_faulty = self.faults.as_ref().is_some_and(|faults| !faults.is_idle());
-        self.is_busy = is_faulty || self.reflexes.is_some() || !self.beats.is_empty();
+        let is_faulty = || self.faults.as_ref().is_some_and(|faults| !faults.is_idle());
+        self.is_busy = self.reflexes.is_some() || !self.beats.is_empty() || is_faulty();
     }
 
     /// Makes room for faults, so that a tick need not allocate memory for them.

@@ -373,14 +373,20 @@ impl LinkStatus {
             LinkState::Stale if stale == 0 || stale != self.0.stale.load(Ordering::Relaxed) => {}
             _ => return,
         }
-        self.look_again(now, stale, ages);
+        self.look_again(now, ages);
     }
 
-    /// Updates the state when the data of `stale` stations are too old.
+    /// Updates the state from the ages as they are now: since the first look, another thread may have received data, or
+    /// entered a state at a later time than `now`, which then stays.
     #[cold]
-    fn look_again(&self, now: Nanos, stale: usize, ages: impl Iterator<Item = Nanos> + Clone) {
+    fn look_again(&self, now: Nanos, ages: impl Iterator<Item = Nanos> + Clone) {
         let limit = self.0.max_age;
         let mut record = self.lock();
+        if now < record.link.since {
+            return;
+        }
+        let all = ages.clone();
+        let stale = all.filter(|age| is_stale(*age, limit, true)).count();
         let shown = now - record.link.since;
         match record.link.state {
             // A line that has just come up may still have old data.

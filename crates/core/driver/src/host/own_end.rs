@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{FaultBoard, Slots, TickTime};
@@ -50,12 +51,16 @@ struct Station {
 
 impl OwnEnd {
     /// Creates the end with the faults and the heartbeats of `config`.
+    ///
+    /// # Errors
+    ///
+    /// There are more faults than an end can have.
     pub(super) fn new(
         config: Arc<Config>,
         board: &Arc<FaultBoard>,
         tap: Tap,
         recorder: Option<Recorder>,
-    ) -> Self {
+    ) -> Result<Self, Mistake> {
         let table = &config.table;
         let (writes, reads) = config.role.areas();
         let mut extras = Extras::new(None, Beat::all(&config, config.role));
@@ -67,9 +72,7 @@ impl OwnEnd {
                 writes,
                 edges: &map.edges,
             };
-            extras
-                .inject(fault, slots, board)
-                .expect("a driver.cfg has no more faults than a driver");
+            extras.inject(fault, slots, board)?;
         }
         let frame = |bytes| vec![0; bytes].into();
         let stations = table.stations.iter().enumerate();
@@ -80,7 +83,7 @@ impl OwnEnd {
             sent: frame(station.bytes(writes)),
             received: frame(station.bytes(reads)),
         });
-        Self {
+        Ok(Self {
             extras,
             recorder,
             tap,
@@ -91,7 +94,7 @@ impl OwnEnd {
             begun: None,
             moment: TickTime::default(),
             config,
-        }
+        })
     }
 
     /// Begins a scan: restores the true inputs of the previous one, and lets faults begin and end.
@@ -149,7 +152,8 @@ impl OwnEnd {
 
     /// Puts the heartbeats into the outputs, and prepares the values for [`bend_outputs`](Self::bend_outputs).
     pub(super) fn sending(&mut self, now: Nanos, units: &mut [Unit]) {
-        if !self.extras.is_busy() {
+        let is_bent = self.extras.bent(true).next().is_some();
+        if !is_bent && self.extras.beating().next().is_none() {
             return;
         }
         for (station, unit) in self.stations.iter().zip(&*units) {
@@ -164,7 +168,7 @@ impl OwnEnd {
                 take_over(signal, beat, &mut unit.outputs);
             }
         }
-        if self.extras.bent(true).next().is_some() {
+        if is_bent {
             self.extras.sending(&mut self.slots);
             self.encode_sent();
         }
@@ -263,10 +267,12 @@ impl OwnEnd {
 mod tests {
     use super::*;
     use crate::Watch;
-    use crate::host::cpu::half;
-    use crate::statistics::Figures;
+    use crate::host::cpu::{Cpu, half};
+    use crate::statistics::{Counters as _, Figures};
+    use tickbus_base::statistics::Statistics;
     use tickbus_base::time::Manual;
     use tickbus_fieldbus::{LinkStatus, Role};
+    use tickbus_image::BusEnd;
     use tickbus_plc::{Program, Scan};
 
     /// Writes its outputs once.
@@ -292,15 +298,11 @@ mod tests {
         }
     }
 
-    #[test]
-    fn the_heartbeat_of_a_program_leaves_its_other_outputs_alone() {
-        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\nrole = \"controller\"\n\
-                    heartbeat = [{ signal = \"life\", every = \"1ms\" }, { signal = \"n\", every = \"1ms\" }]\n\
-                    [[signal]]\nname = \"life\"\naddress = \"%QX1.2\"\n\
-                    [[signal]]\nname = \"n\"\naddress = \"%QW2\"\norder = \"DCBA\"\n";
+    /// A program with the own end of this driver.cfg.
+    fn with_own_end(text: &str) -> (Cpu, BusEnd) {
         let config = Config::parse("driver.cfg", text, &crate::KINDS)
             .unwrap_or_else(|mistakes| panic!("{mistakes}"));
-        let (mut cpu, mut bus) = half(Box::new(Once(false)), &config, Role::Controller);
+        let (mut cpu, bus) = half(Box::new(Once(false)), &config, Role::Controller);
         let figures = Figures {
             status: LinkStatus::new("x", config.timing.max_age),
             board: Arc::default(),
@@ -310,12 +312,47 @@ mod tests {
         let (config, board) = (Arc::new(config), Arc::clone(&figures.board));
         let shared = Arc::clone(&config);
         let (tap, _watch) = Watch::new(shared, Manual::new(), figures, false);
-        cpu.own = Some(OwnEnd::new(config, &board, tap, None));
+        cpu.own = Some(OwnEnd::new(config, &board, tap, None).expect("it has no faults"));
+        (cpu, bus)
+    }
+
+    #[test]
+    fn the_heartbeat_of_a_program_leaves_its_other_outputs_alone() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\nrole = \"controller\"\n\
+                    heartbeat = [{ signal = \"life\", every = \"1ms\" }, { signal = \"n\", every = \"1ms\" }]\n\
+                    [[signal]]\nname = \"life\"\naddress = \"%QX1.2\"\n\
+                    [[signal]]\nname = \"n\"\naddress = \"%QW2\"\norder = \"DCBA\"\n";
+        let (mut cpu, mut bus) = with_own_end(text);
         for (millis, expected) in [(0, [0xff, 0xf4, 1, 0]), (1, [0xff, 0xf0, 2, 0])] {
             let now = Nanos::from_millis(millis);
             cpu.scan(now, true);
             bus.attend(now, None);
             assert_eq!(bus.outgoing(0, now), expected);
         }
+    }
+
+    #[test]
+    fn an_input_that_a_fault_holds_on_rises_once() {
+        let (mut cpu, mut bus) = with_own_end(
+            "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\nrole = \"controller\"\n\
+             [[signal]]\nname = \"jam\"\naddress = \"%IX0.0\"\n\
+             [[signal]]\nname = \"out\"\naddress = \"%QD0\"\n\
+             [[fault]]\nkind = \"stuck\"\nsignal = \"jam\"\nvalue = 1\nat = \"2ms\"\nfor = \"5ms\"\n",
+        );
+        let mut counts = Vec::new();
+        for millis in 0..10 {
+            let now = Nanos::from_millis(millis);
+            bus.received(0, now, &[0], true);
+            bus.hand_over();
+            cpu.scan(now, true);
+            let mut statistics = Statistics::default();
+            cpu.scan_counters.write(&mut statistics);
+            let text = statistics.to_string();
+            let count = text
+                .lines()
+                .find_map(|line| line.strip_prefix("plc.rises.jam="));
+            counts.push(count.expect("it is counted").to_owned());
+        }
+        assert_eq!(counts.concat(), "0011111111");
     }
 }

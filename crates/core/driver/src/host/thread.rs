@@ -134,12 +134,14 @@ impl HostThread {
             program: Some(Arc::clone(&counters) as _),
             record,
         };
-        let watch = is_own.then(|| {
+        let mut watch = None;
+        if is_own {
             let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
-            let (tap, watch) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
-            cpu.own = Some(OwnEnd::new(config, &board, tap, hosted.recorder));
-            watch
-        });
+            let (tap, own) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
+            watch = Some(own);
+            let end = OwnEnd::new(config, &board, tap, hosted.recorder);
+            cpu.own = Some(end.map_err(DriverError::Fault)?);
+        }
         let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
         let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
             Bus::Free(bus) => {

@@ -58,9 +58,7 @@ impl Unit {
     /// Lets `take` fetch the inputs.
     #[inline]
     pub(super) fn take(&mut self, take: impl FnOnce(&mut Inputs) -> Arrival) {
-        let inputs = &mut self.inputs;
-        ScanCounters::keep(self.counted.1, &mut inputs.before, &inputs.bytes);
-        self.arrival = Some(take(inputs));
+        self.arrival = Some(take(&mut self.inputs));
     }
 
     /// Runs the program on the inputs.
@@ -79,6 +77,8 @@ impl Unit {
             return;
         };
         scan_counters.count(*read, &inputs.before, &inputs.bytes);
+        // Kept here and not before the next scan, which begins without the faults of this one.
+        ScanCounters::keep(*read, &mut inputs.before, &inputs.bytes);
         self.is_alive = in_time && !arrival.stale;
         ScanCounters::keep(*written, outputs_before, outputs);
         program.scan(&mut Scan {

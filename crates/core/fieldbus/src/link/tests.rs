@@ -43,6 +43,24 @@ fn a_running_line_becomes_stale_and_running_again_by_age_alone() {
 }
 
 #[test]
+fn a_look_that_another_thread_overtook_changes_nothing() {
+    let status = LinkStatus::new("test", MAX_AGE);
+    status.running(at(0), "the peer is there");
+    status.observe(at(1005), std::iter::once(at(101)));
+    assert_eq!(status.state(), LinkState::Stale);
+    // It read the clock before the other thread did.
+    status.observe(at(1004), std::iter::once(at(100)));
+    assert_eq!(status.state(), LinkState::Stale);
+    status.observe(at(1010), std::iter::once(at(1)));
+    assert_eq!(status.state(), LinkState::Running);
+    // Data arrive between its two looks.
+    let looks = std::cell::Cell::new(0);
+    let ages = std::iter::once_with(|| at([101, 1][looks.replace(1)]));
+    status.observe(at(2000), ages);
+    assert_eq!((status.state(), looks.get()), (LinkState::Running, 1));
+}
+
+#[test]
 fn a_silent_station_among_several_is_told_by_its_name() {
     let names = ["lift", "press", "saw"].map(str::to_owned);
     let status = LinkStatus::of_stations("test", MAX_AGE, names.into());

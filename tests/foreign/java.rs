@@ -15,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use crate::harness::machine::{Machine, SIGNALS};
 use crate::harness::{self, Absent, Test};
+use tickbus_conformance::rig::{PATIENCE, patiently};
 
 pub(crate) const TESTS: &[(&str, Test)] = &[
     ("plc4x_drives_the_modbus_server", plc4x_over_modbus),
@@ -49,9 +50,29 @@ struct Peer {
 }
 
 impl Peer {
-    /// Starts it; the machine ticks until it is ready.
+    /// Starts it; the machine ticks until it is ready. A JVM that missed a time limit of its own library while the machine
+    /// was busy is started a second time.
     #[track_caller]
     fn start(machine: &mut Machine, class: &str, arguments: &[&str]) -> Result<Self, Absent> {
+        for attempt in 1..=2 {
+            let peer = Self::spawn(class, arguments)?;
+            let said = patiently(|| {
+                machine.tick();
+                peer.lines.try_recv().ok()
+            });
+            if let Some(said) = said {
+                assert_eq!(said, "ready", "{class} {arguments:?}");
+                return Ok(peer);
+            }
+            eprintln!("{class} is not ready within {PATIENCE:?}, attempt {attempt}");
+        }
+        panic!(
+            "in vain until the peer is ready\n{}",
+            machine.driver.statistics()
+        );
+    }
+
+    fn spawn(class: &str, arguments: &[&str]) -> Result<Self, Absent> {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/peers/java");
         if !folder.join("java-peers-0.jar").exists() {
             return Err(Absent(
@@ -68,7 +89,6 @@ impl Peer {
             .current_dir(&folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(Stdio::null())
             .spawn()
             .map_err(|why| Absent(format!("there is no java: {why}")))?;
         let stdin = child.stdin.take();
@@ -81,14 +101,11 @@ impl Peer {
                 }
             }
         });
-        let peer = Self {
+        Ok(Self {
             child,
             stdin,
             lines,
-        };
-        let said = machine.until_some("the peer is ready", |_| peer.lines.try_recv().ok());
-        assert_eq!(said, "ready", "{class} {arguments:?}");
-        Ok(peer)
+        })
     }
 
     /// Sends a request, and lets the machine tick until the answer arrives.

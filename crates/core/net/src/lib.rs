@@ -3,8 +3,8 @@
 //! | part | contents |
 //! |---|---|
 //! | [`Address`] | hosts and ports, as a driver.cfg and a command line have them |
-//! | [`connect`], [`reach`], [`Dialler`] | connecting: with a stop, blocking, again and again |
-//! | [`listen`], [`bind`] | listening: with a stop, at once |
+//! | [`connect()`], [`reach`], [`Dialler`] | connecting: with a stop, blocking, again and again |
+//! | [`listen()`], [`bind`] | listening: with a stop, at once |
 //! | [`Acceptor`] | accepting clients in a poll set |
 //! | [`prepare`], [`close_gracefully`], … | what every connection needs from the system |
 //! | [`begins_like_browser`] | distinguishing a web browser from a peer |

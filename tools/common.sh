@@ -138,7 +138,8 @@ maven() {
 }
 
 # Lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus command) and simulator/
-# (the simulator, the control tables, and in peeler/ the driver.cfg of the peeling line). Needs the output of tools/build.
+# (the simulator, the machines with their control tables and demos, and in peeler/ the driver.cfg of the peeling line). Needs
+# the output of tools/build.
 assemble() {
     local folder=$1 release
     release=$(version)
@@ -148,6 +149,6 @@ assemble() {
     # The command is needed for plug-ins in helper processes.
     cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
         "$folder/DeviceDriver/"
-    cp java/simulator/*.table "java/simulator/target/simulator-$release.jar" \
+    cp java/machines/*.table "java/machines/target/tickbus-machines-$release.jar" "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
 }

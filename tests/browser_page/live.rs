@@ -74,7 +74,7 @@ impl Machine {
             .and_then(|()| {
                 fs::write(
                     folder.path().join("rig.svg"),
-                    include_str!("../../java/simulator/rig.svg"),
+                    include_str!("../../java/machines/rig.svg"),
                 )
             })
             .expect("there is room");

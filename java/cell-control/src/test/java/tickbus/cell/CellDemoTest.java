@@ -29,7 +29,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.condition.DisabledOnOs;
 import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
-import tickbus.demo.cell.CellDemo;
+import tickbus.machines.cell.CellDemo;
 
 /** The whole chain: simulator, driver, Modbus, the nets' process. */
 @Tag("native")
@@ -69,7 +69,7 @@ class CellDemoTest {
 
     private List<String> arguments(String nets, String... more) {
         List<String> arguments = new ArrayList<>(List.of("--drivers", folder.resolve("drivers").toString(), "--control",
-            root().resolve("java/simulator/cell.table").toString(), "--report", folder.resolve("demo/report.txt").toString(),
+            root().resolve("java/machines/cell.table").toString(), "--report", folder.resolve("demo/report.txt").toString(),
             "--nets", nets, "--identification", folder.resolve("identification.cfg").toString()));
         arguments.addAll(List.of(more));
         return arguments;

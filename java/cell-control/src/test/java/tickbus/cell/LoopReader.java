@@ -6,8 +6,8 @@ import java.util.Arrays;
 import java.util.List;
 import tickbus.Signal;
 import tickbus.Tickbus;
-import tickbus.demo.cell.CodeCarrier;
-import tickbus.demo.cell.ManufacturingCell;
+import tickbus.machines.cell.CodeCarrier;
+import tickbus.machines.cell.ManufacturingCell;
 
 /**
  * Stands in for the reader between the cell and the nets, in simulation time without a serial port. The nets see an

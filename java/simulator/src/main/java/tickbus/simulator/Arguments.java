@@ -138,7 +138,7 @@ public final class Arguments {
     public <T> T choice(String name, Map<String, T> choices, String otherwise) {
         String value = values.getOrDefault(name, otherwise);
         if (!choices.containsKey(value)) {
-            throw new UsageException(name + " is \"" + value + "\"; it must be one of "
+            throw new UsageException(name + " is \"" + value + "\"; it must be " + (choices.size() == 1 ? "" : "one of ")
                     + String.join(", ", choices.keySet().stream().sorted().toList()));
         }
         return choices.get(value);

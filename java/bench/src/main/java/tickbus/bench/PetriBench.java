@@ -14,11 +14,11 @@ import org.openjdk.jmh.annotations.Setup;
 import org.openjdk.jmh.annotations.State;
 import org.openjdk.jmh.annotations.TearDown;
 import org.openjdk.jmh.annotations.Warmup;
-import tickbus.petri.Coordinator;
-import tickbus.petri.CoordinatorBuilder;
-import tickbus.petri.NetBuilder;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Reachability;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.CoordinatorBuilder;
 
 /** The cost of a firing of a Petri net, and of a marking of its reachability graph. */
 @BenchmarkMode(Mode.AverageTime)

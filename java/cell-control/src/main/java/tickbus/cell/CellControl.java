@@ -11,13 +11,13 @@ import java.util.concurrent.CompletableFuture;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.TimeUnit;
 import tickbus.Tickbus;
-import tickbus.petri.Coordinator;
-import tickbus.petri.FiringLog;
-import tickbus.petri.NetSvg;
-import tickbus.petri.Stop;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.NetController;
+import tickbus.petri.draw.NetSvg;
 import tickbus.petri.page.NetPage;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.FiringLog;
+import tickbus.petri.run.Stop;
 
 /**
  * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}. The arguments are

@@ -2,12 +2,12 @@ package tickbus.cell;
 
 import java.util.Arrays;
 import tickbus.Tickbus;
-import tickbus.petri.Delay;
-import tickbus.petri.NetBuilder;
-import tickbus.petri.PetriNet;
 import tickbus.petri.control.BoundNet;
 import tickbus.petri.control.Composition;
 import tickbus.petri.control.NetController;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
 
 /** The nets of the transport and of the whole cell, and all nets together. */
 final class CellNets {

@@ -1,7 +1,7 @@
 package tickbus.cell;
 
 import tickbus.identification.PalletRecord.Piece;
-import tickbus.petri.Inputs;
+import tickbus.petri.run.Inputs;
 
 /** The products: of each colour, every second cylinder gets a cap. */
 final class Plan {

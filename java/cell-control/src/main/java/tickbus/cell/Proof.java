@@ -1,9 +1,9 @@
 package tickbus.cell;
 
-import tickbus.petri.Marking;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Reachability;
-import tickbus.petri.Verdict;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.analysis.Verdict;
+import tickbus.petri.net.Marking;
+import tickbus.petri.net.PetriNet;
 
 /**
  * Properties of all nets together, whatever the signals do.

@@ -4,10 +4,10 @@ import java.util.Set;
 import tickbus.identification.PalletRecord;
 import tickbus.identification.PalletRecord.Content;
 import tickbus.identification.PalletRecord.Piece;
-import tickbus.petri.Delay;
-import tickbus.petri.NetBuilder;
-import tickbus.petri.PetriNet;
 import tickbus.petri.control.BoundNet;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
 
 /** The nets of stations 1, 3 and 4. Each waits for "working" of the cell's net, works, and is "done". */
 final class StationNets {

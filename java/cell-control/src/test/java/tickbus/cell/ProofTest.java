@@ -4,8 +4,8 @@ import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import org.junit.jupiter.api.Test;
-import tickbus.petri.Reachability;
-import tickbus.petri.Verdict;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.analysis.Verdict;
 import tickbus.petri.control.BoundNet;
 
 /** Analyses the nets: each alone, and all together. */

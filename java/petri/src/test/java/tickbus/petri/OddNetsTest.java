@@ -9,6 +9,24 @@ import java.util.List;
 import java.util.Map;
 import java.util.function.Consumer;
 import org.junit.jupiter.api.Test;
+import tickbus.petri.analysis.Conflicts;
+import tickbus.petri.analysis.Coverability;
+import tickbus.petri.analysis.GaveUpException;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.analysis.Semiflows;
+import tickbus.petri.analysis.Siphons;
+import tickbus.petri.analysis.Verdict;
+import tickbus.petri.draw.Dot;
+import tickbus.petri.draw.NetSvg;
+import tickbus.petri.format.HpsimText;
+import tickbus.petri.format.Hpx;
+import tickbus.petri.format.HpxTest;
+import tickbus.petri.format.Pnml;
+import tickbus.petri.net.NetException;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.Place;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.Draws;
 
 /** Nets that nobody would draw, and broken files. */
 class OddNetsTest {
@@ -103,7 +121,7 @@ class OddNetsTest {
     }
 
     /** Cuts, doubles, swaps and changes pieces of a text. */
-    private static String mutated(SplitMix random, String text) {
+    private static String mutated(Draws random, String text) {
         StringBuilder changed = new StringBuilder(text);
         String[] pieces = {"-", "999999999999", "2147483647", "-2147483648", "\u0000", "<", "&", "\"", "\n", ";", "[", "]", "=", "p0", "t0",
             "<page id=\"x\">", "\uD800", "\uFEFF", "(", ")", "0", "1.5", " ", "//"};
@@ -128,7 +146,7 @@ class OddNetsTest {
 
     @Test
     void aDamagedFileIsReadOrRefusedWithItsName() {
-        SplitMix random = new SplitMix(11);
+        Draws random = new Draws(11);
         String pnml = Pnml.write(Samples.everything());
         for (int i = 0; i < 500; i++) {
             refusedOnlyAsANet(mutated(random, pnml), text -> Pnml.parse("f", text));

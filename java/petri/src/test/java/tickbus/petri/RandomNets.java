@@ -1,21 +1,25 @@
 package tickbus.petri;
 
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Draws;
+
 /** Seeded nets for tests against an oracle. */
-final class RandomNets {
+public final class RandomNets {
     private RandomNets() {
     }
 
     /** A net with arcs of all kinds and some capacities; often unbounded. */
-    static PetriNet any(SplitMix random, int places, int transitions) {
+    public static PetriNet any(Draws random, int places, int transitions) {
         return net(random, places, transitions, true);
     }
 
     /** A net with input and output arcs only. */
-    static PetriNet plain(SplitMix random, int places, int transitions) {
+    public static PetriNet plain(Draws random, int places, int transitions) {
         return net(random, places, transitions, false);
     }
 
-    private static PetriNet net(SplitMix random, int places, int transitions, boolean special) {
+    private static PetriNet net(Draws random, int places, int transitions, boolean special) {
         NetBuilder builder = PetriNet.named("random");
         for (int p = 0; p < places; p++) {
             builder.place("p" + p, random.below(3));

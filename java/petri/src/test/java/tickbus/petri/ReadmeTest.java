@@ -12,6 +12,9 @@ import java.util.ArrayList;
 import java.util.List;
 import java.util.Optional;
 import org.junit.jupiter.api.Test;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Coordinator;
 
 /** The example of docs/petri.md, which must be there word for word. */
 class ReadmeTest {

@@ -1,9 +1,14 @@
 package tickbus.petri;
 
+import tickbus.petri.format.HpsimText;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
+
 /** Nets that several tests use. */
-final class Samples {
+public final class Samples {
     /** The export that the paper on the cell prints, with its wrapped comment and its missing parenthesis. */
-    static final String PAPER = """
+    public static final String PAPER = """
         // Transition Name Vector:
         (T0 ;T1 ;T2 ;T3 ;)
         // Position Name Vector:
@@ -36,12 +41,12 @@ final class Samples {
     private Samples() {
     }
 
-    static PetriNet paper() {
+    public static PetriNet paper() {
         return HpsimText.parse("paper.txt", PAPER, java.util.Map.of()).net();
     }
 
     /** A producer and a consumer about a buffer of three, with arcs of all kinds. */
-    static PetriNet everything() {
+    public static PetriNet everything() {
         return PetriNet.named("every kind")
             .place("ready", 1).place("made").delay(5_000L).place("buffer").capacity(3).place("idle", 2).place("stop & <go>")
             .transition("make").input("ready").output("made").inhibitor("stop & <go>", 1).delay(Delay.fixed(1_000_000))
@@ -52,7 +57,7 @@ final class Samples {
     }
 
     /** Dining philosophers who take both forks at once. */
-    static PetriNet philosophers(int count) {
+    public static PetriNet philosophers(int count) {
         NetBuilder builder = PetriNet.named("philosophers");
         for (int i = 0; i < count; i++) {
             builder.place("fork" + i, 1).place("thinks" + i, 1).place("eats" + i);
@@ -61,6 +66,18 @@ final class Samples {
             String other = "fork" + (i + 1) % count;
             builder.transition("start" + i).input("fork" + i, other, "thinks" + i).output("eats" + i);
             builder.transition("end" + i).input("eats" + i).output("fork" + i, other, "thinks" + i);
+        }
+        return builder.build();
+    }
+
+    /** One token in a ring of places. */
+    public static PetriNet ring(int size) {
+        NetBuilder builder = PetriNet.named("ring");
+        for (int i = 0; i < size; i++) {
+            builder.place("p" + i, i == 0 ? 1 : 0);
+        }
+        for (int i = 0; i < size; i++) {
+            builder.transition("t" + i).input("p" + i).output("p" + (i + 1) % size);
         }
         return builder.build();
     }

@@ -13,8 +13,8 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
-import tickbus.simulator.DeviceDriverFolder;
 import tickbus.machines.demo.DriverFolder;
+import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.TimeSource;
 

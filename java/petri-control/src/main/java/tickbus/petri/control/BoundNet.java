@@ -6,10 +6,10 @@ import java.util.LinkedHashSet;
 import java.util.List;
 import java.util.Map;
 import java.util.Set;
-import tickbus.petri.Action;
-import tickbus.petri.Condition;
-import tickbus.petri.FiringListener;
-import tickbus.petri.PetriNet;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Action;
+import tickbus.petri.run.Condition;
+import tickbus.petri.run.FiringListener;
 
 /**
  * A net, and the signals that its transitions wait for and its places set.

@@ -3,11 +3,11 @@ package tickbus.petri.control;
 import java.util.HashSet;
 import java.util.List;
 import java.util.Set;
-import tickbus.petri.Arc;
-import tickbus.petri.NetBuilder;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Place;
-import tickbus.petri.Transition;
+import tickbus.petri.net.Arc;
+import tickbus.petri.net.NetBuilder;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.Place;
+import tickbus.petri.net.Transition;
 
 /**
  * Makes one net of several, for analysis: nodes are named {@code net.node}, and each {@link BoundNet#marked} and {@link

@@ -3,10 +3,10 @@ package tickbus.petri.control;
 import java.util.List;
 import java.util.Map;
 import java.util.function.Function;
-import tickbus.petri.Condition;
-import tickbus.petri.Conjunction;
-import tickbus.petri.Coordinator;
-import tickbus.petri.Inputs;
+import tickbus.petri.run.Condition;
+import tickbus.petri.run.Conjunction;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.Inputs;
 
 /** The terms of one transition's condition, with their indices looked up; all must hold. */
 final class Conditions implements Conjunction {

@@ -15,13 +15,13 @@ import java.util.function.BooleanSupplier;
 import tickbus.Signal;
 import tickbus.Status;
 import tickbus.Tickbus;
-import tickbus.petri.Action;
-import tickbus.petri.Coordinator;
-import tickbus.petri.CoordinatorBuilder;
-import tickbus.petri.Marking;
-import tickbus.petri.MarkingFile;
-import tickbus.petri.NetWatch;
-import tickbus.petri.Stop;
+import tickbus.petri.format.MarkingFile;
+import tickbus.petri.net.Marking;
+import tickbus.petri.run.Action;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.CoordinatorBuilder;
+import tickbus.petri.run.NetWatch;
+import tickbus.petri.run.Stop;
 
 /**
  * Runs nets as the PLC of a driver: reads {@code %I}, fires, writes {@code %Q}, over any bus that has the role {@code
@@ -172,7 +172,7 @@ public final class NetController {
      *
      * @return this
      * @throws IOException if the file cannot be read
-     * @throws tickbus.petri.NetException if it is not of these nets
+     * @throws tickbus.petri.net.NetException if it is not of these nets
      */
     public NetController resume(Path from) throws IOException {
         List<Marking> markings = MarkingFile.read(from, Arrays.stream(order).map(Coordinator::net).toList());

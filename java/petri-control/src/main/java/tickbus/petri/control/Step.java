@@ -1,6 +1,6 @@
 package tickbus.petri.control;
 
-import tickbus.petri.Action;
+import tickbus.petri.run.Action;
 
 /**
  * One action, as written by the user.

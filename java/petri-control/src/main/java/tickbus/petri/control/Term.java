@@ -1,8 +1,8 @@
 package tickbus.petri.control;
 
 import java.math.BigDecimal;
-import tickbus.petri.Condition;
-import tickbus.petri.Conjunction;
+import tickbus.petri.run.Condition;
+import tickbus.petri.run.Conjunction;
 
 /**
  * One part of a condition, as written by the user.

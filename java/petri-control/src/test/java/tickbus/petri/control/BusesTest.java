@@ -7,7 +7,7 @@ import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
-import tickbus.petri.PetriNet;
+import tickbus.petri.net.PetriNet;
 
 /** One net over each bus that has the role controller and whose other end tickbus also has. */
 @Tag("native")

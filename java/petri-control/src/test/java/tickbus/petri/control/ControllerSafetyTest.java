@@ -17,9 +17,9 @@ import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
-import tickbus.petri.NetException;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Stop;
+import tickbus.petri.net.NetException;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Stop;
 
 /** How a controller stops, holds, ends and resumes. */
 @Tag("native")

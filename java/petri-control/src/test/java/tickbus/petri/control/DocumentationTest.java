@@ -12,7 +12,7 @@ import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
-import tickbus.petri.PetriNet;
+import tickbus.petri.net.PetriNet;
 
 /** The example of docs/petri.md, which must be there word for word. */
 @Tag("native")

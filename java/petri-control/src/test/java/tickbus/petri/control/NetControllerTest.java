@@ -17,14 +17,14 @@ import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
-import tickbus.petri.Conjunction;
-import tickbus.petri.Delay;
-import tickbus.petri.NetState;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Reachability;
-import tickbus.petri.RunningNet;
-import tickbus.petri.Stop;
-import tickbus.petri.Verdict;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.analysis.Verdict;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Conjunction;
+import tickbus.petri.run.NetState;
+import tickbus.petri.run.RunningNet;
+import tickbus.petri.run.Stop;
 
 /** Nets on a link in simulation time, so that the order of the machine's ticks and the scans is fixed. */
 @Tag("native")

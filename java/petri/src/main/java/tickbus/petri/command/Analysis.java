@@ -11,15 +11,15 @@ import java.util.function.IntFunction;
 import java.util.function.Supplier;
 import java.util.stream.Collectors;
 import java.util.stream.IntStream;
-import tickbus.petri.Conflicts;
-import tickbus.petri.Coverability;
-import tickbus.petri.GaveUpException;
-import tickbus.petri.Marking;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Reachability;
-import tickbus.petri.Semiflows;
-import tickbus.petri.Siphons;
-import tickbus.petri.Verdict;
+import tickbus.petri.analysis.Conflicts;
+import tickbus.petri.analysis.Coverability;
+import tickbus.petri.analysis.GaveUpException;
+import tickbus.petri.analysis.Reachability;
+import tickbus.petri.analysis.Semiflows;
+import tickbus.petri.analysis.Siphons;
+import tickbus.petri.analysis.Verdict;
+import tickbus.petri.net.Marking;
+import tickbus.petri.net.PetriNet;
 
 /** The provable properties of a net, as text. */
 final class Analysis {

@@ -10,11 +10,11 @@ import java.nio.file.NoSuchFileException;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
-import tickbus.petri.Dot;
-import tickbus.petri.NetException;
-import tickbus.petri.NetSvg;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Pnml;
+import tickbus.petri.draw.Dot;
+import tickbus.petri.draw.NetSvg;
+import tickbus.petri.format.Pnml;
+import tickbus.petri.net.NetException;
+import tickbus.petri.net.PetriNet;
 
 /** The command of this jar; see {@code --help}. Exit codes: 0 done, 1 the input was wrong, 2 the command line was wrong. */
 public final class Main {

@@ -11,13 +11,13 @@ import java.util.HashMap;
 import java.util.List;
 import java.util.Locale;
 import java.util.Map;
-import tickbus.petri.Delay;
-import tickbus.petri.Dialect;
-import tickbus.petri.Hpx;
-import tickbus.petri.HpsimText;
-import tickbus.petri.Imported;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Pnml;
+import tickbus.petri.format.Dialect;
+import tickbus.petri.format.HpsimText;
+import tickbus.petri.format.Hpx;
+import tickbus.petri.format.Imported;
+import tickbus.petri.format.Pnml;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.PetriNet;
 
 /** Reads a net from a file of any supported format. */
 final class NetFile {

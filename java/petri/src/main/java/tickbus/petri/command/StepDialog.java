@@ -11,14 +11,15 @@ import java.util.List;
 import java.util.concurrent.locks.LockSupport;
 import java.util.stream.Collectors;
 import java.util.stream.Stream;
-import tickbus.petri.Arc;
-import tickbus.petri.ArcKind;
-import tickbus.petri.NetSvg;
-import tickbus.petri.NetWatch;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Stepper;
-import tickbus.petri.Transition;
+import tickbus.petri.draw.NetSvg;
+import tickbus.petri.net.Arc;
+import tickbus.petri.net.ArcKind;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.Transition;
 import tickbus.petri.page.NetPage;
+import tickbus.petri.run.NetWatch;
+import tickbus.petri.run.Stepper;
 
 /** Steps through a net by the user's commands, line by line. */
 final class StepDialog {
@@ -276,7 +277,7 @@ final class StepDialog {
     }
 
     private void situation() {
-        out.println("time " + Times.text(stepper.time()) + ", " + stepper.marking());
+        out.println("time " + Delay.seconds(stepper.time()) + ", " + stepper.marking());
         list(MOST_LISTED);
     }
 
@@ -289,14 +290,14 @@ final class StepDialog {
         }
         List<Transition> waiting = net.transitions().stream().filter(one -> stepper.due(one.index()) != Long.MAX_VALUE).toList();
         waiting.stream().limit(most).forEach(one -> out.println("     " + one.name() + " in "
-            + Times.text(stepper.due(one.index()) - stepper.time())));
+            + Delay.seconds(stepper.due(one.index()) - stepper.time())));
         int more = Math.max(0, ready.size() - most) + Math.max(0, waiting.size() - most);
         if (more > 0) {
             out.println("     … and " + more + " more, see 'list'");
         }
         if (ready.isEmpty() && waiting.isEmpty()) {
             out.println(stepper.nextDue() == Long.MAX_VALUE ? "     nothing can fire: this is a deadlock"
-                : "     nothing can fire before tokens are available in " + Times.text(stepper.nextDue() - stepper.time()));
+                : "     nothing can fire before tokens are available in " + Delay.seconds(stepper.nextDue() - stepper.time()));
         }
     }
 

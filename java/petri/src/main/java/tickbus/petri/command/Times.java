@@ -4,7 +4,7 @@ import java.math.BigDecimal;
 import java.util.Map;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
-import tickbus.petri.Delay;
+import tickbus.petri.net.Delay;
 
 /** Times as people write them: a number with a unit. */
 final class Times {
@@ -37,10 +37,5 @@ final class Times {
         }
         int dots = bare.indexOf("..");
         return dots < 0 ? Delay.fixed(nanos(bare)) : Delay.uniform(nanos(bare.substring(0, dots)), nanos(bare.substring(dots + 2)));
-    }
-
-    /** In seconds, with the unit. */
-    static String text(long nanos) {
-        return new BigDecimal(nanos).movePointLeft(9).stripTrailingZeros().toPlainString() + " s";
     }
 }

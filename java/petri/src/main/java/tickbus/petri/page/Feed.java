@@ -4,8 +4,8 @@ import java.nio.charset.StandardCharsets;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
-import tickbus.petri.NetWatch;
-import tickbus.petri.RunningNet;
+import tickbus.petri.run.NetWatch;
+import tickbus.petri.run.RunningNet;
 
 /** The newest state, updated while somebody watches. Slow viewers miss intermediate states, and make nobody wait. */
 final class Feed implements Runnable {

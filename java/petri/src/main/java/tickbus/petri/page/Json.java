@@ -1,12 +1,12 @@
 package tickbus.petri.page;
 
 import java.util.List;
-import tickbus.petri.Conjunction;
-import tickbus.petri.NetState;
-import tickbus.petri.NetSvg;
-import tickbus.petri.PetriNet;
-import tickbus.petri.RunningNet;
-import tickbus.petri.Transition;
+import tickbus.petri.draw.NetSvg;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.Transition;
+import tickbus.petri.run.Conjunction;
+import tickbus.petri.run.NetState;
+import tickbus.petri.run.RunningNet;
 
 /** The messages to the page. */
 final class Json {

@@ -14,9 +14,9 @@ import java.nio.charset.StandardCharsets;
 import java.util.List;
 import java.util.Map;
 import java.util.UUID;
-import tickbus.petri.NetSvg;
-import tickbus.petri.NetWatch;
-import tickbus.petri.RunningNet;
+import tickbus.petri.draw.NetSvg;
+import tickbus.petri.run.NetWatch;
+import tickbus.petri.run.RunningNet;
 
 /**
  * A page that shows running nets live: markings, enabled transitions, the conditions that hold one back, and recent firings.

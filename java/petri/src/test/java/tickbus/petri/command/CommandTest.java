@@ -14,9 +14,9 @@ import java.util.List;
 import org.junit.jupiter.api.BeforeEach;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
-import tickbus.petri.Delay;
-import tickbus.petri.PetriNet;
-import tickbus.petri.Pnml;
+import tickbus.petri.format.Pnml;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.PetriNet;
 
 class CommandTest {
     @TempDir

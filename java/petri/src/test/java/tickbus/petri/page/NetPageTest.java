@@ -16,12 +16,12 @@ import java.util.List;
 import java.util.concurrent.atomic.AtomicInteger;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
-import tickbus.petri.Condition;
-import tickbus.petri.NetState;
-import tickbus.petri.NetWatch;
-import tickbus.petri.PetriNet;
-import tickbus.petri.RunningNet;
-import tickbus.petri.Stepper;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Condition;
+import tickbus.petri.run.NetState;
+import tickbus.petri.run.NetWatch;
+import tickbus.petri.run.RunningNet;
+import tickbus.petri.run.Stepper;
 
 @Timeout(120)
 class NetPageTest {

@@ -3,12 +3,12 @@ package tickbus.petri.page;
 import java.util.List;
 import java.util.concurrent.locks.LockSupport;
 import java.util.concurrent.locks.ReentrantLock;
-import tickbus.petri.Conjunction;
-import tickbus.petri.Coordinator;
-import tickbus.petri.Delay;
-import tickbus.petri.Inputs;
-import tickbus.petri.NetWatch;
-import tickbus.petri.PetriNet;
+import tickbus.petri.net.Delay;
+import tickbus.petri.net.PetriNet;
+import tickbus.petri.run.Conjunction;
+import tickbus.petri.run.Coordinator;
+import tickbus.petri.run.Inputs;
+import tickbus.petri.run.NetWatch;
 
 /** A small press that a separate thread scans every 2 ms, and whose inputs a test sets. */
 final class Scanning implements AutoCloseable {

@@ -14,9 +14,9 @@ import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
 import org.junit.jupiter.params.provider.ValueSource;
 import tickbus.InjectedFault;
-import tickbus.machines.rig.Lift;
 import tickbus.junit.Plc;
 import tickbus.junit.PlcTest;
+import tickbus.machines.rig.Lift;
 
 /** How the rig's PLC program reacts to faults, and how an operator restarts it. */
 @RigTest

@@ -1,8 +1,0 @@
-package tickbus.petri;
-
-/** Permits an enabled transition to fire. Tested at most once in a scan, so it must depend on the inputs alone. */
-@FunctionalInterface
-public interface Condition {
-    /** True if the condition holds for these inputs. */
-    boolean test(Inputs inputs);
-}

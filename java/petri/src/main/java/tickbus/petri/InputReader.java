@@ -1,8 +1,0 @@
-package tickbus.petri;
-
-/** Reads all inputs at the start of a scan. */
-@FunctionalInterface
-public interface InputReader {
-    /** Fills in the values, in the order in which the inputs were named. */
-    void read(double[] values);
-}

@@ -1,0 +1,2 @@
+/** Drawings of nets: {@link tickbus.petri.draw.NetSvg} for browsers, {@link tickbus.petri.draw.Dot} for Graphviz. */
+package tickbus.petri.draw;

@@ -1,0 +1,110 @@
+package tickbus.petri.net;
+
+import static org.junit.jupiter.api.Assertions.assertArrayEquals;
+import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertThrows;
+import static org.junit.jupiter.api.Assertions.assertTrue;
+
+import org.junit.jupiter.api.Test;
+import tickbus.petri.Samples;
+
+class PetriNetTest {
+    @Test
+    void everyKindOfArcEnablesAsItShould() {
+        PetriNet net = PetriNet.named("arcs").place("a", 2).place("b", 1).place("c").capacity(2)
+            .transition("t").input("a", 2).test("b", 1).inhibitor("c", 2).output("c").build();
+        Marking marking = net.initialMarking();
+        assertTrue(net.isEnabled(marking, 0));
+        marking.set(0, 1);
+        assertFalse(net.isEnabled(marking, 0), "an input arc of weight 2 finds one token");
+        marking.set(0, 2);
+        marking.set(1, 0);
+        assertFalse(net.isEnabled(marking, 0), "a test arc finds no token");
+        marking.set(1, 1);
+        marking.set(2, 2);
+        assertFalse(net.isEnabled(marking, 0), "an inhibitor arc of weight 2 finds two tokens");
+        marking.set(2, 1);
+        net.fire(marking, 0);
+        assertArrayEquals(new int[] {0, 1, 2}, marking.toArray());
+        assertEquals("{b, c: 2}", marking.toString());
+        assertThrows(IllegalStateException.class, () -> net.fire(marking, 0));
+    }
+
+    @Test
+    void aFullPlaceStopsATransitionUnlessItTakesAsManyAsItPuts() {
+        PetriNet net = PetriNet.named("full").place("a", 1).capacity(1)
+            .transition("more").output("a").transition("same").input("a").output("a").build();
+        assertFalse(net.isEnabled(net.initialMarking(), 0));
+        assertTrue(net.isEnabled(net.initialMarking(), 1));
+    }
+
+    @Test
+    void tooManyTokensForAnIntAreRefusedAndChangeNothing() {
+        PetriNet net = PetriNet.named("many").place("a", Integer.MAX_VALUE).place("b")
+            .transition("t").output("b").output("a").build();
+        Marking marking = net.initialMarking();
+        assertThrows(IllegalStateException.class, () -> net.fire(marking, 0));
+        assertEquals(net.initialMarking(), marking);
+    }
+
+    @Test
+    void matricesGiveTheSameNetAsTheBuilder() {
+        PetriNet built = PetriNet.named("m").place("P0", 1).place("P1")
+            .transition("T0").input("P0").output("P1", 2).transition("T1").input("P1").output("P1").build();
+        int[][] pre = {{1, 0}, {0, 1}};
+        int[][] post = {{0, 0}, {2, 1}};
+        assertTrue(built.isSameAs(PetriNet.fromMatrices("m", pre, post, new int[] {1, 0})));
+        assertArrayEquals(pre, built.pre());
+        assertArrayEquals(post, built.post());
+        assertArrayEquals(new int[][] {{-1, 0}, {2, 0}}, built.incidence());
+        assertFalse(built.isSameAs(PetriNet.fromIncidence("m", built.incidence(), new int[] {1, 0})),
+            "an incidence matrix has no place that is input and output of one transition");
+    }
+
+    @Test
+    void matricesOfTheWrongShapeAreRefused() {
+        NetException rows = assertThrows(NetException.class,
+            () -> PetriNet.fromMatrices("m", new int[][] {{1}}, new int[][] {{1}}, new int[] {1, 0}));
+        assertTrue(rows.getMessage().contains("1 rows; expected 2"), rows.getMessage());
+        NetException columns = assertThrows(NetException.class,
+            () -> PetriNet.fromMatrices("m", new int[][] {{1, 0}, {1}}, new int[][] {{1, 0}, {1, 0}}, new int[] {1, 0}));
+        assertTrue(columns.getMessage().contains("row 1 has 1 columns; expected 2"), columns.getMessage());
+        assertThrows(NetException.class,
+            () -> PetriNet.fromMatrices("m", new int[][] {{-1}}, new int[][] {{1}}, new int[] {1}));
+    }
+
+    @Test
+    void allMistakesOfABuilderAreReportedAtOnce() {
+        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("w").capacity(3).place("a", -1).place("a")
+            .place("b", 5).capacity(2).input("a").transition("t").input("nowhere").input("a", 0).output("b").output("b")
+            .transition(" ").place("a\u0007").place("\u202egnp.exe").build());
+        for (String one : new String[] {"call place(...) before capacity", "place a: -1 tokens", "place a: given twice",
+            "place b: 5 tokens; expected at most its capacity of 2", "there is no transition yet",
+            "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name", "a control character",
+            "place number 4: its name turns the direction of the text"}) {
+            assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
+        }
+    }
+
+    @Test
+    void aDelayBelongsToWhatWasNamedLast() {
+        PetriNet net = PetriNet.named("x").place("p", 1).delay(5).place("q").delay(Delay.fixed(6))
+            .transition("t").delay(500_000_000L).input("p").output("q").build();
+        assertEquals(5, net.place("p").delay());
+        assertEquals(6, net.place("q").delay());
+        assertEquals(Delay.fixed(500_000_000L), net.transition("t").delay());
+        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("x").delay(1).place("p").delay(Delay.exponential(5))
+            .transition("t").delay(-1).capacity(1).build());
+        for (String one : new String[] {"delay 1: there is no place or transition yet", "place p: a delay of kind EXPONENTIAL; expected a fixed one",
+            "transition t: delay -1 ns; expected 0 or more", "capacity 1 of transition t; call place(...) before capacity(...)"}) {
+            assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
+        }
+    }
+
+    @Test
+    void anUnknownNameSaysWhichThereAre() {
+        String text = assertThrows(IllegalArgumentException.class, () -> Samples.paper().place("P9")).getMessage();
+        assertTrue(text.contains("there is no place 'P9'; there are [P0, P1"), text);
+    }
+}

@@ -23,6 +23,8 @@ struct Case {
     signals: fn() -> String,
     each_way: usize,
     mode: &'static str,
+    /// Receives and sends in two calls, in place of one exchange.
+    is_halved: bool,
     /// Sets the values; they are got after the exchange then.
     set: Option<fn(&mut Copies, &mut [Slot])>,
 }
@@ -33,6 +35,15 @@ const CASES: &[Case] = &[
         signals: || bits(16, 8, ""),
         each_way: 16,
         mode: "free",
+        is_halved: false,
+        set: None,
+    },
+    Case {
+        name: "receive-send.free.16",
+        signals: || bits(16, 8, ""),
+        each_way: 16,
+        mode: "free",
+        is_halved: true,
         set: None,
     },
     Case {
@@ -40,6 +51,7 @@ const CASES: &[Case] = &[
         signals: || bits(16, 8, ""),
         each_way: 16,
         mode: "free",
+        is_halved: false,
         set: Some(Copies::set_two),
     },
     Case {
@@ -47,6 +59,7 @@ const CASES: &[Case] = &[
         signals: || bits(16, 8, ""),
         each_way: 16,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_two),
     },
     Case {
@@ -54,6 +67,7 @@ const CASES: &[Case] = &[
         signals: || bits(16, 8, "latch = \"rising\""),
         each_way: 16,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_two),
     },
     Case {
@@ -61,6 +75,7 @@ const CASES: &[Case] = &[
         signals: || reals(1_000),
         each_way: 1_000,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_two),
     },
     Case {
@@ -68,6 +83,7 @@ const CASES: &[Case] = &[
         signals: || reals(10_000),
         each_way: 10_000,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_two),
     },
     Case {
@@ -75,6 +91,7 @@ const CASES: &[Case] = &[
         signals: || bits(2_000, 1, ""),
         each_way: 2_000,
         mode: "free",
+        is_halved: false,
         set: Some(Copies::set_all),
     },
     Case {
@@ -82,6 +99,7 @@ const CASES: &[Case] = &[
         signals: || bits(2_000, 1, "latch = \"rising\""),
         each_way: 2_000,
         mode: "free",
+        is_halved: false,
         set: Some(Copies::set_all),
     },
     Case {
@@ -89,6 +107,7 @@ const CASES: &[Case] = &[
         signals: || bits(2_000, 1, ""),
         each_way: 2_000,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_all),
     },
     Case {
@@ -96,6 +115,7 @@ const CASES: &[Case] = &[
         signals: || bits(2_000, 1, "latch = \"rising\""),
         each_way: 2_000,
         mode: "stepped",
+        is_halved: false,
         set: Some(Copies::set_all),
     },
 ];
@@ -163,7 +183,12 @@ fn ticks(case: &Case, count: u64, driver: &mut Driver, slots: &mut [Slot], begin
         if let Some(set) = case.set {
             set(&mut copies, slots);
         }
-        black_box(driver.exchange(time, slots));
+        if case.is_halved {
+            black_box(driver.receive(time, slots));
+            black_box(driver.send(slots));
+        } else {
+            black_box(driver.exchange(time, slots));
+        }
         if case.set.is_some() {
             copies.get(slots);
         }

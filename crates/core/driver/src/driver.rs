@@ -13,6 +13,7 @@ use tickbus_record::Recorder;
 use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::host::OtherEnd;
+use super::shape::Shape;
 use super::station::Station;
 use super::statistics::{Figures, TickFigures};
 use super::tap::Tap;
@@ -47,8 +48,8 @@ pub struct Driver {
     pub(super) last: Exchange,
     /// The extra work around every exchange; most drivers have none.
     pub(super) extras: Extras,
-    /// True for a free bus with one station, no extra work and no recorder.
-    pub(super) is_simple: bool,
+    /// What the next tick does besides carrying values.
+    pub(super) shape: Shape,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<OtherEnd>,
     pub(super) recorder: Option<Recorder>,

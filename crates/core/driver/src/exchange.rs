@@ -18,6 +18,7 @@ use tickbus_image::TickEnd;
 use tickbus_image::signal::{Conversions, Slot};
 
 use super::bus_handle::{BusHandle, SteppedBus};
+use super::shape::{Extended, InStep, Plain, Shape, Work};
 use super::station::Station;
 use super::tap::Tap;
 use super::tick::Tick;
@@ -38,101 +39,40 @@ impl Driver {
     #[inline]
     pub fn exchange(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
         let time = time.into();
-        match self.exchange_simply(time, slots) {
-            Some(found) => found,
-            None => self.exchange_at(time, slots),
+        self.prepare(slots);
+        match self.shape {
+            Shape::Plain => self.exchange_as::<Plain>(time, slots),
+            Shape::Extended => self.exchange_extended(time, slots),
+            Shape::InStep => self.exchange_in_step(time, slots),
         }
     }
 
-    /// Exchanges for a driver that has nothing else to do, which is the case for most drivers in most ticks. The result
-    /// is that of [`exchange_at`](Self::exchange_at), in half as many instructions. Returns `None` if there is more to
-    /// do: in a first tick, or when an earlier tick must be ended first.
-    #[inline(always)]
-    fn exchange_simply(&mut self, asked: Option<Nanos>, slots: &mut [Slot]) -> Option<Exchange> {
-        let tick = self.counters.ticks + 1;
-        let is_watched = self.tap.as_ref().is_some_and(Tap::is_wanted);
-        if !self.is_simple || self.tick.is_some() || is_watched || tick == 1 {
-            return None;
-        }
-        self.check(slots);
-        let now = self.quick.now();
-        let [station] = &mut self.stations[..] else {
-            return None;
-        };
-        self.given = asked.or(self.given);
-        self.counters.ticks = tick;
-        let image = &mut self.image;
-        match station.encode.word(slots) {
-            Some(word) => image.write_word(now, word),
-            None => write(
-                image,
-                std::slice::from_ref(station),
-                now,
-                slots,
-                &mut self.counters,
-            ),
-        }
-        image.update();
-        let age = station.receive(image, (now, self.max_age), slots, &self.slots);
-        let found = Exchange {
-            code: station.status,
-            sequence: image.cycles(),
-            age,
-            granted: self.given.unwrap_or_else(|| now - self.first_now),
-        };
-        self.last = found;
-        self.counters.count(found.code);
-        if TickTimes::takes(tick) {
-            self.sample(now, found.age);
-        }
-        Some(found)
-    }
-
-    /// Adds a tick to the sample; the tick began at `begun` and delivered data of this age.
     #[inline(never)]
-    fn sample(&mut self, begun: Nanos, age: Nanos) {
-        self.samples.add(self.quick.now() - begun, age);
+    fn exchange_extended(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        self.exchange_as::<Extended>(time, slots)
     }
 
-    /// Decides whether [`exchange_simply`](Self::exchange_simply) is enough.
-    pub(super) fn simplify(&mut self) {
-        self.is_simple = matches!(self.line, BusHandle::Free(_))
-            && self.stations.len() == 1
-            && !self.extras.is_busy()
-            && self.recorder.is_none();
+    #[inline(never)]
+    fn exchange_in_step(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        self.exchange_as::<InStep>(time, slots)
     }
 
-    fn exchange_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
-        let (found, done) = match self.begin(time, slots) {
-            Ok(now) => {
-                if self.extras.is_busy() {
-                    self.extras.handed_over(slots);
-                }
-                self.begin_extras(slots);
-                let sent = self.put(now, slots);
-                let (found, done) = self.take(now, slots);
-                self.lap(now);
+    #[inline(always)]
+    fn exchange_as<W: Work>(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        let (mut tick, begun) = self.begin::<W>(time);
+        let (found, done) = match begun {
+            Ok(()) => {
+                self.handed_over::<W>(slots);
+                self.begin_extras::<W>(&tick, slots);
+                let sent = self.put::<W>(tick.now, slots);
+                let (found, done) = self.take::<W>(&tick, slots);
+                tick.taken = self.lap::<W>(tick.now);
                 (found, sent.and(done))
             }
             Err(error) => (self.last, Err(error)),
         };
-        if let Err(error) = done {
-            self.last = self.failed(found, &error);
-            self.end(self.last, slots);
-            return self.last;
-        }
-        // Field by field: loading the whole struct right after partial stores would stall.
-        let Exchange {
-            code,
-            sequence,
-            age,
-            granted,
-        } = found;
-        self.last.code = code;
-        self.last.sequence = sequence;
-        self.last.age = age;
-        self.last.granted = granted;
-        self.end(found, slots);
+        let found = self.result(found, done);
+        self.end::<W>(tick, found, slots);
         found
     }
 
@@ -147,25 +87,39 @@ impl Driver {
     /// As [`exchange`](Self::exchange).
     #[inline]
     pub fn receive(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
-        self.receive_at(time.into(), slots)
+        let time = time.into();
+        self.prepare(slots);
+        match self.shape {
+            Shape::Plain => self.receive_as::<Plain>(time, slots),
+            Shape::Extended => self.receive_extended(time, slots),
+            Shape::InStep => self.receive_in_step(time, slots),
+        }
     }
 
-    fn receive_at(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
-        let (found, done) = match self.begin(time, slots) {
-            Ok(now) => {
-                self.begin_extras(slots);
-                let (found, done) = self.take(now, slots);
-                self.lap(now);
-                (found, done)
+    #[inline(never)]
+    fn receive_extended(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        self.receive_as::<Extended>(time, slots)
+    }
+
+    #[inline(never)]
+    fn receive_in_step(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        self.receive_as::<InStep>(time, slots)
+    }
+
+    #[inline(always)]
+    fn receive_as<W: Work>(&mut self, time: Option<Nanos>, slots: &mut [Slot]) -> Exchange {
+        let (mut tick, begun) = self.begin::<W>(time);
+        let (found, done) = match begun {
+            Ok(()) => {
+                self.begin_extras::<W>(&tick, slots);
+                let taken = self.take::<W>(&tick, slots);
+                tick.taken = self.lap::<W>(tick.now);
+                taken
             }
             Err(error) => (self.last, Err(error)),
         };
-        if let Err(error) = done {
-            self.last = self.failed(found, &error);
-            return self.last;
-        }
-        self.last = found;
-        found
+        self.tick = Some(tick);
+        self.result(found, done)
     }
 
     /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns the result of
@@ -177,24 +131,43 @@ impl Driver {
     /// # Panics
     ///
     /// As [`exchange`](Self::exchange).
+    #[inline]
     pub fn send(&mut self, slots: &mut [Slot]) -> Exchange {
         self.check(slots);
-        if self.last.code == Code::BusFailed {
-            self.end(self.last, slots);
-            return self.last;
+        match self.shape {
+            Shape::Plain => self.send_as::<Plain>(slots),
+            Shape::Extended => self.send_extended(slots),
+            Shape::InStep => self.send_in_step(slots),
         }
-        let now = self.now();
-        if self.extras.is_busy() {
-            self.extras.handed_over(slots);
+    }
+
+    #[inline(never)]
+    fn send_extended(&mut self, slots: &mut [Slot]) -> Exchange {
+        self.send_as::<Extended>(slots)
+    }
+
+    #[inline(never)]
+    fn send_in_step(&mut self, slots: &mut [Slot]) -> Exchange {
+        self.send_as::<InStep>(slots)
+    }
+
+    #[inline(always)]
+    fn send_as<W: Work>(&mut self, slots: &mut [Slot]) -> Exchange {
+        let mut found = self.last;
+        if !W::IS_STEPPED || found.code != Code::BusFailed {
+            let now = self.now::<W>();
+            self.handed_over::<W>(slots);
+            let sent = self.put::<W>(now, slots);
+            let taken = self.lap::<W>(now);
+            if let Some(tick) = &mut self.tick {
+                tick.taken += taken;
+            }
+            found = self.result(found, sent);
         }
-        let sent = self.put(now, slots);
-        self.lap(now);
-        let done = match sent {
-            Ok(()) => self.last,
-            Err(error) => self.failed(self.last, &error),
-        };
-        self.end(done, slots);
-        done
+        if let Some(tick) = self.tick.take() {
+            self.end::<W>(tick, found, slots);
+        }
+        found
     }
 
     /// Ends a tick that [`receive`](Self::receive) began and [`send`](Self::send) did not end, with the values in
@@ -206,7 +179,28 @@ impl Driver {
     /// As [`exchange`](Self::exchange).
     pub fn end_tick(&mut self, slots: &[Slot]) {
         self.check(slots);
-        self.end(self.last, slots);
+        self.end_open_tick(slots);
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn end_open_tick(&mut self, slots: &[Slot]) {
+        if let Some(tick) = self.tick.take() {
+            if self.is_stepped() {
+                self.end::<InStep>(tick, self.last, slots);
+            } else {
+                self.end::<Extended>(tick, self.last, slots);
+            }
+        }
+    }
+
+    /// Checks the slots before a tick, and ends the tick before if nothing else did.
+    #[inline(always)]
+    fn prepare(&mut self, slots: &[Slot]) {
+        self.check(slots);
+        if self.tick.is_some() {
+            self.end_open_tick(slots);
+        }
     }
 
     #[inline]
@@ -219,62 +213,73 @@ impl Driver {
     }
 
     /// Returns the time on the line: the clock's, or the simulation's on a stepped bus.
-    #[inline]
-    fn now(&mut self) -> Nanos {
+    #[inline(always)]
+    fn now<W: Work>(&mut self) -> Nanos {
         match &self.line {
-            BusHandle::Free(_) => self.quick.now(),
             // Simulation time stands still during an exchange.
-            BusHandle::Stepped { time, .. } => time.now(),
+            BusHandle::Stepped { time, .. } if W::IS_STEPPED => time.now(),
+            _ => self.quick.now(),
         }
     }
 
-    /// Begins a tick and returns the time on the line.
+    /// Begins a tick. On an error the bus has refused it.
     #[inline(always)]
-    fn begin(&mut self, asked: Option<Nanos>, slots: &[Slot]) -> Result<Nanos, BusError> {
-        self.check(slots);
-        if self.tick.is_some() {
-            self.end_unanswered(slots);
-        }
-        let before = self.now();
-        let given = asked.or(self.given);
+    fn begin<W: Work>(&mut self, asked: Option<Nanos>) -> (Tick, Result<(), BusError>) {
+        let now = self.now::<W>();
         self.counters.ticks += 1;
-        let is_first = self.counters.ticks == 1;
+        let is_first = W::HAS_EXTRAS && self.counters.ticks == 1;
         if is_first {
-            self.first_now = before;
+            self.first_now = now;
         }
-        let time = given.unwrap_or(match &self.line {
-            BusHandle::Free(_) => before - self.first_now,
-            BusHandle::Stepped { .. } => self.last.granted,
+        let given = asked.or(self.given);
+        let time = given.unwrap_or(if W::IS_STEPPED {
+            self.last.granted
+        } else {
+            now - self.first_now
         });
         if is_first {
             self.first_time = time;
         }
-        self.tick = Some(Tick {
+        let mut tick = Tick {
             time,
+            now,
             taken: Nanos::ZERO,
-        });
-        let BusHandle::Stepped {
-            bus, time: shown, ..
-        } = &mut self.line
-        else {
-            self.given = given;
-            return Ok(before);
         };
-        if time < before {
-            return Err(went_back(before, time));
+        if W::IS_STEPPED {
+            if let Err(error) = self.step(&tick) {
+                return (tick, Err(error));
+            }
+            tick.now = time;
         }
-        // Ask the bus first: a refused time must not become the lower limit for later times.
-        bus.as_stepped().accepts(time)?;
         self.given = given;
-        shown.set(time);
-        Ok(time)
+        (tick, Ok(()))
     }
 
-    #[inline]
-    fn begin_extras(&mut self, slots: &mut [Slot]) {
-        if self.extras.is_busy()
-            && let Some(tick) = &self.tick
-        {
+    /// Lets the simulation time of a stepped bus go on to that of the tick.
+    fn step(&mut self, tick: &Tick) -> Result<(), BusError> {
+        let BusHandle::Stepped { bus, time, .. } = &mut self.line else {
+            return Ok(());
+        };
+        if tick.time < tick.now {
+            return Err(went_back(tick.now, tick.time));
+        }
+        // Ask the bus first: a refused time must not become the lower limit for later times.
+        bus.as_stepped().accepts(tick.time)?;
+        time.set(tick.time);
+        Ok(())
+    }
+
+    /// The simulation has handed its values over.
+    #[inline(always)]
+    fn handed_over<W: Work>(&mut self, slots: &mut [Slot]) {
+        if W::HAS_EXTRAS && self.extras.is_busy() {
+            self.extras.handed_over(slots);
+        }
+    }
+
+    #[inline(always)]
+    fn begin_extras<W: Work>(&mut self, tick: &Tick, slots: &mut [Slot]) {
+        if W::HAS_EXTRAS && self.extras.is_busy() {
             let moment = TickTime {
                 time: tick.time - self.first_time,
                 tick: self.counters.ticks,
@@ -285,70 +290,80 @@ impl Driver {
 
     /// Sends: the first half.
     #[inline(always)]
-    fn put(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
-        let is_busy = self.extras.is_busy();
+    fn put<W: Work>(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
+        let is_busy = W::HAS_EXTRAS && self.extras.is_busy();
         if is_busy {
             self.extras.beat(now, slots);
             self.extras.sending(slots);
         }
-        self.write(now, slots);
+        self.write::<W>(now, slots);
         if is_busy {
             self.extras.sent(slots);
         }
         match &mut self.line {
-            BusHandle::Free(_) => Ok(()),
-            BusHandle::Stepped { bus, port, .. } => bus.as_stepped().send(now, port),
+            BusHandle::Stepped { bus, port, .. } if W::IS_STEPPED => {
+                bus.as_stepped().send(now, port)
+            }
+            _ => Ok(()),
         }
     }
 
     /// Hands the values of all stations to the bus at once.
-    #[inline]
-    fn write(&mut self, now: Nanos, slots: &[Slot]) {
+    #[inline(always)]
+    fn write<W: Work>(&mut self, now: Nanos, slots: &[Slot]) {
         let (image, stations) = (&mut self.image, &self.stations);
-        if let [station] = &stations[..]
-            && let Some(word) = station.encode.word(slots)
-        {
-            image.write_word(now, word);
-            return;
+        let is_written = match &stations[..] {
+            [station] if !W::HAS_EXTRAS => image.write_word(now, station.encode.word(slots)),
+            stations => image.write_words(now, |index| stations[index].encode.word(slots)),
+        };
+        if !is_written {
+            write(image, stations, now, slots, &mut self.counters);
         }
-        let mut is_same = true;
-        for (index, station) in stations.iter().enumerate() {
-            let Some(word) = station.encode.word(slots) else {
-                write(image, stations, now, slots, &mut self.counters);
-                return;
-            };
-            is_same &= image.keep_word(index, word);
-        }
-        image.write_kept(now, is_same);
     }
 
     /// Receives: returns what was found, and whether receiving succeeded.
     #[inline(always)]
-    fn take(&mut self, now: Nanos, slots: &mut [Slot]) -> (Exchange, Result<(), BusError>) {
+    fn take<W: Work>(
+        &mut self,
+        tick: &Tick,
+        slots: &mut [Slot],
+    ) -> (Exchange, Result<(), BusError>) {
+        let now = tick.now;
         let (granted, done) = match &mut self.line {
-            BusHandle::Free(_) => (self.tick.map_or(now, |tick| tick.time), Ok(())),
-            BusHandle::Stepped { bus, port, .. } => match bus.as_stepped().receive(now, port) {
-                Ok(granted) => (granted, Ok(())),
-                Err(error) => (now, Err(error)),
-            },
+            BusHandle::Stepped { bus, port, .. } if W::IS_STEPPED => {
+                match bus.as_stepped().receive(now, port) {
+                    Ok(granted) => (granted, Ok(())),
+                    Err(error) => (now, Err(error)),
+                }
+            }
+            _ => (tick.time, Ok(())),
         };
         let (mut code, mut age) = (Code::Fresh, Nanos::ZERO);
         let image = &mut self.image;
         image.update();
-        for station in &mut self.stations {
-            age = age.max(station.receive(image, (now, self.max_age), slots, &self.slots));
-            code = code.worse(station.status);
+        match &mut self.stations[..] {
+            [station] if !W::HAS_EXTRAS => {
+                age = station.receive(image, (now, self.max_age), slots, &self.slots);
+                code = station.status;
+            }
+            stations => {
+                for station in stations {
+                    age = age.max(station.receive(image, (now, self.max_age), slots, &self.slots));
+                    code = code.worse(station.status);
+                }
+            }
         }
-        if let BusHandle::Stepped {
-            bus: SteppedBus::Replay(replay),
-            port,
-            ..
-        } = &mut self.line
+        if W::IS_STEPPED
+            && let BusHandle::Stepped {
+                bus: SteppedBus::Replay(replay),
+                port,
+                ..
+            } = &mut self.line
             && !port.is_distorted(now)
         {
             (code, age) = replay.show(age, image, &mut self.stations, slots);
         }
-        if self.extras.is_busy() {
+        if W::HAS_EXTRAS && self.extras.is_busy() {
             self.extras.received(slots);
         }
         let found = Exchange {
@@ -360,10 +375,25 @@ impl Driver {
         (found, done)
     }
 
+    /// Keeps the result of a call on the bus that found `found`, and returns it.
+    #[inline(always)]
+    fn result(&mut self, found: Exchange, done: Result<(), BusError>) -> Exchange {
+        let found = match done {
+            Ok(()) => found,
+            Err(error) => self.failed(found, &error),
+        };
+        // Field by field: loading the whole struct right after partial stores would stall.
+        self.last.code = found.code;
+        self.last.sequence = found.sequence;
+        self.last.age = found.age;
+        self.last.granted = found.granted;
+        found
+    }
+
     /// Returns the result when the bus failed and `found` was found.
     #[cold]
     fn failed(&mut self, found: Exchange, error: &BusError) -> Exchange {
-        let now = self.now();
+        let now = self.now::<InStep>();
         let (state, cause, reason) = (LinkState::Failed, error.into(), error.to_string());
         self.status.enter(now, state, cause, &reason);
         Exchange {
@@ -373,38 +403,31 @@ impl Driver {
         }
     }
 
-    /// Adds the time since `begun` to the current tick, if the tick is in the sample.
-    #[inline]
-    fn lap(&mut self, begun: Nanos) {
-        if TickTimes::takes(self.counters.ticks) {
-            let taken = self.now() - begun;
-            if let Some(tick) = &mut self.tick {
-                tick.taken += taken;
-            }
+    /// Returns the time since `begun` if the tick is in the sample, and else zero; on a stepped bus none is.
+    #[inline(always)]
+    fn lap<W: Work>(&mut self, begun: Nanos) -> Nanos {
+        if !W::IS_STEPPED && TickTimes::takes(self.counters.ticks) {
+            self.quick.now() - begun
+        } else {
+            Nanos::ZERO
         }
     }
 
-    #[cold]
-    fn end_unanswered(&mut self, slots: &[Slot]) {
-        self.end(self.last, slots);
-    }
-
-    /// Ends the current tick, if there is one: counts and records it.
-    #[inline]
-    fn end(&mut self, found: Exchange, slots: &[Slot]) {
-        let Some(tick) = self.tick.take() else {
-            return;
-        };
+    /// Ends a tick: counts and records it.
+    #[inline(always)]
+    fn end<W: Work>(&mut self, tick: Tick, found: Exchange, slots: &[Slot]) {
         self.counters.count(found.code);
-        if self.recorder.is_some() {
+        if W::HAS_EXTRAS && self.recorder.is_some() {
             self.record(tick, found.code, slots);
         }
-        if matches!(self.line, BusHandle::Free(_)) && TickTimes::takes(self.counters.ticks) {
-            self.samples.add(tick.taken, self.last.age);
+        if !W::IS_STEPPED && TickTimes::takes(self.counters.ticks) {
+            self.samples.add(tick.taken, found.age);
         }
-        if self.extras.is_busy() {
-            self.extras.rest();
-            self.simplify();
+        if W::HAS_EXTRAS {
+            if self.extras.is_busy() {
+                self.extras.rest();
+            }
+            self.shape = self.fitting_shape();
         }
         if self.tap.as_ref().is_some_and(Tap::is_wanted) {
             self.serve_watch(tick, found.code, slots);
@@ -601,8 +624,11 @@ mod tests {
                 let rig = &mut rigs[index];
                 rig.pass(pause, sent);
                 let Rig { driver, slots, .. } = rig;
-                assert!(driver.is_simple || index == 1, "else nothing is compared");
-                driver.is_simple = index == 0;
+                let is_plain = step == 0 || driver.shape == Shape::Plain;
+                assert!(is_plain || index == 1, "else nothing is compared");
+                if index == 1 {
+                    driver.shape = Shape::Extended;
+                }
                 slots[bit] = Slot::from_real(level);
                 let found = if is_halved {
                     let found = driver.receive(time, slots);

@@ -21,7 +21,7 @@ impl Driver {
             edges: &self.slots.edges,
         };
         let id = self.extras.inject(fault, slots, &self.board)?;
-        self.is_simple = false;
+        self.shape = self.fitting_shape();
         // Adopt the fault now, so that the tick need not allocate memory.
         if let BusHandle::Stepped { port, .. } = &mut self.line {
             let now = port.clock().now();
@@ -70,6 +70,7 @@ impl Driver {
 mod tests {
     use super::*;
     use crate::Watch;
+    use crate::shape::Shape;
     use tickbus_base::time::{Manual, Monotonic, Nanos};
     use tickbus_driver_cfg::Config;
     use tickbus_image::signal::Slot;
@@ -87,7 +88,7 @@ mod tests {
         let mut tick = |driver: &mut Driver, watch: &mut Watch| {
             watch.ask(false);
             driver.exchange(None, &mut slots);
-            driver.is_simple
+            driver.shape == Shape::Plain
         };
         assert!(tick(&mut driver, &mut watch), "nothing is to be done");
         let fault = watch.force(0, Slot::from_real(5.0)).expect("room");
@@ -122,11 +123,11 @@ mod tests {
                 .unwrap_or_else(|why| panic!("{why}"));
             let _watch = is_watched.then(|| driver.watch());
             driver.exchange(None, &mut slots);
-            assert!(!driver.is_simple, "it is injected");
+            assert_ne!(driver.shape, Shape::Plain, "it is injected");
             for _ in 0..3 {
                 driver.exchange(None, &mut slots);
             }
-            assert!(driver.is_simple, "it is over");
+            assert_eq!(driver.shape, Shape::Plain, "it is over");
         }
         driver.close();
     }
@@ -180,7 +181,7 @@ mod tests {
         for _ in 0..3 {
             driver.exchange(None, &mut slots);
         }
-        assert!(driver.is_simple);
+        assert_eq!(driver.shape, Shape::Plain);
         let fault = driver
             .inject_text("kind = \"stuck\"\nsignal = \"b\"\nvalue = 9\n")
             .unwrap_or_else(|why| panic!("{why}"));

@@ -14,6 +14,7 @@ mod host;
 mod open;
 mod recording;
 mod replay;
+mod shape;
 mod slots;
 mod station;
 mod statistics;

@@ -15,6 +15,7 @@ use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::recording::recorder;
+use super::shape::Shape;
 use super::station::Station;
 use super::supervise::BusThread;
 use super::tick_counters::TickTimes;
@@ -112,7 +113,7 @@ impl Driver {
             tick: None,
             last: Exchange::NONE,
             extras: Extras::new(reflexes, Beat::all(&config, config.role)),
-            is_simple: false,
+            shape: Shape::Extended,
             board,
             program,
             tap: None,
@@ -121,7 +122,7 @@ impl Driver {
         for fault in &list {
             driver.inject(fault).map_err(DriverError::Fault)?;
         }
-        driver.simplify();
+        driver.shape = driver.fitting_shape();
         Ok(driver)
     }
 

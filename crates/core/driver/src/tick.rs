@@ -33,6 +33,8 @@ impl Exchange {
 pub(super) struct Tick {
     /// Simulation time; if the simulation gives none, the clock's time since the first tick.
     pub(super) time: Nanos,
+    /// The time on the line when it began.
+    pub(super) now: Nanos,
     /// The time spent in this tick's calls so far; measured only for ticks in the sample.
     pub(super) taken: Nanos,
 }

@@ -32,7 +32,7 @@ impl Driver {
         let wanted = tap.take_wanted();
         if wanted.orders() {
             self.extras.obey(&mut tap);
-            self.simplify();
+            self.shape = self.fitting_shape();
         }
         if wanted.values() {
             // The simulation's clock stands still during a tick, and other clocks can be read.

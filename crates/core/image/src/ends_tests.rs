@@ -107,14 +107,18 @@ fn a_level_that_returns_to_its_first_value_is_sent_again() {
         (0, 0),
         (0x80, 0x80),
     ] {
-        assert!(
-            tick.keep_word(0, u64::from(level)) == (level == outgoing(&mut bus, 1, None)),
-            "what is published is what the bus has"
-        );
-        write(&mut tick, 1, level);
-        assert!(tick.keep_word(0, u64::from(level)));
-        assert_eq!(outgoing(&mut bus, 1, None), expected);
-        bus.sent(0);
+        for is_word in [false, true, false] {
+            // Something else in between, in the other way.
+            for (is_word, level) in [(!is_word, 0x24), (is_word, level)] {
+                if is_word {
+                    assert!(tick.write_words(Nanos(1), |_| Some(level.into())));
+                } else {
+                    write(&mut tick, 1, level);
+                }
+            }
+            assert_eq!(outgoing(&mut bus, 1, None), expected, "a word: {is_word}");
+            bus.sent(0);
+        }
     }
 }
 

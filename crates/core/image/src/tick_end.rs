@@ -1,4 +1,8 @@
 //! The tick's end of the image.
+#![allow(
+    clippy::inline_always,
+    reason = "most ticks change nothing and find nothing, and should not pay for calls"
+)]
 
 use super::frame::{Frame, Head, NEVER, Place, StationStreams, age, is_stale};
 use super::sync::{Arc, AtomicI64, Ordering};
@@ -156,54 +160,41 @@ impl TickEnd {
         self.ticks(now);
     }
 
-    /// Keeps the bytes of a station, at most eight, as a number whose least significant byte comes first, for
-    /// [`write_kept`](Self::write_kept). Returns whether they equal those published last.
-    #[inline]
-    pub fn keep_word(&mut self, station: usize, word: u64) -> bool {
-        let sent = &mut self.sent[station];
-        sent.kept = word;
-        sent.word == word
-    }
-
-    /// Like [`write`](Self::write), for the bytes of all stations [kept](Self::keep_word) in this tick; `is_same`: all
-    /// of them are published already.
-    #[inline]
-    pub fn write_kept(&mut self, now: Nanos, is_same: bool) {
+    /// Like [`write`](Self::write), for stations of at most eight bytes whose bytes are available as a number, the least
+    /// significant byte first: a tick that changes nothing then touches no frame. Writes nothing and returns false if
+    /// `word` returns `None` for any station.
+    #[inline(always)]
+    pub fn write_words(&mut self, now: Nanos, mut word: impl FnMut(usize) -> Option<u64>) -> bool {
+        let mut is_same = true;
+        for (index, sent) in self.sent.iter_mut().enumerate() {
+            let Some(word) = word(index) else {
+                return false;
+            };
+            sent.kept = word;
+            is_same &= sent.word == word;
+        }
         if !is_same {
-            self.publish_kept();
+            self.publish_words();
         }
         self.ticks(now);
+        true
     }
 
-    #[inline(never)]
-    fn publish_kept(&mut self) {
-        let sent = &mut self.sent;
-        self.tx.with_buffer(|frame| {
-            for station in sent {
-                station.word = station.kept;
-                let bytes = &mut frame.bytes[station.place.bytes.clone()];
-                for (to, from) in bytes.iter_mut().zip(station.word.to_le_bytes()) {
-                    *to = from;
-                }
-                let edges = &mut frame.edges[station.place.edges.clone()];
-                station.edges.count(bytes, edges);
-            }
-        });
-        self.tx.publish();
-    }
-
-    /// Like [`write`](Self::write), for an image of one station whose bytes, at most eight, are available as a number,
-    /// the least significant byte first: a tick that changes nothing then touches no frame.
+    /// Like [`write_words`](Self::write_words), for an image of one station.
     ///
     /// # Panics
     ///
     /// When the image has no station.
     #[inline]
-    pub fn write_word(&mut self, now: Nanos, word: u64) {
+    pub fn write_word(&mut self, now: Nanos, word: Option<u64>) -> bool {
+        let Some(word) = word else {
+            return false;
+        };
         if self.sent[0].word != word {
             self.publish_word(word);
         }
         self.ticks(now);
+        true
     }
 
     #[inline(never)]
@@ -217,6 +208,23 @@ impl TickEnd {
                 *to = from;
             }
             edges.count(&frame.bytes, &mut frame.edges);
+        });
+        self.tx.publish();
+    }
+
+    #[inline(never)]
+    fn publish_words(&mut self) {
+        let sent = &mut self.sent;
+        self.tx.with_buffer(|frame| {
+            for station in sent {
+                station.word = station.kept;
+                let bytes = &mut frame.bytes[station.place.bytes.clone()];
+                for (to, from) in bytes.iter_mut().zip(station.word.to_le_bytes()) {
+                    *to = from;
+                }
+                let edges = &mut frame.edges[station.place.edges.clone()];
+                station.edges.count(bytes, edges);
+            }
         });
         self.tx.publish();
     }

@@ -119,7 +119,7 @@ impl Plan {
     /// # Panics
     ///
     /// When `slots` is shorter than the plan needs.
-    #[inline]
+    #[inline(always)]
     pub fn word(&self, slots: &[Slot]) -> Option<u64> {
         self.check(slots.len(), self.bytes);
         if self.is_word {

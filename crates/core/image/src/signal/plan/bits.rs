@@ -79,7 +79,7 @@ impl Octets {
     }
 
     /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN.
-    #[inline]
+    #[inline(always)]
     pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
         let (mut word, mut seen) = (0, i64x2::ZERO);
         let (eights, _) = slots.get(self.first..)?.as_chunks::<8>();

@@ -119,6 +119,10 @@ impl Plan {
     /// # Panics
     ///
     /// When `slots` is shorter than the plan needs.
+    #[expect(
+        clippy::inline_always,
+        reason = "it is most of a small tick, and called at few places"
+    )]
     #[inline(always)]
     pub fn word(&self, slots: &[Slot]) -> Option<u64> {
         self.check(slots.len(), self.bytes);

@@ -79,6 +79,10 @@ impl Octets {
     }
 
     /// The octets of a frame of up to eight bytes, byte k in bits 8k to 8k + 7; `None` if a value is NaN.
+    #[expect(
+        clippy::inline_always,
+        reason = "it is most of a small tick, and called at few places"
+    )]
     #[inline(always)]
     pub(super) fn word(&self, slots: &[Slot]) -> Option<u64> {
         let (mut word, mut seen) = (0, i64x2::ZERO);

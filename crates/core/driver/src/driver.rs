@@ -48,7 +48,7 @@ pub struct Driver {
     pub(super) last: Exchange,
     /// The extra work around every exchange; most drivers have none.
     pub(super) extras: Extras,
-    /// What the next tick does besides carrying values.
+    /// The work of the next tick besides carrying values.
     pub(super) shape: Shape,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<OtherEnd>,

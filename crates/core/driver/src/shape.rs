@@ -18,7 +18,7 @@ pub(super) enum Shape {
     InStep,
 }
 
-/// What a tick contains.
+/// The parts of a tick, as constants, so that each shape is compiled without what it lacks.
 pub(super) trait Work {
     /// The bus runs on the tick, in simulation time, and can refuse a tick.
     const IS_STEPPED: bool;

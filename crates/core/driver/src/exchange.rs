@@ -162,7 +162,10 @@ impl Driver {
             if let Some(tick) = &mut self.tick {
                 tick.taken += taken;
             }
-            found = self.result(found, sent);
+            if let Err(error) = sent {
+                // Not kept: only a failed `receive` forbids to send.
+                found = self.failed(found, &error);
+            }
         }
         if let Some(tick) = self.tick.take() {
             self.end::<W>(tick, found, slots);
@@ -431,6 +434,17 @@ impl Driver {
         }
         if self.tap.as_ref().is_some_and(Tap::is_wanted) {
             self.serve_watch(tick, found.code, slots);
+        }
+    }
+
+    /// Returns the smallest shape that has all work of the next tick.
+    pub(super) fn fitting_shape(&self) -> Shape {
+        let is_first = self.counters.ticks == 0;
+        let has_extras = is_first || self.extras.is_busy() || self.recorder.is_some();
+        match &self.line {
+            BusHandle::Stepped { .. } => Shape::InStep,
+            BusHandle::Free(_) if has_extras || self.stations.len() != 1 => Shape::Extended,
+            BusHandle::Free(_) => Shape::Plain,
         }
     }
 

@@ -4,9 +4,6 @@
 //! the shape does not need. The shape is chosen when the driver is opened, and again at the end of a tick that may have
 //! changed it. So a driver without a recorder, axes or faults does not ask in each tick whether it has any.
 
-use super::Driver;
-use super::bus_handle::BusHandle;
-
 /// The shape of a driver's next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shape {
@@ -48,17 +45,4 @@ impl Work for Extended {
 impl Work for InStep {
     const IS_STEPPED: bool = true;
     const HAS_EXTRAS: bool = true;
-}
-
-impl Driver {
-    /// Returns the smallest shape that has all work of the next tick.
-    pub(super) fn fitting_shape(&self) -> Shape {
-        let is_first = self.counters.ticks == 0;
-        let has_extras = is_first || self.extras.is_busy() || self.recorder.is_some();
-        match &self.line {
-            BusHandle::Stepped { .. } => Shape::InStep,
-            BusHandle::Free(_) if has_extras || self.stations.len() != 1 => Shape::Extended,
-            BusHandle::Free(_) => Shape::Plain,
-        }
-    }
 }

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::frame::{Frame, Place, StationStreams, age};
+use super::frame::{Frame, Place, StationStreams};
+use super::stale::{NEVER, age};
 use super::sync::{Arc, AtomicI64, Ordering};
 use super::{EdgeCounter, LatchedBit, Peers, Producer, PulseShaper, Reader, Writer, copy_frame};
 use tickbus_base::time::Nanos;
@@ -64,7 +65,7 @@ impl BusEnd {
             is_news: false,
             is_cycle: false,
             tx,
-            ticked: super::frame::NEVER,
+            ticked: NEVER,
             is_dead: false,
             alive,
             stations: stations.collect(),

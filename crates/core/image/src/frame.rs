@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::LatchedBit;
-use tickbus_base::time::Nanos;
+use super::stale::NEVER;
 
 /// The fail-safe bytes and the latched signals of one station's two streams; tx and rx are as seen from the tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -16,26 +16,6 @@ pub struct StationStreams {
     pub rx_fail_safe: Box<[u8]>,
     /// The latched signals of the rx bytes.
     pub rx_latched: Box<[LatchedBit]>,
-}
-
-/// Never: earlier than any time of a clock.
-pub(super) const NEVER: i64 = i64::MIN;
-
-/// `now - then`, for a `then` that may be [`NEVER`].
-#[inline]
-pub(super) fn age(now: Nanos, then: i64) -> Nanos {
-    if then == NEVER {
-        Nanos::MAX
-    } else {
-        (now - Nanos(then)).max(Nanos::ZERO)
-    }
-}
-
-/// True if received data are stale. This rule applies to the tick, which then delivers fail-safe values, to the line's
-/// state and to the statistics. Data of exactly the age `max_age` are fresh.
-#[inline]
-pub const fn is_stale(age: Nanos, max_age: Nanos, is_valid: bool) -> bool {
-    !is_valid || age.0 > max_age.0
 }
 
 /// The state of one station's bytes: handed over with them, so that no reader takes old bytes for young ones.

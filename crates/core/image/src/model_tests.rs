@@ -385,6 +385,10 @@ fn sent(mut random: Random, stations: usize) {
                     .iter()
                     .map(|bytes| next_written(*bytes, &mut random))
                     .collect();
+                for (index, bytes) in written.iter().enumerate() {
+                    let word = u64::from(u16::from_le_bytes(*bytes));
+                    assert_eq!(tick.published_word(index), word, "step {step}");
+                }
                 write_somehow(&mut tick, Nanos(now), &drawn, random.below(3));
                 (written, ticked) = (drawn, Some(now));
                 for (index, bytes) in written.iter().enumerate() {

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 
-use super::frame::{Head, NEVER, age};
+use super::frame::Head;
+use super::stale::{NEVER, age};
 use tickbus_base::time::Nanos;
 
 /// The state of each station's peer, for statistics: readable at any time and from any thread.

@@ -4,7 +4,8 @@
     reason = "most ticks change nothing and find nothing, and should not pay for calls"
 )]
 
-use super::frame::{Frame, Head, NEVER, Place, StationStreams, age, is_stale};
+use super::frame::{Frame, Head, Place, StationStreams};
+use super::stale::{NEVER, age, is_stale};
 use super::sync::{Arc, AtomicI64, Ordering};
 use super::{Consumer, EdgeCounter, Peers, PulseShaper, Reader, Writer};
 use tickbus_base::time::Nanos;
@@ -234,6 +235,13 @@ impl TickEnd {
     pub fn ticks(&self, now: Nanos) {
         // After the frame: a bus that sees this time and then looks for a frame finds one of at least this time.
         self.alive.store(now.0, Ordering::Release);
+    }
+
+    /// The bytes of a station that were published last, up to eight, as the number that the words of later ticks are
+    /// compared with.
+    #[cfg(test)]
+    pub(super) fn published_word(&self, station: usize) -> u64 {
+        self.sent[station].word
     }
 
     /// Takes over the newest frame of the peer, for all stations.

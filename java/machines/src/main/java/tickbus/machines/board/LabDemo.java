@@ -4,14 +4,13 @@ import java.io.IOException;
 import java.io.PrintStream;
 import java.nio.file.Files;
 import java.nio.file.Path;
-import java.util.ArrayList;
 import java.util.List;
 import tickbus.machines.demo.DemoFailure;
+import tickbus.machines.demo.DemoRun;
 import tickbus.machines.demo.HtmlPage;
 import tickbus.machines.demo.Stalls;
 import tickbus.machines.demo.Timeline;
 import tickbus.machines.demo.Verdict;
-import tickbus.simulator.Arguments;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.ShutdownGuard;
 import tickbus.simulator.Simulator;
@@ -26,9 +25,6 @@ import tickbus.simulator.TimeSource;
  */
 public final class LabDemo {
     private static final Verdict VERDICT = new Verdict("demo-lab");
-
-    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
-    private static final int ATTEMPTS = 5;
 
     /** The driver's text when the dispatcher has accepted it: it is not running yet, because nothing is connected. */
     private static final String JOINED = "joined the dispatcher";
@@ -67,31 +63,20 @@ public final class LabDemo {
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
-        if (List.of(args).contains("--help")) {
-            out.print(LabOptions.USAGE);
-            return Verdict.OK;
-        }
-        LabOptions options;
-        try {
-            options = LabOptions.read(args);
-        } catch (Arguments.UsageException e) {
-            err.println(e.getMessage() + "\n");
-            err.print(LabOptions.USAGE);
-            out.println(VERDICT.failed(e.getMessage()));
-            return Verdict.USAGE;
-        }
+        return DemoRun.start(args, LabOptions.USAGE, LabOptions::read, VERDICT, options -> run(options, out, err), out, err);
+    }
+
+    private static int run(LabOptions options, PrintStream out, PrintStream err) {
         // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
-            List<String> notes = new ArrayList<>();
-            LabDemo demo = new LabDemo(options, out, notes);
-            String verdict = demo.play(guard, err);
-            while (!VERDICT.isOk(verdict) && !guard.triggered() && demo.stalls.longestNanos() > 0
-                    && notes.size() + 1 < ATTEMPTS) {
-                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
-                        + demo.stalls.longestNanos() / 1_000_000 + " ms: " + verdict);
-                demo = new LabDemo(options, out, notes);
+            DemoRun run = new DemoRun(VERDICT);
+            LabDemo demo;
+            String verdict;
+            do {
+                demo = new LabDemo(options, out, run.notes());
                 verdict = demo.play(guard, err);
-            }
+            } while (!guard.triggered() && run.repeats(verdict, demo.stalls));
+            verdict = run.verdict(verdict);
             String trouble = demo.page(out);
             if (trouble != null && VERDICT.isOk(verdict)) {
                 verdict = VERDICT.failed(trouble);

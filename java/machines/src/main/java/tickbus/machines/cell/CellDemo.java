@@ -11,13 +11,13 @@ import java.util.Map;
 import java.util.TreeMap;
 import java.util.stream.Stream;
 import tickbus.machines.demo.DemoFailure;
+import tickbus.machines.demo.DemoRun;
 import tickbus.machines.demo.HtmlPage;
 import tickbus.machines.demo.PlcCommand;
 import tickbus.machines.demo.PlcProcess;
 import tickbus.machines.demo.Stalls;
 import tickbus.machines.demo.Timeline;
 import tickbus.machines.demo.Verdict;
-import tickbus.simulator.Arguments;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.ShutdownGuard;
 import tickbus.simulator.Simulator;
@@ -37,9 +37,6 @@ public final class CellDemo {
     private static final int READER = 1999;
 
     private static final Verdict VERDICT = new Verdict("demo-cell");
-
-    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
-    private static final int ATTEMPTS = 5;
 
     /** The interval of the reports of the nets' process. */
     private static final long REPORT_NANOS = 100_000_000L;
@@ -85,33 +82,20 @@ public final class CellDemo {
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
-        if (List.of(args).contains("--help")) {
-            out.print(CellOptions.USAGE);
-            return Verdict.OK;
-        }
-        CellOptions options;
-        try {
-            options = CellOptions.read(args);
-        } catch (Arguments.UsageException e) {
-            err.println(e.getMessage() + "\n");
-            err.print(CellOptions.USAGE);
-            out.println(VERDICT.failed(e.getMessage()));
-            return Verdict.USAGE;
-        }
+        return DemoRun.start(args, CellOptions.USAGE, CellOptions::read, VERDICT, options -> run(options, out, err), out, err);
+    }
+
+    private static int run(CellOptions options, PrintStream out, PrintStream err) {
         // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
-            List<String> notes = new ArrayList<>();
+            DemoRun run = new DemoRun(VERDICT);
+            CellDemo demo;
             String verdict;
-            while (true) {
-                CellDemo demo = new CellDemo(options, out, List.copyOf(notes));
+            do {
+                demo = new CellDemo(options, out, run.notes());
                 verdict = demo.play(guard, err);
-                long stall = demo.stalls.longestNanos();
-                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0 || demo.netsKilled || notes.size() == ATTEMPTS - 1) {
-                    break;
-                }
-                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
-                        + stall / 1_000_000 + " ms: " + verdict);
-            }
+            } while (!guard.triggered() && !demo.netsKilled && run.repeats(verdict, demo.stalls));
+            verdict = run.verdict(verdict);
             if (options.plc() != null && options.recording() != null && !guard.triggered()) {
                 Path page = options.report().resolveSibling("report.html");
                 String trouble = CellPage.make(options, page, statistics(options));

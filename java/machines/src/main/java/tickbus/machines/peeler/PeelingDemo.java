@@ -11,12 +11,12 @@ import java.util.List;
 import java.util.Locale;
 import java.util.Map;
 import tickbus.machines.demo.DemoFailure;
+import tickbus.machines.demo.DemoRun;
 import tickbus.machines.demo.HtmlPage;
 import tickbus.machines.demo.Screen;
 import tickbus.machines.demo.Stalls;
 import tickbus.machines.demo.Timeline;
 import tickbus.machines.demo.Verdict;
-import tickbus.simulator.Arguments;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.ShutdownGuard;
 import tickbus.simulator.Simulator;
@@ -32,9 +32,6 @@ import tickbus.simulator.text.Durations;
  */
 public final class PeelingDemo {
     private static final Verdict VERDICT = new Verdict("demo-peeler");
-
-    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
-    private static final int ATTEMPTS = 5;
 
     /** The position of the knife at which the picture of a block that is not round is most instructive. */
     private static final double PICTURE_MM = 138;
@@ -83,35 +80,20 @@ public final class PeelingDemo {
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
-        if (List.of(args).contains("--help")) {
-            out.print(PeelingOptions.USAGE);
-            return Verdict.OK;
-        }
-        PeelingOptions options;
-        try {
-            options = PeelingOptions.read(args);
-        } catch (Arguments.UsageException e) {
-            err.println(e.getMessage() + "\n");
-            err.print(PeelingOptions.USAGE);
-            out.println(VERDICT.failed(e.getMessage()));
-            return Verdict.USAGE;
-        }
+        return DemoRun.start(args, PeelingOptions.USAGE, PeelingOptions::read, VERDICT, options -> run(options, out, err), out, err);
+    }
+
+    private static int run(PeelingOptions options, PrintStream out, PrintStream err) {
         // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
-            PeelingDemo demo = new PeelingDemo(options, out, List.of());
-            String verdict = demo.play(guard, err);
-            List<String> notes = new ArrayList<>();
-            while (!VERDICT.isOk(verdict) && !guard.triggered() && demo.stalls.longestNanos() > 0) {
-                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
-                        + demo.stalls.longestNanos() / 1_000_000 + " ms: " + verdict);
-                if (notes.size() == ATTEMPTS) {
-                    verdict = VERDICT.failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, so nothing"
-                            + " can be said; the last attempt ended: " + VERDICT.reason(verdict));
-                    break;
-                }
-                demo = new PeelingDemo(options, out, List.copyOf(notes));
+            DemoRun run = new DemoRun(VERDICT);
+            PeelingDemo demo;
+            String verdict;
+            do {
+                demo = new PeelingDemo(options, out, run.notes());
                 verdict = demo.play(guard, err);
-            }
+            } while (!guard.triggered() && run.repeats(verdict, demo.stalls));
+            verdict = run.verdict(verdict);
             out.print(demo.tables);
             String trouble = demo.pages();
             if (trouble != null && VERDICT.isOk(verdict)) {

@@ -5,16 +5,15 @@ import java.io.IOException;
 import java.io.PrintStream;
 import java.nio.file.Files;
 import java.nio.file.Path;
-import java.util.ArrayList;
 import java.util.List;
 import tickbus.machines.demo.DemoFailure;
+import tickbus.machines.demo.DemoRun;
 import tickbus.machines.demo.Plc;
 import tickbus.machines.demo.PlcCommand;
 import tickbus.machines.demo.Screen;
 import tickbus.machines.demo.Stalls;
 import tickbus.machines.demo.Timeline;
 import tickbus.machines.demo.Verdict;
-import tickbus.simulator.Arguments;
 import tickbus.simulator.DeviceDriverFolder;
 import tickbus.simulator.DriverSet;
 import tickbus.simulator.ShutdownGuard;
@@ -31,9 +30,6 @@ import tickbus.simulator.text.Durations;
  */
 public final class Demo {
     private static final Verdict VERDICT = new Verdict("demo");
-
-    /** A failure while the machine was stalled proves nothing, so the demo is restarted at most this often. */
-    private static final int ATTEMPTS = 5;
 
     /** The step, and the time in it, at which a picture of the rig shows most: both lifts up, the lamp on. */
     private static final int PICTURE_STEP = 5;
@@ -79,22 +75,9 @@ public final class Demo {
      * @return the exit code
      */
     public static int run(String[] args, PrintStream out, PrintStream err) {
-        if (List.of(args).contains("--help")) {
-            out.print(DemoOptions.USAGE);
-            return Verdict.OK;
-        }
-        DemoOptions options;
-        try {
-            options = DemoOptions.read(args);
-        } catch (Arguments.UsageException e) {
-            err.println(e.getMessage() + "\n");
-            err.print(DemoOptions.USAGE);
-            out.println(VERDICT.failed(e.getMessage()));
-            return Verdict.USAGE;
-        }
-        Path folder = options.drivers();
-        return run(options, () -> DeviceDriverFolder.scan(folder).open(),
-                driver -> options.plc() == null ? new HostedPlc(driver) : process(options, driver), out, err);
+        return DemoRun.start(args, DemoOptions.USAGE, DemoOptions::read, VERDICT, options -> run(options,
+                () -> DeviceDriverFolder.scan(options.drivers()).open(),
+                driver -> options.plc() == null ? new HostedPlc(driver) : process(options, driver), out, err), out, err);
     }
 
     /** The rig's PLC program as a process that connects to a driver, which must be listening. */
@@ -130,24 +113,14 @@ public final class Demo {
             PrintStream err) {
         // The guard is closed last, so that the verdict is printed even after Ctrl-C.
         try (ShutdownGuard guard = new ShutdownGuard()) {
-            List<String> notes = new ArrayList<>();
+            DemoRun run = new DemoRun(VERDICT);
+            Demo demo;
             String verdict;
-            while (true) {
-                Demo demo = new Demo(options, display, List.copyOf(notes));
+            do {
+                demo = new Demo(options, display, run.notes());
                 verdict = demo.play(opener, plc, guard, err);
-                long stall = demo.stalls.longestNanos();
-                if (VERDICT.isOk(verdict) || guard.triggered() || stall == 0) {
-                    break;
-                }
-                notes.add("attempt " + (notes.size() + 1) + " does not count, because this machine stood still for "
-                        + stall / 1_000_000 + " ms: " + verdict);
-                if (notes.size() == ATTEMPTS) {
-                    verdict = VERDICT.failed("this machine stood still too long in each of " + ATTEMPTS + " attempts, the last"
-                            + " time for " + stall / 1_000_000 + " ms, so nothing can be said; the last attempt ended: "
-                            + VERDICT.reason(verdict));
-                    break;
-                }
-            }
+            } while (!guard.triggered() && run.repeats(verdict, demo.stalls));
+            verdict = run.verdict(verdict);
             if (options.recording() != null && options.plc() != null) {
                 String trouble = RigPage.make(options, out);
                 if (trouble != null && VERDICT.isOk(verdict)) {

@@ -14,7 +14,6 @@ use std::ffi::{CStr, CString, c_char};
 use std::panic::catch_unwind;
 use std::path::Path;
 use std::ptr::{NonNull, null_mut};
-#[cfg(unix)]
 use std::sync::Once;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -41,7 +40,6 @@ static RETIRED: Mutex<Vec<Buffer>> = Mutex::new(Vec::new());
 static TEXTS: Lazy<Mutex<HashSet<&'static CStr>>> = Lazy::new(Mutex::default);
 
 /// Registers the exit handler, once, with the first driver.
-#[cfg(unix)]
 static AT_EXIT: Once = Once::new();
 
 thread_local! {
@@ -138,7 +136,6 @@ fn permanent(text: &str) -> *const c_char {
 }
 
 /// Closes the drivers that are still open when the process ends.
-#[cfg(unix)]
 fn close_all() {
     closing(|| DRIVERS.close_all(Opened::close));
 }
@@ -243,7 +240,6 @@ unsafe extern "C" fn tb_open(path: *const c_char, tables: *const c_char, driver:
         let shared =
             shared.ok_or_else(|| Refusal::new(Code::Internal, "the buffer is not aligned"))?;
         let device = Device::new(opened, shared);
-        #[cfg(unix)]
         AT_EXIT.call_once(|| tickbus_base::os::at_exit(close_all));
         let name = device.config().name.clone();
         let handle = place.fill(&name, Opened { device, buffer });

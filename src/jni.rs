@@ -15,7 +15,6 @@ mod open;
 use std::ffi::c_void;
 use std::panic::catch_unwind;
 use std::path::Path;
-#[cfg(unix)]
 use std::sync::Once;
 
 use jni::objects::{JClass, JLongArray, JObject, JString};
@@ -34,11 +33,9 @@ use failure::{Failure, ThrowFieldbusException};
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
 
 /// Registers the exit handler, once, with the first driver.
-#[cfg(unix)]
 static AT_EXIT: Once = Once::new();
 
 /// Closes the drivers that are still open when the process ends, after the JVM's shutdown hooks.
-#[cfg(unix)]
 fn close_all() {
     // The JVM has ended and no longer accepts the release of references.
     closing(|| DRIVERS.close_all(|device| std::mem::forget(device.close())));
@@ -287,7 +284,6 @@ fn initialize(
         tables.try_to_string(env)?
     };
     let device = open::open(env, &open::file_of(&path), &tables, layout)?;
-    #[cfg(unix)]
     AT_EXIT.call_once(|| tickbus_base::os::at_exit(close_all));
     let name = device.config().name.clone();
     Ok(place.fill(&name, device))

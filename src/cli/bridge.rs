@@ -1,7 +1,6 @@
 //! `tickbus bridge`: connects programs and brokers that cannot connect to the dispatcher themselves.
 
 mod mqtt;
-#[cfg(unix)]
 mod serial;
 
 use clap::Subcommand;
@@ -19,7 +18,6 @@ pub(super) struct Arguments {
 #[derive(Debug, Subcommand)]
 enum Command {
     Mqtt(mqtt::Arguments),
-    #[cfg(unix)]
     Serial(serial::Arguments),
 }
 
@@ -34,7 +32,6 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
     };
     match &arguments.command {
         Command::Mqtt(arguments) => mqtt::run(arguments, &stop),
-        #[cfg(unix)]
         Command::Serial(arguments) => serial::run(arguments, &stop),
     }
 }

@@ -15,7 +15,6 @@ mod bridge;
 mod check;
 mod dispatch;
 mod export;
-#[cfg(unix)]
 mod fmu_helper;
 mod gsd;
 mod host;
@@ -24,9 +23,7 @@ mod lab;
 mod logo;
 mod mirror;
 mod plc;
-#[cfg(unix)]
 mod plugin_helper;
-#[cfg(unix)]
 mod profibus;
 mod report;
 mod run;
@@ -60,18 +57,15 @@ enum Command {
     Logo(logo::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
-    #[cfg(unix)]
     Profibus(profibus::Arguments),
     Report(report::Arguments),
     Run(run::Arguments),
     Sync(sync::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
-    #[cfg(unix)]
     #[command(hide = true)]
     PluginHelper,
     /// Run an FMU for the process that starts this; not for people.
-    #[cfg(unix)]
     #[command(hide = true)]
     FmuHelper,
 }
@@ -135,15 +129,12 @@ pub fn main(kinds: &'static Kinds) -> ExitCode {
         Command::Logo(arguments) => logo::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
         Command::Plc(arguments) => plc::run(&arguments, kinds),
-        #[cfg(unix)]
         Command::Profibus(arguments) => profibus::run(&arguments, kinds),
         Command::Report(arguments) => report::run(&arguments),
         Command::Run(arguments) => run::run(&arguments, kinds),
         Command::Sync(arguments) => sync::run(&arguments, kinds),
         Command::Test(arguments) => test::run(&arguments, kinds),
-        #[cfg(unix)]
         Command::PluginHelper => plugin_helper::run(),
-        #[cfg(unix)]
         Command::FmuHelper => fmu_helper::run(),
     };
     tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);

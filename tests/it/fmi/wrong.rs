@@ -545,13 +545,10 @@ fn a_crash_in_a_helper_is_a_sentence_and_the_recording_is_whole() {
     for (how, words) in [
         (
             "crash",
-            "it.fmu: its process crashed (SIGSEGV, an access to memory that is not its own) in the step of 0.01 s at 0.03 s",
+            "it.fmu: its process was ended by SIGSEGV (an access to memory that is not its own) in the step of 0.01 s at 0.03 s",
         ),
-        ("abort", "it.fmu: its process aborted (SIGABRT)"),
-        (
-            "exit",
-            "it.fmu: its process ended by itself, with exit code 7,",
-        ),
+        ("abort", "it.fmu: its process was ended by SIGABRT"),
+        ("exit", "it.fmu: its process ended with exit code 7 in"),
         (
             "close",
             "it.fmu: its process has closed the line to its host, and hangs in the step of 0.01 s at 0.03 s",

@@ -1,18 +1,12 @@
 //! The bus `ivi-client`: the heads of a reader as stations, each with a command that a toggle bit triggers.
-#![cfg_attr(
-    not(unix),
-    allow(dead_code, unused_imports, reason = "no serial ports are used there")
-)]
 
 mod session;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_base::toml_text::Table;
-#[cfg(unix)]
 use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::{BusError, Free, Port};
 use tickbus_image::signal::SignalTable;
-#[cfg(unix)]
 use tickbus_net::serial;
 
 use crate::LineOptions;
@@ -87,7 +81,6 @@ impl Free for IviClient {
         0
     }
 
-    #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = &self.options.line;
         let mut call = Call::new(serial::open(&line.device, line.settings())?);
@@ -96,10 +89,5 @@ impl Free for IviClient {
         let now = port.clock().now();
         let mut session = session::Session::new(&self.options, &mut self.stations, self.cycle, now);
         call.run(&mut session, port, stop)
-    }
-
-    #[cfg(not(unix))]
-    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
-        Err(crate::line::no_serial_port())
     }
 }

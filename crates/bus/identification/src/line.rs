@@ -6,8 +6,6 @@ use std::path::Path;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value};
-#[cfg(not(unix))]
-use tickbus_fieldbus::BusError;
 use tickbus_fieldbus::CYCLE;
 use tickbus_net::serial;
 
@@ -111,6 +109,13 @@ fn read_device(value: &Value<'_>, may_make: bool) -> Option<String> {
         );
         return None;
     }
+    if !cfg!(unix) {
+        value.wrong(
+            "this system has no pseudo-terminals",
+            "name a serial port, such as device = \"COM3\", or one of a pair of virtual ports",
+        );
+        return None;
+    }
     if !Path::new(link).is_absolute() {
         value.wrong(
             format!("\"{link}\" does not begin with a slash"),
@@ -131,10 +136,4 @@ fn read_baud(value: &Value<'_>) -> Option<u32> {
         );
     }
     found.copied()
-}
-
-/// Serial ports are not supported on this system yet.
-#[cfg(not(unix))]
-pub(crate) fn no_serial_port() -> BusError {
-    BusError::Link("this version has serial ports on Linux and macOS alone".to_owned())
 }

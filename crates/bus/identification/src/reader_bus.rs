@@ -1,21 +1,13 @@
 //! The bus `ivi-reader`: a simulated reader whose heads are stations.
-#![cfg_attr(
-    not(unix),
-    allow(dead_code, unused_imports, reason = "no serial ports are used there")
-)]
 
 use std::io;
 
 use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_base::toml_text::Table;
-#[cfg(unix)]
-use tickbus_fieldbus::tcp::Call;
-use tickbus_fieldbus::tcp::Caller;
+use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{BusError, Free, Port};
 use tickbus_image::signal::SignalTable;
-#[cfg(unix)]
-use tickbus_net::serial;
-use tickbus_net::serial::gone;
+use tickbus_net::serial::{self, gone};
 
 use crate::heads::HeadNumbers;
 use crate::{Carrier, CarrierType, HEADS, Head, LineOptions, Reader, Status};
@@ -101,7 +93,6 @@ impl IviReader {
 }
 
 impl Free for IviReader {
-    #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let line = self.options.line.clone();
         // The carrier may have changed while there was no port.
@@ -120,14 +111,8 @@ impl Free for IviReader {
         let device = serial::open(&line.device, line.settings())?;
         self.serve(Call::new(device), port, stop)
     }
-
-    #[cfg(not(unix))]
-    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
-        Err(crate::line::no_serial_port())
-    }
 }
 
-#[cfg(unix)]
 impl IviReader {
     fn serve<S: tickbus_net::Stream>(
         &mut self,

@@ -64,11 +64,3 @@ pub use tag_address::TagAddress;
 /// The default holding register at which `%I` begins in a server, PLC or machine: after the outputs except for very
 /// large ones, and where `OpenPLC` has its memory words.
 const INPUTS: usize = 1024;
-
-/// Serial ports are not supported on this system yet.
-#[cfg(not(unix))]
-fn no_serial_port() -> tickbus_fieldbus::BusError {
-    tickbus_fieldbus::BusError::Link(
-        "this version has serial ports on Linux and macOS alone; use Modbus TCP".to_owned(),
-    )
-}

@@ -1,24 +1,18 @@
 //! The helper process: `tickbus plugin-helper`, which calls a library on behalf of its host.
 //!
-//! The host passes two things in place of stdin and stdout: a socket for messages, and the file of the shared
-//! memory. Both are moved to other descriptors first, out of the library's way.
+//! The host passes a line for messages, and the shared memory with the image.
 
-use std::fs::File;
 use std::io::{self, Read as _, Write as _};
-use std::os::fd::{AsFd as _, OwnedFd};
-use std::os::unix::net::UnixStream;
 use std::sync::mpsc;
 use std::time::Duration;
-
-use rustix::event::{PollFd, PollFlags, poll};
-use rustix::process::{Signal, getpid, kill_process};
 
 use super::VERSION;
 use super::answer::Answer;
 use super::library::{Bus, Library};
 use super::request::Request;
 use super::setup::Setup;
-use tickbus_base::os::{SharedMemory, flush_log};
+use tickbus_base::os::helper::{self, Line};
+use tickbus_base::os::{MemoryFile, SharedMemory, flush_log};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
 use tickbus_net::{Inbox, Message};
@@ -87,25 +81,16 @@ fn exchange(
 
 /// The host as its helper sees it.
 struct Host {
-    line: UnixStream,
+    line: Line,
     inbox: Inbox,
 }
 
 impl Host {
-    /// Moves the socket and the memory's file away from stdin and stdout. A library that then reads from stdin finds
-    /// nothing, and its prints go to stderr.
-    fn take_over() -> io::Result<(Self, OwnedFd)> {
-        let line = io::stdin().as_fd().try_clone_to_owned()?;
-        let memory = io::stdout().as_fd().try_clone_to_owned()?;
-        let line = UnixStream::from(line);
-        line.peer_addr().map_err(|_| {
-            io::Error::other(
-                "this command is for tickbus itself, which starts it for a driver.cfg with \
-                 kind = \"plugin\" and isolated = true",
-            )
-        })?;
-        rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
-        rustix::stdio::dup2_stdout(io::stderr())?;
+    fn take_over() -> io::Result<(Self, MemoryFile)> {
+        let purpose = "this command is for tickbus itself, which starts it for a driver.cfg with kind = \"plugin\" and \
+                       isolated = true";
+        let (line, memory) = helper::take_over(true, purpose)?;
+        let memory = memory.ok_or_else(|| io::Error::other(purpose))?;
         let inbox = Inbox::new();
         Ok((Self { line, inbox }, memory))
     }
@@ -140,20 +125,17 @@ impl Host {
 
 /// Kills this process if its host has gone and the library does not let the process end within `grace`: nothing else
 /// would. Dropping the returned sender cancels that.
-fn guard(line: &UnixStream, grace: Duration) -> io::Result<mpsc::Sender<()>> {
+fn guard(line: &Line, grace: Duration) -> io::Result<mpsc::Sender<()>> {
     let line = line.try_clone()?;
     let (ended, end) = mpsc::channel();
     std::thread::Builder::new()
         .name("guard".to_owned())
         .spawn(move || {
-            // No event is requested, so only the loss of the other end ends the wait.
-            let mut watched = [PollFd::new(&line, PollFlags::empty())];
-            while poll(&mut watched, None).is_err() {}
+            helper::wait_for_end(&line);
             if end.recv_timeout(grace) == Err(mpsc::RecvTimeoutError::Timeout) {
                 log::error!("the host has gone away, and the library does not end: ending it");
                 flush_log(Nanos::from_millis(100));
-                // Nothing less is certain to work against a library that hangs.
-                let _ = kill_process(getpid(), Signal::KILL);
+                helper::kill_this_process();
             }
         })?;
     Ok(ended)

@@ -1,23 +1,17 @@
 //! The plug-in bus whose library runs in a helper process.
 
-#[cfg(target_vendor = "apple")]
-use std::io::Write as _;
 use std::io::{self, ErrorKind, Read as _};
 use std::net::Shutdown;
-use std::os::fd::{AsFd as _, OwnedFd};
-use std::os::unix::net::UnixStream;
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::path::PathBuf;
+use std::process::Child;
 use std::sync::Arc;
-
-use rustix::process::Signal;
 
 use super::answer::Answer;
 use super::helper::{memory_bytes, out_word};
 use super::request::Request;
 use super::setup::Setup;
 use super::{Limits, VERSION};
+use tickbus_base::os::helper::{self, Line, send_quietly};
 use tickbus_base::os::{Interest, PollSet, SharedMemory};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_fieldbus::{BusError, Exchange, Exchanged, Free, Port};
@@ -138,7 +132,7 @@ struct Helper {
     /// Waits for `line`, and is dropped first.
     set: PollSet,
     interest: Interest,
-    line: UnixStream,
+    line: Line,
     inbox: Inbox,
     memory: SharedMemory,
     /// The system's time, in which the helper runs regardless of the driver's clock.
@@ -158,13 +152,13 @@ impl Helper {
             ))
         };
         let (memory, file) = SharedMemory::create(memory_bytes(&bus.setup)).map_err(cannot)?;
-        let (line, theirs) = UnixStream::pair().map_err(cannot)?;
+        let started = helper::start(&bus.program, "plugin-helper", Some(&file));
+        let (child, line) = started.map_err(cannot)?;
         line.set_nonblocking(true).map_err(cannot)?;
         let mut set = PollSet::new(stop);
         let interest = Interest::Read;
         set.add(0, &line, interest).map_err(cannot)?;
         let clock = Monotonic::shared();
-        let child = spawn(&bus.program, theirs.into(), file).map_err(cannot)?;
         Ok(Self {
             child,
             set,
@@ -298,14 +292,13 @@ impl Helper {
         // If the helper has died already, it keeps its exit status.
         let _ = self.child.kill();
         let status = self.child.wait();
-        let killed = Some(Signal::KILL.as_raw());
-        let right = if matches!(&status, Ok(status) if status.signal() == killed) {
+        let right = if matches!(&status, Ok(status) if helper::was_killed(*status)) {
             "see who did that; the system does when memory is short"
         } else {
             "tell the library's maker"
         };
         let how = match status {
-            Ok(status) => end_of(status),
+            Ok(status) => helper::ending(status),
             Err(error) => format!("ended: {error}"),
         };
         log::debug!("the helper process of {} {how} {detail}", self.library);
@@ -358,7 +351,11 @@ impl Helper {
             match self.line.read(&mut [0; 4096]) {
                 Ok(0) => return Ok(true),
                 Ok(_) => {}
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(false),
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                {
+                    return Ok(false);
+                }
                 Err(error) => return Err(error),
             }
         }
@@ -379,58 +376,5 @@ impl Drop for Helper {
         // If the helper has ended on its own, it keeps its exit status.
         let _ = self.child.kill();
         let _ = self.child.wait();
-    }
-}
-
-/// Writes to a socket whose other end may be gone, without SIGPIPE: the process belongs to the host's application,
-/// which may not ignore that signal.
-#[cfg(not(target_vendor = "apple"))]
-fn send_quietly(line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
-    Ok(rustix::net::send(
-        line,
-        bytes,
-        rustix::net::SendFlags::NOSIGNAL,
-    )?)
-}
-
-#[cfg(target_vendor = "apple")]
-fn send_quietly(mut line: &UnixStream, bytes: &[u8]) -> io::Result<usize> {
-    line.write(bytes)
-}
-
-/// Starts a helper with its socket and its memory in place of stdin and stdout. The helper's prints go to stderr, and
-/// Ctrl-C at the terminal reaches only the host.
-fn spawn(program: &Path, line: OwnedFd, memory: OwnedFd) -> io::Result<Child> {
-    Command::new(program)
-        .arg("plugin-helper")
-        .stdin(Stdio::from(line))
-        .stdout(Stdio::from(memory))
-        .stderr(Stdio::from(io::stderr().as_fd().try_clone_to_owned()?))
-        .process_group(0)
-        .spawn()
-}
-
-/// How a process ended, as text.
-fn end_of(status: ExitStatus) -> String {
-    let names = [
-        (Signal::SEGV, "SIGSEGV"),
-        (Signal::ABORT, "SIGABRT"),
-        (Signal::BUS, "SIGBUS"),
-        (Signal::FPE, "SIGFPE"),
-        (Signal::ILL, "SIGILL"),
-        (Signal::TRAP, "SIGTRAP"),
-        (Signal::KILL, "SIGKILL"),
-        (Signal::TERM, "SIGTERM"),
-    ];
-    match (status.code(), status.signal()) {
-        (Some(code), _) => format!("ended with exit code {code}"),
-        (None, Some(number)) => {
-            let name = names.iter().find(|(signal, _)| signal.as_raw() == number);
-            match name {
-                Some((_, name)) => format!("was ended by {name}"),
-                None => format!("was ended by signal {number}"),
-            }
-        }
-        (None, None) => "ended".to_owned(),
     }
 }

@@ -4,28 +4,21 @@
 //! shared memory, and short messages pass the turn. In both cases the same code (`library`) calls the library.
 
 mod abi;
-#[cfg(unix)]
 mod answer;
 mod direct;
-#[cfg(unix)]
 mod helper;
-#[cfg(unix)]
 mod isolated;
 mod kind;
 mod library;
-#[cfg(unix)]
 mod locate;
 mod options;
 mod outcome;
-#[cfg(unix)]
 mod request;
 mod setup;
 
 use std::path::{Path, PathBuf};
 
-#[cfg(unix)]
 pub use answer::Answer;
-#[cfg(unix)]
 pub use helper::serve as serve_host;
 pub use options::Options;
 pub use outcome::Outcome;
@@ -36,7 +29,6 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusSetup, Free, OpenError};
 
 /// The version that host and helper must share.
-#[cfg(unix)]
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The time limits of library calls.
@@ -76,7 +68,6 @@ pub fn open(options: &Options, line: &BusSetup<'_>) -> Result<Box<dyn Free>, Ope
     Ok(Box::new(direct::Direct::new(setup, limits)))
 }
 
-#[cfg(unix)]
 fn isolated(
     options: &Options,
     directory: &Path,
@@ -88,13 +79,6 @@ fn isolated(
     let program =
         locate::helper(named, &absolute(directory, Path::new(""))).map_err(OpenError::Config)?;
     Ok(Box::new(isolated::Isolated::new(setup, limits, program)))
-}
-
-#[cfg(not(unix))]
-fn isolated(_: &Options, _: &Path, _: Setup, _: Limits) -> Result<Box<dyn Free>, OpenError> {
-    Err(OpenError::Unsupported(
-        "isolated = true is not available on this system; remove it".to_owned(),
-    ))
 }
 
 /// A path in the driver.cfg, relative to its folder.

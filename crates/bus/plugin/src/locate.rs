@@ -74,6 +74,7 @@ fn search(places: Vec<Candidate>) -> Result<PathBuf, Mistake> {
     ))
 }
 
+#[cfg(unix)]
 fn is_program(path: &Path) -> bool {
     use std::os::unix::fs::PermissionsExt as _;
 
@@ -81,14 +82,25 @@ fn is_program(path: &Path) -> bool {
         .is_ok_and(|data| data.is_file() && data.permissions().mode() & 0o111 != 0)
 }
 
+/// Files have no mark of a program on this system.
+#[cfg(not(unix))]
+fn is_program(path: &Path) -> bool {
+    path.is_file()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::os::unix::fs::OpenOptionsExt as _;
 
+    /// Makes a file; the mode counts only where files have one.
     fn file(path: &Path, mode: u32) {
-        let mut options = std::fs::OpenOptions::new();
-        let file = options.write(true).create_new(true).mode(mode).open(path);
+        use std::fs::OpenOptions;
+
+        let mut options = OpenOptions::new();
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, mode);
+        let _ = mode;
+        let file = options.write(true).create_new(true).open(path);
         file.expect("a new file");
     }
 
@@ -96,7 +108,9 @@ mod tests {
     fn the_first_program_is_taken_and_what_is_no_program_is_passed_by() {
         let folder = tempfile::tempdir().expect("a folder");
         let [first, second] = ["first", "second"].map(|name| folder.path().join(name));
-        file(&first, 0o600);
+        if cfg!(unix) {
+            file(&first, 0o600);
+        }
         file(&second, 0o700);
         let places = vec![
             ("a", Err("nothing".to_owned())),

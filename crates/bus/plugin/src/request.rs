@@ -26,10 +26,20 @@ impl Message for Request {
 mod tests {
     use super::*;
     use crate::setup::Station;
-    use std::ffi::OsStr;
-    use std::os::unix::ffi::OsStrExt as _;
+    use std::ffi::OsString;
     use tickbus_fieldbus::Role;
     use tickbus_net::Inbox;
+
+    /// A path that is no text.
+    #[cfg(unix)]
+    fn library() -> OsString {
+        std::os::unix::ffi::OsStringExt::from_vec(b"/opt/vendor \xFF/libx.so".to_vec())
+    }
+
+    #[cfg(windows)]
+    fn library() -> OsString {
+        std::os::windows::ffi::OsStringExt::from_wide(&[0x0043, 0x003A, 0xD800, 0x0078])
+    }
 
     #[test]
     fn requests_arrive_as_they_were_sent() {
@@ -39,7 +49,7 @@ mod tests {
             rx,
         };
         let setup = Setup {
-            library: OsStr::from_bytes(b"/opt/vendor \xFF/libx.so").into(),
+            library: library(),
             name: "Zelle 4".to_owned(),
             directory: "/opt/cell".to_owned(),
             role: Role::Controller,

@@ -1,7 +1,6 @@
 //! The bus: moves bytes between the serial port and the stations, and frames between the stations and the image.
 
 mod diagnosis;
-#[cfg(unix)]
 mod line;
 
 use tickbus_base::os::SerialSettings;
@@ -55,16 +54,8 @@ impl ProfibusDevice {
 }
 
 impl Free for ProfibusDevice {
-    #[cfg(unix)]
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         line::serve(&self.options, &self.stations, port, stop)
-    }
-
-    #[cfg(not(unix))]
-    fn run(&mut self, _port: &mut Port, _stop: &Stop) -> Result<(), BusError> {
-        Err(BusError::Link(
-            "this version has serial ports on Linux and macOS alone".to_owned(),
-        ))
     }
 }
 

@@ -33,6 +33,26 @@ pub enum TcpListener {
     Simulated(Box<dyn SimulatedListener>),
 }
 
+/// Two ends of a connection within this computer, as a system without pairs of local sockets has them.
+///
+/// # Errors
+///
+/// The system has no sockets left.
+pub fn local_pair() -> io::Result<(net::TcpStream, net::TcpStream)> {
+    let listener = net::TcpListener::bind((net::Ipv4Addr::LOCALHOST, 0))?;
+    let one = net::TcpStream::connect(listener.local_addr()?)?;
+    let own = one.local_addr()?;
+    loop {
+        let (two, from) = listener.accept()?;
+        // Another program may have connected first.
+        if from == own {
+            one.set_nodelay(true)?;
+            two.set_nodelay(true)?;
+            return Ok((one, two));
+        }
+    }
+}
+
 impl From<net::TcpStream> for TcpStream {
     fn from(stream: net::TcpStream) -> Self {
         Self::Os(stream)

@@ -1,14 +1,10 @@
 //! Serial ports, for the buses that run on them.
 
 use std::fmt;
-#[cfg(unix)]
 use std::io::{self, ErrorKind};
-#[cfg(unix)]
 use std::path::Path;
 
-#[cfg(unix)]
 use tickbus_base::os::{SerialLine, SerialPort, SerialSettings};
-#[cfg(unix)]
 use tickbus_base::time::Clock;
 use tickbus_base::toml_text::Value;
 
@@ -19,7 +15,11 @@ const DEVICE_LIMIT: usize = 1000;
 
 /// Reads the system's name of a port.
 pub fn read_device(value: &Value<'_>) -> Option<String> {
-    let right = "name the serial port, such as \"/dev/ttyUSB0\"";
+    let right = if cfg!(windows) {
+        "name the serial port, such as \"COM3\""
+    } else {
+        "name the serial port, such as \"/dev/ttyUSB0\""
+    };
     value.label(DEVICE_LIMIT, right).map(str::to_owned)
 }
 
@@ -28,7 +28,6 @@ pub fn read_device(value: &Value<'_>) -> Option<String> {
 /// # Errors
 ///
 /// The port does not exist, is not a serial port, or does not support the settings.
-#[cfg(unix)]
 pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, Error> {
     SerialPort::open(Path::new(device), settings).map_err(|error| no_port(device, settings, &error))
 }
@@ -39,7 +38,6 @@ pub fn open(device: &str, settings: SerialSettings) -> Result<SerialPort, Error>
 /// # Errors
 ///
 /// As [`open`].
-#[cfg(unix)]
 pub fn open_marking(
     device: &str,
     settings: SerialSettings,
@@ -49,9 +47,11 @@ pub fn open_marking(
         .map_err(|error| no_port(device, settings, &error))
 }
 
-#[cfg(unix)]
 fn no_port(device: &str, settings: SerialSettings, error: &io::Error) -> Error {
     let right = match error.kind() {
+        ErrorKind::NotFound if cfg!(windows) => {
+            "plug it in, or correct \"device\"; the device manager shows what is there"
+        }
         ErrorKind::NotFound => {
             "plug it in, or correct \"device\"; ls /dev/serial/by-id shows what is there"
         }

@@ -7,9 +7,7 @@ use std::time::Duration;
 use socket2::SockRef;
 
 use tickbus_base::net::{HalfClose, TcpStream};
-use tickbus_base::os::Pollable;
-#[cfg(unix)]
-use tickbus_base::os::{LinkedTerminal, SerialLine, SerialPort};
+use tickbus_base::os::{LinkedTerminal, Pollable, SerialLine, SerialPort};
 use tickbus_base::time::Nanos;
 
 /// The maximum number of reads from a socket while it is being closed.
@@ -56,13 +54,10 @@ impl<S: Stream + ?Sized> Stream for Box<S> {
     }
 }
 
-#[cfg(unix)]
 impl Stream for SerialPort {}
 
-#[cfg(unix)]
 impl Stream for SerialLine {}
 
-#[cfg(unix)]
 impl Stream for LinkedTerminal {}
 
 /// Closes the sending direction before a connection is closed. With unread bytes the system would reset the connection,

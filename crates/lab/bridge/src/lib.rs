@@ -5,11 +5,9 @@
 
 mod ascii;
 mod lines;
-#[cfg(any(unix, feature = "mqtt"))]
 mod link;
 pub mod mqtt;
 mod outbox;
-#[cfg(unix)]
 pub mod serial;
 mod speaker;
 

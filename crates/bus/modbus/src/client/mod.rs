@@ -10,12 +10,9 @@ mod session;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::WriteGuard;
-#[cfg(unix)]
-use tickbus_fieldbus::tcp::Call;
-use tickbus_fieldbus::tcp::dial;
+use tickbus_fieldbus::tcp::{Call, dial};
 use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
 use tickbus_image::signal::SignalTable;
-#[cfg(unix)]
 use tickbus_net::serial;
 
 use super::Line;
@@ -111,7 +108,6 @@ impl Free for ModbusClient {
                 let mut session = self.session(framing, peer.to_string(), port, port.clock().now());
                 call.run(&mut session, port, stop)
             }
-            #[cfg(unix)]
             Line::Serial(line) => {
                 let mut call = Call::new(serial::open(&line.device, line.settings)?);
                 port.tell("device", &line.device);
@@ -127,8 +123,6 @@ impl Free for ModbusClient {
                 let mut session = self.session(framing, line.device, port, now);
                 call.run(&mut session, port, stop)
             }
-            #[cfg(not(unix))]
-            Line::Serial(_) => Err(super::no_serial_port()),
         }
     }
 }

@@ -40,10 +40,6 @@ pub(super) enum Framing {
         inbox: Vec<u8>,
     },
     /// By their length, and by silence between them.
-    #[cfg_attr(
-        not(unix),
-        expect(dead_code, reason = "no serial ports are used there")
-    )]
     Rtu {
         /// The received part of an answer.
         inbox: Vec<u8>,

@@ -1,7 +1,6 @@
 //! The bus `modbus-server`: clients read and write the image.
 
 mod options;
-#[cfg(unix)]
 mod serial;
 mod tcp;
 mod units;
@@ -43,10 +42,7 @@ impl Free for ModbusServer {
                 };
                 many::serve(address, &mut service, port, stop)
             }
-            #[cfg(unix)]
             Line::Serial(line) => serial::serve(line, &mut self.units, port, stop),
-            #[cfg(not(unix))]
-            Line::Serial(_) => Err(super::no_serial_port()),
         }
     }
 }

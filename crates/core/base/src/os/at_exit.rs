@@ -11,8 +11,48 @@ type Call = (u32, fn());
 
 static CALLS: Mutex<Vec<Call>> = Mutex::new(Vec::new());
 
+#[cfg(unix)]
 unsafe extern "C" {
     fn atexit(function: extern "C" fn()) -> c_int;
+}
+
+/// The function of the C library that the program has, in place of the one that this library has: Windows runs the latter when
+/// it has ended all threads. A program with a C library of its own has no such function, and no call is made.
+///
+/// # Safety
+///
+/// As for `atexit`.
+#[cfg(windows)]
+unsafe fn atexit(function: extern "C" fn()) -> c_int {
+    use windows_sys::Win32::System::LibraryLoader::{
+        GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS, GET_MODULE_HANDLE_EX_FLAG_PIN, GetModuleHandleExW,
+        GetModuleHandleW, GetProcAddress,
+    };
+    use windows_sys::w;
+
+    type Register = unsafe extern "C" fn(extern "C" fn()) -> c_int;
+
+    // SAFETY: the name ends with a zero.
+    let library = unsafe { GetModuleHandleW(w!("ucrtbase.dll")) };
+    if library.is_null() {
+        return -1;
+    }
+    // SAFETY: the library is loaded, and the name ends with a zero.
+    let Some(register) = (unsafe { GetProcAddress(library, c"_crt_atexit".as_ptr().cast()) })
+    else {
+        return -1;
+    };
+    // The function must not be unloaded before it is called.
+    let flags = GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS | GET_MODULE_HANDLE_EX_FLAG_PIN;
+    let mut own = std::ptr::null_mut();
+    // SAFETY: with these flags the second argument is an address in the module that stays loaded.
+    if unsafe { GetModuleHandleExW(flags, function as *const u16, &raw mut own) } == 0 {
+        return -1;
+    }
+    // SAFETY: the type is that of the function in the C library's documentation.
+    let register = unsafe { std::mem::transmute::<_, Register>(register) };
+    // SAFETY: the function stays loaded.
+    unsafe { register(function) }
 }
 
 extern "C" fn exiting() {

@@ -1,17 +1,16 @@
 //! Thin, safe wrappers around the operating system; one file per topic.
 
-#[cfg(unix)]
 mod at_exit;
 mod file_lock;
+pub mod helper;
 mod library;
-#[cfg(unix)]
+#[cfg_attr(not(unix), path = "no_linked_terminal.rs")]
 mod linked_terminal;
 mod log;
 mod marked;
 #[cfg(unix)]
 mod named_memory;
 mod open_files;
-#[cfg(unix)]
 mod own_file;
 mod peer_silence;
 mod poll;
@@ -22,20 +21,16 @@ mod process_watch;
 #[cfg(unix)]
 mod pseudo_terminal;
 mod serial;
-#[cfg(unix)]
 mod serial_line;
-#[cfg(unix)]
 mod shared_memory;
 mod time_stamp_counter;
 mod timer_slack;
 
 /// The questions to a [`PollSet`], and its answers.
 pub use crate::time::{Interest, Ready};
-#[cfg(unix)]
 pub use at_exit::at_exit;
 pub use file_lock::{Lock, lock_file, lock_holder, unlock_file};
 pub use library::{Library, one_line};
-#[cfg(unix)]
 pub use linked_terminal::LinkedTerminal;
 pub use log::{
     collect_log, dropped_log_lines, flush_log, has_log, is_rarely_logged, is_told, log_to_stderr,
@@ -45,7 +40,6 @@ pub use marked::{Characters, Marks};
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
 pub use open_files::raise_open_files;
-#[cfg(unix)]
 pub use own_file::own_file;
 pub use peer_silence::peer_silence;
 pub use poll_set::PollSet;
@@ -54,12 +48,8 @@ pub use pollable::{Pollable, Source};
 pub use process_watch::ProcessWatch;
 #[cfg(unix)]
 pub use pseudo_terminal::PseudoTerminal;
-#[cfg(unix)]
-pub use serial::SerialPort;
-pub use serial::{Parity, SerialSettings};
-#[cfg(unix)]
+pub use serial::{Parity, SerialPort, SerialSettings};
 pub use serial_line::SerialLine;
-#[cfg(unix)]
-pub use shared_memory::SharedMemory;
+pub use shared_memory::{MemoryFile, SharedMemory};
 pub use time_stamp_counter::TimeStampCounter;
 pub use timer_slack::wake_on_time;

@@ -1,5 +1,10 @@
 //! The file that this code was loaded from.
 
+#![cfg_attr(
+    windows,
+    allow(unsafe_code, reason = "the system is asked for a module")
+)]
+
 use std::io;
 use std::path::PathBuf;
 
@@ -25,7 +30,47 @@ pub fn own_file() -> io::Result<PathBuf> {
             None => {}
         }
     }
+    #[cfg(windows)]
+    return windows::own_file();
+    #[cfg(not(windows))]
     Err(io::Error::other("this system does not tell where that is"))
+}
+
+#[cfg(windows)]
+mod windows {
+    use std::ffi::OsString;
+    use std::io;
+    use std::os::windows::ffi::OsStringExt as _;
+    use std::path::PathBuf;
+
+    use windows_sys::Win32::System::LibraryLoader::{
+        GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS, GET_MODULE_HANDLE_EX_FLAG_UNCHANGED_REFCOUNT,
+        GetModuleFileNameW, GetModuleHandleExW,
+    };
+
+    /// The longest path of the system, in UTF-16 units.
+    const LONGEST: usize = 1 << 15;
+
+    pub(super) fn own_file() -> io::Result<PathBuf> {
+        let flags =
+            GET_MODULE_HANDLE_EX_FLAG_FROM_ADDRESS | GET_MODULE_HANDLE_EX_FLAG_UNCHANGED_REFCOUNT;
+        let address = own_file as fn() -> io::Result<PathBuf> as *const u16;
+        let mut module = std::ptr::null_mut();
+        // SAFETY: with these flags the second argument is any address in a module, and the handle is written.
+        if unsafe { GetModuleHandleExW(flags, address, &raw mut module) } == 0 {
+            return Err(io::Error::last_os_error());
+        }
+        let mut name = vec![0; LONGEST];
+        let room = u32::try_from(name.len()).unwrap_or(0);
+        // SAFETY: the buffer has the length given.
+        let length = unsafe { GetModuleFileNameW(module, name.as_mut_ptr(), room) };
+        match usize::try_from(length) {
+            Ok(length) if length > 0 && length < name.len() => {
+                Ok(OsString::from_wide(&name[..length]).into())
+            }
+            _ => Err(io::Error::last_os_error()),
+        }
+    }
 }
 
 /// The suffix in the list of mappings for a deleted file.
@@ -47,7 +92,7 @@ fn mapped_file(maps: &[u8], address: usize) -> Option<&[u8]> {
     })
 }
 
-#[cfg(all(test, target_os = "linux"))]
+#[cfg(all(test, any(target_os = "linux", windows)))]
 mod tests {
     use super::*;
 
@@ -57,6 +102,7 @@ mod tests {
         assert_eq!(own_file().expect("found"), program);
     }
 
+    #[cfg(target_os = "linux")]
     #[test]
     fn files_with_blanks_and_deleted_ones_are_found() {
         let maps = b"1000-2000 r--p 00000000 08:01 77    /a/first\n\

@@ -37,7 +37,6 @@ impl Pollable for TcpListener {
     }
 }
 
-#[cfg(unix)]
 impl Pollable for super::SerialLine {
     fn source(&self) -> Source<'_> {
         match self {
@@ -75,7 +74,6 @@ of_the_system! {
     std::net::TcpListener,
     #[cfg(unix)]
     std::os::unix::net::UnixStream,
-    #[cfg(unix)]
     super::SerialPort,
     #[cfg(unix)]
     super::LinkedTerminal,

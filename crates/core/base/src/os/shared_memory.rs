@@ -9,11 +9,22 @@ use std::sync::atomic::AtomicU32;
 use std::sync::atomic::{AtomicU64, Ordering, fence};
 use std::time::Duration;
 
-use rustix::fd::{AsFd, OwnedFd};
-use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
-
 #[cfg(target_os = "linux")]
 use super::poll::timespec;
+
+#[cfg(unix)]
+mod unix;
+#[cfg(windows)]
+mod windows;
+
+#[cfg(unix)]
+use unix as system;
+#[cfg(unix)]
+pub use unix::MemoryFile;
+#[cfg(windows)]
+use windows as system;
+#[cfg(windows)]
+pub use windows::MemoryFile;
 
 /// Bytes of one word.
 const WORD: usize = size_of::<AtomicU64>();
@@ -38,8 +49,8 @@ impl SharedMemory {
     /// # Errors
     ///
     /// The system has no memory left.
-    pub fn create(bytes: usize) -> io::Result<(Self, OwnedFd)> {
-        let file = file(words(bytes) * WORD)?;
+    pub fn create(bytes: usize) -> io::Result<(Self, MemoryFile)> {
+        let file = system::create(words(bytes) * WORD)?;
         let memory = Self::open(&file, bytes)?;
         Ok((memory, file))
     }
@@ -49,29 +60,19 @@ impl SharedMemory {
     /// # Errors
     ///
     /// The file is not such memory, or is too small.
-    pub fn open(file: &impl AsFd, bytes: usize) -> io::Result<Self> {
+    pub fn open(file: &impl system::Mappable, bytes: usize) -> io::Result<Self> {
         let count = words(bytes);
-        let has = u64::try_from(rustix::fs::fstat(file)?.st_size).unwrap_or(0);
-        if has < (count * WORD) as u64 {
-            let text = format!("the shared memory has {has} bytes, expected {bytes}");
-            return Err(io::Error::new(io::ErrorKind::InvalidData, text));
-        }
-        // SAFETY: a new mapping, at an address that the system chooses, so no memory that is in use
-        // changes. The file is long enough, as checked; where the system can, it is sealed against being
-        // shortened, and elsewhere only processes of this user have it, none of which does that. If one did,
-        // the system would end this process at its next access, rather than let it see anything else.
-        let start = unsafe {
-            mmap(
-                std::ptr::null_mut(),
-                count * WORD,
-                ProtFlags::READ | ProtFlags::WRITE,
-                MapFlags::SHARED,
-                file,
-                0,
-            )?
-        };
-        let words = NonNull::new(start.cast()).expect("mappings are not at address 0");
-        Ok(Self { words, count })
+        let start = system::map(file, count * WORD).map_err(|error| match error {
+            system::Unmapped::TooSmall(has) => {
+                let text = format!("the shared memory has {has} bytes, expected {bytes}");
+                io::Error::new(io::ErrorKind::InvalidData, text)
+            }
+            system::Unmapped::System(error) => error,
+        })?;
+        Ok(Self {
+            words: start.cast(),
+            count,
+        })
     }
 
     /// The memory as words.
@@ -198,49 +199,13 @@ impl SharedMemory {
 impl Drop for SharedMemory {
     fn drop(&mut self) {
         // SAFETY: the whole of a mapping that `open` made; references to it end with borrows of `self`.
-        let unmapped = unsafe { munmap(self.words.as_ptr().cast(), self.count * WORD) };
-        debug_assert!(unmapped.is_ok(), "{unmapped:?}");
+        unsafe { system::unmap(self.words.cast(), self.count * WORD) };
     }
 }
 
 /// The number of words for `bytes` bytes: at least one, since an empty mapping is not allowed.
 fn words(bytes: usize) -> usize {
     SharedMemory::words_for(bytes).max(1)
-}
-
-/// A file in memory, sealed against changes of its size.
-#[cfg(target_os = "linux")]
-fn file(bytes: usize) -> io::Result<OwnedFd> {
-    use rustix::fs::{MemfdFlags, SealFlags, fcntl_add_seals, ftruncate, memfd_create};
-
-    let flags = MemfdFlags::CLOEXEC | MemfdFlags::ALLOW_SEALING;
-    let file = memfd_create("tickbus-image", flags)?;
-    ftruncate(&file, bytes as u64)?;
-    let seals = SealFlags::SHRINK | SealFlags::GROW | SealFlags::SEAL;
-    fcntl_add_seals(&file, seals)?;
-    Ok(file)
-}
-
-/// A file that has already been unlinked.
-#[cfg(not(target_os = "linux"))]
-fn file(bytes: usize) -> io::Result<OwnedFd> {
-    use std::os::unix::fs::OpenOptionsExt as _;
-    use std::sync::atomic::AtomicU32;
-
-    static NEXT: AtomicU32 = AtomicU32::new(0);
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let name = format!("tickbus-{}-{number}", std::process::id());
-    let path = std::env::temp_dir().join(name);
-    let mut options = std::fs::OpenOptions::new();
-    let file = options
-        .read(true)
-        .write(true)
-        .create_new(true)
-        .mode(0o600)
-        .open(&path)?;
-    std::fs::remove_file(&path)?;
-    file.set_len(bytes as u64)?;
-    Ok(file.into())
 }
 
 #[cfg(test)]
@@ -270,8 +235,9 @@ mod tests {
     #[test]
     fn memory_that_is_too_small_is_refused() {
         let (_memory, file) = SharedMemory::create(8).expect("memory");
-        let error = SharedMemory::open(&file, 4096).expect_err("too small");
-        assert!(error.to_string().contains("8 bytes, expected 4096"));
+        // More than a page, which some systems give for any smaller number.
+        let error = SharedMemory::open(&file, 1 << 20).expect_err("too small");
+        assert!(error.to_string().contains("bytes, expected 1048576"));
     }
 
     #[test]

@@ -298,6 +298,15 @@ fn words(message: &str, expected: &str, piece: &str, line: &str) -> Mistake {
         "unexpected leading zero" => {
             Mistake::new("a number begins with 0", "write it without that")
         }
+        // As in the path C:\\users.
+        _ if line.contains('\\')
+            && (message.contains("escape") || message.contains("unicode value")) =>
+        {
+            Mistake::new(
+                "a backslash in double quotes begins an escape such as \\n",
+                "write a path in single quotes, or with slashes",
+            )
+        }
         _ if message.starts_with("invalid basic string")
             || message.starts_with("invalid literal") =>
         {

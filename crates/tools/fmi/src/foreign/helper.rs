@@ -1,10 +1,8 @@
 //! The helper process: `tickbus fmu-helper`, which runs an FMU for its host.
 
-use std::fs::File;
 use std::io::{self, Read as _, Write as _};
-use std::os::fd::AsFd as _;
-use std::os::unix::net::UnixStream;
 
+use tickbus_base::os::helper::{Line, take_over};
 use tickbus_net::{Inbox, Message};
 
 use super::slave::{Direct, Slave as _, Stepped};
@@ -17,15 +15,9 @@ use crate::value::Value;
 ///
 /// This process was not started as a helper, or the host is gone.
 pub fn serve() -> io::Result<()> {
-    let line = io::stdin().as_fd().try_clone_to_owned()?;
-    let mut line = UnixStream::from(line);
-    line.peer_addr().map_err(|_| {
-        io::Error::other(
-            "this command is for tickbus itself, which starts it for `tickbus run --isolated`",
-        )
-    })?;
-    // An FMU that reads from stdin must find nothing.
-    rustix::stdio::dup2_stdin(File::open("/dev/null")?)?;
+    let purpose =
+        "this command is for tickbus itself, which starts it for `tickbus run --isolated`";
+    let (mut line, _) = take_over(false, purpose)?;
     // A helper with a hanging FMU must not outlive its host.
     #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
@@ -66,12 +58,12 @@ pub fn serve() -> io::Result<()> {
     }
 }
 
-fn tell(line: &mut UnixStream, answer: &Answer) -> io::Result<()> {
+fn tell(line: &mut Line, answer: &Answer) -> io::Result<()> {
     line.write_all(&answer.write())
 }
 
 /// Returns the next message; `None` at the end of the line.
-pub(super) fn next<M: Message>(line: &mut UnixStream, inbox: &mut Inbox) -> io::Result<Option<M>> {
+pub(super) fn next<M: Message>(line: &mut Line, inbox: &mut Inbox) -> io::Result<Option<M>> {
     loop {
         if let Some(message) = inbox.take().map_err(io::Error::other)? {
             return Ok(Some(message));

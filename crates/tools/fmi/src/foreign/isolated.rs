@@ -1,11 +1,9 @@
 //! An FMU in a helper process, where it can crash or hang without harm.
 
 use std::io::{self, ErrorKind, Write as _};
-use std::os::fd::{AsFd as _, OwnedFd};
-use std::os::unix::net::UnixStream;
-use std::os::unix::process::{CommandExt as _, ExitStatusExt as _};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ExitStatus};
 
+use tickbus_base::os::helper::{self, Line};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_net::{Inbox, Message as _};
 
@@ -24,7 +22,7 @@ const END: Nanos = Nanos::from_secs(2);
 #[derive(Debug)]
 pub(super) struct Isolated {
     child: Child,
-    line: UnixStream,
+    line: Line,
     inbox: Inbox,
     file: String,
     is_over: bool,
@@ -43,22 +41,13 @@ impl Isolated {
                 setup.file
             ))
         };
-        let (line, theirs) = UnixStream::pair().map_err(cannot)?;
+        let started =
+            std::env::current_exe().and_then(|program| helper::start(&program, "fmu-helper", None));
+        let (child, line) = started.map_err(cannot)?;
         line.set_read_timeout(Some(PATIENCE.to_duration()))
             .map_err(cannot)?;
-        // The FMU's output goes to stderr: stdout belongs to this command.
-        let stderr: OwnedFd = io::stderr().as_fd().try_clone_to_owned().map_err(cannot)?;
-        let child = std::env::current_exe().and_then(|program| {
-            Command::new(program)
-                .arg("fmu-helper")
-                .stdin(OwnedFd::from(theirs))
-                .stdout(Stdio::from(stderr))
-                // Ctrl-C is for the host, which ends the helper.
-                .process_group(0)
-                .spawn()
-        });
         let mut slave = Self {
-            child: child.map_err(cannot)?,
+            child,
             line,
             inbox: Inbox::new(),
             file: setup.file.clone(),
@@ -132,23 +121,11 @@ impl Isolated {
     /// Describes a helper that ended on its own.
     fn gone(&mut self, what: &str) -> Failure {
         let how = match self.ended() {
-            Ok(Some(status)) => ending(status),
+            Ok(Some(status)) => helper::ending(status),
             Ok(None) => "has closed the line to its host, and hangs".to_owned(),
             Err(error) => format!("has gone ({error})"),
         };
         self.failed(&format!("its process {how} in {what}: tell its maker"))
-    }
-}
-
-/// Describes how a process ended, as a part of a sentence.
-fn ending(status: ExitStatus) -> String {
-    match (status.signal(), status.code()) {
-        (Some(11), _) => "crashed (SIGSEGV, an access to memory that is not its own)".to_owned(),
-        (Some(6), _) => "aborted (SIGABRT)".to_owned(),
-        (Some(8), _) => "crashed (SIGFPE, a division by zero)".to_owned(),
-        (Some(signal), _) => format!("was killed by signal {signal}"),
-        (None, Some(code)) => format!("ended by itself, with exit code {code},"),
-        (None, None) => "ended".to_owned(),
     }
 }
 

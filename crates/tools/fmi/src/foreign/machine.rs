@@ -191,13 +191,7 @@ fn open(
     if !options.isolated {
         return Ok(Box::new(Direct::open(setup, inputs, outputs)?));
     }
-    #[cfg(unix)]
-    return Ok(Box::new(super::isolated::Isolated::open(
+    Ok(Box::new(super::isolated::Isolated::open(
         setup, inputs, outputs,
-    )?));
-    #[cfg(not(unix))]
-    Err(Failure(format!(
-        "{}: there are no helper processes on this system; leave out --isolated, or isolated = true",
-        setup.file
-    )))
+    )?))
 }

@@ -2,21 +2,17 @@
 
 mod archive;
 mod description;
-#[cfg(unix)]
 mod helper;
-#[cfg(unix)]
 mod isolated;
 mod join;
 mod library;
 mod machine;
 mod map;
 mod slave;
-#[cfg(unix)]
 mod talk;
 
 pub use archive::Unpacked;
 pub use description::{Causality, ForeignVariable, Model};
-#[cfg(unix)]
 pub use helper::serve;
 pub use join::{Join, Unjoined};
 pub use machine::{Machine, MachineOptions};

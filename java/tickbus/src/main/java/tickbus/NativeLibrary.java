@@ -4,12 +4,17 @@ import java.io.IOException;
 import java.io.InputStream;
 import java.io.OutputStream;
 import java.net.URISyntaxException;
+import java.nio.file.DirectoryIteratorException;
+import java.nio.file.DirectoryStream;
 import java.nio.file.Files;
 import java.nio.file.InvalidPathException;
 import java.nio.file.Path;
+import java.time.Duration;
+import java.time.Instant;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Locale;
+import java.util.stream.Collectors;
 
 /**
  * Finds and loads the native library, once per class loader.
@@ -21,6 +26,13 @@ final class NativeLibrary {
     static final String LIBRARY = "tickbus.library";
     static final String DIRECTORY = "tickbus.native.dir";
     static final String COPY = "tickbus.copy";
+
+    private static final String PREFIX = "tickbus-";
+    /** Much longer than the time from a file's creation until it is loaded. */
+    private static final Duration RECENT = Duration.ofMinutes(10);
+
+    private static final List<String> PLATFORMS =
+        List.of("linux-x86_64", "linux-aarch64", "windows-x86_64", "macos-aarch64", "macos-x86_64");
 
     private static boolean loaded;
 
@@ -92,7 +104,7 @@ final class NativeLibrary {
     }
 
     private boolean insideTheJar() {
-        String resource = "/tickbus/native/" + platform + "/" + file;
+        String resource = resource(platform);
         String place = "inside the jar: " + resource;
         try (InputStream content = NativeLibrary.class.getResourceAsStream(resource)) {
             if (content == null) {
@@ -104,6 +116,12 @@ final class NativeLibrary {
             tried.add(place + ": cannot be read: " + e);
             return false;
         }
+    }
+
+    /** The library for a platform in the jar. */
+    private static String resource(String platform) {
+        String name = platform.startsWith("windows") ? "tickbus.dll" : platform.startsWith("macos") ? "libtickbus.dylib" : "libtickbus.so";
+        return "/tickbus/native/" + platform + "/" + name;
     }
 
     private boolean fromFile(String place, String name) {
@@ -143,9 +161,8 @@ final class NativeLibrary {
 
     private boolean fromCopy(String place, InputStream content) throws IOException {
         extracts = true;
-        Path copy = Files.createTempFile("tickbus-", "-" + file);
-        // Where a loaded library cannot be deleted (Windows), the file stays until the JVM ends, or longer.
-        copy.toFile().deleteOnExit();
+        Path copy = Files.createTempFile(PREFIX, "-" + file);
+        deleteLeftovers(copy);
         // Into the existing file, which only this user can write: a file that replaces it would have the umask's
         // permissions.
         try (OutputStream into = Files.newOutputStream(copy)) {
@@ -162,11 +179,29 @@ final class NativeLibrary {
         }
     }
 
+    /**
+     * Deletes the copies of earlier processes. Windows deletes no library in use, so that a process cannot delete its own;
+     * a recent copy may belong to a process that is about to load it.
+     */
+    private void deleteLeftovers(Path own) {
+        Instant recent = Instant.now().minus(RECENT);
+        try (DirectoryStream<Path> copies = Files.newDirectoryStream(own.getParent(), PREFIX + "*-" + file)) {
+            for (Path copy : copies) {
+                if (!copy.equals(own) && Files.getLastModifiedTime(copy).toInstant().isBefore(recent)) {
+                    deleteWherePossible(copy);
+                }
+            }
+        } catch (IOException | DirectoryIteratorException e) {
+            // Another process deletes them too; or the folder cannot be listed, and they stay.
+            return;
+        }
+    }
+
     private static void deleteWherePossible(Path copy) {
         try {
             Files.deleteIfExists(copy);
         } catch (IOException e) {
-            // In use; deleteOnExit takes care of it.
+            // In use, or of another user; a later process deletes it.
             return;
         }
     }
@@ -180,6 +215,14 @@ final class NativeLibrary {
             .append(" cannot be loaded. Looked at, in this order:");
         for (int i = 0; i < tried.size(); i++) {
             what.append("\n  ").append(i + 1).append(". ").append(tried.get(i));
+        }
+        if (platform.matches(".*-(x86|i[3-6]86|arm)")) {
+            what.append("\n  This is a 32-bit JVM; run a 64-bit one.");
+        }
+        String there = PLATFORMS.stream().filter(name -> NativeLibrary.class.getResource(resource(name)) != null)
+            .collect(Collectors.joining(", "));
+        if (!there.isEmpty()) {
+            what.append("\n  The jar has the library for ").append(there).append('.');
         }
         if (runsOnMusl()) {
             what.append("\n  This JVM runs on the C library musl, but the library in the jar is made for glibc;"

@@ -6,12 +6,16 @@ import java.nio.charset.StandardCharsets;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.regex.Pattern;
 
 /** A separate JVM, for tests that would disturb the current one. */
 final class ChildJvm {
     /** The exit code of the JVM, and its output. */
     record Outcome(int exit, String output) {
     }
+
+    /** Each JVM prints this in Wine. */
+    private static final Pattern IN_WINE = Pattern.compile(".* warning: Attempt to get process group affinity failed.*\n");
 
     private final List<String> command = new ArrayList<>();
 
@@ -33,7 +37,7 @@ final class ChildJvm {
         Process process = new ProcessBuilder(command).redirectErrorStream(true).start();
         process.getOutputStream().close();
         String output = new String(process.getInputStream().readAllBytes(), StandardCharsets.UTF_8);
-        return new Outcome(process.waitFor(), output);
+        return new Outcome(process.waitFor(), IN_WINE.matcher(output.replace("\r\n", "\n")).replaceAll(""));
     }
 
     /** The class path of the tests. */

@@ -9,7 +9,7 @@ final class EndInATick {
 
     public static void main(String[] arguments) throws Exception {
         Path cfg = Path.of(arguments[0]);
-        Tickbus bus = Tickbus.open(cfg, "[record]\nfile = \"" + arguments[1] + "\"\n");
+        Tickbus bus = Tickbus.open(cfg, "[record]\nfile = '" + arguments[1] + "'\n");
         Tickbus busy = Tickbus.open(cfg);
         bus.exchange();
         bus.receive();

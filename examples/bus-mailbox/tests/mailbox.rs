@@ -32,10 +32,7 @@ impl Bus for Folder {
     }
 
     fn fieldbus(&self, _role: &str) -> String {
-        format!(
-            "kind = \"mailbox\"\nfolder = \"{}\"",
-            self.0.path().display()
-        )
+        format!("kind = \"mailbox\"\nfolder = '{}'", self.0.path().display())
     }
 
     /// Writes a file with another image.

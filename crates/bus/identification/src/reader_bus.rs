@@ -100,6 +100,9 @@ impl Free for IviReader {
         take(&mut self.reader, &self.stations, line.carriers, now, port);
         if let Some(link) = line.made() {
             let terminal = tickbus_base::os::LinkedTerminal::open(link).map_err(|error| {
+                if error.kind() == io::ErrorKind::Unsupported {
+                    return BusError::Link(error.to_string());
+                }
                 BusError::Link(format!(
                     "cannot make the pseudo-terminal {} ({error}); remove what is there, or name a folder that can be \
                      written",

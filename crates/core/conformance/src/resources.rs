@@ -71,7 +71,12 @@ impl PartialEq for Resources {
 impl Resources {
     /// The resources of the process at this moment.
     pub fn now() -> Self {
-        let count = |directory: &str| std::fs::read_dir(directory).map_or(0, Iterator::count);
+        // In Wine these folders are there too, and are those of Wine.
+        let is_linux = cfg!(target_os = "linux");
+        let count = |directory: &str| match std::fs::read_dir(directory) {
+            Ok(entries) if is_linux => entries.count(),
+            _ => 0,
+        };
         let tasks = std::fs::read_dir("/proc/self/task").into_iter().flatten();
         let children = tasks
             .flatten()

@@ -21,7 +21,15 @@ impl Library {
     ///
     /// The message of the system's loader, as one line.
     pub fn load(path: &Path) -> Result<Self, String> {
-        open(path).map(Self).map_err(|error| words(&error))
+        open(path).map(Self).map_err(|error| {
+            let words = words(&error);
+            // Windows does not say which file.
+            let shown = path.display().to_string();
+            if words.contains(&shown) {
+                return words;
+            }
+            format!("{shown}: {words}")
+        })
     }
 
     /// The value of an exported symbol: a function, or the address of a variable. It is valid as long as the

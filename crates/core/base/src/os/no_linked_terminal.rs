@@ -16,7 +16,7 @@ impl LinkedTerminal {
     ///
     /// Always.
     pub fn open(_link: &Path) -> io::Result<Self> {
-        let text = "this system has no pseudo-terminals; use a pair of virtual COM ports";
+        let text = "this system has no pseudo-terminals; name a serial port, or one of a pair of virtual ones";
         Err(io::Error::new(ErrorKind::Unsupported, text))
     }
 }

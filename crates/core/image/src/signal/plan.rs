@@ -280,5 +280,11 @@ fn index(number: usize) -> u32 {
     u32::try_from(number).expect("signal tables and frames have fewer than 2^32 slots and bytes")
 }
 
+/// An unscaled number as the codec rounds it. `f64::round` is that of the C library, which in MinGW turns
+/// 0.49999999999999994 into 1.
+pub(super) fn rounded(raw: f64) -> f64 {
+    number::nudge(raw).trunc()
+}
+
 #[cfg(all(test, not(loom)))]
 mod tests;

@@ -1,5 +1,6 @@
 //! The `[[signal]]` sections of a driver.cfg: the same on every bus.
 
+use super::plan::rounded as rounded_by_codec;
 use super::{Address, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot, Width};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, short_number, shown};
@@ -489,7 +490,7 @@ pub fn slot_of(value: &Value<'_>, signal: &Signal, key: &str) -> Option<Slot> {
     let raw = signal.scale.map_or(number, |scale| scale.raw(number));
     // Rounded as the codec rounds it.
     let rounded = if signal.data_type.is_integer() {
-        raw.round()
+        rounded_by_codec(raw)
     } else {
         raw
     };

@@ -30,7 +30,7 @@ fn config(port: u16, role: Role, file: &Path) -> Config {
     let (_, signals) = whole.split_once("[[signal]]").expect("it has signals");
     let text = format!(
         "[driver]\nid = 1\nname = \"Test rig\"\n[fieldbus]\nkind = \"sdsp\"\naddress = \"127.0.0.1:{port}\"\n\
-         role = \"{}\"\n[record]\nfile = \"{}\"\n[[signal]]{signals}",
+         role = \"{}\"\n[record]\nfile = '{}'\n[[signal]]{signals}",
         role.name(),
         file.display()
     );

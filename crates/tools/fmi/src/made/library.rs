@@ -269,7 +269,7 @@ mod tests {
     /// Returns the libraries found in a folder: their platforms and their sources.
     fn found(folder: &Path) -> Result<Vec<(&'static str, String)>, String> {
         let found = find_libraries(&[], Some(folder)).map_err(|mistake| mistake.to_string())?;
-        let place = format!("{}/", folder.display());
+        let place = format!("{}{}", folder.display(), std::path::MAIN_SEPARATOR);
         let tell = |one: NativeLibrary| (one.platform.tuple, one.origin.replace(&place, ""));
         Ok(found.into_iter().map(tell).collect())
     }

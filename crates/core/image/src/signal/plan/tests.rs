@@ -1,6 +1,7 @@
-//! Numbers against a model: one signal at a time, rounded and cut by the standard library.
+//! Numbers against a model: one signal at a time, rounded by the definition, and cut.
 
 use super::*;
+use number::half_away_from_zero;
 
 /// The bounds of an integer type as doubles, and its bytes, the most significant one first.
 struct Whole {
@@ -87,7 +88,7 @@ fn integers_are_rounded_half_away_from_zero_and_cut_at_their_bounds_wherever_the
         let (expected, saturated): (Vec<_>, Vec<_>) = values
             .iter()
             .map(|value| {
-                let rounded = value.round();
+                let rounded = half_away_from_zero(*value);
                 let cut = rounded.clamp(bounds[0], bounds[1]);
                 (bytes(cut), (cut - rounded).abs() > 0.0)
             })

@@ -57,7 +57,9 @@ class CheckJniTest {
 
     /** The version of the JDK in a folder; 0 if it is not a JDK. */
     private static int feature(Path home) {
-        if (!Files.isExecutable(home.resolve("bin").resolve("java"))) {
+        // In Wine the JDKs of the computer are there, too.
+        String program = File.separatorChar == '\\' ? "java.exe" : "java";
+        if (!Files.isExecutable(home.resolve("bin").resolve(program))) {
             return 0;
         }
         try {

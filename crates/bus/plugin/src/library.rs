@@ -153,7 +153,8 @@ impl Library {
             if byte == 0 {
                 break;
             }
-            bytes.push(byte.cast_unsigned());
+            let [byte] = byte.to_ne_bytes();
+            bytes.push(byte);
         }
         let text = one_line(&String::from_utf8_lossy(&bytes));
         (!text.is_empty()).then_some(text)

@@ -26,6 +26,9 @@ use windows_sys::Win32::Networking::WinSock::{
     FROM_PROTOCOL_INFO, INVALID_SOCKET, WSA_FLAG_NO_HANDLE_INHERIT, WSA_FLAG_OVERLAPPED,
     WSADuplicateSocketW, WSAGetLastError, WSAPROTOCOL_INFOW, WSASocketW,
 };
+use windows_sys::Win32::System::Diagnostics::Debug::{
+    SEM_FAILCRITICALERRORS, SEM_NOGPFAULTERRORBOX, SetErrorMode,
+};
 use windows_sys::Win32::System::Threading::{
     CREATE_NEW_PROCESS_GROUP, CREATE_NO_WINDOW, GetCurrentProcess, TerminateProcess,
 };
@@ -105,6 +108,9 @@ fn handle_for(child: &Child, memory: &MemoryFile) -> io::Result<usize> {
 }
 
 pub(super) fn take_over(expects_memory: bool) -> io::Result<(Line, Option<MemoryFile>)> {
+    // A crash ends the process at once: no window asks what to do about it.
+    // SAFETY: the call has no preconditions.
+    unsafe { SetErrorMode(SEM_FAILCRITICALERRORS | SEM_NOGPFAULTERRORBOX) };
     // Sockets work only after the first one of std.
     drop(std::net::UdpSocket::bind("127.0.0.1:0")?);
     let mut stdin = io::stdin().lock();

@@ -10,11 +10,12 @@ use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::{Signal, SignalTable, Station};
 use tickbus_net::{Address, Host};
 
+use super::keys::LOGINS;
 use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};
 
 /// The longest `write_to`, in characters.
-const IDENTITY_LIMIT: usize = 1000;
+pub(crate) const IDENTITY_LIMIT: usize = 1000;
 
 /// The shortest publishing and sampling interval: servers count both in milliseconds.
 const SHORTEST: Nanos = Nanos::from_millis(1);
@@ -280,7 +281,7 @@ impl ServerOptions {
         let is_single_writer = Writers::read(table);
         if !keys.has_user() && anonymous.is_none() {
             table.require_one_of(
-                &["user", "anonymous"],
+                &LOGINS,
                 "name the user that may log in, with password_file or password_env, or write \
                  anonymous = true to let everybody in",
             );

@@ -4,6 +4,7 @@
 
 mod config;
 mod driver_table;
+pub mod keys;
 mod kinds;
 mod layout;
 pub mod loopback;

@@ -61,6 +61,3 @@ pub(crate) const SERVER: &[Key] = &[
     ),
     Key::new("anonymous", Shape::Boolean, "true: everybody can log in"),
 ];
-
-/// Those of which a server has one.
-pub(crate) const LOGINS: [&str; 2] = ["user", "anonymous"];

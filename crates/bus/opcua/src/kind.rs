@@ -6,7 +6,7 @@ use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{ClientOptions, ServerOptions, keys, security};
+use super::{ClientOptions, ServerOptions, keys, options, security};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
@@ -62,7 +62,7 @@ impl BusKind for ServerOptions {
     const NAME: &'static str = "opcua-server";
     const LEARNS_OF_WRITES: bool = true;
     const KEYS: &'static [&'static [Key]] = &[keys::SERVER, security::KEYS, Writers::KEYS];
-    const ONE_OF: &'static [&'static str] = &keys::LOGINS;
+    const ONE_OF: &'static [&'static str] = &options::LOGINS;
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)

@@ -10,12 +10,14 @@ use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::{Signal, SignalTable, Station};
 use tickbus_net::{Address, Host};
 
-use super::keys::LOGINS;
 use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};
 
 /// The longest `write_to`, in characters.
 pub(crate) const IDENTITY_LIMIT: usize = 1000;
+
+/// The keys of which a server has one: someone can log in.
+pub(crate) const LOGINS: [&str; 2] = ["user", "anonymous"];
 
 /// The shortest publishing and sampling interval: servers count both in milliseconds.
 const SHORTEST: Nanos = Nanos::from_millis(1);

@@ -9,6 +9,9 @@ use tickbus_record as record;
 
 use crate::{driver_table, layout, page, timing};
 
+pub use crate::kind_keys::KindKeys;
+pub use crate::layout::STATION_LIMIT;
+
 const ROLES: [&str; Role::ALL.len()] = [Role::ALL[0].name(), Role::ALL[1].name()];
 
 /// The keys of `[fieldbus]` on every bus, beside `kind` and `events`, in groups.
@@ -73,21 +76,3 @@ pub const FILE: &[Key] = &[
         "Shows the driver on a live page",
     ),
 ];
-
-/// The most stations of a driver.
-pub use crate::layout::STATION_LIMIT;
-
-/// The keys of one kind of bus.
-#[derive(Clone, Copy, Debug)]
-pub struct KindKeys {
-    /// The kind's name.
-    pub name: &'static str,
-    /// True if `events` can be `"writes"`.
-    pub learns_of_writes: bool,
-    /// Its keys in `[fieldbus]`, in groups.
-    pub keys: &'static [&'static [Key]],
-    /// Those of which a file has at least one; empty if it can be without all of them.
-    pub one_of: &'static [&'static str],
-    /// Its keys in a `[[station]]`.
-    pub station_keys: &'static [Key],
-}

@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::{BusKind, BusOptions, Events, Role};
 use tickbus_plc::Programs;
 
-use crate::keys::KindKeys;
+use crate::kind_keys::KindKeys;
 use crate::{Options, loopback};
 
 /// Reads the keys of one kind in `[fieldbus]`; see [`BusKind::read`].

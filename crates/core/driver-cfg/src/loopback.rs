@@ -10,7 +10,7 @@ use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL, Programs};
 use tickbus_record as record;
 
-use crate::keys::KindKeys;
+use crate::kind_keys::KindKeys;
 
 /// The name of the kind in a driver.cfg.
 pub const NAME: &str = "loopback";

@@ -1,7 +1,7 @@
 //! The effect of a fault: the keys of its kind.
 
 use super::Keys;
-use super::keys::SIGNAL;
+use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::{
@@ -78,22 +78,12 @@ fn read_chance(keys: &Keys<'_>, usual: Option<f64>) -> Option<f64> {
     None
 }
 
-/// The directions of lost and repeated frames.
-pub(super) const DIRECTIONS: [(&str, Direction); 3] = [
-    ("in", Direction::In),
-    ("out", Direction::Out),
-    ("both", Direction::Both),
-];
-
 fn read_direction(keys: &Keys<'_>) -> Option<Direction> {
     let choose = |value: &Value<'_>| value.choice("directions", &DIRECTIONS);
     keys.direction
         .as_ref()
         .map_or(Some(Direction::Both), choose)
 }
-
-/// The maximum number of slots and channels that a diagnosis distinguishes in a station.
-pub(super) const DIAGNOSIS_LIMIT: i128 = 64;
 
 fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<Diagnosis> {
     let small = |value: &Value<'_>, range| {

@@ -3,8 +3,8 @@
 use tickbus_base::toml_text::{Key, Shape, names};
 use tickbus_image::signal::section::NAME_LIMIT;
 
+use super::super::Direction;
 use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
-use super::effect::{DIAGNOSIS_LIMIT, DIRECTIONS};
 
 /// The keys of one kind of faults, beside those that all kinds have.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +109,16 @@ const KIND_NAMES: [&str; FAULT_KINDS.len()] = {
     }
     names
 };
+
+/// The directions of lost and repeated frames.
+pub(super) const DIRECTIONS: [(&str, Direction); 3] = [
+    ("in", Direction::In),
+    ("out", Direction::Out),
+    ("both", Direction::Both),
+];
+
+/// The maximum number of slots and channels that a diagnosis distinguishes in a station.
+pub(super) const DIAGNOSIS_LIMIT: i128 = 64;
 
 /// A number, or a text with a number and its unit.
 const QUANTITY: Shape = Shape::Any(&[Shape::Number, Shape::Text]);

@@ -130,39 +130,48 @@ pub(super) struct Job<'a> {
     pub(super) interval: Nanos,
 }
 
-/// Reads the driver.cfg, hosts the program, and reports on stdout.
-pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
-    let title = job.title;
+/// Reads the driver.cfg, with what the command line asks for.
+fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
+    let (title, format) = (job.title, &arguments.format);
     let asked = CommandLineEnd {
         role: job.role,
         moved: arguments.address.is_some(),
     };
-    let format = &arguments.format;
     let mut config = match Config::load_as(job.file, Some(asked), job.kinds) {
         Ok(config) => config,
-        Err(mistakes) => return format.refuse(title, &mistakes),
+        Err(mistakes) => return Err(format.refuse(title, &mistakes)),
     };
     if let Some(address) = &arguments.address
         && let Err(error) = config.bus.set_address(address)
     {
         let reason = format!("--address: {error} (the bus is \"{}\")", config.bus.kind());
-        return format.fail(title, &reason, Outcome::WrongInput);
+        return Err(format.fail(title, &reason, Outcome::WrongInput));
     }
     if let Some(file) = &arguments.faults
         && let Err(mistakes) = config.add_faults(file)
     {
-        return format.refuse(title, &mistakes);
+        return Err(format.refuse(title, &mistakes));
     }
     // The [record] table belongs to the simulation, which may run at the other end of the same line.
     config.record = match arguments.record.as_deref().map(recording).transpose() {
         Ok(record) => record,
         Err(error) => {
-            return format.fail(title, &format!("--record: {error}"), Outcome::WrongInput);
+            return Err(format.fail(title, &format!("--record: {error}"), Outcome::WrongInput));
         }
     };
     if let Some(page) = &arguments.page {
         page.ask(&mut config);
     }
+    Ok(config)
+}
+
+/// Reads the driver.cfg, hosts the program, and reports on stdout.
+pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
+    let (title, format) = (job.title, &arguments.format);
+    let config = match configure(&job, arguments) {
+        Ok(config) => config,
+        Err(outcome) => return outcome,
+    };
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
         let stop = stop.clone();

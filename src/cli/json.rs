@@ -45,7 +45,10 @@ impl Format {
     pub(super) fn fail(&self, title: &str, reason: &str, outcome: Outcome) -> Outcome {
         eprintln!("{reason}");
         if self.json {
-            print_document(title, json!({ "ok": false, "reason": reason }));
+            let bare = reason.strip_prefix(title);
+            let bare = bare.and_then(|reason| reason.strip_prefix(": "));
+            let document = json!({ "ok": false, "reason": bare.unwrap_or(reason) });
+            print_document(title, document);
         }
         outcome
     }

@@ -97,6 +97,6 @@ fn write(title: &str, line: &Mutex<Line>, stop: &Stop) {
             line.text
         );
         line.is_shown = true;
-        next = next + INTERVAL;
+        next += INTERVAL;
     }
 }

@@ -53,7 +53,7 @@ struct Count {
     ticks: u64,
 }
 
-/// What each file of a run needs.
+/// The data that each file of a run needs.
 struct Job<'a> {
     arguments: &'a Arguments,
     kinds: &'static Kinds,

@@ -304,3 +304,46 @@ fn systemd_accepts_the_units_and_the_command_their_options() {
     let told = String::from_utf8_lossy(&verified.stderr);
     assert!(verified.status.success() && told.is_empty(), "{told}");
 }
+
+/// Reads from a pipe that has no writer yet, with stderr on a terminal.
+#[test]
+#[cfg(unix)]
+fn work_that_takes_long_is_a_line_on_a_terminal_which_is_erased() {
+    use std::process::Stdio;
+    use std::time::Duration;
+
+    let folder = tempfile::tempdir().expect("a folder");
+    let pipe = folder.path().join("tags.csv");
+    let made = Command::new("mkfifo").arg(&pipe).status();
+    assert!(made.expect("mkfifo").success());
+    let (mut terminal, name) = tickbus_base::os::PseudoTerminal::open().expect("a terminal");
+    let screen = fs::File::options()
+        .write(true)
+        .open(name)
+        .expect("its other end");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .arg("import")
+        .arg(&pipe)
+        .env("TERM", "xterm")
+        .stdout(Stdio::null())
+        .stderr(screen)
+        .spawn()
+        .expect("the tickbus program runs");
+    let mut told = String::new();
+    let mut read_until = |told: &mut String, words: &str| {
+        let mut bytes = [0; 1000];
+        while !told.contains(words) {
+            let count = terminal.read_within(&mut bytes, Duration::from_secs(60));
+            let count = count.expect("the terminal");
+            assert!(count > 0, "{words} in {told:?}");
+            told.push_str(&String::from_utf8_lossy(&bytes[..count]));
+        }
+    };
+    read_until(&mut told, "\r\x1b[Kimport: reading tags.csv, ");
+    fs::write(&pipe, "Valve;%QX0.0;BOOL\n").expect("a reader");
+    assert!(command.wait().expect("it ends").success());
+    read_until(&mut told, "import: ok signals=1");
+    let (shown, end) = told.rsplit_once("\r\x1b[K").expect("erased");
+    assert!(shown.ends_with(" s"), "{told:?}");
+    assert!(end.starts_with("import: ok"), "{told:?}");
+}

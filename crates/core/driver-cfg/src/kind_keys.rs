@@ -9,10 +9,10 @@ pub struct KindKeys {
     pub name: &'static str,
     /// True if `events` can be `"writes"`.
     pub learns_of_writes: bool,
-    /// Its keys in `[fieldbus]`, in groups.
+    /// The keys in `[fieldbus]`, in groups.
     pub keys: &'static [&'static [Key]],
     /// Those of which a file has at least one; empty if it can be without all of them.
     pub one_of: &'static [&'static str],
-    /// Its keys in a `[[station]]`.
+    /// The keys in a `[[station]]`.
     pub station_keys: &'static [Key],
 }

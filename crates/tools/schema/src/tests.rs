@@ -141,7 +141,7 @@ fn every_file_with_a_structural_mistake_fails() {
     assert!(failed > 50, "{failed} files are there");
 }
 
-/// What the right files do not have.
+/// Tables that the right files do not have.
 const MORE: &str = r#"
 [driver]
 id = 1

@@ -44,7 +44,11 @@ fn the_long_version_has_commit_and_features_and_the_short_one_is_a_line() {
     let first = lines.next().expect("a line");
     let rest = first.strip_prefix(short.trim_end()).expect("the version");
     // An archive has no git, and no commit.
-    if repository().join(".git").exists() {
+    let git = Command::new("git")
+        .arg("log")
+        .current_dir(repository())
+        .output();
+    if git.is_ok_and(|git| git.status.success()) {
         let (commit, date) = rest
             .strip_prefix(" (")
             .and_then(|rest| rest.strip_suffix(')')?.split_once(' '))
@@ -305,44 +309,71 @@ fn systemd_accepts_the_units_and_the_command_their_options() {
     assert!(verified.status.success() && told.is_empty(), "{told}");
 }
 
-/// Reads from a pipe that has no writer yet, with stderr on a terminal.
+/// A terminal on which a command shows its messages, and what it has shown.
+#[cfg(unix)]
+struct Terminal {
+    end: tickbus_base::os::PseudoTerminal,
+    told: String,
+}
+
+#[cfg(unix)]
+impl Terminal {
+    /// Starts the command with stderr on a new terminal.
+    fn with(command: &mut Command) -> (Self, std::process::Child) {
+        let (end, name) = tickbus_base::os::PseudoTerminal::open().expect("a terminal");
+        let screen = fs::File::options().write(true).open(name);
+        let child = command
+            .env("TERM", "xterm")
+            .stdout(std::process::Stdio::null())
+            .stderr(screen.expect("its other end"))
+            .spawn()
+            .expect("the tickbus program runs");
+        let told = String::new();
+        (Self { end, told }, child)
+    }
+
+    fn await_words(&mut self, words: &str) {
+        let mut bytes = [0; 1000];
+        while !self.told.contains(words) {
+            let patience = std::time::Duration::from_secs(60);
+            let count = self.end.read_within(&mut bytes, patience);
+            let count = count.expect("the terminal");
+            assert!(count > 0, "{words} in {:?}", self.told);
+            self.told
+                .push_str(&String::from_utf8_lossy(&bytes[..count]));
+        }
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn a_terminal_has_colours_unless_the_user_wants_none() {
+    for (no_colour, has_colours) in [("", true), ("1", false)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"));
+        command.args(["check", "--no-such-option"]);
+        command.env("NO_COLOR", no_colour).env_remove("CLICOLOR");
+        let (mut terminal, mut child) = Terminal::with(&mut command);
+        terminal.await_words("For more information");
+        assert_eq!(child.wait().expect("it ends").code(), Some(2));
+        assert_eq!(terminal.told.contains('\x1b'), has_colours, "{no_colour}");
+    }
+}
+
+/// Reads from a pipe that has no writer yet.
 #[test]
 #[cfg(unix)]
 fn work_that_takes_long_is_a_line_on_a_terminal_which_is_erased() {
-    use std::process::Stdio;
-    use std::time::Duration;
-
     let folder = tempfile::tempdir().expect("a folder");
     let pipe = folder.path().join("tags.csv");
     let made = Command::new("mkfifo").arg(&pipe).status();
     assert!(made.expect("mkfifo").success());
-    let (mut terminal, name) = tickbus_base::os::PseudoTerminal::open().expect("a terminal");
-    let screen = fs::File::options()
-        .write(true)
-        .open(name)
-        .expect("its other end");
-    let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .arg("import")
-        .arg(&pipe)
-        .env("TERM", "xterm")
-        .stdout(Stdio::null())
-        .stderr(screen)
-        .spawn()
-        .expect("the tickbus program runs");
-    let mut told = String::new();
-    let mut read_until = |told: &mut String, words: &str| {
-        let mut bytes = [0; 1000];
-        while !told.contains(words) {
-            let count = terminal.read_within(&mut bytes, Duration::from_secs(60));
-            let count = count.expect("the terminal");
-            assert!(count > 0, "{words} in {told:?}");
-            told.push_str(&String::from_utf8_lossy(&bytes[..count]));
-        }
-    };
-    read_until(&mut told, "\r\x1b[Kimport: reading tags.csv, ");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"));
+    let (mut terminal, mut child) = Terminal::with(command.arg("import").arg(&pipe));
+    terminal.await_words("\r\x1b[Kimport: reading tags.csv, ");
     fs::write(&pipe, "Valve;%QX0.0;BOOL\n").expect("a reader");
-    assert!(command.wait().expect("it ends").success());
-    read_until(&mut told, "import: ok signals=1");
+    assert!(child.wait().expect("it ends").success());
+    terminal.await_words("import: ok signals=1");
+    let told = &terminal.told;
     let (shown, end) = told.rsplit_once("\r\x1b[K").expect("erased");
     assert!(shown.ends_with(" s"), "{told:?}");
     assert!(end.starts_with("import: ok"), "{told:?}");

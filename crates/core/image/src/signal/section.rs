@@ -101,15 +101,12 @@ const TYPES: [&str; DataType::ALL.len()] = {
     names
 };
 
-const ORDERS: [&str; ByteOrder::ALL.len()] = {
-    let mut names = [""; ByteOrder::ALL.len()];
-    let mut index = 0;
-    while index < names.len() {
-        names[index] = ByteOrder::ALL[index].name();
-        index += 1;
-    }
-    names
-};
+const ORDERS: [&str; 4] = [
+    ByteOrder::Abcd.name(),
+    ByteOrder::Cdab.name(),
+    ByteOrder::Badc.name(),
+    ByteOrder::Dcba.name(),
+];
 
 /// The edges that can be latched.
 const LATCHES: [(&str, Latch); 3] = [

@@ -189,8 +189,9 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "static",
         Shape::Boolean,
-        "diagnosis: true: the station has no valid data",
-    ),
+        "diagnosis: true: the device cannot exchange data, and its master continues to read the diagnosis",
+    )
+    .or("false"),
     Key::new(
         "seed",
         Shape::Whole(0, u64::MAX as i128),

@@ -1,11 +1,13 @@
 //! `tickbus check FILE`: prints the signal table of a driver.cfg, or every mistake in it.
 
 mod axes;
+mod document;
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use super::json::{Format, print_document};
 use super::{Outcome, print};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
@@ -21,15 +23,18 @@ use tickbus_record as record;
 pub(super) struct Arguments {
     /// The driver.cfg to check.
     file: PathBuf,
+
+    #[command(flatten)]
+    format: Format,
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     match Config::load(&arguments.file, kinds) {
-        Ok(config) => print("check", &report(&config)),
-        Err(mistakes) => {
-            eprintln!("{mistakes}\ncheck: failed mistakes={}", mistakes.len());
-            Outcome::WrongInput
+        Ok(config) if arguments.format.is_json() => {
+            print_document("check", document::document(&config))
         }
+        Ok(config) => print("check", &report(&config)),
+        Err(mistakes) => arguments.format.refuse("check", &mistakes),
     }
 }
 
@@ -300,12 +305,17 @@ fn bit_of_word(signal: &Signal, station: &Station, taken: &HashSet<WordKey>) -> 
         .unwrap_or_default()
 }
 
+fn edge(latch: Latch) -> &'static str {
+    match latch {
+        Latch::Rising => "rising",
+        Latch::Falling => "falling",
+        Latch::Both => "both",
+    }
+}
+
 fn latch(signal: &Signal) -> String {
-    let edge = match signal.latch {
-        None => return String::new(),
-        Some(Latch::Rising) => "rising",
-        Some(Latch::Falling) => "falling",
-        Some(Latch::Both) => "both",
+    let Some(edge) = signal.latch.map(edge) else {
+        return String::new();
     };
     if signal.hold == Nanos::ZERO {
         edge.to_owned()

@@ -1,9 +1,11 @@
 //! `tickbus gsd FILE`: the GSD file of a custom machine.
 
-use std::io::Write as _;
 use std::path::PathBuf;
 
-use super::Outcome;
+use serde_json::json;
+
+use super::json::{Format, print_document};
+use super::{Outcome, print};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
 use tickbus_bus_profibus as profibus;
@@ -18,6 +20,9 @@ pub(super) struct Arguments {
     /// The stations with this ident, such as 0x80E0, if there are several.
     #[arg(long, value_name = "NUMBER", value_parser = ident)]
     ident: Option<u16>,
+
+    #[command(flatten)]
+    format: Format,
 }
 
 fn ident(text: &str) -> Result<u16, String> {
@@ -40,19 +45,9 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         let made = options.gsd(&config.name, &config.table, arguments.ident);
         made.map_err(of_file)
     });
-    // A reader of stdout that is gone (`| head`) need not be reported.
     match made {
-        Ok(text) => {
-            let _ = std::io::stdout().lock().write_all(text.as_bytes());
-            Outcome::Done
-        }
-        Err(mistakes) => {
-            let _ = writeln!(
-                std::io::stderr().lock(),
-                "{mistakes}\ngsd: failed mistakes={}",
-                mistakes.len()
-            );
-            Outcome::WrongInput
-        }
+        Ok(text) if arguments.format.is_json() => print_document("gsd", json!({ "gsd": text })),
+        Ok(text) => print("gsd", &text),
+        Err(mistakes) => arguments.format.refuse("gsd", &mistakes),
     }
 }

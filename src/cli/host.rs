@@ -5,8 +5,12 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use serde_json::{Map, Value, json};
+
 use super::Outcome;
+use super::json::{Format, print_document};
 use crate::page::{self, PageError, Place};
+use tickbus_base::statistics::entries;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Host, Watch};
 use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds, PageOptions};
@@ -48,6 +52,21 @@ pub(super) struct Hosting {
     #[arg(long, value_name = "INTERVAL", num_args = 0..=1, require_equals = false,
         default_missing_value = "", value_parser = stats)]
     stats: Option<Stats>,
+
+    #[command(flatten)]
+    pub(super) format: Format,
+}
+
+impl Hosting {
+    /// Prints lines while the program runs: on stdout, or with `--json` on stderr.
+    fn say(&self, text: &str) -> io::Result<()> {
+        let mut out: Box<dyn io::Write> = if self.format.is_json() {
+            Box::new(io::stderr().lock())
+        } else {
+            Box::new(io::stdout().lock())
+        };
+        out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    }
 }
 
 /// The address at which to serve the page; `None` leaves it to the driver.cfg.
@@ -111,67 +130,74 @@ pub(super) struct Job<'a> {
     pub(super) interval: Nanos,
 }
 
-/// Reads the driver.cfg, hosts the program, and reports on stdout.
-pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
-    let title = job.title;
+/// Reads the driver.cfg, with what the command line asks for.
+fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
+    let (title, format) = (job.title, &arguments.format);
     let asked = CommandLineEnd {
         role: job.role,
         moved: arguments.address.is_some(),
     };
     let mut config = match Config::load_as(job.file, Some(asked), job.kinds) {
         Ok(config) => config,
-        Err(mistakes) => {
-            eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());
-            return Outcome::WrongInput;
-        }
+        Err(mistakes) => return Err(format.refuse(title, &mistakes)),
     };
     if let Some(address) = &arguments.address
         && let Err(error) = config.bus.set_address(address)
     {
-        eprintln!("--address: {error} (the bus is \"{}\")", config.bus.kind());
-        return Outcome::WrongInput;
+        let reason = format!("--address: {error} (the bus is \"{}\")", config.bus.kind());
+        return Err(format.fail(title, &reason, Outcome::WrongInput));
     }
     if let Some(file) = &arguments.faults
         && let Err(mistakes) = config.add_faults(file)
     {
-        eprintln!("{mistakes}\n{title}: failed mistakes={}", mistakes.len());
-        return Outcome::WrongInput;
+        return Err(format.refuse(title, &mistakes));
     }
     // The [record] table belongs to the simulation, which may run at the other end of the same line.
     config.record = match arguments.record.as_deref().map(recording).transpose() {
         Ok(record) => record,
         Err(error) => {
-            eprintln!("--record: {error}");
-            return Outcome::WrongInput;
+            return Err(format.fail(title, &format!("--record: {error}"), Outcome::WrongInput));
         }
     };
     if let Some(page) = &arguments.page {
         page.ask(&mut config);
     }
+    Ok(config)
+}
+
+/// Reads the driver.cfg, hosts the program, and reports on stdout.
+pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
+    let (title, format) = (job.title, &arguments.format);
+    let config = match configure(&job, arguments) {
+        Ok(config) => config,
+        Err(outcome) => return outcome,
+    };
     let stop = Stop::new();
     if let Err(error) = ctrlc::set_handler({
         let stop = stop.clone();
         move || stop.stop()
     }) {
-        eprintln!("{title}: Ctrl-C cannot be caught: {error}");
-        return Outcome::BusFailed;
+        let reason = format!("{title}: Ctrl-C cannot be caught: {error}");
+        return format.fail(title, &reason, Outcome::BusFailed);
     }
     let report = job.program.report();
     let clock = Monotonic::shared();
     let host = match Host::open(&config, job.program, job.interval, Arc::clone(&clock) as _) {
         Ok(host) => host,
         Err(error) => {
-            eprintln!("{title}: {error}");
-            return if error.is_wrong_input() {
-                Outcome::WrongInput
-            } else {
-                Outcome::BusFailed
-            };
+            let outcome = outcome_of(error.is_wrong_input());
+            return format.fail(title, &format!("{title}: {error}"), outcome);
         }
     };
-    let _place = match show(title, &config, || host.watch()) {
+    let announce = |url: &str| {
+        let _ = arguments.say(&format!("{title}: page at {url}\n"));
+    };
+    let _place = match page::show(&config, || host.watch(), announce) {
         Ok(place) => place,
-        Err(outcome) => return outcome,
+        Err(error) => {
+            let outcome = outcome_of(error.is_wrong_input());
+            return format.fail(title, &format!("{title}: {error}"), outcome);
+        }
     };
     let is_done = || report.as_ref().is_some_and(|report| report.is_done());
     // The line keeps running even if the reader of stdout is gone (`| head`).
@@ -179,8 +205,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let statistics = host.statistics();
     let (scans, stale) = host.scans();
     // Only a run on virtual time has a hash.
-    let hash = host.fact("sdsp.hash").map(|hash| format!(" hash={hash}"));
-    let hash = hash.unwrap_or_default();
+    let hash = host.fact("sdsp.hash");
     let fault = host.fault();
     let unmet = host.has_only_failed().then(|| never_ran(&host.link()));
     // Closing detects a scan that never ends, even if the command was too short to detect it earlier.
@@ -189,18 +214,37 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     let failure = fault
         .or_else(|| report.as_ref().and_then(|report| report.failure()))
         .or(unmet);
-    if told.is_ok() {
-        let mut out = io::stdout().lock();
+    let summary = report
+        .as_ref()
+        .map(|report| report.summary())
+        .unwrap_or_default();
+    if format.is_json() {
+        let of_program: Vec<&str> = summary.lines().collect();
+        let document = json!({
+            "ok": failure.is_none(),
+            "reason": failure,
+            "scans": scans,
+            "stale": stale,
+            "hash": hash,
+            "statistics": entries(&statistics)
+                .map(|(key, value)| (key, json!(value)))
+                .collect::<Map<String, Value>>(),
+            "summary": of_program,
+        });
+        print_document(title, document);
+    } else if told.is_ok() {
+        let mut text = String::new();
         if arguments.stats.is_some() {
-            let _ = writeln!(out, "{statistics}");
+            text = format!("{statistics}\n");
         }
-        if let Some(report) = &report {
-            let _ = write!(out, "{}", report.summary());
-        }
+        text += &summary;
+        let hash = hash.map(|hash| format!(" hash={hash}")).unwrap_or_default();
+        // Writing to a string cannot fail.
         let _ = match &failure {
-            None => writeln!(out, "{title}: ok scans={scans} stale={stale}{hash}"),
-            Some(failure) => writeln!(out, "{title}: failed reason={failure}"),
+            None => writeln!(text, "{title}: ok scans={scans} stale={stale}{hash}"),
+            Some(failure) => writeln!(text, "{title}: failed reason={failure}"),
         };
+        let _ = arguments.say(&text);
     }
     if failure.is_some() {
         Outcome::BusFailed
@@ -214,7 +258,7 @@ pub(super) fn never_ran(link: &Link) -> String {
     format!("the line never ran: {}", link.reason)
 }
 
-/// Shows the command's driver or program on the page that its driver.cfg asks for, and prints the address.
+/// Shows a command's driver or program on the page that its driver.cfg asks for, and prints the address.
 pub(super) fn show(
     title: &str,
     config: &Config,
@@ -234,14 +278,19 @@ pub(super) fn show_run(
         .map_err(|error| not_shown(title, &error))
 }
 
+fn not_shown(title: &str, error: &PageError) -> Outcome {
+    eprintln!("{title}: {error}");
+    outcome_of(error.is_wrong_input())
+}
+
 /// Prints the address of the page.
 fn announce(title: &str) -> impl FnOnce(&str) {
     move |url| super::lab::say(title, &format!("page at {url}"))
 }
 
-fn not_shown(title: &str, error: &PageError) -> Outcome {
-    eprintln!("{title}: {error}");
-    if error.is_wrong_input() {
+/// Returns the outcome of a failure, which is the input's or the bus's.
+fn outcome_of(is_wrong_input: bool) -> Outcome {
+    if is_wrong_input {
         Outcome::WrongInput
     } else {
         Outcome::BusFailed
@@ -292,8 +341,7 @@ fn watch(
             next_stats = next_stats.max(now - every) + every;
         }
         if result.is_ok() && !text.is_empty() {
-            let mut out = io::stdout().lock();
-            result = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+            result = arguments.say(&text);
         }
         if is_over {
             break;

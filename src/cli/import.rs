@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 
+use super::progress::Progress;
 use super::{Outcome, print};
 use tickbus_base::toml_text::{Mistakes, PlacedMistake};
 use tickbus_driver_cfg::Kinds;
@@ -62,8 +63,11 @@ fn clients() -> impl TypedValueParser<Value = Client> {
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
-    match read(arguments, kinds).and_then(|imported| write(arguments, &imported).map(|()| imported))
-    {
+    let name = arguments.table.file_name().unwrap_or_default();
+    let progress = Progress::begin("import", format!("reading {}", name.to_string_lossy()));
+    let imported = read(arguments, kinds);
+    drop(progress);
+    match imported.and_then(|imported| write(arguments, &imported).map(|()| imported)) {
         Ok(imported) => {
             let file = arguments.table.display();
             if !imported.skipped.is_empty() {

@@ -13,22 +13,28 @@ macro_rules! eprintln {
 mod axes;
 mod bridge;
 mod check;
+mod completions;
 mod dispatch;
 mod export;
 mod fmu_helper;
 mod gsd;
 mod host;
 mod import;
+mod json;
 mod lab;
 mod logo;
+mod man;
 mod mirror;
 mod plc;
 mod plugin_helper;
 mod profibus;
+mod progress;
 mod report;
 mod run;
+mod schema;
 mod sync;
 mod test;
+mod version;
 
 use std::process::ExitCode;
 
@@ -39,27 +45,39 @@ use tickbus_driver_cfg::Kinds;
 
 /// Puts a simulated machine on a real PLC's fieldbus.
 #[derive(Debug, Parser)]
-#[command(name = "tickbus", version, about)]
+#[command(name = "tickbus", version, long_version = version::long(), about, after_help = EXIT_CODES)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
 }
+
+/// The meaning of the exit codes, for the help and the manual page; see [`Outcome`].
+const EXIT_CODES: &str = "\
+Exit codes:
+    0  done
+    1  the input is wrong, or a test has failed
+    2  the command line is wrong
+    3  the bus or the peer has failed
+  130  interrupted";
 
 #[derive(Debug, Subcommand)]
 enum Command {
     Axes(axes::Arguments),
     Bridge(bridge::Arguments),
     Check(check::Arguments),
+    Completions(completions::Arguments),
     Dispatch(dispatch::Arguments),
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
     Logo(logo::Arguments),
+    Man(man::Arguments),
     Mirror(mirror::Arguments),
     Plc(plc::Arguments),
     Profibus(profibus::Arguments),
     Report(report::Arguments),
     Run(run::Arguments),
+    Schema(schema::Arguments),
     Sync(sync::Arguments),
     Test(test::Arguments),
     /// Call a plug-in for the process that starts this; not for people.
@@ -122,16 +140,19 @@ pub fn main(kinds: &'static Kinds) -> ExitCode {
         Command::Axes(arguments) => axes::run(&arguments, kinds),
         Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Check(arguments) => check::run(&arguments, kinds),
+        Command::Completions(arguments) => completions::run(&arguments),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
         Command::Export(arguments) => export::run(&arguments, kinds),
         Command::Gsd(arguments) => gsd::run(&arguments, kinds),
         Command::Import(arguments) => import::run(&arguments, kinds),
         Command::Logo(arguments) => logo::run(&arguments),
+        Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
         Command::Plc(arguments) => plc::run(&arguments, kinds),
         Command::Profibus(arguments) => profibus::run(&arguments, kinds),
         Command::Report(arguments) => report::run(&arguments),
         Command::Run(arguments) => run::run(&arguments, kinds),
+        Command::Schema(arguments) => schema::run(&arguments, kinds),
         Command::Sync(arguments) => sync::run(&arguments, kinds),
         Command::Test(arguments) => test::run(&arguments, kinds),
         Command::PluginHelper => plugin_helper::run(),

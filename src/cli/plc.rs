@@ -51,13 +51,16 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     {
         Ok(program) => program,
         Err(error) => {
-            eprintln!("plc: {error}");
             // A wrong name is a mistake on the command line; a wrong file is wrong input.
-            return if plc::HostedProgram::is_path(&arguments.program) {
+            let outcome = if plc::HostedProgram::is_path(&arguments.program) {
                 Outcome::WrongInput
             } else {
                 Outcome::Usage
             };
+            return arguments
+                .host
+                .format
+                .fail("plc", &format!("plc: {error}"), outcome);
         }
     };
     let interval = plc::interval(&*program, arguments.scan);

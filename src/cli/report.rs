@@ -3,7 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::Outcome;
+use serde_json::{Value, json};
+
+use super::json::{Format, print_document};
+use super::progress::Progress;
+use super::{Outcome, print};
 use tickbus_base::toml_text::nearest;
 use tickbus_record::Recording;
 use tickbus_report as report;
@@ -44,21 +48,61 @@ pub(super) struct Arguments {
     /// The largest number of value changes in the page; beyond it, the busiest signals are thinned out.
     #[arg(long, value_name = "COUNT", default_value_t = DEFAULT_BUDGET)]
     changes: usize,
+
+    #[command(flatten)]
+    format: Format,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Outcome {
     match make(arguments) {
-        Ok(told) => {
-            println!("report: ok {told}");
-            Outcome::Done
-        }
+        Ok(made) if arguments.format.is_json() => print_document("report", made.document()),
+        Ok(made) => print("report", &format!("report: ok {}\n", made.line())),
         Err(mistakes) => {
             for mistake in &mistakes {
                 eprintln!("{mistake}");
             }
             eprintln!("report: failed mistakes={}", mistakes.len());
+            if arguments.format.is_json() {
+                let list = mistakes.iter().map(|what| json!({ "what": what }));
+                print_document(
+                    "report",
+                    json!({ "ok": false, "mistakes": list.collect::<Value>() }),
+                );
+            }
             Outcome::WrongInput
         }
+    }
+}
+
+/// The page that was made.
+struct Made {
+    signals: usize,
+    ticks: u64,
+    bytes: u64,
+    file: PathBuf,
+}
+
+impl Made {
+    fn line(&self) -> String {
+        let Self {
+            signals,
+            ticks,
+            bytes,
+            file,
+        } = self;
+        format!(
+            "signals={signals} ticks={ticks} bytes={bytes} file={}",
+            file.display()
+        )
+    }
+
+    fn document(&self) -> Value {
+        json!({
+            "signals": self.signals,
+            "ticks": self.ticks,
+            "bytes": self.bytes,
+            "file": self.file.display().to_string(),
+        })
     }
 }
 
@@ -101,7 +145,7 @@ impl Beside {
 }
 
 /// Makes the page and describes it, or returns all mistakes.
-fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
+fn make(arguments: &Arguments) -> Result<Made, Vec<String>> {
     let mut mistakes = Vec::new();
     let beside = Beside::read(arguments, &mut mistakes);
     let mut recording = match Recording::open(&arguments.recording, None) {
@@ -111,7 +155,10 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
             return Err(mistakes);
         }
     };
+    let name = file_name(&arguments.recording);
+    let progress = Progress::begin("report", format!("reading {name}"));
     let (run, error) = report::read(&mut recording, arguments.changes);
+    drop(progress);
     let mut number = |option: &str, name: &String| {
         let found = run.signal(name);
         if found.is_none() {
@@ -129,7 +176,7 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         .filter_map(|name| number("--fault", name));
     let faults: Vec<usize> = faults.collect();
     let columns = recording.columns();
-    let file = file_name(&arguments.recording);
+    let file = name;
     let names = [arguments.title.as_ref(), Some(&columns.driver), Some(&file)];
     let title = names.into_iter().flatten().find(|name| !name.is_empty());
     let ending = recording.ending();
@@ -144,7 +191,7 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         statistics: beside.statistics.as_ref(),
         texts: &beside.texts,
     };
-    let mut told = String::new();
+    let mut made = None;
     // A recording is worth a page up to a damaged place; mistakes on the command line are not.
     if mistakes.is_empty() {
         let beside = || arguments.recording.with_extension("html");
@@ -152,8 +199,12 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         let file = out.display();
         match report::write_file(&contents, &out) {
             Ok(bytes) => {
-                let (signals, ticks) = (run.signals().len(), run.ticks());
-                told = format!("signals={signals} ticks={ticks} bytes={bytes} file={file}");
+                made = Some(Made {
+                    signals: run.signals().len(),
+                    ticks: run.ticks(),
+                    bytes,
+                    file: out.clone(),
+                });
             }
             Err(error) => mistakes.push(format!(
                 "{file}: the page cannot be written: {error}; choose another place with --out"
@@ -161,10 +212,9 @@ fn make(arguments: &Arguments) -> Result<String, Vec<String>> {
         }
     }
     mistakes.extend(error.map(|error| error.to_string()));
-    if mistakes.is_empty() {
-        Ok(told)
-    } else {
-        Err(mistakes)
+    match made {
+        Some(made) if mistakes.is_empty() => Ok(made),
+        _ => Err(mistakes),
     }
 }
 

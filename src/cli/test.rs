@@ -4,7 +4,11 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use serde_json::{Value, json};
+
 use super::Outcome;
+use super::json::{Format, print_document};
+use super::progress::Progress;
 use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_driver_cfg::Kinds;
 use tickbus_report::page_beside;
@@ -35,6 +39,9 @@ pub(super) struct Arguments {
     /// List the tests without running them.
     #[arg(long)]
     list: bool,
+
+    #[command(flatten)]
+    format: Format,
 }
 
 /// The number of tests for each result.
@@ -46,15 +53,37 @@ struct Count {
     ticks: u64,
 }
 
+/// The data that each file of a run needs.
+struct Job<'a> {
+    arguments: &'a Arguments,
+    kinds: &'static Kinds,
+    progress: Progress,
+}
+
+impl Job<'_> {
+    /// Prints a line on stdout, unless a JSON document will say the same. The tests continue even if the reader is gone
+    /// (`| head`).
+    fn tell(&self, line: &str) {
+        if !self.arguments.format.is_json() {
+            let print = || writeln!(std::io::stdout().lock(), "{line}");
+            let _ = self.progress.aside(print);
+        }
+    }
+
+    /// Prints a mistake on stderr.
+    fn report(&self, mistake: impl std::fmt::Display) {
+        self.progress.aside(|| eprintln!("{mistake}"));
+    }
+}
+
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let mut files = Vec::new();
     for path in &arguments.paths {
         if let Err(error) = collect(path, &mut files) {
-            eprintln!(
-                "test: {}: {error}; name a folder with test files, or a test file",
-                path.display()
-            );
-            return Outcome::WrongInput;
+            let path = path.display();
+            let reason =
+                format!("test: {path}: {error}; name a folder with test files, or a test file");
+            return arguments.format.fail("test", &reason, Outcome::WrongInput);
         }
     }
     if files.is_empty() {
@@ -63,28 +92,34 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
             .iter()
             .map(|path| path.display().to_string())
             .collect();
-        eprintln!(
+        let reason = format!(
             "test: there is no *.toml with tests in {}; docs/testing.md tells what a test file looks like",
             paths.join(", ")
         );
-        return Outcome::WrongInput;
+        return arguments.format.fail("test", &reason, Outcome::WrongInput);
     }
     let mut count = Count::default();
+    let job = Job {
+        arguments,
+        kinds,
+        progress: Progress::begin("test", "reading the tests"),
+    };
     let groups: Vec<Group> = files
         .iter()
-        .map(|file| run_file(file, (arguments, kinds), &mut count))
+        .map(|file| run_file(file, &job, &mut count))
         .collect();
     if let Some(path) = &arguments.junit
         && !arguments.list
         && let Err(error) = write_file(path, &junit_xml(&groups))
     {
-        eprintln!("test: {}: cannot be written: {error}", path.display());
-        return Outcome::WrongInput;
+        let reason = format!("test: {}: cannot be written: {error}", path.display());
+        return arguments.format.fail("test", &reason, Outcome::WrongInput);
     }
-    conclude(arguments, &count)
+    conclude(&job, &groups, &count)
 }
 
-fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
+fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
+    let arguments = job.arguments;
     let Count {
         passed,
         failed,
@@ -95,8 +130,11 @@ fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
     if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
         eprintln!("test: no test has \"{only}\" in its name; --list lists them");
     }
+    if arguments.format.is_json() {
+        print_document("test", document(arguments, groups, count, green));
+    }
     if !arguments.list {
-        tell(&format!(
+        job.tell(&format!(
             "test: {} passed={passed} failed={failed} wrong={wrong} ticks={ticks}",
             if green { "ok" } else { "failed" }
         ));
@@ -105,6 +143,48 @@ fn conclude(arguments: &Arguments, count: &Count) -> Outcome {
         Outcome::Done
     } else {
         Outcome::WrongInput
+    }
+}
+
+/// Returns the results as a JSON document.
+fn document(arguments: &Arguments, groups: &[Group], count: &Count, green: bool) -> Value {
+    let of_case = |case: &Case| {
+        let (verdict, what, details) = match &case.verdict {
+            Verdict::Passed if arguments.list => (None, None, None),
+            Verdict::Passed => (Some("passed"), None, None),
+            Verdict::Failed(what, full) => (Some("failed"), Some(what), Some(full)),
+            Verdict::Wrong(what, full) => (Some("wrong"), Some(what), Some(full)),
+        };
+        json!({
+            "name": case.name,
+            "line": case.line,
+            "verdict": verdict,
+            "what": what,
+            "details": details,
+            "seconds": case.took.as_secs_f64(),
+        })
+    };
+    let files = groups.iter().map(|group| {
+        json!({ "file": group.name, "tests": group.cases.iter().map(of_case).collect::<Value>() })
+    });
+    json!({
+        "ok": green,
+        "passed": if arguments.list { 0 } else { count.passed },
+        "failed": count.failed,
+        "wrong": count.wrong,
+        "ticks": count.ticks,
+        "files": files.collect::<Value>(),
+    })
+}
+
+/// Returns the case of a test that is listed and does not run: its verdict does not count.
+fn listed(test: &Test) -> Case {
+    Case {
+        name: test.name.clone(),
+        line: test.place.0,
+        took: std::time::Duration::ZERO,
+        verdict: Verdict::Passed,
+        output: String::new(),
     }
 }
 
@@ -144,17 +224,14 @@ fn is_test_file(path: &Path) -> bool {
     })
 }
 
-fn run_file(
-    file: &Path,
-    (arguments, kinds): (&Arguments, &'static Kinds),
-    count: &mut Count,
-) -> Group {
+fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> Group {
+    let arguments = job.arguments;
     let name = file.display().to_string();
-    let suite = match Suite::load(file, kinds) {
+    let suite = match Suite::load(file, job.kinds) {
         Ok(suite) => suite,
         Err(mistakes) => {
             count.wrong += mistakes.len();
-            eprintln!("{mistakes}");
+            job.report(&mistakes);
             let cases = vec![wrong_file(&mistakes)];
             return Group { name, cases };
         }
@@ -166,13 +243,14 @@ fn run_file(
     let mut cases = Vec::new();
     for test in suite.tests.iter().filter(wanted) {
         if arguments.list {
-            tell(&format!(
+            job.tell(&format!(
                 "{name}:{}:{}: {}",
                 test.place.0, test.place.1, test.name
             ));
             count.passed += 1;
+            cases.push(listed(test));
         } else {
-            cases.push(run_test(&suite, test, arguments.keep.as_deref(), count));
+            cases.push(run_test(&suite, test, job, count));
         }
     }
     Group { name, cases }
@@ -196,7 +274,10 @@ fn wrong_file(mistakes: &Mistakes) -> Case {
     }
 }
 
-fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) -> Case {
+fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Case {
+    let done = count.passed + count.failed + count.wrong;
+    job.progress
+        .now(format!("{done} tests done, running \"{}\"", test.name));
     let begun = Instant::now();
     let ran = suite.run(test, None);
     let took = begun.elapsed();
@@ -204,7 +285,7 @@ fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) 
     let verdict = match ran {
         Err(error) => {
             count.wrong += 1;
-            eprintln!("{error}");
+            job.report(&error);
             Verdict::Wrong(error.to_string(), error.to_string())
         }
         Ok(ran) => {
@@ -213,7 +294,7 @@ fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) 
             match ran.failure {
                 None => {
                     count.passed += 1;
-                    tell(&format!("ok    {} ({} ticks)", test.name, ran.ticks));
+                    job.tell(&format!("ok    {} ({} ticks)", test.name, ran.ticks));
                     Verdict::Passed
                 }
                 Some(failure) => {
@@ -224,11 +305,11 @@ fn run_test(suite: &Suite, test: &Test, keep: Option<&Path>, count: &mut Count) 
                         full.push_str("\n      ");
                         full.push_str(more);
                     }
-                    if let Some(folder) = keep {
+                    if let Some(folder) = &job.arguments.keep {
                         let kept = record(suite, test, folder, &full);
                         full.push_str(&kept);
                     }
-                    tell(&format!("FAIL  {}\n      {full}", test.name));
+                    job.tell(&format!("FAIL  {}\n      {full}", test.name));
                     Verdict::Failed(failure.what, full)
                 }
             }
@@ -285,9 +366,4 @@ fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
         std::fs::create_dir_all(folder)?;
     }
     std::fs::write(path, text)
-}
-
-/// Prints a line on stdout. The tests continue even if the reader is gone (`| head`).
-fn tell(line: &str) {
-    let _ = writeln!(std::io::stdout().lock(), "{line}");
 }

@@ -27,6 +27,7 @@ mod prepare;
 #[path = "../peers/pty.rs"]
 mod pty;
 mod s7;
+mod schema;
 mod second_ivi;
 mod st;
 mod vcd;
@@ -54,5 +55,6 @@ fn main() -> ExitCode {
         ("vcd", vcd::TESTS),
         ("plc", plc::TESTS),
         ("second_ivi", second_ivi::TESTS),
+        ("schema", schema::TESTS),
     ])
 }

@@ -16,6 +16,7 @@ mod exports;
 mod faults;
 mod fmi;
 mod import;
+mod installed;
 mod logo;
 mod loopback;
 mod own_program;

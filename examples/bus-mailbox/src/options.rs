@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
@@ -22,6 +22,11 @@ pub struct Options {
 
 impl BusKind for Options {
     const NAME: &'static str = "mailbox";
+    const KEYS: &'static [&'static [Key]] = &[&[Key::required(
+        "folder",
+        Shape::Label(PATH_LIMIT),
+        "The folder of the two files; a relative path begins at the folder of this file",
+    )]];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let hint = "name the folder of the two files, such as folder = \"mailbox\"";

@@ -87,6 +87,12 @@ fn the_command_has_the_bus_beside_its_own() {
         let report = String::from_utf8_lossy(&output.stdout);
         assert!(output.status.success() && report.contains(told), "{report}");
     }
+    let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus-with-mailbox"));
+    let schema = command.arg("schema").output().expect("it runs").stdout;
+    let schema = String::from_utf8_lossy(&schema);
+    for word in ["\"mailbox\"", "The folder of the two files"] {
+        assert!(schema.contains(word), "{word}");
+    }
 }
 
 /// Checks that the bus can be added without forking any of these crates.

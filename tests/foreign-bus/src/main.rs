@@ -5,7 +5,7 @@
 use std::sync::{Arc, Mutex};
 
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Table};
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::{Config, Kind, Kinds};
 use tickbus_fieldbus::{
@@ -26,6 +26,7 @@ struct Options;
 
 impl BusKind for Options {
     const NAME: &'static str = "wire";
+    const KEYS: &'static [&'static [Key]] = &[];
 
     fn read(_role: Role, _moved: bool, _table: &mut Table<'_>) -> Option<Self> {
         Some(Self)

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table, names};
 use tickbus_fieldbus::{
     Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
     Moved, NamedFile, OpenError, Port, Role, Vendor, Verdict,
@@ -32,6 +32,32 @@ const RESET: Nanos = Nanos::from_secs(5);
 /// The time for the card to register that this program is ready or not.
 const STATE: Nanos = Nanos::from_millis(200);
 
+/// The keys of the bus, for the schema of a driver.cfg.
+const KEYS: &[Key] = &[
+    Key::new(
+        "device",
+        Shape::Whole(0, 3),
+        "The card's number in the driver's set-up",
+    )
+    .or("0"),
+    Key::new(
+        "reset",
+        Shape::Choice(&names(&RESETS)),
+        "How the card is reset when it is opened",
+    )
+    .or("\"warmstart\""),
+    Key::new(
+        "io_timeout",
+        Shape::Duration,
+        "How long the card may take to hand over the process data",
+    )
+    .or("\"100ms\""),
+    CardOptions::library_key(Some(NAME)),
+];
+
+/// The kinds of reset: the modes of the driver's call.
+const RESETS: [(&str, u16); 2] = [("coldstart", 2), ("warmstart", 3)];
+
 /// The options of the bus `hilscher-cif`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -47,6 +73,7 @@ pub struct Options {
 
 impl BusKind for Options {
     const NAME: &'static str = "hilscher-cif";
+    const KEYS: &'static [&'static [Key]] = &[KEYS, CardOptions::KEYS];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let device = table.take("device");
@@ -54,8 +81,7 @@ impl BusKind for Options {
         let io_timeout = table.take("io_timeout");
         let card = CardOptions::read(table, Some(NAME));
         let device = device.map_or(Some(0), |value| value.whole(0..=3));
-        let modes = [("coldstart", 2), ("warmstart", 3)];
-        let reset = reset.map_or(Some(3), |value| value.choice("kinds of reset", &modes));
+        let reset = reset.map_or(Some(3), |value| value.choice("kinds of reset", &RESETS));
         let io_timeout = read(io_timeout, Nanos::from_millis(100));
         Some(Self {
             card: card?,

@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 use tickbus_fieldbus::{
     Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Card, CardBus, CardOptions, Failing,
     Moved, NamedFile, OpenError, Port, Role, Vendor, Verdict,
@@ -28,6 +28,30 @@ const STATE: Nanos = Nanos::from_secs(1);
 
 /// The longest name of a board in the driver.
 const BOARD_LIMIT: usize = 15;
+
+/// The keys of the bus, for the schema of a driver.cfg.
+const KEYS: &[Key] = &[
+    Key::new(
+        "board",
+        Shape::Label(BOARD_LIMIT),
+        "The board, by the name or alias that the vendor's tools show",
+    )
+    .or("\"cifX0\""),
+    Key::new("channel", Shape::Whole(0, 5), "The channel of the board").or("0"),
+    Key::new(
+        "io_timeout",
+        Shape::Duration,
+        "How long the card may take to hand over the process data",
+    )
+    .or("\"10ms\""),
+    Key::new(
+        "bus_on_timeout",
+        Shape::Duration,
+        "How long opening waits for the bus to communicate",
+    )
+    .or("\"10s\""),
+    CardOptions::library_key(Some(NAME)),
+];
 
 /// The options of the bus `hilscher-cifx`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,6 +70,7 @@ pub struct Options {
 
 impl BusKind for Options {
     const NAME: &'static str = "hilscher-cifx";
+    const KEYS: &'static [&'static [Key]] = &[KEYS, CardOptions::KEYS];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let board = table.take("board");

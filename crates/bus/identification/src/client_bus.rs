@@ -3,7 +3,7 @@
 mod session;
 
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 use tickbus_fieldbus::tcp::Call;
 use tickbus_fieldbus::{BusError, Free, Port};
 use tickbus_image::signal::SignalTable;
@@ -27,6 +27,14 @@ pub const NO_ANSWER: u8 = 0xFF;
 
 /// The default time-out for an answer, in addition to the time of its characters.
 const TIMEOUT: Nanos = Nanos::from_secs(1);
+
+/// The client's own key.
+pub(crate) const KEYS: &[Key] = &[Key::new(
+    "timeout",
+    Shape::Duration,
+    "How long the reader may take for an answer, beside the time of its characters",
+)
+.or("\"1s\"")];
 
 /// The options of the bus `ivi-client`.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,10 +1,17 @@
 //! The head of each station, in a driver.cfg.
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
 use tickbus_image::signal::{Area, SignalTable};
 
 use crate::HEADS;
+
+/// The key of a station, or of a driver without stations.
+pub(crate) const KEYS: &[Key] = &[Key::new(
+    "head",
+    Shape::Whole(1, HEADS as i128),
+    "The number of the reader's head; with several stations each has its own",
+)];
 
 /// The head of each station.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,15 +1,17 @@
 //! The kinds `ivi-client` and `ivi-reader`, for the list of bus kinds.
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 use crate::heads::meaning;
-use crate::{ClientOptions, ReaderOptions, client_bus, reader_bus};
+use crate::{ClientOptions, ReaderOptions, client_bus, heads, line, reader_bus};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "ivi-client";
+    const KEYS: &'static [&'static [Key]] = &[line::KEYS, heads::KEYS, client_bus::KEYS];
+    const STATION_KEYS: &'static [Key] = heads::KEYS;
 
     fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         if role == Role::Device {
@@ -66,6 +68,8 @@ impl BusOptions for ClientOptions {
 
 impl BusKind for ReaderOptions {
     const NAME: &'static str = "ivi-reader";
+    const KEYS: &'static [&'static [Key]] = &[line::KEYS, heads::KEYS];
+    const STATION_KEYS: &'static [Key] = heads::KEYS;
 
     fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         if role == Role::Controller {

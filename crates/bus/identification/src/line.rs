@@ -5,7 +5,7 @@ use std::path::Path;
 
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
 use tickbus_fieldbus::CYCLE;
 use tickbus_net::serial;
 
@@ -19,6 +19,23 @@ const QUESTION: usize = 16;
 
 /// The prefix of a device that this end creates.
 const PSEUDO: &str = "pty:";
+
+/// The keys of the line, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    serial::DEVICE_KEY,
+    Key::new(
+        "baud",
+        Shape::Numbers(&RATES),
+        "Bits per second, as the reader's switches are set",
+    )
+    .or("9600"),
+    Key::new(
+        "carrier",
+        Shape::Choice(&names(&CarrierType::ALL)),
+        "The type of the code carriers",
+    )
+    .or("\"IDC-1K\""),
+];
 
 /// The line, and the carriers at its reader's heads.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,17 +1,18 @@
 //! The kind `interbus-ddi`, for the list of bus kinds.
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Table};
 use tickbus_fieldbus::{
-    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, NamedFile, OpenError, Role,
+    Bus, BusKind, BusOptions, BusSetup, CYCLE, CardBus, CardOptions, NamedFile, OpenError, Role,
 };
 use tickbus_image::signal::SignalTable;
 
 use super::card::Ddi;
-use super::options::{LIBRARY, Options};
+use super::options::{self, LIBRARY, Options};
 
 impl BusKind for Options {
     const NAME: &'static str = "interbus-ddi";
+    const KEYS: &'static [&'static [Key]] = &[options::KEYS, CardOptions::KEYS];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)

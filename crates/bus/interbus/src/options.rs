@@ -1,7 +1,7 @@
 //! The bus's section of a driver.cfg.
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 use tickbus_fieldbus::CardOptions;
 
 /// The vendor's library on Windows; on other systems `library` has to name one.
@@ -13,6 +13,28 @@ pub(super) const LIBRARY: Option<&str> = if cfg!(windows) {
 
 /// The longest name of a device, in characters.
 const DEVICE_LIMIT: usize = 40;
+
+/// The bus's own keys, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "device",
+        Shape::Label(DEVICE_LIMIT),
+        "Board and node as the driver names them, without _D and _M",
+    )
+    .or("\"IBB1N1\""),
+    Key::new(
+        "activate",
+        Shape::Whole(1, 0xFFFF),
+        "The service that activates the configuration; without it the board's own configuration counts",
+    ),
+    Key::new(
+        "start_timeout",
+        Shape::Duration,
+        "How long the board may take to answer, and the bus to run",
+    )
+    .or("\"10s\""),
+    CardOptions::library_key(LIBRARY),
+];
 
 /// The options of the bus `interbus-ddi`.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,16 +2,19 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 use tickbus_net::Address;
 
-use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions};
+use super::{ClientOptions, ModbusClient, ModbusServer, ServerOptions, keys};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "modbus-server";
     const LEARNS_OF_WRITES: bool = true;
+    const KEYS: &'static [&'static [Key]] = &[keys::LINE, keys::SERVER, Writers::KEYS];
+    const STATION_KEYS: &'static [Key] = keys::SERVED_STATION;
 
     fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, table)
@@ -55,6 +58,8 @@ impl BusOptions for ServerOptions {
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "modbus-client";
+    const KEYS: &'static [&'static [Key]] = &[keys::LINE, keys::CLIENT];
+    const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
     fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)

@@ -36,6 +36,7 @@ mod client;
 mod element_address;
 mod function;
 mod identification;
+mod keys;
 mod kind;
 mod line;
 pub mod mbap;

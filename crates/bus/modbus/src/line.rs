@@ -12,7 +12,17 @@ use tickbus_net::serial as serial_port;
 use super::rtu;
 
 /// The range of serial speeds, in bits per second.
-const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
+pub(super) const BAUDS: std::ops::RangeInclusive<i128> = 50..=4_000_000;
+
+/// The framings of telegrams over TCP: true for RTU.
+pub(super) const FRAMINGS: [(&str, bool); 2] = [("tcp", false), ("rtu", true)];
+
+/// The parities of a serial port.
+pub(super) const PARITIES: [(&str, Parity); 3] = [
+    ("even", Parity::Even),
+    ("odd", Parity::Odd),
+    ("none", Parity::None),
+];
 
 /// The line to the other end.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -102,8 +112,7 @@ impl Line {
                     );
                 }
             }
-            let framings = [("tcp", false), ("rtu", true)];
-            let is_rtu = framing.map_or(Some(false), |value| value.choice("framings", &framings));
+            let is_rtu = framing.map_or(Some(false), |value| value.choice("framings", &FRAMINGS));
             let framed = |address| {
                 Some(if is_rtu? {
                     Self::RtuOverTcp(address)
@@ -170,13 +179,8 @@ fn read_settings(
         None => Some(19_200),
         Some(value) => value.whole(BAUDS).and_then(|baud| u32::try_from(baud).ok()),
     };
-    let parities = [
-        ("even", Parity::Even),
-        ("odd", Parity::Odd),
-        ("none", Parity::None),
-    ];
     let parity = parity.map_or(Some(Parity::Even), |value| {
-        value.choice("parities", &parities)
+        value.choice("parities", &PARITIES)
     });
     // A character has eleven bits in the standard: without parity there are two stop bits.
     let two_by_default = parity == Some(Parity::None);

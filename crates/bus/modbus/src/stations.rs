@@ -3,7 +3,7 @@
 use tickbus_base::toml_text::{Table, Value};
 
 /// The longest identity, in characters.
-const IDENTITY_LIMIT: usize = 1000;
+pub(super) const IDENTITY_LIMIT: usize = 1000;
 
 /// The range of unit numbers on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,14 +1,16 @@
 //! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{ClientOptions, ServerOptions};
+use super::{ClientOptions, ServerOptions, keys, options, security};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
+    const KEYS: &'static [&'static [Key]] = &[keys::CLIENT, security::KEYS];
 
     fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(moved, table)
@@ -59,6 +61,8 @@ impl BusOptions for ClientOptions {
 impl BusKind for ServerOptions {
     const NAME: &'static str = "opcua-server";
     const LEARNS_OF_WRITES: bool = true;
+    const KEYS: &'static [&'static [Key]] = &[keys::SERVER, security::KEYS, Writers::KEYS];
+    const ONE_OF: &'static [&'static str] = &options::LOGINS;
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)

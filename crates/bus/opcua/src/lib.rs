@@ -3,6 +3,7 @@
 //! Every build reads their options in a driver.cfg. The buses themselves use the crate `async-opcua` and are
 //! only built with the cargo feature `opcua`.
 
+mod keys;
 mod kind;
 mod node;
 mod options;

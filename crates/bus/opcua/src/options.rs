@@ -14,7 +14,10 @@ use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};
 
 /// The longest `write_to`, in characters.
-const IDENTITY_LIMIT: usize = 1000;
+pub(crate) const IDENTITY_LIMIT: usize = 1000;
+
+/// The keys of which a server has one: someone can log in.
+pub(crate) const LOGINS: [&str; 2] = ["user", "anonymous"];
 
 /// The shortest publishing and sampling interval: servers count both in milliseconds.
 const SHORTEST: Nanos = Nanos::from_millis(1);
@@ -280,7 +283,7 @@ impl ServerOptions {
         let is_single_writer = Writers::read(table);
         if !keys.has_user() && anonymous.is_none() {
             table.require_one_of(
-                &["user", "anonymous"],
+                &LOGINS,
                 "name the user that may log in, with password_file or password_env, or write \
                  anonymous = true to let everybody in",
             );

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
 use tickbus_fieldbus::NamedFile;
 
 /// The longest path, name or password, in characters.
@@ -129,6 +129,53 @@ impl Credentials {
     }
 }
 
+/// The keys of both ends, but for `security`: for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "mode",
+        Shape::Choice(&names(&Mode::NAMES)),
+        "The mode of protected messages",
+    )
+    .or("\"SignAndEncrypt\""),
+    Key::new(
+        "user",
+        Shape::Label(TEXT_LIMIT),
+        "The user, with one of password_file, password_env and password_in_clear",
+    ),
+    Key::new(
+        "password_file",
+        Shape::Label(TEXT_LIMIT),
+        "The file whose first line is the password, relative to the folder of this file",
+    ),
+    Key::new(
+        "password_env",
+        Shape::Label(TEXT_LIMIT),
+        "The environment variable that has the password",
+    ),
+    Key::new(
+        "password_in_clear",
+        Shape::Text,
+        "The password, for everybody to read",
+    ),
+    Key::new(
+        "pki",
+        Shape::Label(TEXT_LIMIT),
+        "The folder of certificates, relative to the folder of this file",
+    )
+    .or("\"pki\""),
+    Key::new(
+        "trust",
+        Shape::Choice(&names(&WAYS_TO_TRUST)),
+        "\"any\" accepts every certificate, and files it under \"trusted\"",
+    )
+    .or("\"listed\""),
+];
+
+const WAYS_TO_TRUST: [(&str, Trust); 2] = [("listed", Trust::Listed), ("any", Trust::Any)];
+
+/// The names of the security policies.
+pub(crate) const POLICIES: Shape = Shape::Choice(&names(&Policy::NAMES));
+
 /// The keys of both ends, as written in the driver.cfg.
 pub(super) struct Keys<'a> {
     pub(super) security: Option<Value<'a>>,
@@ -182,8 +229,7 @@ impl<'a> Keys<'a> {
             value.choice("security modes", &Mode::NAMES)
         });
         let trust = self.trust.as_ref().map_or(Some(Trust::default()), |value| {
-            let ways = [("listed", Trust::Listed), ("any", Trust::Any)];
-            value.choice("ways to trust", &ways)
+            value.choice("ways to trust", &WAYS_TO_TRUST)
         });
         let pki = self.pki.as_ref().map_or(Some(PKI), |value| {
             value.label(TEXT_LIMIT, "name the folder of certificates")

@@ -1,14 +1,15 @@
 //! The kind `plugin`, for the list of bus kinds.
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, shown};
+use tickbus_base::toml_text::{Key, Table, shown};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
-use super::Options;
+use super::{Options, options};
 
 impl BusKind for Options {
     const NAME: &'static str = "plugin";
+    const KEYS: &'static [&'static [Key]] = &[options::KEYS];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, shown};
 
 /// The most entries of `options`.
 const OPTION_LIMIT: usize = 100;
@@ -35,6 +35,54 @@ pub struct Options {
     /// driver.cfg.
     pub helper: Option<PathBuf>,
 }
+
+/// The keys of the bus, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::required(
+        "library",
+        Shape::Label(TEXT_LIMIT),
+        "The library's file; a relative path begins at the folder of this file",
+    ),
+    Key::new(
+        "options",
+        Shape::Map(&Shape::Any(&[Shape::Text, Shape::Number, Shape::Boolean])),
+        "Options for the library itself",
+    ),
+    Key::new(
+        "timeout",
+        Shape::Duration,
+        "How long an exchange may wait for the peer; one cycle by default, at least 10ms",
+    ),
+    Key::new(
+        "open_timeout",
+        Shape::Duration,
+        "How long loading the library and opening the bus may take",
+    )
+    .or("\"10s\""),
+    Key::new(
+        "call_timeout",
+        Shape::Duration,
+        "How long past \"timeout\" an exchange may take before it counts as hung",
+    )
+    .or("\"1s\""),
+    Key::new(
+        "close_timeout",
+        Shape::Duration,
+        "How long closing the driver waits for the library",
+    )
+    .or("\"2s\""),
+    Key::new(
+        "isolated",
+        Shape::Boolean,
+        "true: the library runs in a helper process",
+    )
+    .or("false"),
+    Key::new(
+        "helper",
+        Shape::Label(TEXT_LIMIT),
+        "With isolated = true: the tickbus command, which the helper process runs",
+    ),
+];
 
 impl Options {
     /// Reads `library`, `options`, the time-outs, and `isolated` with `helper`.

@@ -5,11 +5,12 @@ mod machine;
 mod station;
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
-use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 use tickbus_net::serial;
@@ -19,6 +20,35 @@ use crate::layout::{Layout, Place};
 use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
 pub use station::{Device, StationOptions};
 use station::{check_sizes, read_station};
+
+/// The keys of the line, for the schema of a driver.cfg.
+const KEYS: &[Key] = &[
+    serial::DEVICE_KEY,
+    Key::new("baud", Shape::Numbers(&BAUDS), "Bits per second").or("19200"),
+    Key::new(
+        "rs485",
+        Shape::Boolean,
+        "true: the port's driver switches the direction with RTS",
+    )
+    .or("false"),
+    Key::new(
+        "max_tsdr",
+        Shape::whole(&MAX_TSDR),
+        "In bits: an answer that would begin later is not sent; by the rate if it is left out",
+    ),
+];
+
+const MAX_TSDR: RangeInclusive<i128> = 11..=SLOT_TIME_LIMIT as i128 - 1;
+
+const BAUDS: [u32; RATES.len()] = {
+    let mut bauds = [0; RATES.len()];
+    let mut index = 0;
+    while index < bauds.len() {
+        bauds[index] = RATES[index].baud;
+        index += 1;
+    }
+    bauds
+};
 
 /// The options of the bus `profibus-device`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,6 +85,8 @@ impl Keys {
 
 impl BusKind for Options {
     const NAME: &'static str = "profibus-device";
+    const KEYS: &'static [&'static [Key]] = &[KEYS, station::KEYS];
+    const STATION_KEYS: &'static [Key] = station::OWN_KEYS;
 
     fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let device = table.require(
@@ -74,7 +106,7 @@ impl BusKind for Options {
         let device = device.and_then(|value| serial::read_device(&value));
         let rate = baud.map_or(Some(RATES[1]), |value| read_rate(&value));
         let rs485 = rs485.map_or(Some(false), |value| value.boolean());
-        let max_tsdr = max_tsdr.map(|value| value.whole(11..=i128::from(SLOT_TIME_LIMIT) - 1));
+        let max_tsdr = max_tsdr.map(|value| value.whole(MAX_TSDR));
         let rate = rate?;
         let max_tsdr = match max_tsdr {
             None => rate.max_tsdr,

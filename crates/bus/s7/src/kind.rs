@@ -2,15 +2,18 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table, shown};
+use tickbus_base::toml_text::{Collector, Key, Table, shown};
+use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{ClientOptions, S7Client, S7Server, ServerOptions};
+use super::{ClientOptions, S7Client, S7Server, ServerOptions, keys};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "s7-server";
     const LEARNS_OF_WRITES: bool = true;
+    const KEYS: &'static [&'static [Key]] = &[keys::SERVER, Writers::KEYS];
+    const STATION_KEYS: &'static [Key] = keys::SERVED_STATION;
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(table)
@@ -57,6 +60,8 @@ impl BusOptions for ServerOptions {
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "s7-client";
+    const KEYS: &'static [&'static [Key]] = &[keys::CLIENT];
+    const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
     fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)

@@ -60,6 +60,7 @@
 
 mod client;
 pub mod item;
+mod keys;
 mod kind;
 mod length;
 pub mod pdu;

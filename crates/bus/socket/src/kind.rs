@@ -2,14 +2,16 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 
-use super::{Message, Options, Sending, Socket, TcpRole};
+use super::{Message, Options, Sending, Socket, TcpRole, options};
 
 impl BusKind for Options {
     const NAME: &'static str = "socket";
+    const KEYS: &'static [&'static [Key]] = &[options::KEYS];
+    const STATION_KEYS: &'static [Key] = options::STATION_KEYS;
 
     fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)

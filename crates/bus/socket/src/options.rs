@@ -2,7 +2,7 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value, names};
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
@@ -33,6 +33,54 @@ pub enum Message {
         at: usize,
     },
 }
+
+const TCP_ROLES: [(&str, TcpRole); 2] =
+    [("listen", TcpRole::Listen), ("connect", TcpRole::Connect)];
+
+const WAYS: [(&str, Sending); 3] = [
+    ("cyclic", Sending::Cyclic),
+    ("on-change", Sending::OnChange),
+    ("reply", Sending::Reply),
+];
+
+/// The keys of the bus, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "address",
+        Shape::ADDRESS,
+        "Where to listen, or what to connect to; port 0 lets the system choose one",
+    )
+    .or("\"127.0.0.1:20030\""),
+    Key::new(
+        "role_tcp",
+        Shape::Choice(&names(&TCP_ROLES)),
+        "A device listens and a controller connects, if it is left out",
+    ),
+    Key::new(
+        "send",
+        Shape::Choice(&names(&WAYS)),
+        "When a record is sent: every cycle, when a signal has changed, or for each that comes in",
+    )
+    .or("\"cyclic\""),
+    Key::new(
+        "min_interval",
+        Shape::Duration,
+        "With send = \"on-change\": the least time between two records",
+    ),
+    Key::new(
+        "message",
+        Shape::Choice(&["image", "axis"]),
+        "\"axis\": each message has one [[axis]], behind its number",
+    )
+    .or("\"image\""),
+];
+
+/// The keys of a station.
+pub(crate) const STATION_KEYS: &[Key] = &[Key::new(
+    "address",
+    Shape::ADDRESS,
+    "Where to listen for the station's own peer; in all stations, or in none",
+)];
 
 /// The options of the socket bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -86,8 +134,7 @@ impl Options {
             .as_ref()
             .map_or(Some(Address::local(PORT)), Address::read);
         let tcp = tcp.as_ref().map_or(Some(default_tcp(role)), |value| {
-            let roles = [("listen", TcpRole::Listen), ("connect", TcpRole::Connect)];
-            value.choice("TCP roles", &roles)
+            value.choice("TCP roles", &TCP_ROLES)
         });
         if let (Some(value), Some(address), Some(tcp)) = (&address, &read, tcp)
             && let Err(mistake) = check_port(address, tcp)
@@ -95,14 +142,9 @@ impl Options {
         {
             value.refuse(mistake);
         }
-        let stated = send.as_ref().map(|value| {
-            let ways = [
-                ("cyclic", Sending::Cyclic),
-                ("on-change", Sending::OnChange),
-                ("reply", Sending::Reply),
-            ];
-            value.choice("ways to send", &ways)
-        });
+        let stated = send
+            .as_ref()
+            .map(|value| value.choice("ways to send", &WAYS));
         let sending = stated.unwrap_or_else(|| Some(Sending::default()));
         let least = min_interval
             .as_ref()

@@ -11,9 +11,10 @@ use switches::read_switches;
 use super::field::Quantity;
 use super::{Axis, AxisKind, COMMAND_BYTES, EXTENDED_FEEDBACK_BYTES, FEEDBACK_BYTES, Field};
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, short_number, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names, short_number, shown};
 use tickbus_image::signal::section::{
-    NAME_LIMIT, Section, Structure, dead_band_of, name_of, pair_of, scale_of,
+    DEAD_BAND_KEY, NAME_LIMIT, SCALE_KEY, STATION_KEY, Section, Structure, TWO_NUMBERS,
+    dead_band_of, name_of, pair_of, scale_of,
 };
 use tickbus_image::signal::{
     AREA_LIMIT, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot,
@@ -27,6 +28,74 @@ const UNIT_LIMIT: usize = 36;
 
 /// The most commands, and the most end switches, of one axis.
 const LIST_LIMIT: usize = 1000;
+
+/// The keys of an `[[axis]]` section.
+pub const KEYS: &[Key] = &[
+    Key::required(
+        "name",
+        Shape::Label(NAME_LIMIT - FIELD_NAME),
+        "A unique name; the names of its signals begin with it",
+    ),
+    Key::new(
+        "kind",
+        Shape::Choice(&names(&AxisKind::ALL)),
+        "The commands that make sense: \"torque\" opens and closes",
+    )
+    .or("\"position\""),
+    Key::new(
+        "unit",
+        Shape::Label(UNIT_LIMIT),
+        "The unit of the position; speeds get /s, accelerations /s²",
+    ),
+    SCALE_KEY,
+    Key::new("limits", TWO_NUMBERS, "The least and the greatest position"),
+    Key::new(
+        "inverted",
+        Shape::Boolean,
+        "true: on the wire positions count from the other limit, and speeds the other way",
+    )
+    .or("false"),
+    DEAD_BAND_KEY,
+    STATION_KEY,
+    Key::new(
+        "command_offset",
+        Shape::Whole(0, (AREA_LIMIT - COMMAND_BYTES) as i128),
+        "The first byte of the command in %Q; right behind the axis before it if it is left out",
+    ),
+    Key::new(
+        "feedback_offset",
+        Shape::Whole(0, (AREA_LIMIT - FEEDBACK_BYTES) as i128),
+        "The first byte of the feedback in %I; right behind the axis before it if it is left out",
+    ),
+    Key::new(
+        "acknowledge",
+        Shape::Boolean,
+        "true: with the bit .Acknowledge",
+    )
+    .or("false"),
+    Key::new(
+        "diagnostics",
+        Shape::Boolean,
+        "true: with the words .Status and .Error",
+    )
+    .or("false"),
+    Key::new(
+        "jerk",
+        Shape::Boolean,
+        "true: with the number .Jerk, which requests an S-curve",
+    )
+    .or("false"),
+    Key::new(
+        "command",
+        Shape::List(&Shape::Table(commands::KEYS), 0, LIST_LIMIT),
+        "The commands that the PLC requests by number",
+    ),
+    Key::new(
+        "switch",
+        Shape::List(&Shape::Table(switches::KEYS), 0, LIST_LIMIT),
+        "The end switches",
+    ),
+];
 
 /// The bytes that the preceding axis tables occupy.
 #[derive(Debug, Default)]
@@ -166,7 +235,8 @@ pub fn read<'a>(
     let ((name, value), kind) = (named?, kind?);
     let end = (command + COMMAND_BYTES).max(feedback + feedback_bytes);
     let judged = whole && !matches!(scaled, Some(None));
-    if !judged || (mirrored.is_some() && bounds.is_none()) || !fits(end, name, value) {
+    let may_invert = mirrored.is_some_and(|(inverted, _)| inverted != Some(false));
+    if !judged || (may_invert && bounds.is_none()) || !fits(end, name, value) {
         return None;
     }
     let axis = Axis {

@@ -398,6 +398,14 @@ mod tests {
     const HEAD: &str = "[driver]\nid = 1\nname = \"Cell\"\n[fieldbus]\nkind = \"loopback\"\n\
                         link = \"cell\"\n";
 
+    #[test]
+    fn an_axis_that_is_not_inverted_needs_no_limits() {
+        let text = format!("{HEAD}[[axis]]\nname = \"A\"\ninverted = false\n");
+        let config = Config::parse("test.cfg", &text, &crate::KINDS).expect("right");
+        assert_eq!(config.axes.len(), 1);
+        assert!(!config.table.signals.is_empty());
+    }
+
     /// Reads one signal from the keys of its section.
     #[track_caller]
     fn signal(keys: &str) -> Signal {

@@ -1,6 +1,6 @@
 //! The table `[driver]` of a driver.cfg.
 
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table, names};
 use tickbus_image::signal::Addressing;
 
 /// The longest name of a driver, in characters.
@@ -8,6 +8,30 @@ const NAME_LIMIT: usize = 120;
 
 /// The longest path of a file, in characters.
 pub(crate) const PATH_LIMIT: usize = 1000;
+
+/// The keys of the table.
+pub(crate) const KEYS: &[Key] = &[
+    Key::required(
+        "id",
+        Shape::Whole(1, i32::MAX as i128),
+        "A positive number, unique among the drivers of a folder",
+    ),
+    Key::required("name", Shape::Label(NAME_LIMIT), "A name for people"),
+    Key::new(
+        "addressing",
+        Shape::Choice(&names(&ADDRESSINGS)),
+        "\"bytes\": addresses are byte offsets, as Siemens counts; \"iec\": they count elements, as CODESYS does",
+    )
+    .or("\"bytes\""),
+    Key::new(
+        "faults",
+        Shape::Label(PATH_LIMIT),
+        "A file with [[fault]] sections, relative to the folder of this file",
+    ),
+];
+
+const ADDRESSINGS: [(&str, Addressing); 2] =
+    [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
 
 /// The contents of `[driver]`.
 pub(crate) struct DriverTable {
@@ -27,7 +51,6 @@ pub(crate) fn read_driver(mut table: Table<'_>) -> DriverTable {
     let addressing = table.take("addressing");
     let faults = table.take("faults");
     table.finish();
-    let choices = [("bytes", Addressing::Bytes), ("iec", Addressing::Elements)];
     DriverTable {
         id: id
             .and_then(|value| value.whole(1..=i32::MAX.into()))
@@ -36,7 +59,7 @@ pub(crate) fn read_driver(mut table: Table<'_>) -> DriverTable {
             .and_then(|value| value.label(NAME_LIMIT, "give the driver a name for people"))
             .map(str::to_owned),
         addressing: addressing
-            .and_then(|value| value.choice("ways of addressing", &choices))
+            .and_then(|value| value.choice("ways of addressing", &ADDRESSINGS))
             .unwrap_or_default(),
         faults: faults
             .and_then(|value| {

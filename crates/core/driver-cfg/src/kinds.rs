@@ -7,6 +7,7 @@ use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::{BusKind, BusOptions, Events, Role};
 use tickbus_plc::Programs;
 
+use crate::kind_keys::KindKeys;
 use crate::{Options, loopback};
 
 /// Reads the keys of one kind in `[fieldbus]`; see [`BusKind::read`].
@@ -15,8 +16,7 @@ type ReadOptions = fn(Role, bool, &mut Table<'_>) -> Option<Box<dyn BusOptions>>
 /// A kind of bus, as an entry in a list of kinds.
 #[derive(Clone, Copy)]
 pub struct Kind {
-    name: &'static str,
-    learns_of_writes: bool,
+    keys: KindKeys,
     read: ReadOptions,
 }
 
@@ -24,8 +24,13 @@ impl Kind {
     /// Returns the kind whose options are of type `K`.
     pub const fn of<K: BusKind>() -> Self {
         Self {
-            name: K::NAME,
-            learns_of_writes: K::LEARNS_OF_WRITES,
+            keys: KindKeys {
+                name: K::NAME,
+                learns_of_writes: K::LEARNS_OF_WRITES,
+                keys: K::KEYS,
+                one_of: K::ONE_OF,
+                station_keys: K::STATION_KEYS,
+            },
             read: |role, moved, table| {
                 let options = K::read(role, moved, table)?;
                 Some(Box::new(options))
@@ -36,7 +41,7 @@ impl Kind {
 
 impl fmt::Debug for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.name.fmt(f)
+        self.keys.name.fmt(f)
     }
 }
 
@@ -101,22 +106,27 @@ impl Kinds {
 
     /// Returns the names of all kinds.
     pub fn names(&self) -> Vec<&'static str> {
-        let mut names = match self.others {
-            Some(others) => others.names(),
-            None => vec![loopback::NAME],
+        self.keys().iter().map(|kind| kind.name).collect()
+    }
+
+    /// Returns the keys of all kinds.
+    pub fn keys(&self) -> Vec<KindKeys> {
+        let mut all = match self.others {
+            Some(others) => others.keys(),
+            None => vec![loopback::KIND_KEYS],
         };
-        for kind in self.buses {
+        for Kind { keys, .. } in self.buses {
             // A further kind of the same name is never used.
-            if !names.contains(&kind.name) {
-                names.push(kind.name);
+            if all.iter().all(|other| other.name != keys.name) {
+                all.push(*keys);
             }
         }
-        names
+        all
     }
 
     fn find(&self, name: &str) -> Option<&Kind> {
         let others = self.others.and_then(|others| others.find(name));
-        others.or_else(|| self.buses.iter().find(|kind| kind.name == name))
+        others.or_else(|| self.buses.iter().find(|kind| kind.keys.name == name))
     }
 
     /// Reads `events` and the keys of the bus kind `kind`, and reports their mistakes. `moved` says that another
@@ -141,8 +151,8 @@ impl Kinds {
             }
             Some((_, Some(kind))) => {
                 let options = (kind.read)(role, moved, &mut table);
-                let options = options.map(|options| Options::named(kind.name, options));
-                (options, kind.learns_of_writes)
+                let options = options.map(|options| Options::named(kind.keys.name, options));
+                (options, kind.keys.learns_of_writes)
             }
             other => {
                 table.finish_open();

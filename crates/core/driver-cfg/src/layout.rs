@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use crate::Options;
 use tickbus_axis as axis;
 use tickbus_axis::Axis;
-use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, shown};
 use tickbus_image::signal::section::{self, NAME_LIMIT, STATION, Section};
 use tickbus_image::signal::{AREA_LIMIT, Addressing, Area, SignalTable, Station};
 
@@ -17,7 +17,21 @@ pub(super) const SIGNAL_LIMIT: usize = 100_000;
 pub(super) const AXIS_LIMIT: usize = 2_000;
 
 /// The most stations of one driver.
-const STATION_LIMIT: usize = 256;
+pub const STATION_LIMIT: usize = 256;
+
+/// The keys of the sizes of a station's areas.
+pub(crate) const SIZE_KEYS: &[Key] = &[
+    Key::new(
+        "input_bytes",
+        Shape::Whole(0, AREA_LIMIT as i128),
+        "The size of %I; as far as the signals reach if it is left out",
+    ),
+    Key::new(
+        "output_bytes",
+        Shape::Whole(0, AREA_LIMIT as i128),
+        "The size of %Q; as far as the signals reach if it is left out",
+    ),
+];
 
 /// The sizes of a station's areas, where stated.
 #[derive(Clone, Debug, Default)]

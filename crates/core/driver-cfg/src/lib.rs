@@ -4,6 +4,8 @@
 
 mod config;
 mod driver_table;
+pub mod keys;
+mod kind_keys;
 mod kinds;
 mod layout;
 pub mod loopback;

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, names, shown};
 use tickbus_fieldbus::loopback::{CYCLE, FreeLoopback, SteppedLoopback};
 use tickbus_fieldbus::{Bus, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_plc::{HostedProgram, INTERVAL, Programs};
 use tickbus_record as record;
+
+use crate::kind_keys::KindKeys;
 
 /// The name of the kind in a driver.cfg.
 pub const NAME: &str = "loopback";
@@ -50,6 +52,52 @@ pub enum Peer {
     Replay(PathBuf),
 }
 
+/// The keys of the loopback in `[fieldbus]`.
+const KEYS: &[Key] = &[
+    Key::new(
+        "mode",
+        Shape::Choice(&names(&Mode::NAMES)),
+        "\"free\": bus and program run on threads of their own; \"stepped\": on the tick's thread, on simulation time",
+    ),
+    Key::new(
+        "link",
+        Shape::Label(LINK_LIMIT),
+        "The name of the link: two drivers with one link and different roles meet there",
+    ),
+    Key::new(
+        "program",
+        Shape::Text,
+        "The PLC program at the other end: a built-in one, or the path of your own, \"./program.so\"",
+    ),
+    Key::new(
+        "replay",
+        record::FILE_SHAPE,
+        "A recording whose peer drives this end",
+    ),
+    Key::new(
+        "program_options",
+        Shape::Map(&Shape::Any(&[Shape::Text, Shape::Number])),
+        "The options of the program",
+    ),
+    Key::new(
+        "scan",
+        Shape::Duration,
+        "The scan interval of the program; 10ms for a built-in one",
+    ),
+];
+
+/// Those of which a loopback has one.
+const ONE_OF: [&str; 3] = ["program", "link", "replay"];
+
+/// The keys as those of a kind.
+pub(super) const KIND_KEYS: KindKeys = KindKeys {
+    name: NAME,
+    learns_of_writes: false,
+    keys: &[KEYS],
+    one_of: &ONE_OF,
+    station_keys: &[],
+};
+
 /// The options of the loopback bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -71,7 +119,7 @@ impl Options {
         let program_options = table.take("program_options");
         let scan = table.take("scan");
         table.require_one_of(
-            &["program", "link", "replay"],
+            &ONE_OF,
             "add program = \"rig\" to host a PLC program at the other end, link = \"name\" to \
              meet the driver that names the same link, or replay = \"run.vcd\" to replay a recording",
         );

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_net::Address;
 
 /// The default port of a page.
@@ -17,6 +17,38 @@ const LEAST_GRACE: Nanos = Nanos::from_secs(1);
 
 /// The longest path of a picture, in characters.
 const PATH_LIMIT: usize = 1000;
+
+/// The keys of the table.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "listen",
+        Shape::ADDRESS,
+        "Where the page is served; port 0 lets the system choose one",
+    )
+    .or("\"127.0.0.1:20080\""),
+    Key::new(
+        "grace",
+        Shape::Duration,
+        "How long signals stay forced when no viewer has the token any more; at least 1s",
+    )
+    .or("\"10s\""),
+    Key::new(
+        "keep_forced",
+        Shape::Boolean,
+        "true: signals stay forced until they are released, or the driver closes",
+    )
+    .or("false"),
+    Key::new(
+        "picture",
+        Shape::Pattern("\\S.*\\.[sS][vV][gG]"),
+        "An SVG drawing of the machine, relative to the folder of this file",
+    ),
+    Key::new(
+        "token_file",
+        Shape::Label(PATH_LIMIT),
+        "The file in which the token survives a restart, relative to the folder of this file",
+    ),
+];
 
 /// The live page of a driver.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use crate::Options;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
 use tickbus_fieldbus::{Outputs, Role};
 
 /// The default pauses between attempts to reach the peer.
@@ -35,6 +35,41 @@ const LEAST_PAUSE: Nanos = Nanos::from_millis(10);
 
 /// The most pauses in `reconnect`.
 const RECONNECT_LIMIT: usize = 100;
+
+/// The keys of these times in `[fieldbus]`.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "cycle",
+        Shape::Duration,
+        "The bus cycle, at least 50us; each bus has its own default",
+    ),
+    Key::new(
+        "max_age",
+        Shape::Duration,
+        "Data older than this are stale; ten cycles by default, at least 250ms",
+    ),
+    Key::new(
+        "watchdog",
+        Shape::Any(&[Shape::Duration, Shape::Choice(&[OFF])]),
+        "If the simulation has not ticked for this long, the other end gets fail-safe values; at least 10ms, or \"off\"",
+    ),
+    Key::new(
+        "at_close",
+        Shape::Choice(&names(&Outputs::CHOICES)),
+        "The values that the other end has after this end has closed",
+    ),
+    Key::new(
+        "while_stale",
+        Shape::Choice(&names(&Outputs::CHOICES)),
+        "The values that a controller sends while its own data are stale; \"fail_safe\" by default",
+    ),
+    Key::new(
+        "reconnect",
+        Shape::List(&Shape::Duration, 1, RECONNECT_LIMIT),
+        "Pauses between attempts to open a line that broke, at least 10ms each; the last one repeats",
+    )
+    .or("[\"1s\", \"2s\", \"4s\", \"8s\", \"15s\", \"30s\"]"),
+];
 
 /// The properties of a driver's bus that its times depend on.
 #[derive(Clone, Copy, Debug)]

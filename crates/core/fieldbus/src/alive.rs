@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::Role;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, shown};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
 /// The shortest time within which a signal can be required to change: shorter times are within the jitter of an
@@ -111,7 +111,41 @@ pub struct Written<'a> {
     heartbeat: Option<Value<'a>>,
 }
 
+const SIGNAL: Key = Key::required("signal", Shape::Text, "The name of the signal");
+
+const ALIVE: Shape = Shape::Table(&[
+    SIGNAL,
+    Key::required(
+        "within",
+        Shape::Duration,
+        "The signal has to change within this time: at least 10ms and one bus cycle",
+    ),
+]);
+
+const HEARTBEAT: Shape = Shape::Table(&[
+    SIGNAL,
+    Key::required(
+        "every",
+        Shape::Duration,
+        "The signal is counted up once in this time: at least 1ms",
+    ),
+]);
+
 impl<'a> Written<'a> {
+    /// The keys in `[fieldbus]`.
+    pub const KEYS: &'static [Key] = &[
+        Key::new(
+            "alive",
+            Shape::Any(&[ALIVE, Shape::List(&ALIVE, 0, usize::MAX)]),
+            "A signal that this end reads and that has to change, or a list of such tables",
+        ),
+        Key::new(
+            "heartbeat",
+            Shape::Any(&[HEARTBEAT, Shape::List(&HEARTBEAT, 0, usize::MAX)]),
+            "A signal that this end writes and that the driver counts up, or a list of such tables",
+        ),
+    ];
+
     /// Takes the keys out of `[fieldbus]`.
     pub fn take(table: &mut Table<'a>) -> Self {
         Self {

@@ -7,7 +7,7 @@ use tickbus_base::toml_text::{Value, did_you_mean, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 
 /// The longest address, in characters.
-const ADDRESS_LIMIT: usize = 500;
+pub const ADDRESS_LIMIT: usize = 500;
 
 /// One line of `[fieldbus.at]`: a signal, and its address in the notation of the device's own tools.
 #[derive(Clone, Debug)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 use tickbus_image::signal::SignalTable;
 
 use super::{BusError, BusSetup, CYCLE, Cycles, Exchange, Exchanged, Free, OpenError, Port, Role};
@@ -33,6 +33,37 @@ pub struct CardOptions {
 }
 
 impl CardOptions {
+    /// The keys that [`read`](Self::read) takes, but for `library`.
+    pub const KEYS: &'static [Key] = &[
+        Key::new(
+            "write_offset",
+            Shape::Whole(0, 65_535),
+            "The first byte that this end writes in the card's process data",
+        )
+        .or("0"),
+        Key::new(
+            "read_offset",
+            Shape::Whole(0, 65_535),
+            "The first byte that this end reads in the card's process data",
+        )
+        .or("0"),
+        Key::new(
+            "card_watchdog",
+            Shape::Boolean,
+            "true: the card watches this end, which triggers it in each exchange",
+        )
+        .or("false"),
+    ];
+
+    /// Returns the key `library`, which a file needs if the vendor has no library for this system.
+    pub const fn library_key(vendor: Option<&str>) -> Key {
+        const DOC: &str = "The file of the vendor's library; the system searches for a name alone";
+        match vendor {
+            Some(_) => Key::new("library", Shape::Label(PATH_LIMIT), DOC),
+            None => Key::required("library", Shape::Label(PATH_LIMIT), DOC),
+        }
+    }
+
     /// Reads `library`, `write_offset`, `read_offset` and `card_watchdog`. If `vendor` has no library for this system,
     /// `library` is required.
     pub fn read(table: &mut Table<'_>, vendor: Option<&str>) -> Option<Self> {

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Clock, Nanos, Stop};
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{At, Bus, Events, Role};
@@ -214,6 +214,15 @@ pub trait BusKind: BusOptions + Sized {
     /// True if the bus learns of each write of its peer, so that a driver.cfg can request [writes as
     /// events](Events::Writes).
     const LEARNS_OF_WRITES: bool = false;
+
+    /// The keys that [`read`](Self::read) takes, in groups that kinds can share: for the schema of a driver.cfg.
+    const KEYS: &'static [&'static [Key]];
+
+    /// Those of the keys of which a file has at least one; empty if it can be without all of them.
+    const ONE_OF: &'static [&'static str] = &[];
+
+    /// The keys that [`read_station`](BusOptions::read_station) takes.
+    const STATION_KEYS: &'static [Key] = &[];
 
     /// Reads the keys of this kind in `[fieldbus]`, for the end with `role`, and reports their mistakes. `moved` means
     /// that [another address](BusOptions::set_address) will follow.

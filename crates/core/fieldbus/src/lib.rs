@@ -23,7 +23,7 @@ pub mod loopback;
 pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
-pub use at::{At, both_ways};
+pub use at::{ADDRESS_LIMIT, At, both_ways};
 pub use bus::{Bus, CYCLE, Free, Lead, Stepped};
 pub use card::{Card, CardBus, CardOptions, Failing, Meaning, Moved, Vendor, Verdict};
 pub use changes::ChangeEvents;

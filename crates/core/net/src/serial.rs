@@ -6,12 +6,19 @@ use std::path::Path;
 
 use tickbus_base::os::{SerialLine, SerialPort, SerialSettings};
 use tickbus_base::time::Clock;
-use tickbus_base::toml_text::Value;
+use tickbus_base::toml_text::{Key, Shape, Value};
 
 use crate::Error;
 
 /// The longest name of a serial port, in characters.
 const DEVICE_LIMIT: usize = 1000;
+
+/// The key `device`, of a bus that needs a serial port.
+pub const DEVICE_KEY: Key = Key::required(
+    "device",
+    Shape::Label(DEVICE_LIMIT),
+    "The serial port, such as \"/dev/ttyUSB0\"",
+);
 
 /// Reads the system's name of a port.
 pub fn read_device(value: &Value<'_>) -> Option<String> {

@@ -25,7 +25,7 @@ mod vcd;
 mod tests;
 
 pub use columns::{Column, Columns, Tick, ValueKind};
-pub use options::{Format, Options, When, file_of};
+pub use options::{FILE_SHAPE, Format, Options, When, file_of};
 pub use places::FileClaim;
 pub use reading::{Recording, RecordingError};
 pub use recorder::{Recorder, RecorderCounters, RecorderError};

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
 
 /// The default capacity of the ring in ticks, unless that takes too much memory.
 const TICKS: usize = 4096;
@@ -58,6 +58,12 @@ pub enum When {
     Never,
 }
 
+/// The values of the key `when`.
+const TIMES: [(&str, When); 2] = [("always", When::Always), ("never", When::Never)];
+
+/// The shape of the name of a recording's file.
+pub const FILE_SHAPE: Shape = Shape::Pattern("\\S.*\\.([vV][cC][dD]|[cC][sS][vV])");
+
 /// The options for recording in a driver.cfg.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Options {
@@ -86,6 +92,26 @@ impl Options {
         })
     }
 
+    /// The keys of the table `[record]`.
+    pub const KEYS: &'static [Key] = &[
+        Key::required(
+            "file",
+            FILE_SHAPE,
+            "The recording: a name that ends in .vcd or .csv, relative to the folder of this file",
+        ),
+        Key::new(
+            "ring",
+            Shape::Whole(1, MOST_TICKS as i128),
+            "Ticks that may wait to be written; 4096 by default, at most 16 MiB",
+        ),
+        Key::new(
+            "when",
+            Shape::Choice(&names(&TIMES)),
+            "\"never\" switches recording off",
+        )
+        .or("\"always\""),
+    ];
+
     /// Reads the `[record]` table. `replayed` is the recording that the bus replays, if any: it must not be
     /// overwritten.
     pub fn read(mut table: Table<'_>, replayed: Option<&Path>) -> Option<Self> {
@@ -94,8 +120,7 @@ impl Options {
         let when = table.take("when");
         table.finish();
         let ring = ring.map(|value| ring_of(&value));
-        let choices = [("always", When::Always), ("never", When::Never)];
-        let when = when.map_or(Some(When::Always), |value| value.choice("times", &choices));
+        let when = when.map_or(Some(When::Always), |value| value.choice("times", &TIMES));
         let value = file?;
         let (file, format) = file_of(&value)?;
         if replayed.is_some_and(|replayed| plain(replayed) == plain(&file)) {

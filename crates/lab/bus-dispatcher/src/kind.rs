@@ -2,15 +2,16 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Collector, Table};
+use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_dispatcher::Kind;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{DispatcherBus, Options};
+use super::{DispatcherBus, Options, options};
 
 impl BusKind for Options {
     const NAME: &'static str = "dispatcher";
+    const KEYS: &'static [&'static [Key]] = &[options::KEYS];
 
     fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(role, moved, table)

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Table, Value};
+use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
 use tickbus_dispatcher::client::Profile;
 use tickbus_dispatcher::{
     Cable, Channel, Kind, LEAST_PROMISE, LONGEST_NAME, LONGEST_PROMISE, MOST_CHANNELS, PORT,
@@ -14,6 +14,21 @@ use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
 
 use super::channels::{Channels, kind_of};
+
+/// The keys of the bus, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new("address", Shape::ADDRESS, "Where the dispatcher listens").or("\"127.0.0.1:20070\""),
+    Key::new(
+        "name",
+        Shape::Pattern("[A-Za-z0-9_.-]{1,63}"),
+        "A unique name in the laboratory; the driver's name by default",
+    ),
+    Key::new(
+        "connect",
+        Shape::List(&Shape::Text, 0, usize::MAX),
+        "The connections to request, such as \"I1:PUMP:Q2\"",
+    ),
+];
 
 /// The options of the bus `dispatcher`.
 #[derive(Clone, Debug, PartialEq, Eq)]

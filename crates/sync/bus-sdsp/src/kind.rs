@@ -1,14 +1,16 @@
 //! The kind `sdsp`, for the list of bus kinds.
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Table};
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{Every, Options, Sdsp};
+use super::{Every, Options, Sdsp, options};
 
 impl BusKind for Options {
     const NAME: &'static str = "sdsp";
+    const KEYS: &'static [&'static [Key]] = &[options::KEYS];
+    const ONE_OF: &'static [&'static str] = &options::MEETINGS;
 
     fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         Self::read(moved, table)

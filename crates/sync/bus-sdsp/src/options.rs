@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 use tickbus_net::Address;
@@ -18,6 +18,40 @@ const NAME_LIMIT: usize = 120;
 
 /// How long the server may be silent. While it waits for clients or is paused, it sends a message every second.
 const TIMEOUT: Nanos = Nanos::from_secs(60);
+
+/// The keys of the bus, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new("address", Shape::ADDRESS, "Where the server listens"),
+    Key::new(
+        "shared_memory",
+        Shape::Pattern("[A-Za-z0-9_-]{1,40}"),
+        "The name under which a server on this computer offers shared memory",
+    ),
+    Key::new(
+        "client",
+        Shape::Label(NAME_LIMIT),
+        "A unique name in the run; the driver's name by default",
+    ),
+    Key::new(
+        "multiple",
+        Shape::Whole(1, u32::MAX as i128),
+        "The steps of the server in one step of this end; 1 by default",
+    ),
+    Key::new(
+        "step",
+        Shape::Duration,
+        "Instead of \"multiple\": the virtual time of one step of this end",
+    ),
+    Key::new(
+        "timeout",
+        Shape::Duration,
+        "How long the server may be silent, and may take to appear",
+    )
+    .or("\"60s\""),
+];
+
+/// Those of which a file has one.
+pub(crate) const MEETINGS: [&str; 2] = ["address", "shared_memory"];
 
 /// The options of the bus `sdsp`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,7 +89,7 @@ impl Options {
         if !moved {
             let right = "say where the server listens, such as address = \"127.0.0.1:20060\", or by which name it \
                          offers shared memory on this computer, shared_memory = \"cell\"";
-            table.require_one_of(&["address", "shared_memory"], right);
+            table.require_one_of(&MEETINGS, right);
         }
         let meeting = match (address, memory) {
             (Some(_), Some(both)) => {

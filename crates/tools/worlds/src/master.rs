@@ -12,7 +12,7 @@ use profirust::phy::ProfibusPhy;
 use profirust::time::{Duration, Instant};
 use tickbus_base::os::{Marks, Parity, SerialSettings};
 use tickbus_base::time::{Nanos, Stop};
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Table};
 use tickbus_fieldbus::tcp::{Call, Caller};
 use tickbus_fieldbus::{
     Bus, BusError, BusKind, BusOptions, BusSetup, CYCLE, Free, NamedFile, OpenError, Port, Receipt,
@@ -52,6 +52,7 @@ pub(crate) struct Options {
 
 impl BusKind for Options {
     const NAME: &'static str = "profibus-master";
+    const KEYS: &'static [&'static [Key]] = &[];
 
     fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let slot_bits = table.require("slot_bits", "write slot_bits = 1000")?;

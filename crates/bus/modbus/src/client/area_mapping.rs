@@ -4,11 +4,24 @@ use crate::ElementAddress;
 use crate::element_address::SHAPE;
 use crate::table::{ADDRESSES, Span, Table};
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::Value;
+use tickbus_base::toml_text::{Key, Shape, Value};
 use tickbus_image::signal::Area;
 
 /// The most parts that an area may have.
-const PARTS: usize = 100;
+pub(crate) const PARTS: usize = 100;
+
+/// The most bytes of a part.
+const PART_BYTES: i128 = 0x1_0000;
+
+/// The keys of a part.
+pub(crate) const PART_KEYS: &[Key] = &[
+    Key::required("at", Shape::Text, "The first element, such as \"coil:1\""),
+    Key::new(
+        "bytes",
+        Shape::Whole(1, PART_BYTES),
+        "How many bytes of the image lie there; all that are left in the last part",
+    ),
+];
 
 /// The place of an area of the image in the tables of a unit.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -99,7 +112,7 @@ impl AreaMapping {
                 let bytes = match bytes {
                     None => None,
                     Some(value) => {
-                        let bytes = value.whole(1..=0x1_0000)?;
+                        let bytes = value.whole(1..=PART_BYTES)?;
                         Some(usize::try_from(bytes).ok()?)
                     }
                 };

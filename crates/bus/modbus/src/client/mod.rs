@@ -17,6 +17,7 @@ use tickbus_net::serial;
 
 use super::Line;
 pub use area_mapping::Block;
+pub(crate) use area_mapping::{PART_KEYS, PARTS};
 pub use options::ClientOptions;
 pub use piece::Piece;
 pub use plan::{Capabilities, queries};

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value};
 use tickbus_image::signal;
 
 use super::Keys;
@@ -25,6 +25,47 @@ const MODULE_LIMIT: usize = 244;
 
 /// A GSD file is at most this long, in bytes.
 const GSD_LIMIT: u64 = 16 << 20;
+
+/// The keys of a station, for the schema of a driver.cfg.
+pub(crate) const KEYS: &[Key] = &[
+    Key::new(
+        "address",
+        Shape::Whole(0, 125),
+        "The station's address in the PLC's project",
+    ),
+    Key::new(
+        "gsd",
+        Shape::Label(PATH_LIMIT),
+        "The device's GSD file, relative to the folder of this file",
+    ),
+    Key::new(
+        "modules",
+        Shape::List(&Shape::Label(NAME_LIMIT), 0, MODULE_LIMIT),
+        "The names of the modules, slot by slot, as the GSD file has them",
+    ),
+    Key::new(
+        "ident",
+        Shape::Whole(0, 0xFFFF),
+        "Instead of a GSD file: the number of the kind of device",
+    ),
+    Key::new(
+        "config",
+        Shape::List(&Shape::Whole(0, 255), 1, DATA_LIMIT),
+        "Beside \"ident\": the identifiers of the modules",
+    ),
+];
+
+/// The keys of a `[[station]]`, which always has an address.
+pub(crate) const OWN_KEYS: &[Key] = &[
+    Key {
+        is_required: true,
+        ..KEYS[0]
+    },
+    KEYS[1],
+    KEYS[2],
+    KEYS[3],
+    KEYS[4],
+];
 
 /// The keys of one station.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -18,6 +18,7 @@ use tickbus_image::signal::SignalTable;
 use connection::Connection;
 pub use frames::FrameFields;
 pub use options::ClientOptions;
+pub(crate) use options::IDENTITY_LIMIT;
 pub use parameters::{ConnectionParameters, End, SessionEvent};
 pub use refusal::Refusal;
 pub use session::ClientSession;

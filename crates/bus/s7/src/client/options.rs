@@ -18,7 +18,7 @@ use tickbus_net::Address;
 const CALLING: [u8; 2] = [1, 0];
 
 /// The longest identity, in characters.
-const IDENTITY_LIMIT: usize = 200;
+pub(crate) const IDENTITY_LIMIT: usize = 200;
 
 /// The options of the bus `s7-client`.
 #[derive(Clone, Debug, PartialEq, Eq)]

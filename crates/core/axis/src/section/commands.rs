@@ -4,7 +4,30 @@ use std::collections::HashMap;
 
 use super::{LIST_LIMIT, check_within};
 use crate::{AxisKind, Command, Mode, Motion};
-use tickbus_base::toml_text::{Table, Value};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, names};
+
+/// The keys of an `[[axis.command]]` table.
+pub(super) const KEYS: &[Key] = &[
+    Key::required(
+        "number",
+        Shape::Whole(1, u16::MAX as i128),
+        "The number that the PLC sends",
+    ),
+    Key::new(
+        "mode",
+        Shape::Choice(&names(&Mode::ALL)),
+        "What the axis does; by its kind if it is left out",
+    ),
+    Key::new(
+        "position",
+        Shape::Number,
+        "The target, in the unit of the axis",
+    ),
+    Key::new("speed", Shape::Number, "Above 0"),
+    Key::new("acceleration", Shape::Number, "Above 0"),
+    Key::new("deceleration", Shape::Number, "Above 0"),
+    Key::new("torque", Shape::Number, "The torque, in percent"),
+];
 
 /// Reads the numbered commands of an axis of this `kind`.
 pub(super) fn read_commands(

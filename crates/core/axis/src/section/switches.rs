@@ -2,9 +2,25 @@
 
 use super::{LIST_LIMIT, check_within};
 use crate::Switch;
-use tickbus_base::toml_text::{Table, Value};
-use tickbus_image::signal::section::{Section, Structure, address_of, name_of};
+use tickbus_base::toml_text::{Key, Shape, Table, Value};
+use tickbus_image::signal::section::{
+    ADDRESS, NAME_LIMIT, Section, Structure, address_of, name_of,
+};
 use tickbus_image::signal::{Addressing, Area, DataType, Signal, Width};
+
+/// The keys of an `[[axis.switch]]` table.
+pub(super) const KEYS: &[Key] = &[
+    Key::required("name", Shape::Label(NAME_LIMIT), "A unique name"),
+    Key::required("address", ADDRESS, "A bit of %I, such as \"%IX120.0\""),
+    Key::new("above", Shape::Number, "The position above which it is on"),
+    Key::new("below", Shape::Number, "The position below which it is on"),
+    Key::new(
+        "hysteresis",
+        Shape::Number,
+        "How far the axis comes back before the switch is off; not negative",
+    )
+    .or("0.0"),
+];
 
 /// The remedy where a trip point is expected.
 const POSITION: &str = "write a position in the unit of the axis, such as 395.0";

@@ -4,6 +4,7 @@
 //! mistake to the text's [`Collector`] at its position, so that the user sees all of them at once. Nothing here knows
 //! the meaning of the keys.
 
+mod key;
 mod mistakes;
 mod nearest;
 mod number;
@@ -11,6 +12,7 @@ mod source;
 mod syntax;
 mod table;
 
+pub use key::{Key, Shape, names};
 pub use mistakes::{Collector, Mistakes, PlacedMistake, printable, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;

@@ -29,7 +29,10 @@ pub use fault::{Begin, Direction, Effect, Fault, Lasts, LineEffect, SignalEffect
 pub use line_fault::LineFault;
 pub use line_faults::{Fate, LineFaults, Shape, Taken};
 pub use list::{Faults, Prepared, Retired, Slots};
-pub use section::{LIMIT, Scope, read_file, read_one, read_sections};
+pub use section::{
+    FAULT_KEYS, FAULT_KINDS, FaultKind, LIMIT, RequiredKey, Scope, read_file, read_one,
+    read_sections,
+};
 pub use tick_time::TickTime;
 
 #[cfg(test)]

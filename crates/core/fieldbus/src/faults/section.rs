@@ -1,8 +1,10 @@
 //! The `[[fault]]` sections: of a driver.cfg, of a separate file, or handed in one at a time.
 
 mod effect;
+mod keys;
 
 use self::effect::read_effect;
+pub use self::keys::{FAULT_KEYS, FAULT_KINDS, FaultKind, RequiredKey};
 use super::{Begin, Condition, Effect, Fault, Lasts};
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, read_text, shown};
 use tickbus_image::signal::SignalTable;
@@ -10,24 +12,6 @@ use tickbus_image::signal::section::NAME_LIMIT;
 
 /// The maximum number of faults of one driver that wait or are active.
 pub const LIMIT: usize = 64;
-
-/// The kinds of faults, and the keys that belong to each.
-const KINDS: [(&str, &[&str]); 11] = [
-    ("stuck", &["signal", "value"]),
-    ("invert", &["signal"]),
-    ("offset", &["signal", "by"]),
-    ("noise", &["signal", "amplitude", "chance", "seed"]),
-    ("delay", &["by"]),
-    ("slow-answers", &["by"]),
-    ("drop", &["chance", "direction", "seed"]),
-    ("duplicate", &["chance", "direction", "seed"]),
-    ("link-down", &[]),
-    ("station-down", &["station"]),
-    (
-        "diagnosis",
-        &["station", "slot", "channel", "error", "octets", "static"],
-    ),
-];
 
 /// The driver for which faults are read.
 #[derive(Clone, Copy, Debug)]
@@ -49,8 +33,6 @@ impl<'a> From<&'a SignalTable> for Scope<'a> {
 }
 
 const KIND: &str = "write the kind of fault, such as kind = \"stuck\"";
-/// The remedy where a signal should be named.
-const SIGNAL: &str = "name the signal that is wrong, such as signal = \"LA1 bottom\"";
 
 /// Reads the faults of a separate file.
 ///
@@ -218,26 +200,18 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
     let keys = Keys::take(&mut section);
     let known = keys.kind.as_ref().and_then(kind_of);
     if let Some(kind) = known {
-        match kind {
-            "offset" => drop(section.require("by", "say by how much, such as by = 2.5")),
-            "delay" | "slow-answers" => {
-                drop(section.require("by", "say by how much, such as by = \"20ms\""));
-            }
-            "drop" => drop(section.require("chance", "say how likely it is, such as chance = 0.1")),
-            "station-down" => drop(section.require("station", "name the station that is gone")),
-            _ => {}
-        }
-        if matches!(kind, "stuck" | "invert" | "offset" | "noise") {
-            section.require("signal", SIGNAL);
+        for key in kind.required {
+            section.require(key.name, key.right);
         }
     }
     let whole = section.is_whole();
     section.finish();
 
     if let Some(kind) = known {
-        check_keys(kind, &keys);
+        check_keys(kind.name, &keys);
     }
-    if let (Some("diagnosis"), Some(value), Some(scope)) = (known, &keys.kind, scope)
+    if let (Some(kind), Some(value), Some(scope)) = (known, &keys.kind, scope)
+        && kind.name == "diagnosis"
         && !scope.has_diagnosis
     {
         value.wrong(
@@ -257,7 +231,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
             .whole(0..=u64::MAX.into())
             .and_then(|seed| u64::try_from(seed).ok()),
     };
-    let effect = known.and_then(|kind| read_effect(kind, &keys, table, whole));
+    let effect = known.and_then(|kind| read_effect(kind.name, &keys, table, whole));
     let (begin, lasts) = (begin?, lasts?);
     let times = read_times(&keys, &begin, lasts)?;
     let (effect, name) = (effect?, name?);
@@ -279,20 +253,19 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
     Some(fault)
 }
 
-fn kind_of(value: &Value<'_>) -> Option<&'static str> {
-    let kinds = KINDS.map(|(kind, _)| (kind, kind));
+fn kind_of(value: &Value<'_>) -> Option<FaultKind> {
+    let kinds = FAULT_KINDS.map(|kind| (kind.name, kind));
     value.choice("kinds of faults", &kinds)
 }
 
 /// Reports keys that do not belong to faults of this kind.
 fn check_keys(kind: &str, keys: &Keys<'_>) {
     for (key, value) in keys.of_kinds() {
-        let belongs = |(_, keys): &&(&str, &[&str])| keys.contains(&key);
         let Some(value) = value else { continue };
-        let owners: Vec<&str> = KINDS
+        let owners: Vec<&str> = FAULT_KINDS
             .iter()
-            .filter(belongs)
-            .map(|(kind, _)| *kind)
+            .filter(|kind| kind.keys().any(|own| own == key))
+            .map(|kind| kind.name)
             .collect();
         if !owners.contains(&kind) {
             value.wrong(

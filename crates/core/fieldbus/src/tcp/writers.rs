@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::{Arc, Weak};
 
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::Table;
+use tickbus_base::toml_text::{Key, Shape, Table};
 
 use crate::Port;
 
@@ -31,6 +31,13 @@ struct Write {
 }
 
 impl Writers {
+    /// The key that [`read`](Self::read) takes.
+    pub const KEYS: &'static [Key] = &[Key::new(
+        "writers",
+        Shape::Whole(1, 1),
+        "1: a client cannot write what another one wrote within max_age; any number of writers without it",
+    )];
+
     /// A station without writes yet; with `is_single` a second writer is refused.
     pub fn new(is_single: bool) -> Self {
         Self {

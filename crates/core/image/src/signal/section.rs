@@ -3,7 +3,7 @@
 use super::plan::rounded as rounded_by_codec;
 use super::{Address, Addressing, Area, ByteOrder, DataType, Latch, Scale, Signal, Slot, Width};
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::{Table, Value, did_you_mean, short_number, shown};
+use tickbus_base::toml_text::{Key, Shape, Table, Value, did_you_mean, names, short_number, shown};
 
 /// The longest name of a signal or station, in characters.
 pub const NAME_LIMIT: usize = 120;
@@ -13,6 +13,108 @@ const UNIT_LIMIT: usize = 40;
 
 /// The remedy where a station should be named.
 pub const STATION: &str = "write the name of a [[station]] in quotes";
+
+/// The shape of an address, such as `%QX1.0`.
+pub const ADDRESS: Shape = Shape::Pattern("\\s*%[IQiq][XBWDLxbwdl]?[0-9]+(\\.[0-7])?\\s*");
+
+/// The shape of two numbers.
+pub const TWO_NUMBERS: Shape = Shape::List(&Shape::Number, 2, 2);
+
+/// The key `scale`.
+pub const SCALE_KEY: Key = Key::new(
+    "scale",
+    Shape::Table(&[
+        Key::required("raw", TWO_NUMBERS, "Two values on the wire"),
+        Key::required(
+            "value",
+            TWO_NUMBERS,
+            "The values that they mean, in the unit",
+        ),
+    ]),
+    "A linear scale: { raw = [0, 27648], value = [0.0, 250.0] }",
+);
+
+/// The key `dead_band`.
+pub const DEAD_BAND_KEY: Key = Key::new(
+    "dead_band",
+    Shape::Number,
+    "How far the value may move without being sent, on buses that send on change; not negative",
+);
+
+/// The key `station`.
+pub const STATION_KEY: Key = Key::new(
+    "station",
+    Shape::Label(NAME_LIMIT),
+    "The name of its [[station]], if there are several",
+);
+
+/// The keys of a `[[signal]]` section.
+pub const KEYS: &[Key] = &[
+    Key::required(
+        "name",
+        Shape::Label(NAME_LIMIT),
+        "A unique name; names that begin with \"bus.\" are reserved",
+    ),
+    Key::required(
+        "address",
+        ADDRESS,
+        "%QX1.0 (a bit), %QB1, %QW2, %QD4, %QL8, and %I likewise; directions are the PLC's",
+    ),
+    Key::new(
+        "type",
+        Shape::AnyCase(&TYPES),
+        "The type in IEC 61131-3, of the address's size; BOOL, BYTE, WORD, DWORD or LWORD if it is left out",
+    ),
+    Key::new(
+        "order",
+        Shape::Choice(&ORDERS),
+        "Byte order: ABCD big-endian, DCBA little-endian, CDAB words swapped, BADC bytes swapped in each word",
+    )
+    .or("\"ABCD\""),
+    SCALE_KEY,
+    Key::new("unit", Shape::Label(UNIT_LIMIT), "A unit for people"),
+    Key::new(
+        "latch",
+        Shape::Choice(&names(&LATCHES)),
+        "On a BOOL: these edges must not get lost",
+    ),
+    Key::new(
+        "hold",
+        Shape::Duration,
+        "On a latched %I: how long a pulse is held beyond the exchange that carries it",
+    ),
+    Key::new(
+        "fail_safe",
+        Shape::Any(&[Shape::Number, Shape::Boolean]),
+        "The value when data are stale, or the simulation has stopped; all bits zero by default",
+    ),
+    DEAD_BAND_KEY,
+    STATION_KEY,
+];
+
+const TYPES: [&str; DataType::ALL.len()] = {
+    let mut names = [""; DataType::ALL.len()];
+    let mut index = 0;
+    while index < names.len() {
+        names[index] = DataType::ALL[index].name();
+        index += 1;
+    }
+    names
+};
+
+const ORDERS: [&str; 4] = [
+    ByteOrder::Abcd.name(),
+    ByteOrder::Cdab.name(),
+    ByteOrder::Badc.name(),
+    ByteOrder::Dcba.name(),
+];
+
+/// The edges that can be latched.
+const LATCHES: [(&str, Latch); 3] = [
+    ("rising", Latch::Rising),
+    ("falling", Latch::Falling),
+    ("both", Latch::Both),
+];
 
 /// One `[[signal]]` section, read on its own.
 #[derive(Debug)]
@@ -295,12 +397,7 @@ fn fitting_order(value: &Value<'_>, order: ByteOrder, data_type: DataType) -> Op
 }
 
 fn latch_of(value: &Value<'_>) -> Option<Latch> {
-    let names = [
-        ("rising", Latch::Rising),
-        ("falling", Latch::Falling),
-        ("both", Latch::Both),
-    ];
-    value.choice("latches", &names)
+    value.choice("latches", &LATCHES)
 }
 
 fn fitting_latch(value: &Value<'_>, latch: Latch, data_type: DataType) -> Option<Latch> {

@@ -1,6 +1,7 @@
 //! The effect of a fault: the keys of its kind.
 
-use super::{Keys, SIGNAL};
+use super::Keys;
+use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::{
@@ -78,19 +79,11 @@ fn read_chance(keys: &Keys<'_>, usual: Option<f64>) -> Option<f64> {
 }
 
 fn read_direction(keys: &Keys<'_>) -> Option<Direction> {
-    let choices = [
-        ("in", Direction::In),
-        ("out", Direction::Out),
-        ("both", Direction::Both),
-    ];
-    let choose = |value: &Value<'_>| value.choice("directions", &choices);
+    let choose = |value: &Value<'_>| value.choice("directions", &DIRECTIONS);
     keys.direction
         .as_ref()
         .map_or(Some(Direction::Both), choose)
 }
-
-/// The maximum number of slots and channels that a diagnosis distinguishes in a station.
-const DIAGNOSIS_LIMIT: i128 = 64;
 
 fn read_diagnosis(keys: &Keys<'_>, table: &SignalTable, whole: bool) -> Option<Diagnosis> {
     let small = |value: &Value<'_>, range| {

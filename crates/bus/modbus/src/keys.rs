@@ -1,0 +1,111 @@
+//! The keys of `modbus-server` and `modbus-client` in a driver.cfg, for its schema.
+
+use tickbus_base::toml_text::{Key, Shape, names};
+use tickbus_net::serial;
+
+use crate::client::{PART_KEYS, PARTS};
+use crate::line::{BAUDS, FRAMINGS, PARITIES};
+use crate::stations::IDENTITY_LIMIT;
+
+/// The line of both ends.
+pub(crate) const LINE: &[Key] = &[
+    Key::new(
+        "address",
+        Shape::ADDRESS,
+        "Where to listen, or what to connect to; \"127.0.0.1:1502\" if there is no device",
+    ),
+    Key::new(
+        "framing",
+        Shape::Choice(&names(&FRAMINGS)),
+        "\"rtu\": RTU telegrams over TCP",
+    ),
+    Key {
+        is_required: false,
+        ..serial::DEVICE_KEY
+    },
+    Key::new(
+        "baud",
+        Shape::whole(&BAUDS),
+        "Bits per second; 19200 by default",
+    ),
+    Key::new(
+        "parity",
+        Shape::Choice(&names(&PARITIES)),
+        "The parity of the serial port; \"even\" by default",
+    ),
+    Key::new(
+        "stop_bits",
+        Shape::Whole(1, 2),
+        "The stop bits of the serial port; 1 by default, 2 without parity",
+    ),
+    Key::new(
+        "silence",
+        Shape::Duration,
+        "The pause that ends a telegram; 3.5 characters by default, 1.75 ms above 19200 baud",
+    ),
+    Key::new(
+        "echo",
+        Shape::Boolean,
+        "true: the line echoes what this end sends; false by default",
+    ),
+    Key::new(
+        "rs485",
+        Shape::Boolean,
+        "true: the port switches the transceiver with RTS while it sends; false by default",
+    ),
+];
+
+const UNIT: Key = Key::new(
+    "unit",
+    Shape::Whole(0, 255),
+    "The number of the Modbus unit; 1 to 247 with RTU. With several stations each has its own",
+);
+
+const WRITE_TO: Key = Key::new(
+    "write_to",
+    Shape::Label(IDENTITY_LIMIT),
+    "The identity of the device that may be written to; without it nothing is written",
+);
+
+/// The server's own.
+pub(crate) const SERVER: &[Key] = &[
+    UNIT,
+    Key::new(
+        "inputs",
+        Shape::Text,
+        "The holding register from which on %I can be read once more; \"offset:1024\" by default",
+    ),
+    Key::new(
+        "clients",
+        Shape::Whole(1, 10_000),
+        "The most clients at the same time",
+    )
+    .or("1024"),
+];
+
+/// The client's own.
+pub(crate) const CLIENT: &[Key] = &[
+    UNIT,
+    Key::new("inputs", AREA, "The place of %I"),
+    Key::new("outputs", AREA, "The place of %Q"),
+    Key::new(
+        "timeout",
+        Shape::Duration,
+        "How long the device has for an answer; 1s by default",
+    ),
+    Key::new(
+        "read_write",
+        Shape::Boolean,
+        "false: never function 23, which writes and reads in one request",
+    )
+    .or("true"),
+    WRITE_TO,
+];
+
+const AREA: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Table(PART_KEYS), 1, PARTS)]);
+
+/// A server's station.
+pub(crate) const SERVED_STATION: &[Key] = &[UNIT];
+
+/// A client's station.
+pub(crate) const POLLED_STATION: &[Key] = &[UNIT, WRITE_TO];

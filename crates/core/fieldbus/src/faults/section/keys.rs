@@ -1,0 +1,224 @@
+//! The keys of a `[[fault]]` section, and the kinds of faults that have them.
+
+use tickbus_base::toml_text::{Key, Shape, names};
+use tickbus_image::signal::section::NAME_LIMIT;
+
+use super::super::Direction;
+use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
+
+/// The keys of one kind of faults, beside those that all kinds have.
+#[derive(Clone, Copy, Debug)]
+pub struct FaultKind {
+    /// The kind's name.
+    pub name: &'static str,
+    /// The keys that it needs.
+    pub required: &'static [RequiredKey],
+    /// The keys that it can have.
+    pub optional: &'static [&'static str],
+}
+
+/// A key that one kind of faults needs.
+#[derive(Clone, Copy, Debug)]
+pub struct RequiredKey {
+    /// The key.
+    pub name: &'static str,
+    /// The values that it has in faults of this kind.
+    pub shape: Shape,
+    /// The remedy for a section without it.
+    pub right: &'static str,
+}
+
+impl FaultKind {
+    /// Returns all of its own keys.
+    pub fn keys(&self) -> impl Iterator<Item = &'static str> {
+        let required = self.required.iter().map(|key| key.name);
+        required.chain(self.optional.iter().copied())
+    }
+}
+
+const fn kind(
+    name: &'static str,
+    required: &'static [RequiredKey],
+    optional: &'static [&'static str],
+) -> FaultKind {
+    FaultKind {
+        name,
+        required,
+        optional,
+    }
+}
+
+/// The remedy where a signal should be named.
+pub(super) const SIGNAL: &str = "name the signal that is wrong, such as signal = \"LA1 bottom\"";
+
+const fn key(name: &'static str, shape: Shape, right: &'static str) -> RequiredKey {
+    RequiredKey { name, shape, right }
+}
+
+const OF_SIGNAL: RequiredKey = key("signal", Shape::Text, SIGNAL);
+const BY_TIME: RequiredKey = key(
+    "by",
+    Shape::Duration,
+    "say by how much, such as by = \"20ms\"",
+);
+
+/// The kinds of faults.
+pub const FAULT_KINDS: [FaultKind; 11] = [
+    kind("stuck", &[OF_SIGNAL], &["value"]),
+    kind("invert", &[OF_SIGNAL], &[]),
+    kind(
+        "offset",
+        &[
+            key("by", QUANTITY, "say by how much, such as by = 2.5"),
+            OF_SIGNAL,
+        ],
+        &[],
+    ),
+    kind("noise", &[OF_SIGNAL], &["amplitude", "chance", "seed"]),
+    kind("delay", &[BY_TIME], &[]),
+    kind("slow-answers", &[BY_TIME], &[]),
+    kind(
+        "drop",
+        &[key(
+            "chance",
+            Shape::Number,
+            "say how likely it is, such as chance = 0.1",
+        )],
+        &["direction", "seed"],
+    ),
+    kind("duplicate", &[], &["chance", "direction", "seed"]),
+    kind("link-down", &[], &[]),
+    kind(
+        "station-down",
+        &[key("station", Shape::Text, "name the station that is gone")],
+        &[],
+    ),
+    kind(
+        "diagnosis",
+        &[],
+        &["station", "slot", "channel", "error", "octets", "static"],
+    ),
+];
+
+const KIND_NAMES: [&str; FAULT_KINDS.len()] = {
+    let mut names = [""; FAULT_KINDS.len()];
+    let mut index = 0;
+    while index < names.len() {
+        names[index] = FAULT_KINDS[index].name;
+        index += 1;
+    }
+    names
+};
+
+/// The directions of lost and repeated frames.
+pub(super) const DIRECTIONS: [(&str, Direction); 3] = [
+    ("in", Direction::In),
+    ("out", Direction::Out),
+    ("both", Direction::Both),
+];
+
+/// The maximum number of slots and channels that a diagnosis distinguishes in a station.
+pub(super) const DIAGNOSIS_LIMIT: i128 = 64;
+
+/// A number, or a text with a number and its unit.
+const QUANTITY: Shape = Shape::Any(&[Shape::Number, Shape::Text]);
+
+/// A count of ticks or of times.
+const COUNT: Shape = Shape::Whole(1, i64::MAX as i128);
+
+/// The keys of a section: of all kinds of faults.
+pub const FAULT_KEYS: &[Key] = &[
+    Key::required("kind", Shape::Choice(&KIND_NAMES), "The kind of fault"),
+    Key::new(
+        "name",
+        Shape::Label(NAME_LIMIT),
+        "A name of its own; kind and signal by default",
+    ),
+    Key::new(
+        "signal",
+        Shape::Text,
+        "The name of the signal that is wrong",
+    ),
+    Key::new(
+        "value",
+        Shape::Any(&[Shape::Number, Shape::Boolean, Shape::Text]),
+        "stuck: the value; where the signal is when the fault begins, without this key",
+    ),
+    Key::new(
+        "by",
+        QUANTITY,
+        "offset: what is added; delay and slow-answers: a duration, at most 60s",
+    ),
+    Key::new(
+        "amplitude",
+        QUANTITY,
+        "noise: how far the value goes to either side",
+    ),
+    Key::new(
+        "chance",
+        Shape::Number,
+        "How likely it is, above 0 and up to 1",
+    ),
+    Key::new(
+        "direction",
+        Shape::Choice(&names(&DIRECTIONS)),
+        "The frames that it meets, as seen from this end",
+    )
+    .or("\"both\""),
+    Key::new("station", Shape::Text, "The name of the station"),
+    Key::new(
+        "slot",
+        Shape::Whole(1, DIAGNOSIS_LIMIT),
+        "diagnosis: the slot of the module",
+    ),
+    Key::new(
+        "channel",
+        Shape::Whole(0, DIAGNOSIS_LIMIT - 1),
+        "diagnosis: the channel of the module",
+    ),
+    Key::new(
+        "error",
+        Shape::Choice(&names(&ChannelError::ALL)),
+        "diagnosis: the error of the channel",
+    ),
+    Key::new(
+        "octets",
+        Shape::List(&Shape::Whole(0, 255), 1, OCTET_LIMIT),
+        "diagnosis: octets of the device's own",
+    ),
+    Key::new(
+        "static",
+        Shape::Boolean,
+        "diagnosis: true: the device cannot exchange data, and its master continues to read the diagnosis",
+    )
+    .or("false"),
+    Key::new(
+        "seed",
+        Shape::Whole(0, u64::MAX as i128),
+        "The seed of the random numbers: the same seed gives the same run",
+    )
+    .or("1"),
+    Key::new(
+        "at",
+        Shape::Duration,
+        "The fault begins this long after the first tick",
+    ),
+    Key::new("tick", COUNT, "The fault begins at this tick"),
+    Key::new(
+        "when",
+        Shape::Text,
+        "The fault begins when this condition becomes true, such as \"LA1 run == 1\"",
+    ),
+    Key::new(
+        "while",
+        Shape::Text,
+        "The fault is there whenever this condition is true",
+    ),
+    Key::new("for", Shape::Duration, "The fault ends after this time"),
+    Key::new("ticks", COUNT, "The fault ends after this many ticks"),
+    Key::new(
+        "times",
+        COUNT,
+        "With \"when\": the fault begins at most this often",
+    ),
+];

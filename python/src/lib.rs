@@ -10,6 +10,7 @@ mod failure;
 mod memory;
 mod opened;
 mod signal;
+mod vector;
 mod view;
 
 use pyo3::prelude::*;
@@ -32,13 +33,16 @@ mod _native {
     #[pymodule_export]
     use crate::signal::{Event, Signal};
     #[pymodule_export]
+    use crate::vector::{Block, DriverVector};
+    #[pymodule_export]
     use crate::view::Slots;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         let table = Code::ALL.map(|code| (code.code(), code.name(), code.text(), code.remedy()));
-        module.add("STATUS_TABLE", table)
+        module.add("STATUS_TABLE", table)?;
+        module.add("MAX_DRIVERS", tickbus_binding::MAX_DRIVERS)
     }
 
     /// Must be called in a child process right after a fork: the parent's drivers do not belong to the child.

@@ -16,6 +16,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_driver::Code;
 
@@ -81,12 +82,16 @@ struct Content<T> {
     name: String,
     /// The text of the panic that ended in [`FAILED`].
     panic: String,
+    /// The last call of [`Handles::tick_each`] that ticked the tenant.
+    round: u64,
 }
 
 /// A table of tenants of type `T`, in blocks of `N` places.
 pub struct Handles<T, const N: usize = BLOCK> {
     first: [HandleEntry<T>; N],
     more: [OnceLock<Box<[HandleEntry<T>]>>; MORE_BLOCKS],
+    /// The number of calls of [`tick_each`](Self::tick_each).
+    rounds: AtomicU64,
 }
 
 // SAFETY: `content` is the one part that is not Sync already. Only a `Claim` gives access to it. A claim exists from a
@@ -107,6 +112,7 @@ impl<T, const N: usize> Handles<T, N> {
         Self {
             first: [const { HandleEntry::new() }; N],
             more: [const { OnceLock::new() }; MORE_BLOCKS],
+            rounds: AtomicU64::new(0),
         }
     }
 
@@ -170,13 +176,45 @@ impl<T, const N: usize> Handles<T, N> {
     /// The handle was never open or is closed; another thread ticks the tenant; or the tenant has failed.
     #[inline]
     pub fn tick<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+        self.claimed(handle, |claim| claim.run(work))
+    }
+
+    /// Ticks each of these tenants once, one after the other, on this thread: calls `work` with the place in the list and
+    /// the tenant, and `done` with the place and the result. A tenant that fails stops no other one. The second mention
+    /// of a tenant is not ticked, and has the result `BAD_ARGUMENT`.
+    pub fn tick_each(
+        &self,
+        handles: impl IntoIterator<Item = i64>,
+        mut work: impl FnMut(usize, &mut T) -> Code,
+        mut done: impl FnMut(usize, Code),
+    ) {
+        let round = self.rounds.fetch_add(1, Ordering::Relaxed) + 1;
+        for (at, handle) in handles.into_iter().enumerate() {
+            let ticked = self.claimed(handle, |mut claim| {
+                if std::mem::replace(&mut claim.content().round, round) == round {
+                    return Err(Code::BadArgument);
+                }
+                claim.run(|tenant| work(at, tenant))
+            });
+            done(at, ticked.unwrap_or_else(|refused| refused));
+        }
+    }
+
+    /// Claims a tenant for a tick, and then lets a waiting visit in.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a tick should not pay for this call")]
+    fn claimed<R>(
+        &self,
+        handle: i64,
+        run: impl FnOnce(Claim<'_, T>) -> Result<R, Code>,
+    ) -> Result<R, Code> {
         let (place, generation) = self.place(handle).ok_or(Code::NotOpen)?;
         let claimed = word(generation, TICKING);
         let claim = match Claim::take(place, word(generation, OPEN), claimed, OPEN) {
             Some(claim) => claim,
             None => place.after_visit(generation)?,
         };
-        let done = claim.run(work);
+        let done = run(claim);
         if place.wanted.load(Ordering::Relaxed) {
             place.let_in(generation);
         }
@@ -273,8 +311,9 @@ impl<T, const N: usize> Handles<T, N> {
     }
 }
 
-/// A further block of free places.
+/// A further block of free places, for which the limit of open files may be too low.
 fn block<T, const N: usize>() -> Box<[HandleEntry<T>]> {
+    raise_open_files();
     (0..N).map(|_| HandleEntry::new()).collect()
 }
 
@@ -287,6 +326,7 @@ impl<T> HandleEntry<T> {
                 tenant: None,
                 name: String::new(),
                 panic: String::new(),
+                round: 0,
             }),
         }
     }

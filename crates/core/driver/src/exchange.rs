@@ -436,8 +436,9 @@ impl Driver {
     #[inline(never)]
     fn record(&mut self, tick: Tick, code: Code, slots: &[Slot]) {
         if let Some(recorder) = &mut self.recorder {
+            let (number, time) = self.recorded.tick(self.counters.ticks, tick.time);
             let stations = self.stations.iter().map(|station| station.status.code());
-            recorder.record(self.counters.ticks, tick.time, code.code(), stations, slots);
+            recorder.record(number, time, code.code(), stations, slots);
         }
     }
 }

@@ -24,3 +24,24 @@ pub fn raise_open_files() -> usize {
 pub fn raise_open_files() -> usize {
     usize::MAX
 }
+
+/// The remedy for an error that [`is_out_of_files`].
+pub const OUT_OF_FILES: &str = "this process, or the computer, has as many files and sockets open as the system allows; \
+                                raise the limit (ulimit -n, LimitNOFILE of systemd), or spread the drivers over several \
+                                processes";
+
+/// Returns true if the limit of open files is the reason of this error.
+pub fn is_out_of_files(error: &std::io::Error) -> bool {
+    #[cfg(unix)]
+    {
+        use rustix::io::Errno;
+
+        let reason = Errno::from_io_error(error);
+        matches!(reason, Some(Errno::MFILE | Errno::NFILE))
+    }
+    #[cfg(not(unix))]
+    {
+        let _ = error;
+        false
+    }
+}

@@ -14,7 +14,7 @@
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
 use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
@@ -72,6 +72,8 @@ struct HandleEntry<T> {
     word: AtomicU64,
     /// True while a visit waits for the end of a tick. Only a hint: a waiting visit sets a lost flag again.
     wanted: AtomicBool,
+    /// The last call of [`Handles::tick_each`] that ticked the tenant. It changes only under a claim, and fits in a gap.
+    round: AtomicU32,
     /// Accessed only by the thread that has moved the word to [`TICKING`] or [`VISITED`], until that thread moves the
     /// word on.
     content: UnsafeCell<Content<T>>,
@@ -82,8 +84,6 @@ struct Content<T> {
     name: String,
     /// The text of the panic that ended in [`FAILED`].
     panic: String,
-    /// The last call of [`Handles::tick_each`] that ticked the tenant.
-    round: u64,
 }
 
 /// A table of tenants of type `T`, in blocks of `N` places.
@@ -91,7 +91,7 @@ pub struct Handles<T, const N: usize = BLOCK> {
     first: [HandleEntry<T>; N],
     more: [OnceLock<Box<[HandleEntry<T>]>>; MORE_BLOCKS],
     /// The number of calls of [`tick_each`](Self::tick_each).
-    rounds: AtomicU64,
+    rounds: AtomicU32,
 }
 
 // SAFETY: `content` is the one part that is not Sync already. Only a `Claim` gives access to it. A claim exists from a
@@ -112,7 +112,7 @@ impl<T, const N: usize> Handles<T, N> {
         Self {
             first: [const { HandleEntry::new() }; N],
             more: [const { OnceLock::new() }; MORE_BLOCKS],
-            rounds: AtomicU64::new(0),
+            rounds: AtomicU32::new(0),
         }
     }
 
@@ -188,12 +188,14 @@ impl<T, const N: usize> Handles<T, N> {
         mut work: impl FnMut(usize, &mut T) -> Code,
         mut done: impl FnMut(usize, Code),
     ) {
-        let round = self.rounds.fetch_add(1, Ordering::Relaxed) + 1;
+        // Never zero, with which a place begins.
+        let round = self.rounds.fetch_add(1, Ordering::Relaxed) | 1 << 31;
         for (at, handle) in handles.into_iter().enumerate() {
-            let ticked = self.claimed(handle, |mut claim| {
-                if std::mem::replace(&mut claim.content().round, round) == round {
+            let ticked = self.claimed(handle, |claim| {
+                if claim.place.round.load(Ordering::Relaxed) == round {
                     return Err(Code::BadArgument);
                 }
+                claim.place.round.store(round, Ordering::Relaxed);
                 claim.run(|tenant| work(at, tenant))
             });
             done(at, ticked.unwrap_or_else(|refused| refused));
@@ -322,11 +324,11 @@ impl<T> HandleEntry<T> {
         Self {
             word: AtomicU64::new(word(0, FREE)),
             wanted: AtomicBool::new(false),
+            round: AtomicU32::new(0),
             content: UnsafeCell::new(Content {
                 tenant: None,
                 name: String::new(),
                 panic: String::new(),
-                round: 0,
             }),
         }
     }

@@ -465,7 +465,7 @@ fn write(
 fn went_back(before: Nanos, time: Nanos) -> BusError {
     BusError::Refused(format!(
         "simulation time went back from {before} to {time}, and what runs on it cannot; hand in the \
-         nanoseconds since the simulation began, and open the driver again when it begins anew"
+         nanoseconds since the simulation began, and reset the driver when it begins again"
     ))
 }
 

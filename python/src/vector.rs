@@ -72,8 +72,9 @@ impl DriverVector {
                 ));
             }
             (Some(seconds), None) => {
-                if let Ok(seconds) = seconds.extract() {
-                    return time(Some(seconds), None).map(Times::Same);
+                // NumPy's numbers have no length, but its arrays of one number can pass for a number.
+                if seconds.len().is_err() {
+                    return time(Some(seconds.extract()?), None).map(Times::Same);
                 }
                 let each = list::<f64>(seconds)?.into_iter();
                 let each = each.map(|seconds| time(Some(seconds), None));
@@ -81,8 +82,8 @@ impl DriverVector {
                     .collect::<PyResult<_>>()?
             }
             (None, Some(nanos)) => {
-                if let Ok(nanos) = nanos.extract() {
-                    return Ok(Times::Same(Some(Nanos(nanos))));
+                if nanos.len().is_err() {
+                    return Ok(Times::Same(Some(Nanos(nanos.extract()?))));
                 }
                 list(nanos)?.into_iter().map(Nanos).collect()
             }

@@ -85,6 +85,8 @@ def test_wrong_lists_are_refused(lines, line_cfg):
             call("now")
         with pytest.raises(TypeError, match="not both"):
             call(1.0, ns=1)
+        with pytest.raises(TypeError):
+            call(object())
     with pytest.raises(ValueError, match="there are 2 places in the mask"):
         lines.reset([True, False])
     assert [line.ticks for line in lines] == [0] * 50

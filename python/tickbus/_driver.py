@@ -1,5 +1,7 @@
 """An open driver."""
 
+from __future__ import annotations
+
 import atexit
 import contextlib
 import itertools
@@ -13,11 +15,14 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _durations, _native, _toml
 from ._errors import FieldbusError, MissingFileError
 from ._status import Status
+
+if TYPE_CHECKING:
+    from typing import Self
 
 _ENTRY = re.compile(r"((?:[^=\\]|\\.)+)=(.*)")
 

@@ -1,14 +1,19 @@
 """Many drivers that tick in one call."""
 
+from __future__ import annotations
+
 import contextlib
 import os
 from collections.abc import Callable, Iterable, Iterator
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING
 
 from . import _native, _toml
 from ._driver import Driver, opened
 from ._native import Signal
+
+if TYPE_CHECKING:
+    from typing import Self
 
 
 def open_vector(

@@ -120,3 +120,23 @@ fn two_runs_of_the_rig_are_equal_to_the_last_bit_however_busy_the_machine_is() {
         assert!(one == other, "{end}: the recordings differ");
     }
 }
+
+#[test]
+fn a_client_of_a_run_cannot_be_reset_for_its_time_belongs_to_the_others_too() {
+    let server = Server::start(Settings::new(STEP, StartCondition::Count(1)));
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("machine.vcd");
+    let mut machine = End::of(config(server.port, Role::Device, &file), &Manual::new());
+    assert_eq!(machine.receive().code, Code::Fresh);
+    let granted = machine.receive().granted;
+    let refused = machine
+        .driver
+        .reset(&mut machine.slots)
+        .expect_err("it takes part in a run");
+    assert_eq!(refused.code(), Code::Unsupported);
+    let text = refused.to_string();
+    assert!(text.contains("belongs to the other participants"), "{text}");
+    assert!(machine.receive().granted > granted, "the run continues");
+    machine.driver.close();
+    server.end().expect("its only client has left");
+}

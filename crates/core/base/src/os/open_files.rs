@@ -56,7 +56,11 @@ mod tests {
     fn only_the_limit_of_open_files_is_taken_for_it() {
         let error = |number| std::io::Error::from_raw_os_error(number);
         let numbers = [rustix::io::Errno::MFILE, rustix::io::Errno::NFILE];
-        assert!(numbers.iter().all(|errno| is_out_of_files(&error(errno.raw_os_error()))));
+        assert!(
+            numbers
+                .iter()
+                .all(|errno| is_out_of_files(&error(errno.raw_os_error())))
+        );
         let missing = File::open("/no such file").expect_err("it does not exist");
         assert!(!is_out_of_files(&missing) && !is_out_of_files(&std::io::Error::other("x")));
     }

@@ -195,6 +195,10 @@ impl DriverVector {
     /// Begins the next episode of the drivers for which ``mask`` is true, or of all, as ``Driver.reset()``. Returns how
     /// many have refused; ``statuses`` has the status of each, and keeps those of the drivers that are not reset.
     #[pyo3(signature = (mask = None))]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "what is made of Python's objects belongs to the function"
+    )]
     fn reset(&self, py: Python<'_>, mask: Option<Vec<bool>>) -> PyResult<usize> {
         if let Some(mask) = &mask {
             self.one_for_each(mask.len(), "places in the mask")?;

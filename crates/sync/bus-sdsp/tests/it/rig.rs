@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use crate::sdsp::{controller, of_two, open};
 use crate::server::Server;
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance::rig::{End, await_that};
@@ -123,20 +124,19 @@ fn two_runs_of_the_rig_are_equal_to_the_last_bit_however_busy_the_machine_is() {
 
 #[test]
 fn a_client_of_a_run_cannot_be_reset_for_its_time_belongs_to_the_others_too() {
-    let server = Server::start(Settings::new(STEP, StartCondition::Count(1)));
-    let folder = tempfile::tempdir().expect("a folder");
-    let file = folder.path().join("machine.vcd");
-    let mut machine = End::of(config(server.port, Role::Device, &file), &Manual::new());
-    assert_eq!(machine.receive().code, Code::Fresh);
-    let granted = machine.receive().granted;
-    let refused = machine
-        .driver
-        .reset(&mut machine.slots)
-        .expect_err("it takes part in a run");
+    let server = of_two(3);
+    let plc = controller(server.port, "", |_, _| ());
+    let mut machine = open(server.port, "device", "");
+    assert_eq!(machine.tick().code, Code::Fresh);
+    let refused = machine.driver.reset(&mut machine.slots);
+    let refused = refused.expect_err("it takes part in a run");
     assert_eq!(refused.code(), Code::Unsupported);
     let text = refused.to_string();
     assert!(text.contains("belongs to the other participants"), "{text}");
-    assert!(machine.receive().granted > granted, "the run continues");
-    machine.driver.close();
-    server.end().expect("its only client has left");
+    // The run continues as if nothing had been asked.
+    assert_eq!(machine.tick().code, Code::Fresh);
+    assert_eq!(machine.tick().code, Code::Fresh);
+    assert_eq!(machine.tick().code, Code::Stale);
+    assert_eq!(server.end().expect("it ends as planned").steps, 3);
+    plc.join().expect("no panic");
 }

@@ -45,9 +45,6 @@ impl Driver {
         } else {
             self.image.restart();
         }
-        for station in &mut self.stations {
-            station.restart();
-        }
         self.counters = TickCounters::default();
         self.samples = TickTimes::default();
         (self.first_now, self.first_time) = (Nanos::ZERO, Nanos::ZERO);

@@ -30,11 +30,6 @@ impl Station {
         }
     }
 
-    /// Notes that the slots hold the initial values again.
-    pub(super) fn restart(&mut self) {
-        (self.stale, self.status) = (true, Code::Stale);
-    }
-
     /// Notes that the slots hold values from a recording instead of received ones, with this status. The next
     /// [`receive`](Self::receive) shows the received values again.
     pub(super) fn shown_instead(&mut self, image: &mut TickEnd, status: Code) {

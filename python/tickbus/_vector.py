@@ -62,6 +62,7 @@ class DriverVector(_native.DriverVector):
     """
 
     __slots__ = ("_drivers",)
+    _drivers: tuple[Driver, ...]
 
     def __new__(cls, drivers: Iterable[Driver]) -> Self:
         """Joins open drivers, each at most once."""

@@ -55,7 +55,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[Any]) -> 
 
 def _note(error: BaseException, text: str) -> None:
     """Adds a note to the exception; before Python 3.11 only pytest shows it."""
-    error.__notes__ = [*getattr(error, "__notes__", []), text]  # type: ignore[attr-defined]
+    error.__notes__ = [*getattr(error, "__notes__", []), text]
 
 
 @dataclass

@@ -13,10 +13,10 @@ use tickbus_base::toml_text::nearest;
 use tickbus_binding::{Refusal, faults, read_fault};
 use tickbus_driver::Code;
 
+use crate::block::Block;
 use crate::failure::{raised, unknown_signal};
 use crate::opened::{Facts, Half, Handle};
 use crate::signal::{Event, Signal};
-use crate::vector::Block;
 use crate::view::Slots;
 
 const NANOS_PER_SECOND: f64 = 1e9;
@@ -128,7 +128,7 @@ impl Driver {
         block: Option<Py<Block>>,
         row: usize,
     ) -> PyResult<Self> {
-        let place = block.as_ref().map(|block| (&block.get().0, row));
+        let place = block.as_ref().map(|block| (block.get(), row));
         let Facts {
             handle,
             id,

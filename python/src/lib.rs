@@ -5,6 +5,7 @@
 //! Its values pass through `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on
 //! any thread, can produce wrong values and nothing worse.
 
+mod block;
 mod driver;
 mod failure;
 mod memory;
@@ -29,11 +30,13 @@ mod _native {
     use crate::failure::raised;
 
     #[pymodule_export]
+    use crate::block::Block;
+    #[pymodule_export]
     use crate::driver::Driver;
     #[pymodule_export]
     use crate::signal::{Event, Signal};
     #[pymodule_export]
-    use crate::vector::{Block, DriverVector};
+    use crate::vector::DriverVector;
     #[pymodule_export]
     use crate::view::Slots;
 

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, OnceLock};
 
 use tickbus_base::time::Nanos;
 use tickbus_binding::{Handles, Refusal, SignalDescription, closing, open};
@@ -14,7 +14,8 @@ use tickbus_image::Event;
 use tickbus_image::signal::Slot;
 use tickbus_kinds::KINDS;
 
-use crate::memory::{Memory, Words};
+use crate::block::Block;
+use crate::memory::Memory;
 use crate::signal::Description;
 
 /// The drivers that are open in this process.
@@ -126,41 +127,6 @@ fn runs(count: usize, wanted: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     runs
 }
 
-/// The memory of the drivers of a vector, with a row for each. The driver that is opened first says how long a row is.
-pub(crate) struct Rows {
-    count: usize,
-    block: OnceLock<Words>,
-}
-
-impl Rows {
-    pub(crate) fn new(count: usize) -> Self {
-        let block = OnceLock::new();
-        Self { count, block }
-    }
-
-    /// Returns the memory of a row with these values.
-    fn row(&self, row: usize, slots: &[Slot]) -> Result<Memory, Refusal> {
-        let length = slots.len();
-        let words = || {
-            let rows = (0..self.count * length).map(|at| AtomicU64::new(slots[at % length].0));
-            rows.collect()
-        };
-        let block = self.block.get_or_init(words);
-        if row >= self.count || block.len() != self.count * length {
-            let text = format!(
-                "driver {row} of a vector of {} has {length} values; expected {} as the others; open it alone",
-                self.count,
-                block.len() / self.count.max(1)
-            );
-            return Err(Refusal::new(Code::BadArgument, text));
-        }
-        Ok(Memory::within(
-            Arc::clone(block),
-            row * length..(row + 1) * length,
-        ))
-    }
-}
-
 /// Ticks each of these drivers once, without an end at the first failure; `done` gets the place of each and its code.
 pub(crate) fn tick_each(
     handles: &[Handle],
@@ -207,7 +173,7 @@ impl Handle {
     pub(crate) fn open(
         path: &Path,
         tables: &str,
-        row: Option<(&Rows, usize)>,
+        row: Option<(&Block, usize)>,
     ) -> Result<Facts, Refusal> {
         Refusal::instead_of_panic(|| {
             tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
@@ -228,7 +194,7 @@ impl Handle {
                 |slot: usize| signals.get(slot).is_some_and(|signal| signal.is_written);
             let slots = driver.initial_slots();
             let memory = Arc::new(match row {
-                Some((rows, row)) => rows.row(row, &slots)?,
+                Some((block, row)) => block.row(row, &slots)?,
                 None => Memory::new(&slots),
             });
             let is_stepped = driver.is_stepped();

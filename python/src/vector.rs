@@ -15,20 +15,8 @@ use tickbus_driver::Code;
 
 use crate::driver::{Driver, time};
 use crate::memory::Words;
-use crate::opened::{Half, Handle, Rows, tick_each};
+use crate::opened::{Half, Handle, tick_each};
 use crate::view::Slots;
-
-/// Memory for the values of this many drivers, one row for each.
-#[pyclass(frozen, module = "tickbus._native")]
-pub(crate) struct Block(pub(crate) Rows);
-
-#[pymethods]
-impl Block {
-    #[new]
-    fn new(rows: usize) -> Self {
-        Self(Rows::new(rows))
-    }
-}
 
 /// Many drivers that tick in one call; the package's class is derived from it.
 #[pyclass(frozen, subclass, module = "tickbus._native")]

@@ -179,9 +179,59 @@ fn a_line_to_a_peer_stays_and_an_edge_that_no_tick_has_seen_is_forgotten() {
 }
 
 #[test]
-fn a_recording_continues_after_a_reset() {
-    let folder = std::env::temp_dir().join(format!("tickbus-reset-{}", std::process::id()));
+fn an_end_of_a_stepped_link_begins_again_and_meets_the_other_end() {
+    let link = "mode = \"stepped\"\nlink = \"reset: stepped\"\n";
+    let (mut driver, mut slots) = open(link, "");
+    let mut other = config(link, "");
+    other.role = tickbus_fieldbus::Role::Controller;
+    let (mut plc, mut theirs) = opened(other, Monotonic::shared());
+    for time in 0..40 {
+        if time % 10 == 0 {
+            driver.reset(&mut slots).expect("its line is its own");
+            assert_eq!(slots[1], Slot::from_real(9.0));
+        }
+        let value = Slot::from_real(f64::from(time));
+        (slots[0], theirs[1]) = (value, value);
+        let done = driver.exchange(Nanos::from_millis(i64::from(time % 10)), &mut slots);
+        assert_ne!(done.code, Code::BusFailed, "{}", driver.link().reason);
+        plc.exchange(Nanos::from_millis(i64::from(time)), &mut theirs);
+        // At first, the other end is not there yet.
+        if time > 0 {
+            assert_eq!(theirs[0], value, "at {time}");
+        }
+        if time % 10 > 0 {
+            assert_eq!(slots[1], Slot::from_real(f64::from(time - 1)), "at {time}");
+        }
+    }
+}
+
+/// A new folder with this name.
+fn folder(name: &str) -> std::path::PathBuf {
+    let folder = std::env::temp_dir().join(format!("tickbus-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
+    folder
+}
+
+#[test]
+fn a_recording_as_the_other_end_is_replayed_from_its_beginning() {
+    let folder = folder("reset-replay");
+    let file = folder.join("run.csv").display().to_string();
+    let (mut driver, mut slots) = open(MIRROR, &format!("[record]\nfile = {file:?}\n"));
+    episode(&mut driver, &mut slots, 6);
+    driver.close();
+    let (mut driver, mut slots) = open(&format!("replay = {file:?}\n"), "");
+    let first = episode(&mut driver, &mut slots, 6);
+    assert_eq!(slots[1], Slot::from_real(25.0));
+    driver.reset(&mut slots).expect("its line is its own");
+    assert_eq!(episode(&mut driver, &mut slots, 6), first);
+    assert_eq!(statistic(&driver, "replay.ticks"), "6");
+    drop(driver);
+    std::fs::remove_dir_all(&folder).expect("it is there");
+}
+
+#[test]
+fn a_recording_continues_after_a_reset() {
+    let folder = folder("reset");
     let file = folder.join("run.csv");
     let record = format!("[record]\nfile = {:?}\n", file.display().to_string());
     let (mut driver, mut slots) = open(MIRROR, &record);

@@ -138,6 +138,22 @@ TB_IMPORT int32_t tb_exchange(tb_driver driver);
 TB_IMPORT int32_t tb_receive(tb_driver driver);
 TB_IMPORT int32_t tb_send(tb_driver driver);
 
+/* Ticks `count` drivers in one call, one after the other on this thread, as tb_exchange, tb_receive and tb_send do. A driver that
+ * fails stops no other one: each has its status in `statuses`. `times` has the simulation time of each driver, which is also
+ * stored in its buffer; or is NULL, and the buffers' own times count. A driver that is in the list twice is ticked once, and the
+ * second status is TB_BAD_ARGUMENT. Returns the number of statuses below 0; tb_last_error explains the last of them. Returns
+ * TB_BAD_ARGUMENT and ticks none if a list is NULL, or if there are more drivers than a process can open (4096).
+ *
+ * Drivers that wait for each other, as two clients of one run on virtual time do, need a thread each. */
+TB_IMPORT int32_t tb_exchange_many(const tb_driver *drivers, size_t count, const int64_t *times, int32_t *statuses);
+TB_IMPORT int32_t tb_receive_many(const tb_driver *drivers, size_t count, const int64_t *times, int32_t *statuses);
+TB_IMPORT int32_t tb_send_many(const tb_driver *drivers, size_t count, int32_t *statuses);
+
+/* Begins the next episode without opening again: values, counts of edges, faults and the counters of ticks are as after tb_open,
+ * and simulation time begins at 0. A hosted PLC program begins with its first scan; a connection to a PLC stays. The thread that
+ * ticks the driver calls this. TB_UNSUPPORTED: the time belongs to other participants as well, and the driver is as before. */
+TB_IMPORT int32_t tb_reset(tb_driver driver);
+
 /* The values of a driver; NULL if it is not open. */
 TB_IMPORT tb_buffer *tb_buffer_of(tb_driver driver);
 

@@ -8,6 +8,8 @@
     reason = "exported names and the pointers that a caller in C hands in"
 )]
 
+mod many;
+
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::ffi::{CStr, CString, c_char};
@@ -199,6 +201,12 @@ unsafe fn hand_over(text: &str, into: *mut c_char, room: usize) -> i32 {
 
 /// Returns why a tick failed, with the line's own reason if there is one.
 fn why(driver: i64, code: Code) -> Refusal {
+    if code == Code::BadArgument {
+        return Refusal::new(
+            code,
+            "a driver is in the list of one call twice, and was ticked once",
+        );
+    }
     // No other code depends on the line, so the thread that is using the driver is left alone.
     if code != Code::BusFailed {
         return DRIVERS.reason(driver, code);
@@ -270,6 +278,14 @@ extern "C" fn tb_receive(driver: i64) -> i32 {
 #[unsafe(no_mangle)]
 extern "C" fn tb_send(driver: i64) -> i32 {
     tick(driver, Device::send)
+}
+
+#[unsafe(no_mangle)]
+extern "C" fn tb_reset(driver: i64) -> i32 {
+    answer(|| {
+        DRIVERS.visit(driver, |opened| opened.device.reset())??;
+        Ok(Code::Fresh.code())
+    })
 }
 
 #[unsafe(no_mangle)]

@@ -10,6 +10,7 @@
 )]
 
 mod failure;
+mod many;
 mod open;
 
 use std::ffi::c_void;
@@ -126,6 +127,17 @@ extern "system" fn Java_tickbus_Tickbus_sendNative(
         .tick(handle, Device::send)
         .unwrap_or_else(|refused| refused)
         .code()
+}
+
+/// `static native void resetNative(long handle)`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_Tickbus_resetNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) {
+    env.with_env(|_| Ok::<(), Failure>(with(handle, Device::reset)??))
+        .resolve::<ThrowFieldbusException>();
 }
 
 /// `static native void finalizeNative(long handle)`

@@ -6,6 +6,7 @@ use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::Slot;
 use tickbus::time::{Manual, Nanos};
+use tickbus_binding::Handles;
 use tickbus_conformance::resources::allocations_of_thread;
 
 /// Every type in both directions, latched bits that change, values that saturate, a NaN.
@@ -184,6 +185,36 @@ fn a_recording() {
             assert_eq!(allocations(&format!("{fieldbus}\n{record}"), ""), 0);
         }
     }
+}
+
+#[test]
+fn many_drivers_in_one_call() {
+    let handles: Box<Handles<(Driver, Vec<Slot>)>> = Box::default();
+    let open = |number: usize| {
+        let fieldbus = [FREE, STEPPED][number % 2];
+        let driver = Driver::open(config(fieldbus, ""), Manual::new()).expect("opens");
+        let slots = driver.initial_slots();
+        handles
+            .reserve()
+            .expect("a place is free")
+            .fill("many", (driver, slots))
+    };
+    let list: Vec<i64> = (0..100).map(open).collect();
+    let (mut before, mut failed) = (0, 0);
+    for tick in 0..1_100_i32 {
+        if tick == 100 {
+            before = allocations_of_thread();
+        }
+        let exchange = |_, (driver, slots): &mut (Driver, Vec<Slot>)| {
+            slots[..52].fill(Slot::from_real(f64::from(tick)));
+            driver.exchange(Nanos::from_millis(tick.into()), slots).code
+        };
+        handles.tick_each(list.iter().copied(), exchange, |_, code| {
+            failed += u32::from(code.code() < 0);
+        });
+    }
+    assert_eq!((allocations_of_thread() - before, failed), (0, 0));
+    handles.close_all(|(driver, _)| driver.close());
 }
 
 #[test]

@@ -13,6 +13,7 @@ use tickbus_base::toml_text::nearest;
 use tickbus_binding::{Refusal, faults, read_fault};
 use tickbus_driver::Code;
 
+use crate::block::Block;
 use crate::failure::{raised, unknown_signal};
 use crate::opened::{Facts, Half, Handle};
 use crate::signal::{Event, Signal};
@@ -28,7 +29,7 @@ static DONE: PyOnceLock<[Py<PyAny>; 3]> = PyOnceLock::new();
 /// An open driver; the package's class is derived from it.
 #[pyclass(frozen, subclass, module = "tickbus._native")]
 pub(crate) struct Driver {
-    handle: Handle,
+    pub(crate) handle: Handle,
     id: i32,
     name: String,
     signals: Vec<Py<Signal>>,
@@ -84,7 +85,7 @@ impl Driver {
 }
 
 /// Returns the time of a tick, given in seconds or in nanoseconds.
-fn time(seconds: Option<f64>, nanos: Option<i64>) -> PyResult<Option<Nanos>> {
+pub(crate) fn time(seconds: Option<f64>, nanos: Option<i64>) -> PyResult<Option<Nanos>> {
     match (seconds, nanos) {
         (None, None) => Ok(None),
         (None, Some(nanos)) => Ok(Some(Nanos(nanos))),
@@ -119,14 +120,21 @@ impl Driver {
         clippy::needless_pass_by_value,
         reason = "what is made of Python's objects belongs to the function"
     )]
-    #[pyo3(signature = (path, overlay = String::new()))]
-    fn new(py: Python<'_>, path: PathBuf, overlay: String) -> PyResult<Self> {
+    #[pyo3(signature = (path, overlay = String::new(), block = None, row = 0))]
+    fn new(
+        py: Python<'_>,
+        path: PathBuf,
+        overlay: String,
+        block: Option<Py<Block>>,
+        row: usize,
+    ) -> PyResult<Self> {
+        let place = block.as_ref().map(|block| (block.get(), row));
         let Facts {
             handle,
             id,
             name,
             signals,
-        } = Self::done(py, py.detach(|| Handle::open(&path, &overlay)))?;
+        } = Self::done(py, py.detach(|| Handle::open(&path, &overlay, place)))?;
         let names = signals.iter().map(|signal| signal.name.clone());
         let by_name = names.enumerate().map(|(at, name)| (name, at)).collect();
         let memory = &handle.memory;
@@ -178,6 +186,16 @@ impl Driver {
     /// Ends the tick that ``receive()`` began: sends the signals that this end writes.
     fn send(&self, py: Python<'_>) -> PyResult<()> {
         self.tick(py, Half::Send, None).map(drop)
+    }
+
+    /// Begins the next episode of the simulation without opening again: values, counts of edges, faults and the counters
+    /// of ticks are as after opening, and simulation time begins at 0.
+    ///
+    /// A PLC program or a recording in this process begins again, too: the program is at its first scan. A connection to
+    /// a PLC stays, and the PLC gets the initial values with the next tick. A recording continues in the same file.
+    /// Raises ``FieldbusError`` with ``Status.UNSUPPORTED`` if the time of a stepped bus belongs to others as well.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        Self::done(py, py.detach(|| self.handle.reset()))
     }
 
     /// Returns a signal by its name, always the same object; ``plc["Valve"]`` is the same.

@@ -5,11 +5,13 @@
 //! Its values pass through `memory::Memory`, of which the driver has a copy: whatever Python does to that memory, on
 //! any thread, can produce wrong values and nothing worse.
 
+mod block;
 mod driver;
 mod failure;
 mod memory;
 mod opened;
 mod signal;
+mod vector;
 mod view;
 
 use pyo3::prelude::*;
@@ -28,9 +30,13 @@ mod _native {
     use crate::failure::raised;
 
     #[pymodule_export]
+    use crate::block::Block;
+    #[pymodule_export]
     use crate::driver::Driver;
     #[pymodule_export]
     use crate::signal::{Event, Signal};
+    #[pymodule_export]
+    use crate::vector::DriverVector;
     #[pymodule_export]
     use crate::view::Slots;
 
@@ -38,7 +44,8 @@ mod _native {
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("__version__", env!("CARGO_PKG_VERSION"))?;
         let table = Code::ALL.map(|code| (code.code(), code.name(), code.text(), code.remedy()));
-        module.add("STATUS_TABLE", table)
+        module.add("STATUS_TABLE", table)?;
+        module.add("MAX_DRIVERS", tickbus_binding::MAX_DRIVERS)
     }
 
     /// Must be called in a child process right after a fork: the parent's drivers do not belong to the child.

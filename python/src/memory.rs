@@ -1,11 +1,15 @@
 //! The memory through which values pass between Python and a driver.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, Ordering};
 
 use tickbus_base::time::Nanos;
 use tickbus_driver::Exchange;
 use tickbus_image::signal::Slot;
+
+/// Words that Python and a driver share.
+pub(crate) type Words = Arc<[AtomicU64]>;
 
 /// The slots as Python sees them, and the results of the last tick.
 ///
@@ -13,7 +17,9 @@ use tickbus_image::signal::Slot;
 /// and the driver works on its own slots: a tick copies the values that this end writes from here, and those that it
 /// reads to here.
 pub(crate) struct Memory {
-    words: Box<[AtomicU64]>,
+    /// The words of this driver, or of all drivers of a vector.
+    pub(crate) block: Words,
+    pub(crate) range: Range<usize>,
     closed: AtomicBool,
     sequence: AtomicU64,
     age: AtomicI64,
@@ -24,8 +30,15 @@ pub(crate) struct Memory {
 impl Memory {
     /// Creates the memory with these values.
     pub(crate) fn new(slots: &[Slot]) -> Self {
+        let block = slots.iter().map(|slot| AtomicU64::new(slot.0)).collect();
+        Self::within(block, 0..slots.len())
+    }
+
+    /// Creates the memory in a part of a block, with the values that are there.
+    pub(crate) fn within(block: Words, range: Range<usize>) -> Self {
         Self {
-            words: slots.iter().map(|slot| AtomicU64::new(slot.0)).collect(),
+            block,
+            range,
             closed: AtomicBool::new(false),
             sequence: AtomicU64::new(0),
             age: AtomicI64::new(Nanos::MAX.0),
@@ -34,24 +47,23 @@ impl Memory {
         }
     }
 
-    /// Returns the words of all slots, which live as long as `self`.
-    pub(crate) fn words(&self) -> &[AtomicU64] {
-        &self.words
+    fn words(&self) -> &[AtomicU64] {
+        &self.block[self.range.clone()]
     }
 
     /// Returns the value of a slot.
     pub(crate) fn get(&self, slot: usize) -> Slot {
-        Slot(self.words[slot].load(Ordering::Relaxed))
+        Slot(self.words()[slot].load(Ordering::Relaxed))
     }
 
     /// Sets the value of a slot.
     pub(crate) fn set(&self, slot: usize, value: Slot) {
-        self.words[slot].store(value.0, Ordering::Relaxed);
+        self.words()[slot].store(value.0, Ordering::Relaxed);
     }
 
     /// Copies from this memory to `slots`.
     pub(crate) fn gather(&self, range: &Range<usize>, slots: &mut [Slot]) {
-        let words = &self.words[range.clone()];
+        let words = &self.words()[range.clone()];
         for (slot, word) in slots[range.clone()].iter_mut().zip(words) {
             slot.0 = word.load(Ordering::Relaxed);
         }
@@ -59,10 +71,17 @@ impl Memory {
 
     /// Copies from `slots` to this memory.
     pub(crate) fn scatter(&self, range: &Range<usize>, slots: &[Slot]) {
-        let words = &self.words[range.clone()];
+        let words = &self.words()[range.clone()];
         for (slot, word) in slots[range.clone()].iter().zip(words) {
             word.store(slot.0, Ordering::Relaxed);
         }
+    }
+
+    /// Takes these values, and counts ticks from zero again.
+    pub(crate) fn restart(&self, slots: &[Slot]) {
+        self.scatter(&(0..slots.len()), slots);
+        self.tell(Exchange::NONE);
+        self.ticks.store(0, Ordering::Relaxed);
     }
 
     /// Stores the result of a tick.

@@ -14,6 +14,7 @@ use tickbus_image::Event;
 use tickbus_image::signal::Slot;
 use tickbus_kinds::KINDS;
 
+use crate::block::Block;
 use crate::memory::Memory;
 use crate::signal::Description;
 
@@ -70,6 +71,13 @@ impl Opened {
         self.tell(done)
     }
 
+    fn reset(&mut self) -> Result<(), Refusal> {
+        self.gather();
+        self.driver.reset(&mut self.slots)?;
+        self.memory.restart(&self.slots);
+        Ok(())
+    }
+
     fn gather(&mut self) {
         for range in &self.written {
             self.memory.gather(range, &mut self.slots);
@@ -119,7 +127,24 @@ fn runs(count: usize, wanted: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     runs
 }
 
+/// Ticks each of these drivers once, without an end at the first failure; `done` gets the place of each and its code.
+pub(crate) fn tick_each(
+    handles: &[Handle],
+    half: Half,
+    time: impl Fn(usize) -> Option<Nanos>,
+    mut done: impl FnMut(usize, Code),
+) {
+    // All were opened before the vector was made.
+    if handles.iter().any(Handle::is_forked) {
+        (0..handles.len()).for_each(|at| done(at, Code::NotOpen));
+        return;
+    }
+    let numbers = handles.iter().map(|handle| handle.number);
+    DRIVERS.tick_each(numbers, |at, opened| opened.tick(half, time(at)), done);
+}
+
 /// An opened driver. Dropping the handle leaves the driver open.
+#[derive(Clone)]
 pub(crate) struct Handle {
     number: i64,
     forks: u64,
@@ -143,8 +168,13 @@ fn forked_child() -> Refusal {
 }
 
 impl Handle {
-    /// Opens the driver that a driver.cfg describes, with `tables` in place of its own.
-    pub(crate) fn open(path: &Path, tables: &str) -> Result<Facts, Refusal> {
+    /// Opens the driver that a driver.cfg describes, with `tables` in place of its own, and its values in a row of a
+    /// vector if one is given.
+    pub(crate) fn open(
+        path: &Path,
+        tables: &str,
+        row: Option<(&Block, usize)>,
+    ) -> Result<Facts, Refusal> {
         Refusal::instead_of_panic(|| {
             tickbus_base::os::log_to_stderr(log::LevelFilter::Warn);
             let place = DRIVERS.reserve()?;
@@ -163,7 +193,10 @@ impl Handle {
             let is_written =
                 |slot: usize| signals.get(slot).is_some_and(|signal| signal.is_written);
             let slots = driver.initial_slots();
-            let memory = Arc::new(Memory::new(&slots));
+            let memory = Arc::new(match row {
+                Some((block, row)) => block.row(row, &slots)?,
+                None => Memory::new(&slots),
+            });
             let is_stepped = driver.is_stepped();
             let opened = Opened {
                 written: runs(slots.len(), is_written),
@@ -221,6 +254,10 @@ impl Handle {
             Ok(snapshot) => Refusal::of_tick(code, &snapshot),
             Err(refusal) => refusal,
         }
+    }
+
+    pub(crate) fn reset(&self) -> Result<(), Refusal> {
+        self.visit(Opened::reset)?
     }
 
     pub(crate) fn snapshot(&self) -> Result<Snapshot, Refusal> {

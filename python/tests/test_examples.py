@@ -1,4 +1,4 @@
-"""The worked examples, run with their programs: MuJoCo, SimPy, and a third-party soft PLC."""
+"""The worked examples, run with their programs: Gymnasium, MuJoCo, SimPy, and a third-party soft PLC."""
 
 import os
 import re
@@ -99,3 +99,20 @@ def test_the_buffer_of_simpy_is_kept_by_the_plc(tmp_path):
     assert int(numbers["longest"]) <= int(numbers["limit"]) + 1
     assert run("--seed", "3")[0] == told
     assert int(run("--seed", "3", "--without-plc")[1]["longest"]) > int(numbers["limit"]) + 1
+
+
+def test_the_tanks_of_gymnasium_are_refilled_by_their_plcs(tmp_path):
+    pytest.importorskip("gymnasium", reason="there is no Gymnasium")
+
+    def run(*more):
+        command = [sys.executable, "-W", "error", root("examples", "gymnasium", "tanks.py"), "--envs", "64", "--steps", "1500", *more]
+        result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert result.stdout.startswith("tanks: ok envs=64 "), result.stdout
+        return dict(re.findall(r"(episodes|reward)=([\d.-]+)", result.stdout))
+
+    first = run()
+    # Without its PLC a tank gives 350 mm at most.
+    assert float(first["reward"]) > 1000
+    assert int(first["episodes"]) == 64
+    assert run() == first
+    assert run("--seed", "2") != first

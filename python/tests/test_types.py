@@ -19,6 +19,11 @@ with tickbus.open(Path("tank.cfg"), {"fieldbus": {"kind": "loopback"}}) as plc:
     plc.send()
     view: memoryview[float] = plc.slots
     plc.exchange(ns=3)
+with tickbus.open_vector("tank.cfg", 4, lambda place: {"fieldbus": {"kind": "mailbox"}}) as plcs:
+    failed: int = plcs.exchange([0.5] * 4) + plcs.receive(ns=3) + plcs.reset([True] * 4)
+    column: int = plcs.signal("Level").slot
+    first: tickbus.Driver = plcs[0]
+    codes: memoryview[int] = plcs.statuses
 
 def test(plc: Plc) -> None:
     ticks: int = plc.await_(on("Run")).within(3, s)

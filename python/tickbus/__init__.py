@@ -20,9 +20,11 @@ from ._driver import Driver, Fault, Turn, open, report
 from ._errors import FieldbusError, MissingFileError, UnknownSignalError
 from ._native import Event, Signal, __version__
 from ._status import Status
+from ._vector import DriverVector, open_vector
 
 __all__ = [
     "Driver",
+    "DriverVector",
     "Event",
     "Fault",
     "FieldbusError",
@@ -33,5 +35,6 @@ __all__ = [
     "UnknownSignalError",
     "__version__",
     "open",
+    "open_vector",
     "report",
 ]

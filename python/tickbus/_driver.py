@@ -1,5 +1,7 @@
 """An open driver."""
 
+from __future__ import annotations
+
 import atexit
 import contextlib
 import itertools
@@ -13,11 +15,14 @@ import weakref
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from types import FrameType, TracebackType
-from typing import Any, Literal, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from . import _durations, _native, _toml
 from ._errors import FieldbusError, MissingFileError
 from ._status import Status
+
+if TYPE_CHECKING:
+    from typing import Self
 
 _ENTRY = re.compile(r"((?:[^=\\]|\\.)+)=(.*)")
 
@@ -36,8 +41,15 @@ def open(path: str | os.PathLike[str], overlay: _toml.Tables | None = None) -> "
     ``Status.BAD_CONFIG`` and every mistake at its line and column, or with the reason why the bus cannot be opened;
     ``MissingFileError`` if there is no such file.
     """
+    return opened(path, overlay)
+
+
+def opened(
+    path: str | os.PathLike[str], overlay: _toml.Tables | None, block: _native.Block | None = None, row: int = 0
+) -> "Driver":
+    """Opens a driver, with its values in a row of ``block`` if there is one."""
     try:
-        return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "")
+        return Driver(os.fspath(path), _toml.document(overlay) if overlay is not None else "", block, row)
     except FieldbusError as error:
         if error.status is Status.BAD_CONFIG and not Path(path).exists():
             raise MissingFileError(error.code, error.message) from None
@@ -82,7 +94,7 @@ class Driver(_native.Driver):
 
     __slots__ = ("__weakref__",)
 
-    def __init__(self, path: str, overlay: str = "") -> None:
+    def __init__(self, path: str, overlay: str = "", block: _native.Block | None = None, row: int = 0) -> None:
         _open.add(self)
         _close_when_terminated()
 

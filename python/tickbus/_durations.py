@@ -1,5 +1,7 @@
 """Durations, as driver.cfg writes them, "2ms", and in whole nanoseconds."""
 
+from __future__ import annotations
+
 import re
 from decimal import Decimal
 

@@ -1,5 +1,7 @@
 """The exceptions."""
 
+from __future__ import annotations
+
 from ._status import Status
 
 

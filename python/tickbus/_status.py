@@ -1,5 +1,7 @@
 """The status codes: those of every binding of tickbus."""
 
+from __future__ import annotations
+
 from enum import IntEnum
 
 from . import _native

@@ -1,11 +1,16 @@
 """Writes Python values as TOML, the language of driver.cfg."""
 
+from __future__ import annotations
+
 import operator
 import os
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Union
 
-Tables: TypeAlias = str | Mapping[str, Any]
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+Tables: TypeAlias = Union[str, Mapping[str, Any]]
 
 _ESCAPES = {'"': '\\"', "\\": "\\\\"}
 
@@ -53,7 +58,7 @@ def _value(value: object) -> str:
         return _text(os.fsdecode(value))
     if isinstance(value, Mapping):
         return "{ " + ", ".join(f"{_key(name)} = {_value(part)}" for name, part in value.items()) + " }"
-    if isinstance(value, Sequence) and not isinstance(value, bytes | bytearray | memoryview):
+    if isinstance(value, Sequence) and not isinstance(value, (bytes, bytearray, memoryview)):
         return "[" + ", ".join(map(_value, value)) + "]"
     try:
         return str(operator.index(value))  # type: ignore[arg-type]

@@ -49,8 +49,13 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[Any]) -> 
     bench = getattr(item, "funcargs", {}).get("_plc_bench")
     if bench is not None and call.when == "call" and call.excinfo and not call.excinfo.errisinstance(pytest.skip.Exception):
         bench.failure = call.excinfo.value
-        bench.failure.add_note(f"the test stood at {bench.plc._where()}{bench.keep.told()}")
+        _note(bench.failure, f"the test stood at {bench.plc._where()}{bench.keep.told()}")
     return (yield)
+
+
+def _note(error: BaseException, text: str) -> None:
+    """Adds a note to the exception; before Python 3.11 only pytest shows it."""
+    error.__notes__ = [*getattr(error, "__notes__", []), text]
 
 
 @dataclass
@@ -101,7 +106,7 @@ def _plc_bench(request: pytest.FixtureRequest) -> Iterator[_Bench]:
         statistics = driver.statistics()
     keep.finish(bench.failure or unfinished, statistics)
     if unfinished is not None:
-        unfinished.add_note(f"the test stood at {bench.plc._where()}{keep.told()}")
+        _note(unfinished, f"the test stood at {bench.plc._where()}{keep.told()}")
         raise unfinished
 
 

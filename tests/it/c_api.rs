@@ -144,6 +144,17 @@ fn misuse_is_answered_and_nothing_goes_down() {
 }
 
 #[test]
+fn many_drivers_tick_in_one_call_each_with_its_own_time_and_status() {
+    let folder = folder_with_tank();
+    let compiler = ["cc", "-std=c99", "-D_POSIX_C_SOURCE=200809L"];
+    let program = compile(&compiler, "tests/c/many.c", folder.path());
+    let output = run(&program, folder.path(), &["tank.cfg"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{:?} {said}", output.status);
+    assert!(output.stdout.starts_with(b"many: ok"), "{said}");
+}
+
+#[test]
 fn values_of_every_kind_go_as_in_java() {
     let folder = folder_with_tank();
     let config = r#"

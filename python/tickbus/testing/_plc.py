@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, Union
 
 from .. import _durations
 from .._driver import Driver, Fault
@@ -12,10 +12,13 @@ from .._native import Signal
 from ._conditions import Bound, Condition
 from ._watch import Watch
 
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
 _PRESS = "200ms"
 """How long a button is pressed: about as long as a finger does, and longer than any scan."""
 
-Duration: TypeAlias = float | str
+Duration: TypeAlias = Union[float, str]
 
 
 class Machine(Protocol):

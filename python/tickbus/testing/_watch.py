@@ -1,5 +1,7 @@
 """The recent history of a signal, for failure messages."""
 
+from __future__ import annotations
+
 import math
 from collections import deque
 from decimal import Decimal

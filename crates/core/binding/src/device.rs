@@ -62,6 +62,25 @@ impl<K> Device<K> {
         self.tell(done)
     }
 
+    /// Sets the time of the next tick, as if the simulator had written it.
+    pub fn set_time(&mut self, nanos: i64) {
+        self.shared
+            .write(Word::SimulationTime, nanos.cast_unsigned());
+    }
+
+    /// Begins the next episode of the simulation: see [`Driver::reset`].
+    ///
+    /// # Errors
+    ///
+    /// `UNSUPPORTED` if the line cannot begin again, or the reason why it could not be opened. The driver is then as
+    /// before.
+    pub fn reset(&mut self) -> Result<(), Refusal> {
+        self.driver.reset(self.shared.slots())?;
+        self.shared.restart();
+        self.ticks = 0;
+        Ok(())
+    }
+
     /// The time that the simulator wrote, if any.
     #[inline]
     fn time(&self) -> Option<Nanos> {

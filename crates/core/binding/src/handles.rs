@@ -14,8 +14,9 @@
 use std::cell::UnsafeCell;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 
+use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_driver::Code;
 
@@ -71,6 +72,8 @@ struct HandleEntry<T> {
     word: AtomicU64,
     /// True while a visit waits for the end of a tick. Only a hint: a waiting visit sets a lost flag again.
     wanted: AtomicBool,
+    /// The last call of [`Handles::tick_each`] that ticked the tenant. It changes only under a claim, and fits in a gap.
+    round: AtomicU32,
     /// Accessed only by the thread that has moved the word to [`TICKING`] or [`VISITED`], until that thread moves the
     /// word on.
     content: UnsafeCell<Content<T>>,
@@ -87,6 +90,8 @@ struct Content<T> {
 pub struct Handles<T, const N: usize = BLOCK> {
     first: [HandleEntry<T>; N],
     more: [OnceLock<Box<[HandleEntry<T>]>>; MORE_BLOCKS],
+    /// The number of calls of [`tick_each`](Self::tick_each).
+    rounds: AtomicU32,
 }
 
 // SAFETY: `content` is the one part that is not Sync already. Only a `Claim` gives access to it. A claim exists from a
@@ -107,6 +112,7 @@ impl<T, const N: usize> Handles<T, N> {
         Self {
             first: [const { HandleEntry::new() }; N],
             more: [const { OnceLock::new() }; MORE_BLOCKS],
+            rounds: AtomicU32::new(0),
         }
     }
 
@@ -170,13 +176,47 @@ impl<T, const N: usize> Handles<T, N> {
     /// The handle was never open or is closed; another thread ticks the tenant; or the tenant has failed.
     #[inline]
     pub fn tick<R>(&self, handle: i64, work: impl FnOnce(&mut T) -> R) -> Result<R, Code> {
+        self.claimed(handle, |claim| claim.run(work))
+    }
+
+    /// Ticks each of these tenants once, one after the other, on this thread: calls `work` with the place in the list and
+    /// the tenant, and `done` with the place and the result. A tenant that fails stops no other one. The second mention
+    /// of a tenant is not ticked, and has the result `BAD_ARGUMENT`.
+    pub fn tick_each(
+        &self,
+        handles: impl IntoIterator<Item = i64>,
+        mut work: impl FnMut(usize, &mut T) -> Code,
+        mut done: impl FnMut(usize, Code),
+    ) {
+        // Never zero, with which a place begins.
+        let round = self.rounds.fetch_add(1, Ordering::Relaxed) | 1 << 31;
+        for (at, handle) in handles.into_iter().enumerate() {
+            let ticked = self.claimed(handle, |claim| {
+                if claim.place.round.load(Ordering::Relaxed) == round {
+                    return Err(Code::BadArgument);
+                }
+                claim.place.round.store(round, Ordering::Relaxed);
+                claim.run(|tenant| work(at, tenant))
+            });
+            done(at, ticked.unwrap_or_else(|refused| refused));
+        }
+    }
+
+    /// Claims a tenant for a tick, and then lets a waiting visit in.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "a tick should not pay for this call")]
+    fn claimed<R>(
+        &self,
+        handle: i64,
+        run: impl FnOnce(Claim<'_, T>) -> Result<R, Code>,
+    ) -> Result<R, Code> {
         let (place, generation) = self.place(handle).ok_or(Code::NotOpen)?;
         let claimed = word(generation, TICKING);
         let claim = match Claim::take(place, word(generation, OPEN), claimed, OPEN) {
             Some(claim) => claim,
             None => place.after_visit(generation)?,
         };
-        let done = claim.run(work);
+        let done = run(claim);
         if place.wanted.load(Ordering::Relaxed) {
             place.let_in(generation);
         }
@@ -273,8 +313,9 @@ impl<T, const N: usize> Handles<T, N> {
     }
 }
 
-/// A further block of free places.
+/// A further block of free places, for which the limit of open files may be too low.
 fn block<T, const N: usize>() -> Box<[HandleEntry<T>]> {
+    raise_open_files();
     (0..N).map(|_| HandleEntry::new()).collect()
 }
 
@@ -283,6 +324,7 @@ impl<T> HandleEntry<T> {
         Self {
             word: AtomicU64::new(word(0, FREE)),
             wanted: AtomicBool::new(false),
+            round: AtomicU32::new(0),
             content: UnsafeCell::new(Content {
                 tenant: None,
                 name: String::new(),

@@ -85,13 +85,19 @@ impl<K> Shared<K> {
             _keep: keep,
         };
         shared.slots().fill(Slot(0));
-        for word in 0..HEADER {
-            shared.header(word).store(0, Ordering::Relaxed);
-        }
-        shared.write(Word::Version, VERSION);
-        shared.write(Word::SimulationTime, NO_TIME);
-        shared.write(Word::SlotCount, slots as u64);
+        shared.restart();
         Some(shared)
+    }
+
+    /// Writes the header as it is before the first tick.
+    pub fn restart(&mut self) {
+        let mut header = [0; HEADER];
+        header[Word::Version as usize] = VERSION;
+        header[Word::SimulationTime as usize] = NO_TIME;
+        header[Word::SlotCount as usize] = self.slots as u64;
+        for (word, value) in header.into_iter().enumerate() {
+            self.header(word).store(value, Ordering::Relaxed);
+        }
     }
 
     /// The slots, to which this side has exclusive access while they are borrowed.

@@ -13,9 +13,10 @@ use tickbus_record::Recorder;
 use super::bus_handle::BusHandle;
 use super::extras::Extras;
 use super::host::OtherEnd;
+use super::recording::Recorded;
 use super::shape::Shape;
 use super::station::Station;
-use super::statistics::{Figures, TickFigures};
+use super::statistics::{Figures, ProgramCounters, TickFigures};
 use super::tap::Tap;
 use super::tick::Tick;
 use super::tick_counters::TickTimes;
@@ -52,7 +53,10 @@ pub struct Driver {
     pub(super) shape: Shape,
     pub(super) board: Arc<FaultBoard>,
     pub(super) program: Option<OtherEnd>,
+    pub(super) program_counters: ProgramCounters,
     pub(super) recorder: Option<Recorder>,
+    /// The ticks that the recording has so far.
+    pub(super) recorded: Recorded,
     /// Lets another thread look at the driver.
     pub(super) tap: Option<Tap>,
 }
@@ -131,7 +135,7 @@ impl Driver {
         Figures {
             status: self.status.clone(),
             board: Arc::clone(&self.board),
-            program: self.program.as_ref().map(|end| Arc::clone(&end.counters)),
+            program: self.program_counters.clone(),
             record: recorder.map(|recorder| Arc::clone(recorder.counters())),
         }
     }

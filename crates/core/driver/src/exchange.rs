@@ -436,8 +436,9 @@ impl Driver {
     #[inline(never)]
     fn record(&mut self, tick: Tick, code: Code, slots: &[Slot]) {
         if let Some(recorder) = &mut self.recorder {
+            let (number, time) = self.recorded.tick(self.counters.ticks, tick.time);
             let stations = self.stations.iter().map(|station| station.status.code());
-            recorder.record(self.counters.ticks, tick.time, code.code(), stations, slots);
+            recorder.record(number, time, code.code(), stations, slots);
         }
     }
 }
@@ -464,7 +465,7 @@ fn write(
 fn went_back(before: Nanos, time: Nanos) -> BusError {
     BusError::Refused(format!(
         "simulation time went back from {before} to {time}, and what runs on it cannot; hand in the \
-         nanoseconds since the simulation began, and open the driver again when it begins anew"
+         nanoseconds since the simulation began, and reset the driver when it begins again"
     ))
 }
 

@@ -35,6 +35,15 @@ impl Extras {
         extras
     }
 
+    /// Takes the work of `fresh`, whose reflexes and heartbeats are at their beginning, and ends all faults.
+    pub(super) fn restart(&mut self, fresh: Self) {
+        (self.reflexes, self.beats) = (fresh.reflexes, fresh.beats);
+        if let Some(faults) = &mut self.faults {
+            faults.restart();
+        }
+        self.rest();
+    }
+
     #[inline]
     pub(super) const fn is_busy(&self) -> bool {
         self.is_busy

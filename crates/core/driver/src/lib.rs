@@ -14,6 +14,7 @@ mod inject;
 mod open;
 mod recording;
 mod replay;
+mod reset;
 mod shape;
 mod slots;
 mod station;

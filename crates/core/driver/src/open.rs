@@ -7,16 +7,18 @@ use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
 use tickbus_fieldbus::{Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
-use tickbus_image::image;
+use tickbus_image::{BusEnd, EVENT_CAPACITY, TickEnd, image_with_events};
 
 use super::bus;
 use super::bus_handle::{BusHandle, OpenBus};
 use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
-use super::recording::recorder;
+use super::host::OtherEnd;
+use super::recording::{Recorded, recorder};
 use super::shape::Shape;
 use super::station::Station;
+use super::statistics::{Counters, ProgramCounters};
 use super::supervise::BusThread;
 use super::tick_counters::TickTimes;
 use super::{Driver, DriverError, Exchange, SlotMap, TickCounters};
@@ -30,9 +32,8 @@ impl Driver {
     ///
     /// See [`DriverError`].
     pub fn open(config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
-        let (tx, rx) = config.role.areas();
-        let directions = directions(&config.table, config.role);
-        let (tick, bus_end) = image(directions);
+        let areas = config.role.areas();
+        let (tick, bus_end) = image_of(&config);
         let names = config.table.stations.iter();
         let names = names.map(|station| station.name.clone()).collect();
         let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
@@ -42,7 +43,7 @@ impl Driver {
         let recorder = recorder(
             &config,
             &slots,
-            Some(tx),
+            Some(areas.0),
             matches!(bus, OpenBus::Stepped(_)),
             &clock,
         )?;
@@ -53,48 +54,12 @@ impl Driver {
         };
         // Before the bus starts: setting up this clock takes time, in which the bus would find no tick.
         let quick = QuickClock::new(Arc::clone(&clock));
-        let watchdog = config.timing.watchdog;
         let board = Arc::<FaultBoard>::default();
-        let (signs, max_age) = (&config.life_signs, config.timing.max_age);
-        let mut port = Port::new(
-            bus_end,
-            Arc::clone(&clock),
-            config.role,
-            watchdog,
-            status.clone(),
-        )
-        .with_faults(Arc::clone(&board))
-        .with_life_signs(signs.watches(&config.table, config.role, max_age))
-        .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
-        if config.events != Events::None {
-            let stations = 0..config.table.stations.len();
-            port = port.with_changes(
-                stations
-                    .map(|station| ChangeEvents::new(&config.table, station, rx))
-                    .collect(),
-            );
-        }
-        let line = match bus {
-            OpenBus::Free(bus) => {
-                let timing = &config.timing;
-                let thread = BusThread::start(bus, port, timing, status.clone(), &config.name);
-                BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
-            }
-            OpenBus::Stepped(bus) => BusHandle::Stepped {
-                bus,
-                port,
-                time: simulation_time,
-            },
-        };
+        let times = (&clock, &simulation_time);
+        let line = start(&config, bus, bus_end, times, (&status, &board))?;
         let stations = (0..config.table.stations.len())
-            .map(|index| Station::new(&config.table, index, (tx, rx)))
+            .map(|index| Station::new(&config.table, index, areas))
             .collect();
-        // Reflexes belong to the machine: a PLC has its own.
-        let reflexes = match config.role {
-            Role::Device => Reflexes::new(&config.axes),
-            Role::Controller => None,
-        };
-        let list = config.faults.clone();
         let mut driver = Self {
             slots,
             recorder,
@@ -112,18 +77,25 @@ impl Driver {
             given: None,
             tick: None,
             last: Exchange::NONE,
-            extras: Extras::new(reflexes, Beat::all(&config, config.role)),
+            extras: extras(&config),
             shape: Shape::Extended,
             board,
+            program_counters: ProgramCounters::new(counters_of(program.as_ref())),
             program,
+            recorded: Recorded::default(),
             tap: None,
             config: Arc::new(config),
         };
-        for fault in &list {
-            driver.inject(fault).map_err(DriverError::Fault)?;
-        }
+        driver.inject_configured()?;
         driver.shape = driver.fitting_shape();
         Ok(driver)
+    }
+
+    /// Injects the faults of the configuration.
+    pub(super) fn inject_configured(&mut self) -> Result<(), DriverError> {
+        let config = Arc::clone(&self.config);
+        let mut faults = config.faults.iter();
+        faults.try_for_each(|fault| self.inject(fault).map(drop).map_err(DriverError::Fault))
     }
 
     /// Closes the driver: leaves the peer with the fail-safe values if `at_close` asks for that, stops the threads and
@@ -140,4 +112,61 @@ impl Driver {
         let now = clock.now();
         status.enter(now, LinkState::Closed, Cause::Closed, "closed");
     }
+}
+
+/// Creates the two ends of the image.
+pub(super) fn image_of(config: &Config) -> (TickEnd, BusEnd) {
+    let events = match config.events {
+        Events::None => 0,
+        _ => EVENT_CAPACITY,
+    };
+    image_with_events(directions(&config.table, config.role), events)
+}
+
+/// Starts a bus on its own thread, or prepares it for the tick, which advances `time`; `clock` is the clock of the line.
+pub(super) fn start(
+    config: &Config,
+    bus: OpenBus,
+    image: BusEnd,
+    (clock, time): (&Arc<dyn Clock>, &Arc<Manual>),
+    (status, board): (&LinkStatus, &Arc<FaultBoard>),
+) -> Result<BusHandle, DriverError> {
+    let (table, role, timing) = (&config.table, config.role, &config.timing);
+    let (clock, watchdog) = (Arc::clone(clock), timing.watchdog);
+    let mut port = Port::new(image, clock, role, watchdog, status.clone())
+        .with_faults(Arc::clone(board))
+        .with_life_signs(config.life_signs.watches(table, role, timing.max_age))
+        .with_names(table.stations.iter().map(|s| s.name.as_str()));
+    if config.events != Events::None {
+        let (_, rx) = role.areas();
+        let stations = 0..table.stations.len();
+        let changes = stations.map(|station| ChangeEvents::new(table, station, rx));
+        port = port.with_changes(changes.collect());
+    }
+    Ok(match bus {
+        OpenBus::Free(bus) => {
+            let thread = BusThread::start(bus, port, timing, status.clone(), &config.name);
+            BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
+        }
+        OpenBus::Stepped(bus) => BusHandle::Stepped {
+            bus,
+            port,
+            time: Arc::clone(time),
+        },
+    })
+}
+
+/// Creates the extra work of a driver without faults.
+pub(super) fn extras(config: &Config) -> Extras {
+    // Reflexes belong to the machine: a PLC has its own.
+    let reflexes = match config.role {
+        Role::Device => Reflexes::new(&config.axes),
+        Role::Controller => None,
+    };
+    Extras::new(reflexes, Beat::all(config, config.role))
+}
+
+/// Returns the counters of the program at the other end.
+pub(super) fn counters_of(program: Option<&OtherEnd>) -> Option<Arc<dyn Counters>> {
+    program.map(|end| Arc::clone(&end.counters))
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use tickbus_base::time::Clock;
+use tickbus_base::time::{Clock, Nanos};
 use tickbus_image::signal::Area;
 use tickbus_record::{Columns, Recorder, Rows, When};
 
@@ -33,4 +33,26 @@ pub(super) fn recorder(
     };
     let recorder = Recorder::start(options, config.folder(), rows, lossless, clock)?;
     Ok(Some(recorder))
+}
+
+/// The ticks that a recording has so far. After a reset, ticks and simulation time continue where the recording was.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Recorded {
+    /// The number and the time in the recording at the last reset.
+    begin: (u64, Nanos),
+    last: (u64, Nanos),
+}
+
+impl Recorded {
+    /// Returns the number and the time of a tick in the recording.
+    pub(super) fn tick(&mut self, number: u64, time: Nanos) -> (u64, Nanos) {
+        let (before, begin) = self.begin;
+        self.last = (before + number, begin + time);
+        self.last
+    }
+
+    /// Begins to count again, after the last tick.
+    pub(super) fn restart(&mut self) {
+        self.begin = self.last;
+    }
 }

@@ -1,7 +1,7 @@
 //! The counters of a driver.
 
 use std::fmt;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::tick_counters::{TickCounters, TickTimes};
 use tickbus_base::os::dropped_log_lines;
@@ -18,13 +18,38 @@ pub(crate) trait Counters: fmt::Debug + Send + Sync {
     fn write(&self, statistics: &mut Statistics);
 }
 
+/// The counters of the program at this end or at the other one, if there is one. A reset replaces them.
+#[derive(Clone, Debug)]
+pub(super) struct ProgramCounters(Arc<Mutex<Option<Arc<dyn Counters>>>>);
+
+impl ProgramCounters {
+    pub(super) fn new(counters: Option<Arc<dyn Counters>>) -> Self {
+        Self(Arc::new(Mutex::new(counters)))
+    }
+
+    pub(super) fn replace(&self, counters: Option<Arc<dyn Counters>>) {
+        *self.lock() = counters;
+    }
+
+    fn write(&self, statistics: &mut Statistics) {
+        let counters = self.lock().clone();
+        if let Some(counters) = counters {
+            counters.write(statistics);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<dyn Counters>>> {
+        // A pointer is whole after a panic, too.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
 /// The sources of the statistics of one end of a line, all readable from any thread.
 #[derive(Clone, Debug)]
 pub(super) struct Figures {
     pub(super) status: LinkStatus,
     pub(super) board: Arc<FaultBoard>,
-    /// The counters of the program at this end or at the other one, and those of the recording.
-    pub(super) program: Option<Arc<dyn Counters>>,
+    pub(super) program: ProgramCounters,
     pub(super) record: Option<Arc<RecorderCounters>>,
 }
 
@@ -81,9 +106,7 @@ impl Figures {
         }
         self.board.tell(self.status.driver());
         self.board.write(&mut statistics);
-        if let Some(program) = &self.program {
-            program.write(&mut statistics);
-        }
+        self.program.write(&mut statistics);
         if let Some(record) = &self.record {
             record.write(&mut statistics);
         }

@@ -373,6 +373,19 @@ impl PulseShaper {
         self.counts.copy_from_slice(edges);
     }
 
+    /// Drops the edges that wait, up to a frame whose counters are `edges`, and the levels that are held.
+    pub fn restart(&mut self, edges: &[u32]) {
+        self.counts.copy_from_slice(edges);
+        for shown in self.shown.iter_mut().chain(&mut self.next) {
+            shown.waiting = 0;
+        }
+        for hold in &mut self.holds {
+            (hold.until, hold.next_until) = (Nanos(i64::MIN), Nanos(i64::MIN));
+        }
+        self.held.fill(0);
+        self.busy = false;
+    }
+
     /// Records that the receiver has seen the levels shaped or passed last.
     #[inline]
     pub fn confirm(&mut self) {

@@ -393,3 +393,29 @@ fn nothing_is_torn_or_young_again_between_threads() {
         assert!(bus_thread.join().expect("no panic") > 0 || cfg!(miri));
     }
 }
+
+#[test]
+fn a_simulation_that_restarts_sees_the_newest_levels_again_and_no_edge_of_before() {
+    let (mut tick, mut bus) = one_latched_byte();
+    receive(&mut bus, 1, 1);
+    read(&mut tick, 2);
+    for level in [0, 1] {
+        receive(&mut bus, 3, level);
+        bus.events.push(Event::default());
+    }
+    tick.restart();
+    assert_eq!(tick.events.pop(), None);
+    let (arrival, shown, edges) = read(&mut tick, 4);
+    assert_eq!((arrival.fresh, shown, edges), (true, Some(1), vec![(7, 0)]));
+    assert_eq!(read(&mut tick, 5).1, None);
+    tick.restart();
+    let (arrival, shown, edges) = read(&mut tick, 6);
+    assert_eq!(
+        (arrival.fresh, shown, edges),
+        (false, Some(1), vec![(7, 0)])
+    );
+    for level in [0, 1] {
+        receive(&mut bus, 7, level);
+    }
+    assert_eq!(read(&mut tick, 8).2, [(7, 1)]);
+}

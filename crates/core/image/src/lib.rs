@@ -81,7 +81,12 @@ pub const EVENT_CAPACITY: usize = 4096;
 
 /// Creates the two ends of a driver's image, given the streams of each station.
 pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
-    let (producer, consumer) = event_ring(EVENT_CAPACITY);
+    image_with_events(stations, EVENT_CAPACITY)
+}
+
+/// As [`image`], with room for this many events. A full ring has 100 kB, which a driver without events does not need.
+pub fn image_with_events(stations: Vec<StationStreams>, events: usize) -> (TickEnd, BusEnd) {
+    let (producer, consumer) = event_ring(events);
     let (sent, tx) = Place::all(stations.iter().map(|s| (&*s.tx_fail_safe, &*s.tx_latched)));
     let (received, rx) = Place::all(stations.iter().map(|s| (&*s.rx_fail_safe, &*s.rx_latched)));
     let (tx_writer, tx_reader) = triple_buffer(&tx);

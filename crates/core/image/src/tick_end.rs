@@ -7,7 +7,7 @@
 use super::frame::{Frame, Head, Place, StationStreams};
 use super::stale::{NEVER, age, is_stale};
 use super::sync::{Arc, AtomicI64, Ordering};
-use super::{Consumer, EdgeCounter, Peers, PulseShaper, Reader, Writer};
+use super::{Consumer, EVENT_CAPACITY, EdgeCounter, Peers, PulseShaper, Reader, Writer};
 use tickbus_base::time::Nanos;
 
 /// The number of bytes below which a memory comparison does not pay off.
@@ -353,6 +353,31 @@ impl TickEnd {
     /// Like [`shown_instead`](Self::shown_instead), with edges that are not the frame's either.
     pub fn overridden(&mut self, station: usize) {
         self.shown[station].forced = true;
+    }
+
+    /// Forgets what the simulation has seen, for a simulation that restarts: the next [`read`](Self::read) of data that
+    /// count shows the levels of the newest frame. Edges and events that no tick has shown yet are dropped.
+    pub fn restart(&mut self) {
+        self.update();
+        let shown = &mut self.shown;
+        self.rx.with(|frame| {
+            for Shown {
+                place,
+                shaper,
+                forced,
+                ..
+            } in shown
+            {
+                shaper.restart(&frame.edges[place.edges.clone()]);
+                *forced = true;
+            }
+        });
+        // At most a full ring: the bus may report further events meanwhile.
+        for _ in 0..EVENT_CAPACITY {
+            if self.events.pop().is_none() {
+                break;
+            }
+        }
     }
 
     /// The last bytes of a station, stale or not.

@@ -6,7 +6,7 @@ use std::net::{self, SocketAddr, ToSocketAddrs as _};
 use rustix::io::Errno;
 use socket2::{Domain, Protocol, Socket, Type};
 use tickbus_base::net::TcpStream;
-use tickbus_base::os::{Interest, PollSet};
+use tickbus_base::os::{Interest, OUT_OF_FILES, PollSet, is_out_of_files};
 use tickbus_base::time::{Clock, Nanos, Simulation, Stop};
 
 use crate::resolve::resolve;
@@ -94,6 +94,9 @@ fn reach_any(
             "no answer from {address} within {PATIENCE}; check \"address\", the cable, and the firewalls \
              on the way"
         ),
+        _ if is_out_of_files(&error) => {
+            format!("cannot connect to {address} ({error}): {OUT_OF_FILES}")
+        }
         _ => format!(
             "cannot connect to {address} ({error}); start the program that listens there, or correct \
              \"address\""

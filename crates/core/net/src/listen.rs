@@ -4,6 +4,7 @@ use std::io::{self, ErrorKind};
 use std::net::{SocketAddr, ToSocketAddrs as _};
 
 use tickbus_base::net::TcpListener;
+use tickbus_base::os::{OUT_OF_FILES, is_out_of_files};
 use tickbus_base::time::{Clock, Simulation, Stop};
 
 use crate::resolve::resolve;
@@ -33,6 +34,7 @@ pub fn listen(
                  net.ipv4.ip_unprivileged_port_start, by setcap cap_net_bind_service=+ep, or with a redirect \
                  by nft; docs/s7.md has the lines for port 102"
             }
+            _ if is_out_of_files(&error) => OUT_OF_FILES,
             _ => "end the program that has this port, or write another \"address\"",
         };
         Error(format!("cannot listen on {address} ({error}); {right}"))

@@ -39,7 +39,7 @@ pub use log::{
 pub use marked::{Characters, Marks};
 #[cfg(unix)]
 pub use named_memory::NamedMemory;
-pub use open_files::raise_open_files;
+pub use open_files::{OUT_OF_FILES, is_out_of_files, raise_open_files};
 pub use own_file::own_file;
 pub use peer_silence::peer_silence;
 pub use poll_set::PollSet;

@@ -138,6 +138,11 @@ impl Manual {
         }
     }
 
+    /// Shows zero again, for a simulation that restarts. Waits keep their deadlines.
+    pub fn restart(&self) {
+        self.now.store(0, Ordering::SeqCst);
+    }
+
     /// Wakes every wait whose deadline has come.
     #[cold]
     fn wake(&self, now: Nanos) {

@@ -232,3 +232,65 @@ fn what_is_open_at_the_end_is_closed_failed_or_not() {
     assert_eq!(closed, [2, 3]);
     assert_eq!(handles.tick(third, |_| ()), Err(Code::Closed));
 }
+
+#[test]
+fn a_call_ticks_each_tenant_once_and_a_failure_stops_no_other_one() {
+    let handles: Handles<u32, 2> = Handles::new();
+    let all: Vec<i64> = (0..6).map(|tenant| open(&handles, tenant)).collect();
+    handles.close(all[1], drop).expect("it is open");
+    let list = [all[0], all[1], all[2], all[0], 99, all[3], all[4]];
+    for round in 1..=2 {
+        let mut codes = Vec::new();
+        let work = |at: usize, tenant: &mut u32| {
+            assert!(*tenant != 3, "stuck");
+            assert_eq!(list[at], all[usize::try_from(*tenant % 10).expect("small")]);
+            *tenant += 10;
+            Code::Fresh
+        };
+        handles.tick_each(list, work, |at, code| codes.push((at, code)));
+        let codes: Vec<Code> = codes.into_iter().map(|(_, code)| code).collect();
+        let expected = [
+            Code::Fresh,
+            Code::Closed,
+            Code::Fresh,
+            Code::BadArgument,
+            Code::NotOpen,
+            Code::Internal,
+            Code::Fresh,
+        ];
+        assert_eq!(codes, expected, "round {round}");
+        assert_eq!(handles.tick(all[0], |tenant| *tenant), Ok(10 * round));
+    }
+    assert_eq!(handles.tick(all[5], |tenant| *tenant), Ok(5));
+}
+
+#[test]
+fn two_calls_at_once_share_the_tenants_and_each_meets_a_busy_one_at_most() {
+    let handles: Handles<u64, 2> = Handles::new();
+    let all: Vec<i64> = (0..8)
+        .map(|_| handles.reserve().expect("a place is free").fill("x", 0))
+        .collect();
+    let rounds = if cfg!(miri) { 20 } else { 20_000 };
+    let work = || {
+        let mut done = 0;
+        for _ in 0..rounds {
+            let tick = |_, tenant: &mut u64| {
+                *tenant += 1;
+                Code::Fresh
+            };
+            handles.tick_each(all.iter().copied(), tick, |_, code| match code {
+                Code::Fresh => done += 1,
+                code => assert_eq!(code, Code::Busy),
+            });
+        }
+        done
+    };
+    let done: u64 = std::thread::scope(|scope| {
+        let other = scope.spawn(work);
+        work() + other.join().expect("no panic")
+    });
+    let counted = all
+        .iter()
+        .map(|handle| handles.tick(*handle, |tenant| *tenant));
+    assert_eq!(counted.sum::<Result<u64, _>>(), Ok(done));
+}

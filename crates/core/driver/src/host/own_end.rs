@@ -306,7 +306,7 @@ mod tests {
         let figures = Figures {
             status: LinkStatus::new("x", config.timing.max_age),
             board: Arc::default(),
-            program: None,
+            program: crate::statistics::ProgramCounters::new(None),
             record: None,
         };
         let (config, board) = (Arc::new(config), Arc::clone(&figures.board));

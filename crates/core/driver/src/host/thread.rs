@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::DriverError;
-use crate::statistics::{Counters, Figures};
+use crate::statistics::{Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
 use crate::watch::Watch;
 use tickbus_base::os::wake_on_time;
@@ -131,7 +131,7 @@ impl HostThread {
         let figures = Figures {
             status: status.clone(),
             board: Arc::clone(&board),
-            program: Some(Arc::clone(&counters) as _),
+            program: ProgramCounters::new(Some(Arc::clone(&counters) as _)),
             record,
         };
         let mut watch = None;

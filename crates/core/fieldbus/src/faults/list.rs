@@ -167,6 +167,21 @@ impl Faults {
         found.map(|entry| entry.schedule.end()).is_some()
     }
 
+    /// Ends all faults at once, and counts time from zero again: the simulation restarts. Changed values are not
+    /// restored.
+    pub fn restart(&mut self) {
+        for entry in self.entries.drain(..) {
+            if entry.cell.phase() != Phase::Over {
+                let moment = TickTime {
+                    time: self.time,
+                    ..TickTime::default()
+                };
+                self.board.enter(&entry.cell, Phase::Over, moment);
+            }
+        }
+        (self.time, self.given) = (Nanos::ZERO, Nanos::ZERO);
+    }
+
     /// Begins a tick: restores changed values, then lets faults begin and end.
     ///
     /// Conditions are evaluated on true values: written ones as of this tick (or the previous one, if the tick receives

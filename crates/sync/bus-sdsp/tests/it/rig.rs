@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
+use crate::sdsp::{controller, of_two, open};
 use crate::server::Server;
 use tickbus_base::time::{Manual, Monotonic, Nanos};
 use tickbus_conformance::rig::{End, await_that};
@@ -119,4 +120,23 @@ fn two_runs_of_the_rig_are_equal_to_the_last_bit_however_busy_the_machine_is() {
         assert!(one.len() > 50_000, "{end}: {} bytes", one.len());
         assert!(one == other, "{end}: the recordings differ");
     }
+}
+
+#[test]
+fn a_client_of_a_run_cannot_be_reset_for_its_time_belongs_to_the_others_too() {
+    let server = of_two(3);
+    let plc = controller(server.port, "", |_, _| ());
+    let mut machine = open(server.port, "device", "");
+    assert_eq!(machine.tick().code, Code::Fresh);
+    let refused = machine.driver.reset(&mut machine.slots);
+    let refused = refused.expect_err("it takes part in a run");
+    assert_eq!(refused.code(), Code::Unsupported);
+    let text = refused.to_string();
+    assert!(text.contains("belongs to the other participants"), "{text}");
+    // The run continues as if nothing had been asked.
+    assert_eq!(machine.tick().code, Code::Fresh);
+    assert_eq!(machine.tick().code, Code::Fresh);
+    assert_eq!(machine.tick().code, Code::Stale);
+    assert_eq!(server.end().expect("it ends as planned").steps, 3);
+    plc.join().expect("no panic");
 }

@@ -27,7 +27,7 @@ static KINDS: Kinds = Kinds::new(&[Kind::of::<tickbus_bus_sdsp::Options>()]);
 const STEP: Nanos = Nanos::from_millis(1);
 
 /// The server of a run with two clients and this many steps of 1 ms.
-fn of_two(steps: u64) -> Server {
+pub(super) fn of_two(steps: u64) -> Server {
     let mut settings = Settings::new(STEP, StartCondition::Count(2));
     settings.steps = Some(steps);
     Server::start(settings)
@@ -40,12 +40,12 @@ fn config(port: u16, role: &str, extra: &str) -> String {
     )
 }
 
-fn open(port: u16, role: &str, extra: &str) -> End {
+pub(super) fn open(port: u16, role: &str, extra: &str) -> End {
     End::open(&config(port, role, extra), &Manual::new(), &KINDS)
 }
 
 /// The other end on a separate thread: ticks as long as the line has data, and lets `each` see and change them.
-fn controller(
+pub(super) fn controller(
     port: u16,
     extra: &'static str,
     mut each: impl FnMut(&mut End, Exchange) + Send + 'static,

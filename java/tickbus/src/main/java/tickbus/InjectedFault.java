@@ -1,5 +1,10 @@
 package tickbus;
 
+import java.util.List;
+import java.util.Locale;
+import java.util.Optional;
+import java.util.stream.Stream;
+
 /**
  * A fault injected into a driver, such as a stuck signal or a broken line, by a {@code [[fault]]} section of driver.cfg or
  * by {@link Tickbus#inject}.
@@ -27,18 +32,40 @@ public final class InjectedFault implements AutoCloseable {
         OVER
     }
 
+    /** The fields of a fault's line. */
+    private static final int ID = 0;
+    private static final int STATE = 1;
+    private static final int BEGUN = 2;
+    private static final int KIND = 3;
+    private static final int NAME = 4;
+    private static final int WHAT = 5;
+    private static final int FIELDS = 6;
+
     private final Tickbus bus;
     private final int id;
     private final String name;
     private final String kind;
     private final String what;
 
-    InjectedFault(Tickbus bus, int id, String kind, String name, String what) {
+    private InjectedFault(Tickbus bus, String[] line) {
         this.bus = bus;
-        this.id = id;
-        this.name = name;
-        this.kind = kind;
-        this.what = what;
+        this.id = Integer.parseInt(line[ID]);
+        this.name = line[NAME];
+        this.kind = line[KIND];
+        this.what = line[WHAT];
+    }
+
+    /** The faults of a driver, in order of injection. */
+    static List<InjectedFault> all(Tickbus bus) {
+        return lines(bus).map(line -> new InjectedFault(bus, line)).toList();
+    }
+
+    private static Stream<String[]> lines(Tickbus bus) {
+        return Tickbus.faultsNative(bus.handle()).lines().map(line -> line.split("\t", FIELDS));
+    }
+
+    private Optional<String[]> line() {
+        return lines(bus).filter(line -> Integer.parseInt(line[ID]) == id).findFirst();
     }
 
     /**
@@ -75,7 +102,7 @@ public final class InjectedFault implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public State state() {
-        return bus.faultState(id);
+        return line().map(line -> State.valueOf(line[STATE].toUpperCase(Locale.ROOT))).orElse(State.OVER);
     }
 
     /**
@@ -95,7 +122,7 @@ public final class InjectedFault implements AutoCloseable {
      * @throws FieldbusException as {@link #state}
      */
     public long begun() {
-        return bus.faultBegun(id);
+        return line().map(line -> Long.parseLong(line[BEGUN])).orElse(0L);
     }
 
     /**
@@ -104,7 +131,7 @@ public final class InjectedFault implements AutoCloseable {
      * @throws FieldbusException as {@link #state}
      */
     public void end() {
-        bus.endFault(id);
+        Tickbus.endFaultNative(bus.handle(), id);
     }
 
     /** The same as {@link #end}, for try-with-resources; does nothing if the driver is closed. */

@@ -8,12 +8,10 @@ import java.nio.file.Path;
 import java.util.Collections;
 import java.util.HashMap;
 import java.util.List;
-import java.util.Locale;
 import java.util.Map;
 import java.util.Objects;
 import java.util.Optional;
 import java.util.function.LongToIntFunction;
-import java.util.stream.Stream;
 
 /**
  * One open driver: a simulation's end of a PLC's fieldbus.
@@ -74,15 +72,6 @@ public final class Tickbus implements AutoCloseable {
     private static final int MOST_EVENTS = 4096;
     /** Longs per event: signal, slot, time. */
     private static final int EVENT_WORDS = 3;
-
-    /** The fields of a fault's line. */
-    private static final int FAULT_ID = 0;
-    private static final int FAULT_STATE = 1;
-    private static final int FAULT_BEGUN = 2;
-    private static final int FAULT_KIND = 3;
-    private static final int FAULT_NAME = 4;
-    private static final int FAULT_WHAT = 5;
-    private static final int FAULT_FIELDS = 6;
 
     static {
         try {
@@ -291,6 +280,28 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
+     * Begins the next episode of the simulation without opening again, which is faster. The signals have their initial
+     * values, and {@code exchange(0)} can follow: simulation time begins again. All that belongs to the ticks is as after
+     * opening: their counters, the counts of edges, heartbeats, axes, the faults of driver.cfg; injected ones end, and
+     * events that were not polled are dropped.
+     *
+     * <p>A PLC program or a recording in this process begins again, too: the program is at its first scan. A connection to
+     * a PLC stays, and the PLC gets the initial values with the next tick. A {@code [record]} continues in the same file.
+     *
+     * <p>Called by the ticking thread.
+     *
+     * @throws FieldbusException {@link Status#UNSUPPORTED} if the time of a stepped fieldbus belongs to other participants as
+     *     well; {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public void reset() {
+        mustBeTicker();
+        mustBeOpen();
+        resetNative(handle);
+        nextEvent = 0;
+        endOfEvents = 0;
+    }
+
+    /**
      * Retries a call that was refused because another thread's {@link #statistics}, {@link #inject} or {@link #close} was
      * using the driver. Those hold the driver only while they copy what they need, or take it over; after {@code close} the
      * result is {@link Status#CLOSED}.
@@ -424,7 +435,25 @@ public final class Tickbus implements AutoCloseable {
         return Collections.unmodifiableMap(StatisticsText.read(statisticsNative(handle)));
     }
 
-    /** For tests. */
+    /** For a {@link DriverVector}. */
+    boolean isClosed() {
+        return closed;
+    }
+
+    /** For a {@link DriverVector}: true if this thread may tick the driver. */
+    boolean isTickedHere() {
+        if (ticker == Thread.currentThread()) {
+            return true;
+        }
+        try {
+            becomeTicker();
+            return true;
+        } catch (FieldbusException e) {
+            return false;
+        }
+    }
+
+    /** For a {@link DriverVector}, and for tests. */
     long handle() {
         return handle;
     }
@@ -458,8 +487,7 @@ public final class Tickbus implements AutoCloseable {
      * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
      */
     public List<InjectedFault> faults() {
-        return faultLines().map(line -> new InjectedFault(this, Integer.parseInt(line[FAULT_ID]), line[FAULT_KIND],
-            line[FAULT_NAME], line[FAULT_WHAT])).toList();
+        return InjectedFault.all(this);
     }
 
     /**
@@ -471,27 +499,6 @@ public final class Tickbus implements AutoCloseable {
      */
     public Optional<String> page() {
         return Optional.of(pageNative(handle)).filter(address -> !address.isEmpty());
-    }
-
-    InjectedFault.State faultState(int id) {
-        return faultLine(id).map(line -> InjectedFault.State.valueOf(line[FAULT_STATE].toUpperCase(Locale.ROOT)))
-            .orElse(InjectedFault.State.OVER);
-    }
-
-    long faultBegun(int id) {
-        return faultLine(id).map(line -> Long.parseLong(line[FAULT_BEGUN])).orElse(0L);
-    }
-
-    void endFault(int id) {
-        endFaultNative(handle, id);
-    }
-
-    private Optional<String[]> faultLine(int id) {
-        return faultLines().filter(line -> Integer.parseInt(line[FAULT_ID]) == id).findFirst();
-    }
-
-    private Stream<String[]> faultLines() {
-        return faultsNative(handle).lines().map(line -> line.split("\t", FAULT_FIELDS));
     }
 
     /**
@@ -651,6 +658,9 @@ public final class Tickbus implements AutoCloseable {
 
     /** The sending half of the tick; as {@link #xChangeData}. */
     static native int sendNative(long handle);
+
+    /** Begins the next episode; throws {@link FieldbusException}. */
+    static native void resetNative(long handle);
 
     /** Closes a driver; throws {@link FieldbusException}. */
     static native void finalizeNative(long handle);

@@ -1,6 +1,6 @@
 # The commands of this project. tools/ has the scripts; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test python bench soak worlds storm lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test platforms python bench soak worlds storm lint dist build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -26,6 +26,9 @@ demo-cell: ## build, then watch Petri nets make twelve cylinders in the manufact
 
 test: setup ## build and test everything that CI checks
 	@exec tools/test
+
+platforms: setup ## build for Windows, Linux arm64 and musl, and test that in emulators
+	@exec tools/platforms
 
 test-%: setup ## the tests in Rust of one folder of crates/, such as make test-lab
 	@cargo test --locked $$(sed -n 's/^name = "\(tickbus-.*\)"/-p \1/p' crates/$*/*/Cargo.toml)

@@ -5,7 +5,7 @@ use std::ptr::NonNull;
 #[cfg(not(target_os = "linux"))]
 use std::sync::atomic::Ordering;
 
-pub use rustix::fd::AsFd as Mappable;
+pub(super) use rustix::fd::AsFd as Mappable;
 use rustix::fd::OwnedFd;
 use rustix::mm::{MapFlags, ProtFlags, mmap, munmap};
 

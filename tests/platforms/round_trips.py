@@ -194,10 +194,15 @@ def main():
         with open(output, "a", encoding="utf-8") as figures:
             figures.write(f"{platform}.{name}.p50_ms {p50:.3f}\n")
         passed += 1
-    with tempfile.TemporaryDirectory() as folder:
-        over_a_serial_line(platform, command, pathlib.Path(folder))
-    passed += 1
-    print(f"test result: ok. {passed} passed; 0 failed; 0 ignored; 0 measured; 0 filtered out")
+    skipped = 0
+    if platform == "arm64":
+        print("test over_a_serial_line ... ignored, QEMU does not set serial ports")
+        skipped += 1
+    else:
+        with tempfile.TemporaryDirectory() as folder:
+            over_a_serial_line(platform, command, pathlib.Path(folder))
+        passed += 1
+    print(f"test result: ok. {passed} passed; 0 failed; {skipped} ignored; 0 measured; 0 filtered out")
 
 
 if __name__ == "__main__":

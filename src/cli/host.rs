@@ -218,6 +218,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
         .as_ref()
         .map(|report| report.summary())
         .unwrap_or_default();
+    let mut printed = Outcome::Done;
     if format.is_json() {
         let of_program: Vec<&str> = summary.lines().collect();
         let document = json!({
@@ -231,7 +232,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
                 .collect::<Map<String, Value>>(),
             "summary": of_program,
         });
-        print_document(title, document);
+        printed = print_document(title, document);
     } else if told.is_ok() {
         let mut text = String::new();
         if arguments.stats.is_some() {
@@ -249,7 +250,7 @@ pub(super) fn run(job: Job<'_>, arguments: &Hosting) -> Outcome {
     if failure.is_some() {
         Outcome::BusFailed
     } else {
-        Outcome::Done
+        printed
     }
 }
 

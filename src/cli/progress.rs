@@ -15,6 +15,12 @@ const INTERVAL: Nanos = Nanos::from_millis(500);
 /// Returns to the beginning of the line and erases it.
 const ERASE: &str = "\r\x1b[K";
 
+/// Cuts a text at the end of the row: a second row would not be erased.
+const ONE_ROW: &str = "\x1b[?7l";
+
+/// Ends [`ONE_ROW`].
+const ROWS: &str = "\x1b[?7h";
+
 /// The line, from the beginning of the work until this is dropped.
 pub(super) struct Progress {
     line: Arc<Mutex<Line>>,
@@ -93,7 +99,7 @@ fn write(title: &str, line: &Mutex<Line>, stop: &Stop) {
         let mut line = line.lock().unwrap_or_else(PoisonError::into_inner);
         let _ = write!(
             io::stderr().lock(),
-            "{ERASE}{title}: {}, {seconds} s",
+            "{ERASE}{ONE_ROW}{title}: {}, {seconds} s{ROWS}",
             line.text
         );
         line.is_shown = true;

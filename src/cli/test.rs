@@ -130,8 +130,10 @@ fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
     if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
         eprintln!("test: no test has \"{only}\" in its name; --list lists them");
     }
+    let mut printed = Outcome::Done;
     if arguments.format.is_json() {
-        print_document("test", document(arguments, groups, count, green));
+        let document = document(arguments, groups, count, green);
+        printed = job.progress.aside(|| print_document("test", document));
     }
     if !arguments.list {
         job.tell(&format!(
@@ -139,11 +141,7 @@ fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
             if green { "ok" } else { "failed" }
         ));
     }
-    if green {
-        Outcome::Done
-    } else {
-        Outcome::WrongInput
-    }
+    if green { printed } else { Outcome::WrongInput }
 }
 
 /// Returns the results as a JSON document.

@@ -24,7 +24,9 @@ pub(super) fn long() -> &'static str {
         } else {
             features.join(" ")
         };
-        let commit = option_env!("TICKBUS_COMMIT").map(|commit| format!(" ({commit})"));
+        let commit = option_env!("TICKBUS_COMMIT")
+            .filter(|commit| !commit.is_empty())
+            .map(|commit| format!(" ({commit})"));
         let commit = commit.unwrap_or_default();
         format!(
             "{}{commit}\nfeatures: {features}",

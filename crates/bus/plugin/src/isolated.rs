@@ -154,23 +154,23 @@ impl Helper {
         let (memory, file) = SharedMemory::create(memory_bytes(&bus.setup)).map_err(cannot)?;
         let started = helper::start(&bus.program, "plugin-helper", Some(&file));
         let (child, line) = started.map_err(cannot)?;
-        line.set_nonblocking(true).map_err(cannot)?;
-        let mut set = PollSet::new(stop);
-        let interest = Interest::Read;
-        set.add(0, &line, interest).map_err(cannot)?;
-        let clock = Monotonic::shared();
-        Ok(Self {
+        // From here on, an error ends the process as well.
+        let mut helper = Self {
             child,
-            set,
-            interest,
+            set: PollSet::new(stop),
+            interest: Interest::Read,
             line,
             inbox: Inbox::new(),
             memory,
-            clock,
+            clock: Monotonic::shared(),
             program: bus.program.clone(),
             library: bus.name.clone(),
             grace: bus.setup.timeout() + bus.limits.close,
-        })
+        };
+        helper.line.set_nonblocking(true).map_err(cannot)?;
+        let added = helper.set.add(0, &helper.line, helper.interest);
+        added.map_err(cannot)?;
+        Ok(helper)
     }
 
     /// Makes the helper load the library and open the bus; `false` if it was stopped meanwhile.
@@ -191,7 +191,7 @@ impl Helper {
         let what = Waiting::For("tickbus_open");
         let open = Request::Open {
             setup: bus.setup.clone(),
-            grace_ms: u64::try_from(bus.limits.close.0 / 1_000_000).unwrap_or(0),
+            grace_ms: u64::try_from(self.grace.0 / 1_000_000).unwrap_or(0),
         };
         match self.ask(Some(&open), what, limit, stop)? {
             None => Ok(false),

@@ -66,7 +66,16 @@ mod windows {
         let length = unsafe { GetModuleFileNameW(module, name.as_mut_ptr(), room) };
         match usize::try_from(length) {
             Ok(length) if length > 0 && length < name.len() => {
-                Ok(OsString::from_wide(&name[..length]).into())
+                let file = PathBuf::from(OsString::from_wide(&name[..length]));
+                // tickbus-1234-tickbus.dll in the folder for temporary files, where other users may write.
+                let is_copy = file.file_name().is_some_and(|name| {
+                    let name = name.to_string_lossy();
+                    name.starts_with("tickbus-") && name.ends_with("-tickbus.dll")
+                });
+                if is_copy {
+                    return Err(io::Error::other("its file came out of a jar"));
+                }
+                Ok(file)
             }
             _ => Err(io::Error::last_os_error()),
         }

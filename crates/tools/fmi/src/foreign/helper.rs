@@ -2,6 +2,8 @@
 
 use std::io::{self, Read as _, Write as _};
 
+#[cfg(not(target_os = "linux"))]
+use tickbus_base::os::helper;
 use tickbus_base::os::helper::{Line, take_over};
 use tickbus_net::{Inbox, Message};
 
@@ -19,6 +21,14 @@ pub fn serve() -> io::Result<()> {
         "this command is for tickbus itself, which starts it for `tickbus run --isolated`";
     let (mut line, _) = take_over(false, purpose)?;
     // A helper with a hanging FMU must not outlive its host.
+    #[cfg(not(target_os = "linux"))]
+    {
+        let watched = line.try_clone()?;
+        std::thread::spawn(move || {
+            helper::wait_for_end(&watched);
+            helper::kill_this_process();
+        });
+    }
     #[cfg(target_os = "linux")]
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL))?;
     let mut inbox = Inbox::new();

@@ -92,7 +92,14 @@ impl Isolated {
                 );
                 Err(self.failed(&why))
             }
-            Err(error) if error.kind() == ErrorKind::ConnectionReset => Err(self.gone(what)),
+            Err(error)
+                if matches!(
+                    error.kind(),
+                    ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted
+                ) =>
+            {
+                Err(self.gone(what))
+            }
             Err(error) => Err(self.failed(&format!(
                 "its helper process answered with {error}; it has damaged it: tell its maker"
             ))),

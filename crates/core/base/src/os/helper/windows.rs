@@ -11,7 +11,7 @@ use std::mem::MaybeUninit;
 use std::net::TcpStream;
 use std::os::windows::io::{
     AsHandle as _, AsRawHandle as _, AsRawSocket as _, FromRawHandle as _, FromRawSocket as _,
-    OwnedHandle, OwnedSocket,
+    OwnedHandle, OwnedSocket, RawSocket,
 };
 use std::os::windows::process::CommandExt as _;
 use std::path::Path;
@@ -155,7 +155,7 @@ fn opened_socket(info: &[u8; size_of::<WSAPROTOCOL_INFOW>()]) -> io::Result<TcpS
         return Err(last_of_sockets());
     }
     // SAFETY: the socket was just opened, and nothing else uses it.
-    let socket = unsafe { OwnedSocket::from_raw_socket(socket as u64) };
+    let socket = unsafe { OwnedSocket::from_raw_socket(socket as RawSocket) };
     Ok(socket.into())
 }
 

@@ -27,6 +27,10 @@ const PATIENCE: Duration = Duration::from_millis(50);
 /// How long to wait until a thread has ended before its read is cancelled again.
 const ENDING: Duration = Duration::from_millis(2);
 
+/// The longest time for bytes that were accepted to leave the port that is closed, in units of [`ENDING`]: 1,000 characters
+/// at 9,600 baud.
+const LEAVING: u32 = 500;
+
 /// An open serial port. Reading and writing never block; a [`PollSet`](crate::os::PollSet) can wait for it.
 ///
 /// Windows waits for sockets alone, so that two threads carry the bytes between the port and a socket.
@@ -162,13 +166,15 @@ fn receive(port: &serial2::SerialPort, mut line: TcpStream, flags: &Flags) {
 /// for, in Wine and with some drivers of ports.
 fn read(port: &serial2::SerialPort, bytes: &mut [u8]) -> io::Result<usize> {
     let (first, rest) = bytes.split_at_mut(1);
-    if port.read(first)? == 0 {
-        return Ok(0);
-    }
+    let read = port.read(first);
     let mut errors = 0;
     let mut state = COMSTAT::default();
+    // After a damaged character, some drivers refuse to read until this is called.
     // SAFETY: the handle is open, and both numbers are written.
     let known = unsafe { ClearCommError(port.as_raw_handle(), &raw mut errors, &raw mut state) };
+    if read? == 0 {
+        return Ok(0);
+    }
     let waiting = match usize::try_from(state.cbInQue) {
         Ok(waiting) if known != 0 => waiting.min(rest.len()),
         _ => 0,
@@ -214,10 +220,19 @@ impl Write for SerialPort {
 }
 
 impl Drop for SerialPort {
-    /// Closes the port, so that it can be opened again at once.
+    /// Closes the port when what was written has left it, so that it can be opened again at once.
     fn drop(&mut self) {
+        let line = self.line.take();
+        if let (Some(line), Some(sender)) = (&line, self.threads.last()) {
+            let _ = line.shutdown(Shutdown::Write);
+            let mut patience = LEAVING;
+            while !sender.is_finished() && patience > 0 {
+                std::thread::sleep(ENDING);
+                patience -= 1;
+            }
+        }
         self.flags.is_closing.store(true, Ordering::Release);
-        if let Some(line) = self.line.take() {
+        if let Some(line) = line {
             let _ = line.shutdown(Shutdown::Both);
         }
         for thread in self.threads.drain(..) {

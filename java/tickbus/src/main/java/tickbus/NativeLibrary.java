@@ -165,10 +165,10 @@ final class NativeLibrary {
         deleteLeftovers(copy);
         // Into the existing file, which only this user can write: a file that replaces it would have the umask's
         // permissions.
-        try (OutputStream into = Files.newOutputStream(copy)) {
-            content.transferTo(into);
-        }
         try {
+            try (OutputStream into = Files.newOutputStream(copy)) {
+                content.transferTo(into);
+            }
             System.load(copy.toString());
             return true;
         } catch (UnsatisfiedLinkError e) {

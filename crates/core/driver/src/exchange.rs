@@ -192,7 +192,7 @@ impl Driver {
     }
 
     #[inline]
-    fn check(&self, slots: &[Slot]) {
+    pub(super) fn check(&self, slots: &[Slot]) {
         assert!(
             slots.len() >= self.slots.count,
             "the exchange needs all {} slots",

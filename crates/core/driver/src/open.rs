@@ -31,7 +31,7 @@ impl Driver {
     /// # Errors
     ///
     /// See [`DriverError`].
-    pub fn open(config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
+    pub fn open(mut config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
         let areas = config.role.areas();
         let (tick, bus_end) = image_of(&config);
         let names = config.table.stations.iter();
@@ -57,6 +57,10 @@ impl Driver {
         let board = Arc::<FaultBoard>::default();
         let times = (&clock, &simulation_time);
         let line = start(&config, bus, bus_end, times, (&status, &board))?;
+        // A reset finds the files again though the working folder has changed. Mistakes have named the path as given.
+        if let Ok(path) = std::path::absolute(&config.path) {
+            config.path = path;
+        }
         let stations = (0..config.table.stations.len())
             .map(|index| Station::new(&config.table, index, areas))
             .collect();

@@ -40,6 +40,7 @@ pub(super) fn recorder(
 pub(super) struct Recorded {
     /// The number and the time in the recording at the last reset.
     begin: (u64, Nanos),
+    /// The number of the last tick, and the latest time.
     last: (u64, Nanos),
 }
 
@@ -47,12 +48,17 @@ impl Recorded {
     /// Returns the number and the time of a tick in the recording.
     pub(super) fn tick(&mut self, number: u64, time: Nanos) -> (u64, Nanos) {
         let (before, begin) = self.begin;
-        self.last = (before + number, begin + time);
-        self.last
+        let tick = (before + number, begin + time);
+        // The recorder lets no time go back, so that of a refused tick must not become the next beginning.
+        self.last = (tick.0, self.last.1.max(tick.1));
+        tick
     }
 
-    /// Begins to count again, after the last tick.
+    /// Begins to count again, one nanosecond after the last tick: two ticks at the same time would be one in VCD.
     pub(super) fn restart(&mut self) {
-        self.begin = self.last;
+        let (number, time) = self.last;
+        if number > 0 {
+            self.begin = (number, time + Nanos(1));
+        }
     }
 }

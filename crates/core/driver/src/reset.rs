@@ -33,9 +33,9 @@ impl Driver {
     ///
     /// As [`exchange`](Self::exchange).
     pub fn reset(&mut self, slots: &mut [Slot]) -> Result<(), DriverError> {
-        self.end_tick(slots);
+        self.check(slots);
         if self.has_own_line() {
-            self.reopen_line()?;
+            self.reopen_line(slots)?;
         } else if self.is_stepped() {
             return Err(DriverError::Unsupported(format!(
                 "driver \"{}\" cannot be reset: the time on its line belongs to the other participants as well, and \
@@ -43,6 +43,7 @@ impl Driver {
                 self.config.name
             )));
         } else {
+            self.end_tick(slots);
             self.image.restart();
         }
         self.counters = TickCounters::default();
@@ -67,8 +68,8 @@ impl Driver {
         })
     }
 
-    /// Opens the line and the other end again, in place of the present ones.
-    fn reopen_line(&mut self) -> Result<(), DriverError> {
+    /// Opens the line and the other end again, in place of the present ones, whose tick ends with these `slots`.
+    fn reopen_line(&mut self, slots: &[Slot]) -> Result<(), DriverError> {
         let (bus, program) = bus::open(&self.config, &self.clock, None)?;
         let (image, bus_end) = image_of(&self.config);
         let time = match &self.line {
@@ -76,8 +77,10 @@ impl Driver {
             BusHandle::Free(_) => Arc::default(),
         };
         let (status, times) = (&self.status, (&self.clock, &time));
-        // The present line ends only now, so that a failure leaves it as it is.
-        self.line = start(&self.config, bus, bus_end, times, (status, &self.board))?;
+        let line = start(&self.config, bus, bus_end, times, (status, &self.board))?;
+        // The present tick and line end only now, so that a failure leaves them as they are.
+        self.end_tick(slots);
+        self.line = line;
         self.image = image;
         self.program_counters.replace(counters_of(program.as_ref()));
         self.program = program;
@@ -86,6 +89,7 @@ impl Driver {
         }
         // The end of the former line has closed it. A new line that runs already says so again.
         let (now, status) = (self.clock.now(), &self.status);
+        status.injected("");
         status.doubt(now, None, std::iter::empty());
         let why = "the simulation was reset";
         status.enter(now, LinkState::Opening, Cause::Waiting, why);

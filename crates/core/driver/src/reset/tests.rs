@@ -1,8 +1,11 @@
 use super::*;
 use crate::Code;
 use tickbus_base::time::{Clock, Monotonic};
+use tickbus_base::toml_text::{Key, Table};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::Phase;
+use tickbus_fieldbus::{Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
+use tickbus_image::signal::SignalTable;
 
 const SIGNALS: &str = "[[signal]]\nname = \"to\"\naddress = \"%IB0\"\nfail_safe = 3\n\
                        [[signal]]\nname = \"from\"\naddress = \"%QB0\"\nfail_safe = 9\n\
@@ -229,24 +232,222 @@ fn a_recording_as_the_other_end_is_replayed_from_its_beginning() {
     std::fs::remove_dir_all(&folder).expect("it is there");
 }
 
-#[test]
-fn a_recording_continues_after_a_reset() {
-    let folder = folder("reset");
-    let file = folder.join("run.csv");
+/// Records two episodes of three ticks into `file`, with `between` before the reset; returns the recording.
+fn recorded(file: &str, between: impl FnOnce(&mut Driver, &mut [Slot])) -> String {
+    let folder = folder(file);
+    let file = folder.join(file);
     let record = format!("[record]\nfile = {:?}\n", file.display().to_string());
     let (mut driver, mut slots) = open(MIRROR, &record);
-    for _ in 0..2 {
-        episode(&mut driver, &mut slots, 3);
-        driver.reset(&mut slots).expect("its line is its own");
-    }
+    // No tick is before the first episode.
+    driver.reset(&mut slots).expect("its line is its own");
+    episode(&mut driver, &mut slots, 3);
+    between(&mut driver, &mut slots);
+    driver.reset(&mut slots).expect("its line is its own");
+    episode(&mut driver, &mut slots, 3);
     driver.close();
     let text = std::fs::read_to_string(&file).expect("a recording");
     std::fs::remove_dir_all(&folder).expect("it is there");
-    let ticks: Vec<&str> = text
-        .lines()
+    text
+}
+
+/// The number and the time of each tick in a recording as CSV.
+fn ticks(csv: &str) -> Vec<(&str, &str)> {
+    csv.lines()
         .skip(1)
-        .filter_map(|line| line.split(',').next())
+        .filter_map(|line| {
+            let (number, rest) = line.split_once(',')?;
+            Some((number, rest.split_once(',')?.0))
+        })
+        .collect()
+}
+
+#[test]
+fn a_recording_continues_after_a_reset() {
+    let text = recorded("continues.csv", |_, _| {});
+    let expected = [
+        ("1", "0"),
+        ("2", "1000000"),
+        ("3", "2000000"),
+        ("4", "2000001"),
+        ("5", "3000001"),
+        ("6", "4000001"),
+    ];
+    assert_eq!(ticks(&text), expected, "{text}");
+}
+
+#[test]
+fn a_tick_that_was_refused_before_a_reset_takes_no_time_from_the_recording() {
+    let text = recorded("refused.csv", |driver, slots| {
+        let done = driver.exchange(Nanos::ZERO, slots);
+        assert_eq!(done.code, Code::BusFailed);
+    });
+    let expected = [
+        ("1", "0"),
+        ("2", "1000000"),
+        ("3", "2000000"),
+        ("4", "2000000"),
+        ("5", "2000001"),
+        ("6", "3000001"),
+        ("7", "4000001"),
+    ];
+    assert_eq!(ticks(&text), expected, "{text}");
+}
+
+#[test]
+fn the_ticks_before_and_after_a_reset_are_two_in_vcd() {
+    let text = recorded("two.vcd", |_, _| {});
+    let times: Vec<&str> = text.lines().filter(|line| line.starts_with('#')).collect();
+    let expected = [
+        "#0", "#1000000", "#2000000", "#2000001", "#3000001", "#4000001",
+    ];
+    assert_eq!(times, expected, "{text}");
+}
+
+#[test]
+fn random_faults_draw_the_same_in_each_episode() {
+    let faults = "[[fault]]\nkind = \"noise\"\nsignal = \"from\"\namplitude = 9\nseed = 4\n\
+                  [[fault]]\nkind = \"drop\"\nchance = 0.5\ndirection = \"in\"\nseed = 4\n";
+    let (mut driver, mut slots) = open(MIRROR, faults);
+    let first = episode(&mut driver, &mut slots, 50);
+    for round in 0..3 {
+        driver.reset(&mut slots).expect("its line is its own");
+        assert_eq!(episode(&mut driver, &mut slots, 50), first, "round {round}");
+    }
+    let ids: Vec<u32> = driver
+        .injected_faults()
+        .iter()
+        .map(|fault| fault.id)
         .collect();
-    assert_eq!(ticks, ["1", "2", "3", "4", "5", "6"], "{text}");
-    assert!(!text.contains("backwards"));
+    assert_eq!(ids, [1, 2, 3, 4, 5, 6, 7, 8]);
+}
+
+#[test]
+fn a_silence_after_a_reset_does_not_name_a_fault_from_before() {
+    let link = "mode = \"stepped\"\nlink = \"reset: injected\"\nmax_age = \"500ms\"\n";
+    let (mut driver, mut slots) = open(link, "");
+    let mut other = config(link, "");
+    other.role = tickbus_fieldbus::Role::Controller;
+    let (mut plc, mut theirs) = opened(other, Monotonic::shared());
+    driver
+        .inject_text("name = \"jitter\"\nkind = \"delay\"\nby = \"1ms\"\n")
+        .expect("right");
+    let mut silence = |driver: &mut Driver| {
+        for time in 0..3 {
+            plc.exchange(None, &mut theirs);
+            driver.exchange(Nanos::from_millis(time), &mut slots);
+        }
+        driver.exchange(Nanos::from_secs(9), &mut slots);
+        let reason = driver.link().reason;
+        driver.reset(&mut slots).expect("its line is its own");
+        reason
+    };
+    let reason = silence(&mut driver);
+    assert!(reason.contains("injected fault: \"jitter\""), "{reason}");
+    let reason = silence(&mut driver);
+    assert!(reason.ends_with("max_age = 500ms"), "{reason}");
+}
+
+/// A bus whose time others share; it is never opened.
+#[derive(Clone, Debug, PartialEq)]
+struct Shared;
+
+impl BusKind for Shared {
+    const NAME: &'static str = "shared";
+    const KEYS: &'static [&'static [Key]] = &[];
+
+    fn read(_role: Role, _moved: bool, _table: &mut Table<'_>) -> Option<Self> {
+        Some(Self)
+    }
+}
+
+impl BusOptions for Shared {
+    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+        Vec::new()
+    }
+
+    fn files(&self) -> Vec<NamedFile> {
+        Vec::new()
+    }
+
+    fn open(&self, _setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
+        unreachable!("a driver that cannot be reset opens nothing")
+    }
+}
+
+/// Begins a tick, which the refused reset of `driver` must not end, and ends it.
+#[track_caller]
+fn refuses(driver: &mut Driver, slots: &mut [Slot]) -> DriverError {
+    driver.receive(Nanos::ZERO, slots);
+    let before = (driver.statistics(), slots.to_vec());
+    let why = driver.reset(slots).expect_err("it cannot be reset");
+    assert_eq!((driver.statistics(), slots.to_vec()), before);
+    assert_eq!(statistic(driver, "fresh"), "0");
+    driver.send(slots);
+    assert_eq!(statistic(driver, "fresh"), "1");
+    why
+}
+
+#[test]
+fn a_driver_whose_time_belongs_to_others_as_well_goes_on_after_a_refused_reset() {
+    let (mut driver, mut slots) = open(MIRROR, "");
+    let bus = tickbus_driver_cfg::Options::of(Shared);
+    driver.config = Arc::new(Config {
+        bus,
+        ..(*driver.config).clone()
+    });
+    let why = refuses(&mut driver, &mut slots);
+    assert!(matches!(why, DriverError::Unsupported(_)), "{why}");
+}
+
+#[test]
+fn a_driver_whose_line_cannot_be_opened_again_goes_on_after_a_refused_reset() {
+    let folder = folder("reset-refused");
+    let cfg = folder.join("driver.cfg");
+    std::fs::write(folder.join("run.csv"), RUN).expect("written");
+    let (mut driver, mut slots) = replaying(cfg.to_str().expect("UTF-8"));
+    let mut elsewhere = (*driver.config).clone();
+    elsewhere.path = folder.join("elsewhere").join("driver.cfg");
+    driver.config = Arc::new(elsewhere);
+    let why = refuses(&mut driver, &mut slots);
+    assert!(matches!(why, DriverError::Replay(_)), "{why}");
+    drop(driver);
+    std::fs::remove_dir_all(&folder).expect("it is there");
+}
+
+/// A recording of one tick, which shows the value 7.
+const RUN: &str = "bus.tick,bus.time_ns,bus.status,bus.dropped,from\n1,0,0,0,7\n";
+
+/// Opens the driver at `path` with the recording `run.csv` beside it.
+fn replaying(path: &str) -> (Driver, Vec<Slot>) {
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nreplay = \"run.csv\"\n\
+                [[signal]]\nname = \"from\"\naddress = \"%QB0\"\n";
+    let config = Config::parse(path, text, &crate::KINDS).unwrap_or_else(|wrong| panic!("{wrong}"));
+    opened(config, Monotonic::shared())
+}
+
+/// A process has one working folder, so this test runs in a process of its own.
+#[test]
+fn a_reset_finds_its_files_after_a_change_of_the_working_folder() {
+    const NAME: &str = "reset::tests::a_reset_finds_its_files_after_a_change_of_the_working_folder";
+    const CHILD: &str = "TICKBUS_TEST_OF_THE_WORKING_FOLDER";
+    if std::env::var_os(CHILD).is_some() {
+        std::fs::write("run.csv", RUN).expect("written");
+        let (mut driver, mut slots) = replaying("driver.cfg");
+        std::env::set_current_dir("..").expect("it is there");
+        driver.reset(&mut slots).expect("the recording is there");
+        driver.exchange(Nanos::ZERO, &mut slots);
+        assert_eq!(slots[0], Slot::from_real(7.0));
+        return;
+    }
+    let folder = folder("reset-working-folder");
+    let own = std::env::current_exe().expect("a path");
+    let child = std::process::Command::new(own)
+        .args(["--exact", NAME])
+        .env(CHILD, "")
+        .current_dir(&folder)
+        .output()
+        .expect("it starts");
+    std::fs::remove_dir_all(&folder).expect("it is there");
+    let told = String::from_utf8_lossy(&child.stdout);
+    assert!(told.contains("1 passed"), "{told}");
 }

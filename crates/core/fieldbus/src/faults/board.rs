@@ -16,6 +16,8 @@ pub struct FaultBoard {
     cells: Mutex<Vec<Arc<Cell>>>,
     /// The number of the fault that was injected last.
     last: AtomicU32,
+    /// That number when the simulation last restarted.
+    base: AtomicU32,
     /// Line faults on their way to the bus.
     mailbox: Mutex<Vec<LineFault>>,
     /// The number of beginnings of faults that are no longer on the list.
@@ -32,15 +34,16 @@ impl FaultBoard {
         self.news.load(Ordering::Acquire)
     }
 
-    /// Calls `make` with the number of a new fault, and adds the resulting cell. Returns the cell and, if the list was
-    /// full, the number of the oldest fault that is over, which is no longer on the list.
+    /// Calls `make` with the number of a new fault, and with that number counted from the last restart, which says
+    /// what the fault draws; adds the resulting cell. Returns the cell and, if the list was full, the number of the
+    /// oldest fault that is over, which is no longer on the list.
     ///
     /// # Errors
     ///
     /// Too many faults wait or are active.
     pub(super) fn enlist(
         &self,
-        make: impl FnOnce(u32) -> (Arc<Cell>, Option<LineFault>),
+        make: impl FnOnce(u32, u32) -> (Arc<Cell>, Option<LineFault>),
     ) -> Result<(Arc<Cell>, Option<u32>), Mistake> {
         let mut cells = self.cells();
         let over = if cells.len() < LIMIT {
@@ -57,7 +60,8 @@ impl FaultBoard {
             self.forgotten.fetch_add(over.begun(), Ordering::Relaxed);
             Some(over)
         };
-        let (cell, line) = make(self.last.fetch_add(1, Ordering::Relaxed) + 1);
+        let id = self.last.fetch_add(1, Ordering::Relaxed) + 1;
+        let (cell, line) = make(id, id - self.base.load(Ordering::Relaxed));
         let mut earlier = over.iter().chain(&*cells).rev();
         if let Some(earlier) = earlier.find(|earlier| cell.is_namesake(earlier)) {
             cell.follow(earlier);
@@ -67,6 +71,14 @@ impl FaultBoard {
         self.mailbox().extend(line);
         self.news.fetch_add(1, Ordering::Release);
         Ok((cell, over.map(|over| over.id())))
+    }
+
+    /// The simulation restarts: its next fault draws what its first one did.
+    pub(super) fn restart(&self) {
+        // No fault may get its number meanwhile.
+        let _cells = self.cells();
+        let last = self.last.load(Ordering::Relaxed);
+        self.base.store(last, Ordering::Relaxed);
     }
 
     pub(super) fn enter(&self, cell: &Cell, phase: Phase, moment: TickTime) {
@@ -148,7 +160,7 @@ mod tests {
         logged::expect("injected fault \"again\"");
         let board = FaultBoard::default();
         for round in 1..=5_000 {
-            let make = |id| {
+            let make = |id, _| {
                 let (name, what) = ("again".to_owned(), String::new());
                 (Arc::new(Cell::new(id, name, "stuck", what)), None)
             };

@@ -56,8 +56,8 @@ impl Prepared {
     /// Too many faults wait or are active.
     pub fn new(fault: &Fault, slots: Slots<'_>, board: &Arc<FaultBoard>) -> Result<Self, Mistake> {
         let mut kind = Kind::Line;
-        let (cell, forgotten) = board.enlist(|id| {
-            let random = Random::new(fault.seed, id);
+        let (cell, forgotten) = board.enlist(|id, place| {
+            let random = Random::new(fault.seed, place);
             let what = fault.what(slots.table);
             let cell = Arc::new(Cell::new(id, fault.name.clone(), fault.kind(), what));
             let line = match fault.effect {
@@ -167,8 +167,8 @@ impl Faults {
         found.map(|entry| entry.schedule.end()).is_some()
     }
 
-    /// Ends all faults at once, and counts time from zero again: the simulation restarts. Changed values are not
-    /// restored.
+    /// Ends all faults at once, and counts time from zero again: the simulation restarts. Further faults draw what the
+    /// first ones did. Changed values are not restored.
     pub fn restart(&mut self) {
         for entry in self.entries.drain(..) {
             if entry.cell.phase() != Phase::Over {
@@ -179,6 +179,7 @@ impl Faults {
                 self.board.enter(&entry.cell, Phase::Over, moment);
             }
         }
+        self.board.restart();
         (self.time, self.given) = (Nanos::ZERO, Nanos::ZERO);
     }
 

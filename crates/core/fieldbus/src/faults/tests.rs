@@ -204,6 +204,26 @@ fn faults_go_on_when_the_time_of_the_simulation_jumps_back() {
     assert_eq!([(); 4].map(|()| sent(&mut end)), [9.0, 9.0, 9.0, 1.0]);
 }
 
+#[test]
+fn after_a_restart_of_the_simulation_faults_draw_the_same_numbers_again() {
+    let mut end = End::new();
+    let noise = "kind = \"noise\"\nsignal = \"level\"\namplitude = 90\nseed = 3\n";
+    let episode = |end: &mut End| {
+        let ids = [(); 2].map(|()| end.inject(noise));
+        let drawn = [(); 20].map(|()| {
+            end.set(1, 100.0);
+            end.tick(nothing)[1]
+        });
+        end.faults.restart();
+        end.restart();
+        (ids, drawn)
+    };
+    let (ids, first) = episode(&mut end);
+    assert_eq!(ids, [1, 2]);
+    assert_eq!(episode(&mut end), ([3, 4], first));
+    assert_eq!(episode(&mut end), ([5, 6], first));
+}
+
 /// The numbers of a generator of Knuth's.
 fn random(state: &mut u64, below: u64) -> u64 {
     *state = state

@@ -123,7 +123,7 @@ public final class DriverVector implements AutoCloseable {
      * @return how many have failed; {@link #status} tells which
      */
     public int exchange(long simulationNanos) {
-        return tick(EXCHANGE, same(simulationNanos));
+        return tickAt(EXCHANGE, simulationNanos);
     }
 
     /**
@@ -153,7 +153,7 @@ public final class DriverVector implements AutoCloseable {
      * @return how many have failed; {@link #status} tells which
      */
     public int receive(long simulationNanos) {
-        return tick(RECEIVE, same(simulationNanos));
+        return tickAt(RECEIVE, simulationNanos);
     }
 
     /**
@@ -176,9 +176,9 @@ public final class DriverVector implements AutoCloseable {
         return tick(SEND, null);
     }
 
-    private long[] same(long simulationNanos) {
+    private synchronized int tickAt(int half, long simulationNanos) {
         Arrays.fill(sameTime, simulationNanos);
-        return sameTime;
+        return tick(half, sameTime);
     }
 
     private synchronized int tick(int half, long[] times) {

@@ -13,6 +13,7 @@ import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.List;
 import java.util.concurrent.CountDownLatch;
+import java.util.concurrent.atomic.AtomicLong;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.function.Executable;
@@ -87,6 +88,28 @@ class DriverVectorTest {
                 };
                 assertEquals(expected.code(), plcs.status(place), "place " + place);
             }
+        }
+    }
+
+    @Test
+    void aThreadThatWaitsForAnotherOneTicksAtItsOwnTime() throws InterruptedException {
+        try (DriverVector plcs = open(2)) {
+            AtomicLong granted = new AtomicLong();
+            Thread other = new Thread(() -> {
+                plcs.exchange(50 * MILLIS);
+                granted.set(plcs.drivers().get(1).grantedNanos());
+                plcs.releaseThread();
+            });
+            synchronized (plcs) {
+                other.start();
+                while (other.getState() != Thread.State.BLOCKED) {
+                    Thread.onSpinWait();
+                }
+                assertEquals(0, plcs.exchange(MILLIS));
+                plcs.releaseThread();
+            }
+            other.join();
+            assertTrue(granted.get() >= 50 * MILLIS, "granted " + granted);
         }
     }
 

@@ -20,12 +20,13 @@ use windows_sys::Win32::System::IO::CancelIoEx;
 
 use super::{Parity, SerialSettings};
 use crate::net::local_pair;
+use crate::time::{Clock as _, Monotonic, Nanos, Stop};
 
 /// The longest time for a read from the port.
 const PATIENCE: Duration = Duration::from_millis(50);
 
 /// How long to wait until a thread has ended before its read is cancelled again.
-const ENDING: Duration = Duration::from_millis(2);
+const ENDING: Nanos = Nanos::from_millis(2);
 
 /// The longest time for bytes that were accepted to leave the port that is closed, in units of [`ENDING`]: 1,000 characters
 /// at 9,600 baud.
@@ -162,6 +163,12 @@ fn receive(port: &serial2::SerialPort, mut line: TcpStream, flags: &Flags) {
     let _ = line.shutdown(Shutdown::Both);
 }
 
+/// Lets a thread end.
+fn pause() {
+    let clock = Monotonic::shared();
+    clock.wait_until(clock.now() + ENDING, &Stop::new());
+}
+
 /// Waits for a byte, and reads it with all others that are there. A longer read would wait for as many bytes as it has room
 /// for, in Wine and with some drivers of ports.
 fn read(port: &serial2::SerialPort, bytes: &mut [u8]) -> io::Result<usize> {
@@ -227,7 +234,7 @@ impl Drop for SerialPort {
             let _ = line.shutdown(Shutdown::Write);
             let mut patience = LEAVING;
             while !sender.is_finished() && patience > 0 {
-                std::thread::sleep(ENDING);
+                pause();
                 patience -= 1;
             }
         }
@@ -239,7 +246,7 @@ impl Drop for SerialPort {
             while !thread.is_finished() {
                 // SAFETY: the handle is open. There may be nothing to cancel.
                 let _ = unsafe { CancelIoEx(self.port.as_raw_handle(), std::ptr::null()) };
-                std::thread::sleep(ENDING);
+                pause();
             }
             // A thread that panicked has closed its end as well.
             let _ = thread.join();

@@ -55,7 +55,7 @@ class Mirror:
         while True:
             line = self.process.stdout.readline()
             self.said += line
-            found = re.search(r"127\.0\.0\.1:(\d+)", line)
+            found = re.search(r"127\.0\.0\.1:([1-9]\d*)", line)
             if found or "listening on" in line:
                 self.port = int(found[1]) if found else None
                 break

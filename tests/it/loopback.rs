@@ -254,7 +254,8 @@ fn simulation_time_that_goes_back_is_refused_and_goes_on_from_where_it_was() {
     }
     let reason = end.statistic("reason");
     assert!(
-        reason.contains("went back from 9990ms to 0s") && reason.contains("open the driver again"),
+        reason.contains("went back from 9990ms to 0s")
+            && reason.contains("reset the driver when it begins again"),
         "{reason}"
     );
     assert_eq!(end.statistic("cause"), "refused");

@@ -27,9 +27,9 @@ fn a_crash_ends_the_helper_alone_and_the_line_comes_back() {
             let clock = Manual::new();
             let mut end = plugin.open(&clock);
             let reason = until(&end, &clock, "failed", "link");
-            let words =
-                format!("libmisbehave.so: its helper process {words} in tickbus_{function}");
-            assert!(reason.contains(&words), "{reason}");
+            let how = format!("libmisbehave.so: its helper process {words}");
+            let place = format!(" in tickbus_{function}; ");
+            assert!(reason.contains(&how) && reason.contains(&place), "{reason}");
             until_it_echoes(&mut end, &clock, 5.0);
             assert_eq!(end.statistic("plugin.helpers"), "2");
         }

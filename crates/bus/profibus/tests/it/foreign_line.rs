@@ -26,7 +26,8 @@ fn damaged_and_cut_telegrams_and_noise_between_them_are_never_believed() {
         master.first(|seen| seen.outputs[2..6].copy_from_slice(&[0, number, 0, number]));
         until(&mut device, "it arrives", |device| {
             let (speed, echo) = (device.get("speed"), device.get("echo"));
-            assert_eq!(speed, echo);
+            // The fail-safe value, which only the speed has: the line was silent for too long.
+            assert!(speed == echo || speed == -1.0, "{speed} {echo}");
             assert!([f64::from(last), f64::from(number), -1.0].contains(&speed) || last == 0);
             speed == f64::from(number)
         });

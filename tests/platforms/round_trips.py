@@ -12,6 +12,7 @@ import os
 import pathlib
 import re
 import select
+import signal
 import socket
 import statistics
 import subprocess
@@ -65,10 +66,16 @@ class Mirror:
     def __enter__(self):
         return self
 
-    def __exit__(self, *_):
-        # `timeout` passes it on.
-        self.process.terminate()
-        self.process.communicate(timeout=SECONDS)
+    def __exit__(self, failure, *_):
+        # Ctrl-C, which `timeout` passes on; SIGTERM would end only one thread of a program in Wine.
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.said += self.process.communicate(timeout=SECONDS)[0]
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            sys.exit(f"Ctrl-C does not end the mirror: {self.said}")
+        if failure is None and (self.process.returncode != 0 or "mirror: ok" not in self.said):
+            sys.exit(f"the mirror ended with code {self.process.returncode}: {self.said}")
 
 
 def round_trips(count, write, read):

@@ -20,6 +20,7 @@ mod fmu_helper;
 mod gsd;
 mod host;
 mod import;
+mod in_library;
 mod json;
 mod lab;
 mod logo;
@@ -101,14 +102,14 @@ enum Outcome {
     BusFailed,
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> Self {
-        Self::from(match outcome {
-            Outcome::Done => 0,
-            Outcome::WrongInput => 1,
-            Outcome::Usage => 2,
-            Outcome::BusFailed => 3,
-        })
+impl Outcome {
+    fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::WrongInput => 1,
+            Self::Usage => 2,
+            Self::BusFailed => 3,
+        }
     }
 }
 
@@ -133,6 +134,10 @@ const LOG_FLUSH_LIMIT: Nanos = Nanos::from_secs(1);
 
 /// Runs the command with the arguments of the process. A driver.cfg can name these `kinds` of bus.
 pub fn main(kinds: &'static Kinds) -> ExitCode {
+    run(kinds).code().into()
+}
+
+fn run(kinds: &'static Kinds) -> Outcome {
     let arguments = Arguments::parse();
     // Events on the line are reported on stdout.
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
@@ -159,5 +164,5 @@ pub fn main(kinds: &'static Kinds) -> ExitCode {
         Command::FmuHelper => fmu_helper::run(),
     };
     tickbus_base::os::flush_log(LOG_FLUSH_LIMIT);
-    outcome.into()
+    outcome
 }

@@ -10,7 +10,7 @@ const PANICKED: c_int = 101;
 #[allow(unsafe_code)]
 // SAFETY: no other function has this name.
 #[unsafe(no_mangle)]
-pub extern "C" fn tickbus_command() -> c_int {
+extern "C" fn tickbus_command() -> c_int {
     // The hook has reported the panic.
     std::panic::catch_unwind(|| c_int::from(super::run(&crate::KINDS).code())).unwrap_or(PANICKED)
 }

@@ -169,13 +169,14 @@ def pymodbus_tries_everything(*arguments):
 
 def over_a_serial_line(platform, command, folder):
     line = SerialLine()
-    device = line.names[0]
+    device, silence = line.names[0], ""
     if platform == "windows":
-        device = "COM5"
+        # As for an adapter that hands over its bytes in pieces.
+        device, silence = "COM5", 'silence = "20ms"\n'
         link = pathlib.Path(os.environ["WINEPREFIX"]) / "dosdevices" / "com5"
         link.unlink(missing_ok=True)
         link.symlink_to(line.names[0])
-    settings = f'kind = "modbus-server"\ndevice = "{device}"\nbaud = 115200\nparity = "none"\nunit = 1'
+    settings = f'kind = "modbus-server"\ndevice = "{device}"\nbaud = 115200\nparity = "none"\n{silence}unit = 1'
     with Mirror(command, folder, settings):
         pymodbus_tries_everything("rtu", line.names[1])
 

@@ -22,11 +22,7 @@ pub const DEVICE_KEY: Key = Key::required(
 
 /// Reads the system's name of a port.
 pub fn read_device(value: &Value<'_>) -> Option<String> {
-    let right = if cfg!(windows) {
-        "name the serial port, such as \"COM3\""
-    } else {
-        "name the serial port, such as \"/dev/ttyUSB0\""
-    };
+    let right = "name the serial port, such as \"/dev/ttyUSB0\" or \"COM3\"";
     value.label(DEVICE_LIMIT, right).map(str::to_owned)
 }
 

@@ -137,18 +137,17 @@ maven() {
     mvn -q -B -ntp -f java "$@" 2>&1 | sed $'s/\033\\[[0-9;]*m//g'
 }
 
-# Lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus command) and simulator/
-# (the simulator, the machines with their control tables and demos, and in peeler/ the driver.cfg of the peeling line). Needs
-# the output of tools/build.
+# assemble FOLDER [COMMAND]: lays out the distribution in a folder: DeviceDriver/ (the drop-in driver, a driver.cfg, the tickbus
+# command) and simulator/ (the simulator, the machines with their control tables and demos, and in peeler/ the driver.cfg of the
+# peeling line). Needs the output of tools/build.
 assemble() {
-    local folder=$1 release
+    local folder=$1 command=${2:-$STRIPPED/$(tickbus_command)} release
     release=$(version)
     rm -rf "$folder/DeviceDriver" "$folder/simulator"
     mkdir -p "$folder/DeviceDriver" "$folder/simulator/peeler"
     cp plc/peeler/*.cfg "$folder/simulator/peeler/"
     # The command is needed for plug-ins in helper processes.
-    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$STRIPPED/$(tickbus_command)" \
-        "$folder/DeviceDriver/"
+    cp driver.cfg "java/DeviceDrivers/target/device-drivers-$release.jar" "$command" "$folder/DeviceDriver/"
     cp java/machines/*.table "java/machines/target/tickbus-machines-$release.jar" "java/simulator/target/simulator-$release.jar" \
         "java/control-interface/target/control-interface-$release.jar" "$folder/simulator/"
 }

@@ -67,6 +67,16 @@ platform() {
     printf '%s-%s\n' "$system" "$processor"
 }
 
+# The target of Rust for a platform, as the Java library names it.
+rust_target() {
+    case $1 in
+        linux-*) echo "${1#linux-}-unknown-linux-gnu" ;;
+        macos-*) echo "${1#macos-}-apple-darwin" ;;
+        windows-*) echo "${1#windows-}-pc-windows-gnu" ;;
+        *) die "Rust has no target for $1" ;;
+    esac
+}
+
 # The native library's file name on this system.
 native_library() {
     case "$(platform)" in
@@ -102,6 +112,22 @@ without_debug_tables() {
     else
         cp "$1" "$2"
     fi
+}
+
+# The time of everything in an archive: that of the commit.
+archive_time() {
+    echo "${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}"
+}
+
+# reproducible_zip FILE FOLDER: packs a folder with its name. Order, times and permissions of the entries do not depend on the
+# computer; those of the folder itself change for that.
+reproducible_zip() {
+    local file folder=$2
+    file=$(realpath -m "$1")
+    rm -f "$file"
+    find "$folder" -exec touch -h -d "@$(archive_time)" {} +
+    chmod -R u=rwX,go=rX "$folder"
+    (cd "$(dirname "$folder")" && find "$(basename "$folder")" ! -type d | LC_ALL=C sort | TZ=UTC zip -q -X -9 -@ "$file")
 }
 
 # One pip for all environments under target/: installing pip into each takes longer than installing their packages.

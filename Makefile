@@ -1,6 +1,6 @@
 # The commands of this project. tools/ has the scripts; this file gives them their names.
 
-.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test platforms python bench soak worlds storm lint dist build setup clean
+.PHONY: help demo demo-lab demo-peeler demo-profibus demo-robot demo-cell test platforms python bench soak worlds storm lint dist release build setup clean
 .DEFAULT_GOAL := help
 
 help: ## this list
@@ -53,6 +53,9 @@ lint: setup ## formatting, clippy, documentation, Java warnings, shell scripts
 
 dist: setup ## a zip with the DeviceDriver folder and the simulator; needs only a JRE to run
 	@exec tools/dist
+
+release: setup ## everything that a release has, for all platforms, and each part tried
+	@exec tools/release/all
 
 build: setup ## the native library, the tickbus command and the jars
 	@exec tools/build

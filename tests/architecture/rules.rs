@@ -6,6 +6,7 @@ use super::source::{Token, texts, tokens};
 const UNSAFE_HOMES: &[&str] = &[
     "src/c_api.rs",
     "src/c_api/",
+    "src/cli/in_library.rs",
     "src/fmi_api",
     "src/jni.rs",
     "src/jni/",
@@ -19,6 +20,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/core/conformance/src/resources.rs",
     "crates/tools/fmi/src/foreign/library",
     "crates/core/image/src/triple.rs",
+    "crates/tools/launcher/src/main.rs",
     "crates/tools/worlds/src/scheduler.rs",
     "crates/core/plc/src/hosted/table.rs",
     "python/src/view.rs",

@@ -130,6 +130,16 @@ reproducible_zip() {
     (cd "$(dirname "$folder")" && find "$(basename "$folder")" ! -type d | LC_ALL=C sort | TZ=UTC zip -q -X -9 -@ "$file")
 }
 
+# The files of a release, relative to target/dist: those in it, and the jars and POMs of the Maven repository, which has its own
+# checksums beside them. Folders are what zips were packed from.
+release_files() {
+    (
+        cd target/dist
+        find . -maxdepth 1 -type f ! -name SHA256SUMS -printf '%P\n'
+        [ ! -d maven ] || find maven -type f \( -name '*.jar' -o -name '*.pom' \)
+    ) | LC_ALL=C sort
+}
+
 # One pip for all environments under target/: installing pip into each takes longer than installing their packages.
 PIP=target/peers/pip
 

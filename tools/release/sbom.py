@@ -258,7 +258,7 @@ def check(out, platform, *paths):
     text = pathlib.Path(out).read_text()
     error = JsonStrictValidator(SCHEMA).validate_str(text)
     if error:
-        fail(f"{out} does not follow CycloneDX {SCHEMA.to_version()}: {error}")
+        fail(f"{out} does not follow CycloneDX {SCHEMA.to_version()}: {error.data.json_path}: {error.data.message}")
     document = json.loads(text)
     edges = {entry["ref"]: entry.get("dependsOn", []) for entry in document["dependencies"]}
     compared = 0

@@ -7,17 +7,12 @@ use super::lexer::{Kind, tokens};
 use super::outline::{Outline, outline};
 use super::words;
 
-/// The sources of the blocks, each with its name.
+/// The sources of the blocks, each with its name. Links lead to the files, since a published package has no files from
+/// outside its crate.
 pub const SOURCES: [(&str, &str); 3] = [
-    ("timers", include_str!("../../../../plc/iec61131/timers.st")),
-    (
-        "action_control",
-        include_str!("../../../../plc/iec61131/action_control.st"),
-    ),
-    (
-        "scheduler",
-        include_str!("../../../../plc/iec61131/scheduler.st"),
-    ),
+    ("timers", include_str!("library/timers.st")),
+    ("action_control", include_str!("library/action_control.st")),
+    ("scheduler", include_str!("library/scheduler.st")),
 ];
 
 /// The program that runs first in each cycle.

@@ -17,6 +17,10 @@ public record Declaration(String name, int multiple, List<Variable> writes, List
     /**
      * Keeps copies of the lists.
      *
+     * @param name the client's name
+     * @param multiple the number of server steps per step of this client
+     * @param writes the variables that the client writes
+     * @param reads the names of the variables that the client reads
      * @throws IllegalArgumentException if the multiple is below 1, or there are too many variables
      */
     public Declaration {

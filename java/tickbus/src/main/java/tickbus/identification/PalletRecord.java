@@ -72,6 +72,9 @@ public record PalletRecord(LocalDateTime time, Piece piece, Set<Content> content
     /**
      * A record.
      *
+     * @param time when it was written, or null
+     * @param piece what the pallet carries
+     * @param contents what the pallet holds
      * @throws IllegalArgumentException if the year does not have four digits
      */
     public PalletRecord {

@@ -1,0 +1,12 @@
+/** Petri nets; start at {@link tickbus.petri.net.PetriNet}. */
+module org.tickbus.petri {
+    requires java.xml;
+    requires jdk.httpserver;
+
+    exports tickbus.petri.analysis;
+    exports tickbus.petri.draw;
+    exports tickbus.petri.format;
+    exports tickbus.petri.net;
+    exports tickbus.petri.page;
+    exports tickbus.petri.run;
+}

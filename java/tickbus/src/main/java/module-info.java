@@ -1,0 +1,5 @@
+/** A simulation's end of a PLC's fieldbus; start at {@link tickbus.Tickbus}. */
+module org.tickbus {
+    exports tickbus;
+    exports tickbus.identification;
+}

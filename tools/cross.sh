@@ -74,7 +74,7 @@ stripped() {
     case $1 in
         windows) strip=x86_64-w64-mingw32-strip ;;
         arm64) strip=aarch64-linux-gnu-strip ;;
-        *) strip=strip ;;
+        *) strip='strip' ;;
     esac
     "$strip" -o "$3" "$(made "$1")/$2"
 }
@@ -85,7 +85,7 @@ imports() {
     for file in "${@:2}"; do
         case $platform in
             windows)
-                needed=$(x86_64-w64-mingw32-objdump -p "$file" | sed -n 's/.*DLL Name: //p' | tr 'A-Z' 'a-z' |
+                needed=$(x86_64-w64-mingw32-objdump -p "$file" | sed -n 's/.*DLL Name: //p' | tr '[:upper:]' '[:lower:]' |
                     grep -vxE '(kernel32|ntdll|ws2_32|advapi32|bcrypt|bcryptprimitives|userenv|winmm|crypt32|secur32|ole32|shell32|user32|msvcrt|api-ms-win-[a-z0-9-]*)\.dll' || true)
                 ;;
             linux | arm64)

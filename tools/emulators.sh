@@ -9,6 +9,7 @@ export WINEPREFIX=$ROOT/target/platforms/wine WINEDEBUG=-all WINEDLLOVERRIDES=ip
 ARM64_LIBRARIES=/usr/aarch64-linux-gnu
 
 # Sets RUNNER to what runs a program of a platform.
+# shellcheck disable=SC2034 # for the scripts that source this
 run_by() {
     case $1 in
         windows) RUNNER=(timeout --foreground "${2:-400}" "$WINE") ;;

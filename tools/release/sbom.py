@@ -253,44 +253,54 @@ def permitted(licence):
     return getattr(licence, "license_symbol", licence).key in LICENCES
 
 
-def check(out, platform, *paths):
-    """Validates a list, and compares it with what the artefacts contain."""
+def valid(out):
+    """A list that follows the schema."""
     text = pathlib.Path(out).read_text()
     error = JsonStrictValidator(SCHEMA).validate_str(text)
     if error:
         fail(f"{out} does not follow CycloneDX {SCHEMA.to_version()}: {error.data.json_path}: {error.data.message}")
-    document = json.loads(text)
-    edges = {entry["ref"]: entry.get("dependsOn", []) for entry in document["dependencies"]}
-    compared = 0
-    for path in paths:
-        if platform_in(path) not in (None, platform):
-            continue
-        content = pathlib.Path(path).read_bytes()
-        ref = f"{pathlib.Path(path).name}#{hashlib.sha256(content).hexdigest()[:16]}"
-        if ref not in edges:
-            fail(f"{out} does not have {path} as it is now: write it again")
-        with zipfile.ZipFile(path) as opened:
-            crates = third_party(opened)
-        if crates is None:
-            continue
-        listed = crates_below(edges, ref)
-        if crates != listed:
-            fail(f"{path} has a THIRD-PARTY.txt that differs from {out}: {sorted(crates ^ listed)}")
-        compared += 1
-    if not compared:
-        fail(f"no artefact of {platform} has a THIRD-PARTY.txt, so that nothing was compared")
-    spdx_licences = get_spdx_licensing()
-    outside, count = [], 0
+    return json.loads(text)
+
+
+def compare(path, lists):
+    """True if the artefact has a THIRD-PARTY.txt. Its crates must be those that the lists of its platforms have for it."""
+    content = pathlib.Path(path).read_bytes()
+    ref = f"{pathlib.Path(path).name}#{hashlib.sha256(content).hexdigest()[:16]}"
+    listed = set()
+    for out, document in lists.items():
+        if platform_in(path) in (None, platform_in(out)):
+            edges = {entry["ref"]: entry.get("dependsOn", []) for entry in document["dependencies"]}
+            if ref not in edges:
+                fail(f"{out} does not have {path} as it is now: write it again")
+            listed |= crates_below(edges, ref)
+    with zipfile.ZipFile(path) as opened:
+        crates = third_party(opened)
+    if crates is None:
+        return False
+    if crates != listed:
+        fail(f"the THIRD-PARTY.txt of {path} and the lists differ: {sorted(crates ^ listed)}")
+    return True
+
+
+def refused(document):
+    """The crates whose licence is not permitted."""
     for component in document["components"]:
-        if not component.get("purl", "").startswith("pkg:cargo/"):
-            continue
-        count += 1
-        expression = "".join(entry.get("expression", "") for entry in component.get("licenses", []))
-        if not expression or not permitted(spdx_licences.parse(expression, validate=True)):
-            outside.append(f"{component['name']} {component['version']}: {expression or 'no licence'}")
+        if component.get("purl", "").startswith("pkg:cargo/"):
+            expression = "".join(entry.get("expression", "") for entry in component.get("licenses", []))
+            if not expression or not permitted(get_spdx_licensing().parse(expression, validate=True)):
+                yield f"{component['name']} {component['version']}: {expression or 'no licence'}"
+
+
+def check(outs, *paths):
+    """Validates the lists, and compares them with what the artefacts contain."""
+    lists = {out: valid(out) for out in outs.split()}
+    outside = sorted({line for document in lists.values() for line in refused(document)})
     if outside:
         fail("licences outside the list:\n  " + "\n  ".join(outside))
-    print(f"sbom: check ok file={out} crates={count} compared={compared}")
+    compared = sum(compare(path, lists) for path in paths)
+    if not compared:
+        fail("no artefact has a THIRD-PARTY.txt, so that nothing was compared")
+    print(f"sbom: check ok lists={len(lists)} artefacts={len(paths)} compared={compared}")
 
 
 if __name__ == "__main__":

@@ -516,7 +516,7 @@ fn there_is_nothing_to_undo_in_an_original() {
     );
 }
 
-/// All sources in Structured Text of this project.
+/// All sources in Structured Text of this project, without the links to some of them.
 fn tree(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -527,7 +527,8 @@ fn tree(folder: &Path, found: &mut Vec<PathBuf>) {
             .into_owned();
         if path.is_dir() && name != "target" && !name.starts_with('.') {
             tree(&path, found);
-        } else if path.extension().is_some_and(|extension| extension == "st") {
+        } else if path.extension().is_some_and(|extension| extension == "st") && !path.is_symlink()
+        {
             found.push(path);
         }
     }

@@ -70,6 +70,7 @@ platform() {
 # The target of Rust for a platform, as the Java library names it.
 rust_target() {
     case $1 in
+        linux-*-musl) sed 's/linux-\(.*\)-musl/\1-unknown-linux-musl/' <<<"$1" ;;
         linux-*) echo "${1#linux-}-unknown-linux-gnu" ;;
         macos-*) echo "${1#macos-}-apple-darwin" ;;
         windows-*) echo "${1#windows-}-pc-windows-gnu" ;;

@@ -4,16 +4,6 @@
 # The oldest C library of Linux on which all of it must run: that of Debian 10, RHEL 8 and Ubuntu 20.04.
 GLIBC=2.28
 
-triple() {
-    case $1 in
-        linux) echo x86_64-unknown-linux-gnu ;;
-        windows) echo x86_64-pc-windows-gnu ;;
-        arm64) echo aarch64-unknown-linux-gnu ;;
-        musl) echo x86_64-unknown-linux-musl ;;
-        *) die "there is no platform $1: linux, windows, arm64 or musl" ;;
-    esac
-}
-
 # The name of a platform in the jar.
 in_the_jar() {
     case $1 in
@@ -21,7 +11,12 @@ in_the_jar() {
         windows) echo windows-x86_64 ;;
         arm64) echo linux-aarch64 ;;
         musl) echo linux-x86_64-musl ;;
+        *) die "there is no platform $1: linux, windows, arm64 or musl" ;;
     esac
+}
+
+triple() {
+    rust_target "$(in_the_jar "$1")"
 }
 
 # cross_tools PLATFORMS PACKAGE...: installs the compilers and linkers for these platforms, and further packages of Debian.

@@ -66,8 +66,8 @@ wine_prefix() {
         x86_64-w64-mingw32-gcc -shared -O2 -o "$system/bcryptprimitives.dll" tests/platforms/bcryptprimitives.c -ladvapi32
     fi
     # Sockets belong to a server of Wine, which otherwise ends with the last program: a program that starts meanwhile has a
-    # socket where nobody listens.
-    "${WINE%/*}/wineserver64" -p60
+    # socket where nobody listens. It may run already.
+    "${WINE%/*}/wineserver64" -p60 || true
 }
 
 # emulators PLATFORM...: compilers, linkers and emulators, as packages of Debian and of Python.

@@ -66,8 +66,9 @@ wine_prefix() {
         x86_64-w64-mingw32-gcc -shared -O2 -o "$system/bcryptprimitives.dll" tests/platforms/bcryptprimitives.c -ladvapi32
     fi
     # Sockets belong to a server of Wine, which otherwise ends with the last program: a program that starts meanwhile has a
-    # socket where nobody listens. It may run already.
-    "${WINE%/*}/wineserver64" -p60 || true
+    # socket where nobody listens. It may run already. The first program after its start hears no Ctrl-C: that is this one.
+    "${WINE%/*}/wineserver64" -p3600 || true
+    timeout 120 "$WINE" cmd /c exit
 }
 
 # emulators PLATFORM...: compilers, linkers and emulators, as packages of Debian and of Python.

@@ -38,7 +38,10 @@ class CheckJniTest {
             .filter(line -> line.contains("WARNING") || line.contains("FATAL") || line.contains("Warning:"))
             .toList();
         assertEquals(List.of(), suspicious, outcome::output);
-        assertTrue(outcome.output().contains("[         0 tests skipped"), outcome::output);
+        // Elsewhere some tests need what only Linux has.
+        if (System.getProperty("os.name").equals("Linux")) {
+            assertTrue(outcome.output().contains("[         0 tests skipped"), outcome::output);
+        }
     }
 
     private static Optional<Path> jdk(int version) throws IOException {

@@ -70,7 +70,7 @@ platform() {
 # The target of Rust for a platform, as the Java library names it.
 rust_target() {
     case $1 in
-        linux-*-musl) sed 's/linux-\(.*\)-musl/\1-unknown-linux-musl/' <<<"$1" ;;
+        linux-x86_64-musl) echo x86_64-unknown-linux-musl ;;
         linux-*) echo "${1#linux-}-unknown-linux-gnu" ;;
         macos-*) echo "${1#macos-}-apple-darwin" ;;
         windows-*) echo "${1#windows-}-pc-windows-gnu" ;;
@@ -136,7 +136,8 @@ reproducible_zip() {
 release_files() {
     (
         cd target/dist
-        find . -maxdepth 1 -type f ! -name SHA256SUMS -printf '%P\n'
+        find . -maxdepth 1 -type f ! -name SHA256SUMS ! -name '*.asc' ! -name tickbus-maven.zip -printf '%P\n'
+        [ ! -d crates ] || find crates -type f
         [ ! -d maven ] || find maven -type f \( -name '*.jar' -o -name '*.pom' \)
     ) | LC_ALL=C sort
 }

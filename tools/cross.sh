@@ -32,12 +32,18 @@ cross_tools() {
         esac
     done
     if [ ${#packages[@]} -gt 0 ]; then
-        can_install || die "install ${packages[*]}"
+        if ! can_install; then
+            echo "install ${packages[*]}"
+            exit 77
+        fi
         as_root apt-get update -qq
         DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
     fi
     tools/peers --cross
 }
+
+# Between flags for the compiler in CARGO_ENCODED_RUSTFLAGS: paths may have blanks.
+BETWEEN_FLAGS=$'\x1f'
 
 # cargo for a platform, in a folder of its own. Linux programs are linked by zig, against the C library of any age.
 cross_cargo() {
@@ -47,7 +53,8 @@ cross_cargo() {
     export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$ROOT/target/platforms/$platform
     if [ "$platform" = windows ]; then
         # The C runtime goes into the files: some Windows have none.
-        RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=+crt-static" cargo "$command" --target "$target" "$@"
+        local flags=${CARGO_ENCODED_RUSTFLAGS:+$CARGO_ENCODED_RUSTFLAGS$BETWEEN_FLAGS}
+        CARGO_ENCODED_RUSTFLAGS="${flags}-C${BETWEEN_FLAGS}target-feature=+crt-static" cargo "$command" --target "$target" "$@"
         return
     fi
     [[ $target != *-gnu ]] || target=$target.$GLIBC

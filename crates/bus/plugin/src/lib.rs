@@ -76,8 +76,9 @@ fn isolated(
 ) -> Result<Box<dyn Free>, OpenError> {
     let named = options.helper.as_ref();
     let named = named.map(|path| absolute(directory, path));
-    let program =
-        locate::helper(named, &absolute(directory, Path::new(""))).map_err(OpenError::Config)?;
+    // A driver.cfg of the current folder has an empty one, and an empty path cannot be made absolute.
+    let folder = absolute(directory, Path::new("."));
+    let program = locate::helper(named, &folder).map_err(OpenError::Config)?;
     Ok(Box::new(isolated::Isolated::new(setup, limits, program)))
 }
 
@@ -86,4 +87,15 @@ fn absolute(directory: &Path, path: &Path) -> PathBuf {
     let joined = directory.join(path);
     // Fails if the current folder was deleted; then the path stays relative.
     std::path::absolute(&joined).unwrap_or(joined)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_folder_of_a_driver_cfg_in_the_current_folder_is_absolute() {
+        let folder = absolute(Path::new(""), Path::new("."));
+        assert_eq!(Some(folder), std::env::current_dir().ok());
+    }
 }

@@ -68,7 +68,7 @@ final class NativeLibrary {
     private void search() {
         String library = System.getProperty(LIBRARY);
         if (library != null) {
-            if (!fromFile("property " + LIBRARY, library)) {
+            if (!fromFile("property " + LIBRARY, library, Boolean.getBoolean(COPY))) {
                 tried.add("nowhere else, since " + LIBRARY + " is set");
                 throw failure();
             }
@@ -87,7 +87,7 @@ final class NativeLibrary {
             tried.add(place + ": not set");
             return false;
         }
-        return fromFile(place, directory + java.io.File.separator + file);
+        return fromFile(place, directory + java.io.File.separator + file, Boolean.getBoolean(COPY));
     }
 
     private boolean besideTheJar() {
@@ -95,7 +95,8 @@ final class NativeLibrary {
         try {
             Path classes = Path.of(NativeLibrary.class.getProtectionDomain().getCodeSource().getLocation().toURI());
             Path directory = Files.isDirectory(classes) ? classes : classes.getParent();
-            return fromFile(place, directory.resolve(file).toString());
+            // Each class loader that has the jar gets the library, as from inside the jar.
+            return fromFile(place, directory.resolve(file).toString(), true);
         } catch (URISyntaxException | RuntimeException e) {
             // A class loader need not give its classes a location, or gives one that is not a file.
             tried.add(place + ": the classes do not come from a file (" + e + ")");
@@ -124,7 +125,8 @@ final class NativeLibrary {
         return "/tickbus/native/" + platform + "/" + name;
     }
 
-    private boolean fromFile(String place, String name) {
+    /** Loads a file, or if another class loader has loaded it, a copy of it where this {@code copies}. */
+    private boolean fromFile(String place, String name, boolean copies) {
         Path path;
         try {
             path = Path.of(name).toAbsolutePath();
@@ -144,7 +146,7 @@ final class NativeLibrary {
                 tried.add(place + ": " + path + ": " + e.getMessage());
                 return false;
             }
-            if (!Boolean.getBoolean(COPY)) {
+            if (!copies) {
                 throw new FieldbusException(Status.LIBRARY, path + " is already loaded in another class loader of"
                     + " this process, and Java allows a native library only one.\n  Load tickbus in a class loader"
                     + " that both have as a parent, or set -D" + COPY + "=true to give this one a copy of its own;"
@@ -233,7 +235,7 @@ final class NativeLibrary {
                 .append(" nothing may be run there (noexec), name another one by -Djava.io.tmpdir=FOLDER.");
         }
         what.append("\n  Build it with `cargo build --release` in tickbus, then set -D").append(LIBRARY)
-            .append("=FILE, or put ").append(file).append(" beside the jar.");
+            .append("=FILE, or put ").append(file).append(" beside the jar (the zip has it in its folder DeviceDriver).");
         return new FieldbusException(Status.LIBRARY, what.toString());
     }
 

@@ -154,6 +154,13 @@ class NativeLibraryTest {
     }
 
     @Test
+    void aSecondClassLoaderOfTheJarGetsACopyOfTheLibraryBesideIt() throws Exception {
+        Files.copy(BUILT, directory.resolve(FILE));
+        Path jar = jar(null);
+        assertEquals(new ChildJvm.Outcome(0, "loaded\nloaded\n"), load(jar, "-Dsecond=" + jar.toUri()));
+    }
+
+    @Test
     void platformsHaveOneNameEach() {
         assertEquals("linux-x86_64", NativeLibrary.platform("Linux", "amd64"));
         assertEquals("linux-aarch64", NativeLibrary.platform("Linux", "aarch64"));

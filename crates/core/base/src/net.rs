@@ -33,6 +33,11 @@ pub enum TcpListener {
     Simulated(Box<dyn SimulatedListener>),
 }
 
+/// Clients that have connected and are not accepted yet. With the 128 of std, others of a thousand that come at once, such
+/// as after a power cut, try again a second later.
+#[cfg(unix)]
+const BACKLOG: i32 = 4096;
+
 /// Two ends of a connection within this computer, as a system without pairs of local sockets has them.
 ///
 /// # Errors
@@ -273,6 +278,8 @@ impl TcpListener {
             return Ok(Self::Simulated(simulation.listen(addresses)?));
         }
         let listener = net::TcpListener::bind(addresses)?;
+        #[cfg(unix)]
+        rustix::net::listen(&listener, BACKLOG)?;
         listener.set_nonblocking(true)?;
         Ok(Self::Os(listener))
     }
@@ -317,5 +324,27 @@ impl TcpListener {
                 (TcpStream::Simulated(stream), peer)
             }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn clients_that_come_at_once_are_all_connected_before_any_is_accepted() {
+        let listener =
+            TcpListener::bind(&["127.0.0.1:0".parse().expect("an address")], None).expect("a port");
+        let address = listener.local_addr().expect("its address");
+        // The kernel drops the first attempt of one too many, and the client repeats it after a second.
+        let limit = std::time::Duration::from_millis(900);
+        let clients: Vec<_> = (0..300)
+            .map(|number| {
+                net::TcpStream::connect_timeout(&address, limit)
+                    .unwrap_or_else(|error| panic!("client {number}: {error}"))
+            })
+            .collect();
+        assert_eq!(clients.len(), 300);
     }
 }

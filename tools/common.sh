@@ -166,8 +166,9 @@ has_iec2c() {
     have "$IEC2C"
 }
 
-# For programs that end before a thorough compiler would pay.
-SHORT_JVM="-XX:TieredStopAtLevel=1 -XX:+UseSerialGC"
+# For programs that end before a thorough compiler would pay; and without the warning on stdout of a JVM that finds another
+# one's file of measurements.
+SHORT_JVM="-XX:TieredStopAtLevel=1 -XX:+UseSerialGC -XX:-UsePerfData"
 
 # Runs Maven on the Java reactor, quietly and without colours.
 maven() {

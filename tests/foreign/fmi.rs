@@ -126,7 +126,7 @@ fn ask_vdmcheck(asked: &[&Path]) -> Result<Vec<String>, Absent> {
         |file: &&Path| {
             Command::new("java")
             // The program runs only a few seconds.
-            .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC"])
+            .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-XX:-UsePerfData"])
             .args(["-Dvdmj.parser.merge_comments=true"])
             .args(["-Dfmureader.noschema=true", "-Dfmureader.xsd=fmi2schema/fmi2.xsd"])
             .args(["-cp", "lib/*", "com.fujitsu.vdmj.VDMJ", "-vdmsl", "-q", "-annotations", "-e"])

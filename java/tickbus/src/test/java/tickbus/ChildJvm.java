@@ -21,6 +21,8 @@ final class ChildJvm {
 
     ChildJvm(Path javaHome) {
         command.add(javaHome.resolve("bin").resolve("java").toString());
+        // A JVM that finds another one's file of measurements warns on stdout.
+        command.add("-XX:-UsePerfData");
     }
 
     /** The JDK that runs the tests. */

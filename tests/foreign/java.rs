@@ -84,7 +84,11 @@ impl Peer {
         let mut child = Command::new("java")
             // The program ends before a thorough compilation would pay off.
             // Without a file of measurements: if two JVMs have the same number, the later one warns on stdout.
-            .args(["-XX:TieredStopAtLevel=1", "-XX:+UseSerialGC", "-XX:-UsePerfData"])
+            .args([
+                "-XX:TieredStopAtLevel=1",
+                "-XX:+UseSerialGC",
+                "-XX:-UsePerfData",
+            ])
             .args(["-cp", &jars, &format!("peers.{class}")])
             .args(arguments)
             .current_dir(&folder)

@@ -25,6 +25,34 @@ as_root() {
     if [ "$(id -u)" = 0 ]; then "$@"; else sudo -n "$@"; fi
 }
 
+# apt_install PACKAGE...
+apt_install() {
+    as_root apt-get update -qq && apt_install_listed "$@"
+}
+
+# The same, with the lists of packages that are there.
+apt_install_listed() {
+    DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "$@" >/dev/null
+}
+
+# The exit code of a stage or a part that was skipped.
+SKIPPED=77
+
+# Ends a stage that cannot be run on this machine, with the reason.
+skip() {
+    echo "$*"
+    exit "$SKIPPED"
+}
+
+# needs COMMAND:PACKAGE...: installs the packages of commands that are missing, or skips the stage.
+needs() {
+    local entry packages=()
+    for entry in "$@"; do
+        have "${entry%%:*}" || packages+=("${entry##*:}")
+    done
+    [ ${#packages[@]} -eq 0 ] || { can_install && apt_install "${packages[@]}"; } || skip "install ${packages[*]}"
+}
+
 # at_least 1.88 1.95.0: true if the second version is at least the first.
 at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]

@@ -15,6 +15,14 @@ in_the_jar() {
     esac
 }
 
+# The platform whose name in the jar is given.
+from_the_jar() {
+    local platform
+    for platform in linux windows arm64 musl; do
+        [ "$(in_the_jar "$platform")" != "$1" ] || echo "$platform"
+    done
+}
+
 triple() {
     rust_target "$(in_the_jar "$1")"
 }
@@ -31,30 +39,38 @@ cross_tools() {
             arm64) have aarch64-linux-gnu-strip || packages+=(binutils-aarch64-linux-gnu) ;;
         esac
     done
-    if [ ${#packages[@]} -gt 0 ]; then
-        if ! can_install; then
-            echo "install ${packages[*]}"
-            exit 77
-        fi
-        as_root apt-get update -qq
-        DEBIAN_FRONTEND=noninteractive as_root apt-get install -y -qq --no-install-recommends "${packages[@]}" >/dev/null
-    fi
+    [ ${#packages[@]} -eq 0 ] || { can_install && apt_install "${packages[@]}"; } || skip "install ${packages[*]}"
     tools/peers --cross
 }
 
-# Between flags for the compiler in CARGO_ENCODED_RUSTFLAGS: paths may have blanks.
-BETWEEN_FLAGS=$'\x1f'
+# Set where a release is built: paths of this computer, which stand in messages of panics, do not get into its files.
+WITHOUT_PATHS=
+
+# The flags of the compiler for a platform, as CARGO_ENCODED_RUSTFLAGS has them, since paths may have blanks.
+compiler_flags() {
+    local flags=() folder
+    # The C runtime goes into the files: some Windows have none.
+    [ "$1" != windows ] || flags+=(-C target-feature=+crt-static)
+    if [ -n "$WITHOUT_PATHS" ]; then
+        flags+=("--remap-path-prefix=$ROOT=tickbus")
+        for folder in "${CARGO_HOME:-$HOME/.cargo}"/registry/src/*; do
+            flags+=("--remap-path-prefix=$folder=crates")
+        done
+    fi
+    local IFS=$'\x1f'
+    echo "${flags[*]}"
+}
 
 # cargo for a platform, in a folder of its own. Linux programs are linked by zig, against the C library of any age.
 cross_cargo() {
-    local platform=$1 command=$2 target
+    local platform=$1 command=$2 target flags
     shift 2
     target=$(triple "$platform")
+    flags=$(compiler_flags "$platform")
+    [ -z "$flags" ] || export CARGO_ENCODED_RUSTFLAGS=$flags
     export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$ROOT/target/platforms/$platform
     if [ "$platform" = windows ]; then
-        # The C runtime goes into the files: some Windows have none.
-        local flags=${CARGO_ENCODED_RUSTFLAGS:+$CARGO_ENCODED_RUSTFLAGS$BETWEEN_FLAGS}
-        CARGO_ENCODED_RUSTFLAGS="${flags}-C${BETWEEN_FLAGS}target-feature=+crt-static" cargo "$command" --target "$target" "$@"
+        cargo "$command" --target "$target" "$@"
         return
     fi
     [[ $target != *-gnu ]] || target=$target.$GLIBC
@@ -86,21 +102,23 @@ imports() {
     local platform=$1 file needed
     for file in "${@:2}"; do
         case $platform in
-            windows)
-                needed=$(x86_64-w64-mingw32-objdump -p "$file" | sed -n 's/.*DLL Name: //p' | tr '[:upper:]' '[:lower:]' |
-                    grep -vxE '(kernel32|ntdll|ws2_32|advapi32|bcrypt|bcryptprimitives|userenv|winmm|crypt32|secur32|ole32|shell32|user32|msvcrt|api-ms-win-[a-z0-9-]*)\.dll' || true)
-                ;;
-            linux | arm64)
-                needed=$(objdump_any "$file" | grep -oE 'GLIBC_[0-9.]+' | sort -uV |
-                    awk -F_ -v most="$GLIBC" '{ split($2, v, "."); split(most, m, "."); if (v[1] * 1000 + v[2] > m[1] * 1000 + m[2]) print }')
-                ;;
-            musl) needed=$(objdump_any "$file" | grep NEEDED || true) ;;
+            windows) needed=$(foreign_dlls "$file") ;;
+            linux | arm64) needed=$(newer_glibc "$file") ;;
+            musl) needed=$(readelf --dynamic --wide "$file" | grep NEEDED || true) ;;
         esac
         echo "$file: $(wc -c <"$file") bytes"
         [ -z "$needed" ] || die "$file needs $needed, which not every system has"
     done
 }
 
-objdump_any() {
-    readelf --dynamic --version-info --wide "$1" 2>/dev/null
+# The libraries that a file needs and that not every Windows has.
+foreign_dlls() {
+    x86_64-w64-mingw32-objdump -p "$1" | sed -n 's/.*DLL Name: //p' | tr '[:upper:]' '[:lower:]' |
+        grep -vxE '(kernel32|ntdll|ws2_32|advapi32|bcrypt|bcryptprimitives|userenv|winmm|crypt32|secur32|ole32|shell32|user32|msvcrt|api-ms-win-[a-z0-9-]*)\.dll' || true
+}
+
+# The versions of the C library that a file needs and that are newer than the oldest one.
+newer_glibc() {
+    readelf --dynamic --version-info --wide "$1" 2>/dev/null | grep -oE 'GLIBC_[0-9.]+' | sort -uV |
+        awk -F '[_.]' -v most="$GLIBC" '{ split(most, m, "."); if ($2 * 1000 + $3 > m[1] * 1000 + m[2]) print }'
 }

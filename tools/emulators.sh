@@ -18,6 +18,14 @@ run_by() {
     esac
 }
 
+# True if the emulator for a platform is set up.
+can_run() {
+    case $1 in
+        windows) [ -x "$WINE" ] && [ -d "$WINEPREFIX" ] && wine_server ;;
+        arm64) have qemu-aarch64 && [ -d "$ARM64_LIBRARIES/lib" ] ;;
+    esac
+}
+
 # JVMs of the platforms, which a package of Python has.
 java_home() {
     case $1 in
@@ -66,8 +74,12 @@ wine_prefix() {
         timeout 120 "$WINE" wineboot --init >/dev/null 2>&1
         x86_64-w64-mingw32-gcc -shared -O2 -o "$system/bcryptprimitives.dll" tests/platforms/bcryptprimitives.c -ladvapi32
     fi
-    # Sockets belong to a server of Wine, which otherwise ends with the last program: a program that starts meanwhile has a
-    # socket where nobody listens. It may run already. The first program after its start hears no Ctrl-C: that is this one.
+    wine_server
+}
+
+# Sockets belong to a server of Wine, which otherwise ends with the last program: a program that starts meanwhile has a socket
+# where nobody listens. It may run already. The first program after its start hears no Ctrl-C: that is this one.
+wine_server() {
     "${WINE%/*}/wineserver64" -p3600 || true
     timeout 120 "$WINE" cmd /c exit
 }

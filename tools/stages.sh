@@ -2,8 +2,6 @@
 # Stages of tests: compiled once, run several programs at once, counted. Sourced after common.sh by scripts that set LOGS, the
 # folder of all logs.
 
-# The exit code of a stage that was skipped.
-SKIPPED=77
 # The number of test programs that run at once: they mostly wait, for peers and for clocks.
 AT_ONCE=3
 # A program that runs the programs of another platform, with its arguments.
@@ -16,12 +14,6 @@ AT_ITS_TIME=()
 AGAIN_ALONE=
 # The folders with the reports of JUnit, as a pattern.
 JAVA_REPORTS='java/*/target/surefire-reports'
-
-# Ends a stage that cannot be run on this machine, with the reason.
-skip() {
-    echo "$*"
-    exit "$SKIPPED"
-}
 
 # wait_for STAGE: waits for a stage of another lane, whatever its result.
 wait_for() {
@@ -165,6 +157,7 @@ stage() {
     esac
     local verdict=ok
     : >"$LOGS/$function.said"
+    # shellcheck disable=SC2153 # of common.sh
     case $code in
         0)
             if [ $((p + f + s)) -gt 0 ]; then

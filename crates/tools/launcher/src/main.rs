@@ -13,7 +13,9 @@ const ENTRY: &str = "tickbus_command";
 const CANNOT_RUN: u8 = 126;
 
 fn main() -> ExitCode {
-    match run() {
+    let own = std::env::current_exe()
+        .map_err(|error| format!("the folder of this program is unknown: {error}"));
+    match own.and_then(|own| run(&own)) {
         Ok(code) => code.into(),
         Err(message) => {
             eprintln!("tickbus: {message}");
@@ -22,9 +24,8 @@ fn main() -> ExitCode {
     }
 }
 
-fn run() -> Result<u8, String> {
-    let own = std::env::current_exe()
-        .map_err(|error| format!("the folder of this program is unknown: {error}"))?;
+/// Runs the command in the library beside the program `own`.
+fn run(own: &Path) -> Result<u8, String> {
     let library = library_filename("tickbus");
     let beside = own.with_file_name(&library);
     // A symbolic link to the program is followed.
@@ -61,4 +62,42 @@ fn call(file: &Path) -> Result<u8, String> {
     // Threads of the library may still run; the end of the process ends them.
     std::mem::forget(library);
     Ok(u8::try_from(code).unwrap_or(u8::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the launcher says in a folder with these bytes as the library.
+    fn said(name: &str, bytes: Option<&[u8]>) -> (String, String) {
+        let folder =
+            std::env::temp_dir().join(format!("tickbus launcher {} {name}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let library = folder.join(library_filename("tickbus"));
+        if let Some(bytes) = bytes {
+            std::fs::write(&library, bytes).unwrap();
+        }
+        let message = run(&folder.join("tickbus")).unwrap_err();
+        std::fs::remove_dir_all(&folder).unwrap();
+        (message, library.display().to_string())
+    }
+
+    #[test]
+    fn a_command_without_the_library_says_what_to_copy() {
+        let (message, library) = said("alone", None);
+        let expected = format!("{library} is missing: the command needs the native library");
+        assert!(message.starts_with(&expected), "{message}");
+        assert!(message.contains("copy both"), "{message}");
+    }
+
+    #[test]
+    fn a_library_that_is_none_is_named_with_the_cure() {
+        let (message, library) = said("with a text", Some(b"no library"));
+        let expected = format!("{library} cannot be used: ");
+        assert!(message.starts_with(&expected), "{message}");
+        assert!(
+            message.ends_with("from one release for this platform"),
+            "{message}"
+        );
+    }
 }

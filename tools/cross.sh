@@ -61,14 +61,19 @@ compiler_flags() {
     echo "${flags[*]}"
 }
 
-# cargo for a platform, in a folder of its own. Linux programs are linked by zig, against the C library of any age.
+# What cargo makes for other platforms: in one folder, since macros and build scripts, which run here, are the same for all.
+CROSS_TARGET=target/platforms/cargo
+# The folder of the profile there.
+CROSS_PROFILE=release
+
+# cargo for a platform. Linux programs are linked by zig, against the C library of any age.
 cross_cargo() {
     local platform=$1 command=$2 target flags
     shift 2
     target=$(triple "$platform")
     flags=$(compiler_flags "$platform")
     [ -z "$flags" ] || export CARGO_ENCODED_RUSTFLAGS=$flags
-    export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$ROOT/target/platforms/$platform
+    export CARGO_INCREMENTAL=0 CARGO_TARGET_DIR=$ROOT/$CROSS_TARGET
     if [ "$platform" = windows ]; then
         cargo "$command" --target "$target" "$@"
         return
@@ -83,7 +88,7 @@ cross_cargo() {
 
 # The folder with what cargo has made for a platform.
 made() {
-    echo "target/platforms/$1/$(triple "$1")/release"
+    echo "$CROSS_TARGET/$(triple "$1")/$CROSS_PROFILE"
 }
 
 # stripped PLATFORM FILE COPY: a copy of a made file without debug tables.

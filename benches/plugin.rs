@@ -1,24 +1,28 @@
-//! The plug-in bus: an exchange with a library that does almost nothing, on the bus thread and in a helper
-//! process, in alternating rounds of one run.
+//! The plug-in bus: the processor time of a bus cycle with a library that does almost nothing, on the bus thread and in
+//! a helper process, in alternating rounds of one run.
 //!
-//! The cycles follow one another without a pause, so that the time between two is that of an exchange.
+//! A cycle has its fixed time, so that only the processor time tells what it costs: that of all threads of this process
+//! and of its helper, as the kernel counts it. Most of it is the wait for the next cycle.
 //! Medians over the rounds; prints one `rust NAME VALUE` per line on stdout, in microseconds.
 //!
 //! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 
-#[cfg(all(unix, not(no_cc)))]
+#[cfg(all(target_os = "linux", not(no_cc)))]
 fn main() {
     plugin::main();
 }
 
-#[cfg(not(all(unix, not(no_cc))))]
+#[cfg(not(all(target_os = "linux", not(no_cc))))]
 fn main() {
-    eprintln!("plugin: skipped, for want of a C compiler or of helper processes");
+    eprintln!(
+        "plugin: skipped, for want of a C compiler or of Linux, which counts processor time by thread"
+    );
 }
 
-#[cfg(all(unix, not(no_cc)))]
+#[cfg(all(target_os = "linux", not(no_cc)))]
 mod plugin {
+    use std::fs;
     use std::path::{Path, PathBuf};
     use std::process::Command;
     use std::sync::Arc;
@@ -34,13 +38,13 @@ mod plugin {
     pub(crate) fn main() {
         // `cargo bench` passes this; `cargo test` only checks that the bench runs.
         let measured = std::env::args().any(|argument| argument == "--bench");
-        let (rounds, cycles) = if measured { (7, 20_000) } else { (1, 2) };
+        let (rounds, time) = if measured { (7, 1000) } else { (1, 10) };
         let folder = tempfile::tempdir().expect("a folder");
         let library = build(folder.path());
         let mut medians = [const { Vec::new() }; 2];
         for _ in 0..rounds {
             for (isolated, medians) in [false, true].into_iter().zip(&mut medians) {
-                medians.push(exchange(&library, isolated, cycles));
+                medians.push(cycle(&library, isolated, Nanos::from_millis(time)));
             }
         }
         for (name, medians) in ["plain", "isolated"].iter().zip(&mut medians) {
@@ -64,8 +68,8 @@ mod plugin {
         library
     }
 
-    /// The median time of an exchange, in microseconds.
-    fn exchange(library: &Path, isolated: bool, cycles: u64) -> f64 {
+    /// The processor time of a cycle, in microseconds.
+    fn cycle(library: &Path, isolated: bool, time: Nanos) -> f64 {
         let isolation = if isolated {
             let helper = env!("CARGO_BIN_EXE_tickbus");
             format!("isolated = true\nhelper = \"{helper}\"")
@@ -74,7 +78,7 @@ mod plugin {
         };
         let text = format!(
             "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"plugin\"\nlibrary = \"{}\"\n\
-             cycle = \"50us\"\nmax_age = \"1h\"\ninput_bytes = {INPUT}\noutput_bytes = {OUTPUT}\n{isolation}\n\
+             cycle = \"100us\"\nmax_age = \"1h\"\ninput_bytes = {INPUT}\noutput_bytes = {OUTPUT}\n{isolation}\n\
              [[signal]]\nname = \"s\"\naddress = \"%QX0.0\"\n",
             library.display()
         );
@@ -82,18 +86,46 @@ mod plugin {
             .unwrap_or_else(|why| panic!("{why}"));
         let clock = Monotonic::shared();
         let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
-        loop {
-            clock.wait_until(clock.now() + Nanos::from_millis(10), &Stop::new());
+        let wait = |time| clock.wait_until(clock.now() + time, &Stop::new());
+        let cycles = || -> f64 {
             let statistics = driver.statistics();
-            let value = |key: &str| -> f64 {
-                let line = statistics.lines().find_map(|line| line.strip_prefix(key));
-                line.and_then(|value| value.parse().ok()).unwrap_or(0.0)
-            };
-            #[expect(clippy::cast_precision_loss, reason = "a small number")]
-            if value("bus_cycle.count=") >= cycles as f64 {
-                driver.close();
-                return value("bus_cycle.p50_us=");
+            let count = statistics
+                .lines()
+                .find_map(|line| line.strip_prefix("bus_cycle.count="));
+            count.and_then(|count| count.parse().ok()).unwrap_or(0.0)
+        };
+        // Until the helper runs.
+        while cycles() < 2.0 {
+            wait(Nanos::from_millis(10));
+        }
+        let (before, begun) = (cycles(), processor_us());
+        wait(time);
+        let cost = (processor_us() - begun) / (cycles() - before);
+        driver.close();
+        cost
+    }
+
+    /// The processor time of this process and of its children, in microseconds. The first number of `schedstat` is the
+    /// time of a thread on a processor, in nanoseconds.
+    fn processor_us() -> f64 {
+        let own = std::process::id().to_string();
+        let listed = |folder: &Path| -> Vec<PathBuf> {
+            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+            entries.map(|entry| entry.path()).collect()
+        };
+        let mut all = 0.0;
+        for process in listed(Path::new("/proc")) {
+            let status = fs::read_to_string(process.join("status")).unwrap_or_default();
+            let parent = status.lines().find_map(|line| line.strip_prefix("PPid:\t"));
+            if !process.ends_with(&own) && parent != Some(&own) {
+                continue;
+            }
+            for task in listed(&process.join("task")) {
+                let times = fs::read_to_string(task.join("schedstat")).unwrap_or_default();
+                let time = times.split(' ').next().and_then(|time| time.parse().ok());
+                all += time.unwrap_or(0.0) / 1000.0;
             }
         }
+        all
     }
 }

@@ -8,6 +8,7 @@ mkdir demo\run\peeler\DeviceDriver
 copy /y DeviceDriver\*.jar demo\run\peeler\DeviceDriver >nul
 copy /y demo\peeler\*.* demo\run\peeler\DeviceDriver >nul
 if not defined TICKBUS_LOG set TICKBUS_LOG=error
-java --enable-native-access=ALL-UNNAMED -Dtickbus.native.dir=DeviceDriver -cp "simulator/*" tickbus.machines.peeler.PeelingDemo ^
+java --enable-native-access=ALL-UNNAMED -Dtickbus.native.dir=DeviceDriver -Dtickbus.copy=true ^
+    -cp "simulator/*" tickbus.machines.peeler.PeelingDemo ^
     --drivers demo/run/peeler/DeviceDriver --control simulator/peeler.table --plc DeviceDriver/tickbus.exe ^
     --report demo/run/peeler/report.txt --recordings demo/run/peeler %*

@@ -8,6 +8,7 @@ mkdir demo\run\rig\DeviceDriver
 copy /y DeviceDriver\*.jar demo\run\rig\DeviceDriver >nul
 copy /y demo\rig\*.* demo\run\rig\DeviceDriver >nul
 if not defined TICKBUS_LOG set TICKBUS_LOG=error
-java --enable-native-access=ALL-UNNAMED -Dtickbus.native.dir=DeviceDriver -cp "simulator/*" tickbus.machines.rig.Demo ^
+java --enable-native-access=ALL-UNNAMED -Dtickbus.native.dir=DeviceDriver -Dtickbus.copy=true ^
+    -cp "simulator/*" tickbus.machines.rig.Demo ^
     --drivers demo/run/rig/DeviceDriver --control simulator/rig.table --plc DeviceDriver/tickbus.exe ^
     --report demo/run/rig/report.txt --recording demo/run/rig/run.vcd %*

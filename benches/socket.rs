@@ -1,21 +1,19 @@
-//! The socket bus as its peer sees it, compared with bare TCP, in alternating rounds of one run.
+//! The socket bus as its peer sees it, compared with bare TCP, in alternating rounds of one run, each server a process.
 //!
-//! `reply`: a client sends 360 bytes and waits for 134, from a Device with `send = "reply"` and from a bare
-//! server. `cycle`: 134 bytes every 10 ms, from a Device and from a bare thread that sleeps until its
+//! `reply`: a client sends 360 bytes and waits for 134, from a device with `send = "reply"`, with the default
+//! `max_age` and with 90 ms, and from a bare server. `cycle`: 134 bytes every 10 ms, from a device and from a bare server that sleeps until its
 //! deadlines. Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 //!
 //! Pin it to one core from outside: waking another core costs more than everything measured here.
 #![allow(missing_docs, reason = "a bench")]
 
-use std::fmt::Write as _;
+mod servers;
+
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
-use std::sync::Arc;
+use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-use tickbus::driver::Driver;
-use tickbus::driver_cfg::Config;
-use tickbus::time::Monotonic;
+use servers::{Server, Turn, median};
 
 /// Bytes from the PLC and to it: %Q and %I.
 const REQUEST: usize = 360;
@@ -35,6 +33,7 @@ struct Extent {
 }
 
 fn main() {
+    servers::serve_if_told(&[("--deadlines", send_on_deadlines)]);
     // `cargo bench` passes this; `cargo test` only checks that the bench runs.
     let measured = std::env::args().any(|argument| argument == "--bench");
     let extent = if measured {
@@ -56,90 +55,36 @@ fn main() {
     cycle(&extent);
 }
 
-/// A Device with 16 latched bits in each direction, like the rig, and its listening address.
-fn device(keys: &str) -> (Driver, String) {
-    let mut text = format!(
+/// A device like the rig.
+fn device(keys: &str) -> Server {
+    let signals = servers::latched_bits();
+    Server::device(&format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"socket\"\naddress = \"127.0.0.1:0\"\n\
-         max_age = \"1h\"\ninput_bytes = {ANSWER}\noutput_bytes = {REQUEST}\n{keys}\n"
-    );
-    for area in ['Q', 'I'] {
-        for bit in 0..16 {
-            let (byte, bit) = (1 - bit / 8, bit % 8);
-            let _ = write!(
-                text,
-                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\n\
-                 latch = \"rising\"\n"
-            );
-        }
-    }
-    let config =
-        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
-    let clock = Monotonic::shared();
-    let driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
-    loop {
-        let statistics = driver.statistics();
-        let address = statistics
-            .lines()
-            .find_map(|line| line.strip_prefix("address="));
-        if let Some(address) = address {
-            return (driver, address.to_owned());
-        }
-        std::thread::yield_now();
-    }
-}
-
-fn connect(address: &str) -> TcpStream {
-    let stream = TcpStream::connect(address).expect("somebody listens");
-    stream.set_nodelay(true).expect("a TCP option");
-    stream
-}
-
-/// Sends and receives for `span`; returns the exchanges per second.
-fn ping_pong(stream: &mut TcpStream, span: Duration) -> f64 {
-    let (request, mut answer) = ([0; REQUEST], [0; ANSWER]);
-    let begin = Instant::now();
-    let mut exchanges = 0_u32;
-    while begin.elapsed() < span {
-        // The clock is read only once per batch.
-        for _ in 0..50 {
-            stream.write_all(&request).expect("the other end reads");
-            stream.read_exact(&mut answer).expect("an answer");
-        }
-        exchanges += 50;
-    }
-    f64::from(exchanges) / begin.elapsed().as_secs_f64()
+         input_bytes = {ANSWER}\noutput_bytes = {REQUEST}\n{keys}\n{signals}"
+    ))
 }
 
 fn reply(extent: &Extent) {
-    let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-    let mut bare = connect(&listener.local_addr().expect("it is bound").to_string());
-    let (mut served, _) = listener.accept().expect("it connects");
-    served.set_nodelay(true).expect("a TCP option");
-    let server = std::thread::spawn(move || {
-        let (mut request, answer) = ([0; REQUEST], [0; ANSWER]);
-        while served.read_exact(&mut request).is_ok() {
-            served.write_all(&answer).expect("the client reads");
-        }
-    });
-    let (driver, address) = device("send = \"reply\"");
-    let mut adapter = connect(&address);
-
-    ping_pong(&mut bare, extent.replying);
-    ping_pong(&mut adapter, extent.replying);
-    let (mut rates, mut bare_rates, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..extent.replies {
-        let bare = ping_pong(&mut bare, extent.replying);
-        let rate = ping_pong(&mut adapter, extent.replying);
-        bare_rates.push(bare);
-        rates.push(rate);
-        ratios.push(rate / bare);
-    }
-    drop(bare);
-    server.join().expect("no panic");
-    driver.close();
-    println!("rust socket.reply {:.0}", median(&mut rates));
-    println!("rust socket.reply.bare {:.0}", median(&mut bare_rates));
-    println!("rust socket.reply.ratio {:.3}", median(&mut ratios));
+    let bare = Server::own(&["--bare", &REQUEST.to_string(), &ANSWER.to_string()]);
+    let ours = device("send = \"reply\"");
+    let quick = device("send = \"reply\"\nmax_age = \"90ms\"");
+    let turn = |name, server: &Server| {
+        let (mut stream, mut request) = (server.connect(), [0; REQUEST]);
+        Turn::new(name, move || {
+            // An edge for every latch, in both directions in turn.
+            for byte in &mut request[..2] {
+                *byte = !*byte;
+            }
+            stream.write_all(&request).expect("the server reads");
+            stream.read_exact(&mut [0; ANSWER]).expect("an answer");
+        })
+    };
+    let mut turns = [
+        turn("socket.reply.bare", &bare),
+        turn("socket.reply", &ours),
+        turn("socket.reply.max_age_90ms", &quick),
+    ];
+    servers::by_turns(extent.replies, extent.replying, &mut turns);
 }
 
 /// The times at which records arrived.
@@ -183,8 +128,9 @@ impl Intervals {
     }
 }
 
-/// Sends a record at each deadline until the other end is gone; missed ones are skipped, as by the bus.
-fn send_on_deadlines(mut stream: TcpStream) {
+/// Sends a record to one client at each deadline until that is gone; missed ones are skipped, as by the bus.
+fn send_on_deadlines() {
+    let mut stream = servers::accept_one();
     let mut due = Instant::now();
     while stream.write_all(&[0; ANSWER]).is_ok() {
         while due <= Instant::now() {
@@ -197,24 +143,11 @@ fn send_on_deadlines(mut stream: TcpStream) {
 fn cycle(extent: &Extent) {
     let (mut device_records, mut bare_records) = (Intervals::default(), Intervals::default());
     for _ in 0..extent.rounds {
-        let (driver, address) = device("cycle = \"10ms\"");
-        device_records.receive(&mut connect(&address), extent.cycles);
-        driver.close();
-
-        let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
-        let mut stream = connect(&listener.local_addr().expect("it is bound").to_string());
-        let (served, _) = listener.accept().expect("it connects");
-        served.set_nodelay(true).expect("a TCP option");
-        let sender = std::thread::spawn(move || send_on_deadlines(served));
-        bare_records.receive(&mut stream, extent.cycles);
-        drop(stream);
-        sender.join().expect("no panic");
+        let server = device("cycle = \"10ms\"");
+        device_records.receive(&mut server.connect(), extent.cycles);
+        let server = Server::own(&["--deadlines"]);
+        bare_records.receive(&mut server.connect(), extent.cycles);
     }
     device_records.print("socket.cycle");
     bare_records.print("socket.cycle.bare");
-}
-
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

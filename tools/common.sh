@@ -143,6 +143,16 @@ without_debug_tables() {
     fi
 }
 
+# median_ms COMMAND...: the milliseconds that a command takes, as the median of nine.
+median_ms() {
+    local begun
+    for _ in $(seq 9); do
+        begun=$(date +%s%N)
+        "$@" >/dev/null
+        echo $((($(date +%s%N) - begun) / 1000000))
+    done | sort -n | sed -n 5p
+}
+
 # The time of everything in an archive: that of the commit.
 archive_time() {
     echo "${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct)}"

@@ -1,4 +1,4 @@
-//! A libmodbus server on a thread of this process.
+//! A libmodbus server.
 
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::net::SocketAddr;
@@ -15,42 +15,41 @@ type Reply = unsafe extern "C" fn(*mut c_void, *const u8, c_int, *mut c_void) ->
 /// The longest telegram over TCP.
 const LONGEST: usize = 260;
 
-/// Serves one client of `address` until it leaves; `None` if libmodbus is not installed.
-pub(crate) fn serve(address: SocketAddr) -> Option<SocketAddr> {
+/// Prints the address, and serves one client of it until that leaves; returns at once if libmodbus is not installed.
+pub(crate) fn serve(address: SocketAddr) {
     // SAFETY: libmodbus runs no code when it is loaded.
-    let library = unsafe { Library::new("libmodbus.so.5") }.ok()?;
+    let Ok(library) = (unsafe { Library::new("libmodbus.so.5") }) else {
+        return;
+    };
     let host = CString::new(address.ip().to_string()).expect("digits");
     let port = c_int::from(address.port());
-    let (ready, listening) = std::sync::mpsc::channel();
-    std::thread::spawn(move || {
-        // SAFETY: the types are those of modbus.h and modbus-tcp.h, and the library outlives its functions.
-        // The context and the mapping belong to the library and are used by this thread only; libmodbus
-        // guarantees that a request fits into the buffer.
-        unsafe {
-            let symbol = |name: &[u8]| -> Symbol<'_, *const ()> {
-                library.get(name).expect("a function of libmodbus")
-            };
-            let new: New = std::mem::transmute(*symbol(b"modbus_new_tcp"));
-            let mapping: Mapping = std::mem::transmute(*symbol(b"modbus_mapping_new"));
-            let listen: Listen = std::mem::transmute(*symbol(b"modbus_tcp_listen"));
-            let accept: Accept = std::mem::transmute(*symbol(b"modbus_tcp_accept"));
-            let receive: Receive = std::mem::transmute(*symbol(b"modbus_receive"));
-            let reply: Reply = std::mem::transmute(*symbol(b"modbus_reply"));
-            let context = new(host.as_ptr(), port);
-            let tables = mapping(0, 0, 2048, 2048);
-            assert!(!context.is_null() && !tables.is_null());
-            let mut socket = listen(context, 1);
-            let _ = ready.send(socket >= 0);
-            accept(context, &raw mut socket);
-            let mut query = [0; LONGEST];
-            loop {
-                let length = receive(context, query.as_mut_ptr());
-                if length < 0 {
-                    break;
-                }
-                reply(context, query.as_ptr(), length, tables);
+    // SAFETY: the types are those of modbus.h and modbus-tcp.h, and the library outlives its functions.
+    // The context and the mapping belong to the library; libmodbus
+    // guarantees that a request fits into the buffer.
+    unsafe {
+        let symbol = |name: &[u8]| -> Symbol<'_, *const ()> {
+            library.get(name).expect("a function of libmodbus")
+        };
+        let new: New = std::mem::transmute(*symbol(b"modbus_new_tcp"));
+        let mapping: Mapping = std::mem::transmute(*symbol(b"modbus_mapping_new"));
+        let listen: Listen = std::mem::transmute(*symbol(b"modbus_tcp_listen"));
+        let accept: Accept = std::mem::transmute(*symbol(b"modbus_tcp_accept"));
+        let receive: Receive = std::mem::transmute(*symbol(b"modbus_receive"));
+        let reply: Reply = std::mem::transmute(*symbol(b"modbus_reply"));
+        let context = new(host.as_ptr(), port);
+        let tables = mapping(0, 0, 2048, 2048);
+        assert!(!context.is_null() && !tables.is_null());
+        let mut socket = listen(context, 1);
+        assert!(socket >= 0);
+        println!("{address}");
+        accept(context, &raw mut socket);
+        let mut query = [0; LONGEST];
+        loop {
+            let length = receive(context, query.as_mut_ptr());
+            if length < 0 {
+                break;
             }
+            reply(context, query.as_ptr(), length, tables);
         }
-    });
-    listening.recv().ok()?.then_some(address)
+    }
 }

@@ -141,6 +141,13 @@ public final class ByTurns {
                 }
                 return sum;
             }),
+            new Turn("tick.halves", count -> {
+                double sum = 0;
+                for (int i = 0; i < count; i++) {
+                    sum += driver.receiveAndSend();
+                }
+                return sum;
+            }),
             new Turn("tick.arrays", count -> {
                 double sum = 0;
                 for (int i = 0; i < count; i++) {

@@ -71,6 +71,13 @@ public class RigTickBench {
             return bus.exchange(now);
         }
 
+        int receiveAndSend() {
+            now += BenchCfg.TICK_NANOS;
+            int status = bus.receive(now);
+            bus.send();
+            return status;
+        }
+
         double tickByArray() {
             // Two of sixteen bits change at every tick.
             int at = pattern++ & BITS - 1;

@@ -350,6 +350,7 @@ mod tests {
         let mut slots = vec![Slot::from_real(1.0); 16];
         slots[9] = Slot::from_real(f64::NAN);
         assert_eq!(plan.word(&slots), None);
+        assert_eq!(plan.word(&slots[..15]), None, "too few slots");
         assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 1);
         assert_eq!(frame, [0xFF; 2], "the fail-safe value is 1");
         slots[9] = Slot::from_real(f64::INFINITY);

@@ -76,7 +76,7 @@ const CASES: &[Case] = &[
     },
     Case {
         name: "exchange.free.16.recorded",
-        tables: || format!("[record]\nfile = {:?}\n", recording()),
+        tables: || format!("[record]\nfile = '{}'\n", recording().display()),
         ..PLAIN
     },
     Case {

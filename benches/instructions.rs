@@ -2,12 +2,14 @@
 //! valgrind, and compares with `instructions.txt`.
 //!
 //! `instructions CASE TICKS` makes that many ticks; `instructions --list` gives the cases. Valgrind counts in the function
-//! `ticks` alone. The clock stands still meanwhile, so that a free bus has nothing to do. What the clock itself costs, and
-//! the way from Java, are in the times of `make bench`.
+//! `ticks` alone. The clock stands still meanwhile, so that a free bus has nothing to do. `doors/instructions.c` counts the
+//! entry through the C interface; `instructions --still` prints its driver.cfg, whose bus has a cycle of an hour. What the
+//! clock itself costs, and the way from Java, are in the times of `make bench`.
 #![allow(missing_docs, reason = "a bench")]
 
 use std::fmt::Write as _;
 use std::hint::black_box;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use tickbus::driver::Driver;
@@ -27,96 +29,119 @@ struct Case {
     is_halved: bool,
     /// Sets the values; they are got after the exchange then.
     set: Option<fn(&mut Copies, &mut [Slot])>,
+    /// Further tables of driver.cfg.
+    tables: fn() -> String,
 }
 
+impl Case {
+    /// The driver.cfg, for a bus and a program with this cycle.
+    fn driver_cfg(&self, cycle: &str) -> String {
+        format!(
+            "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+             scan = \"{cycle}\"\ncycle = \"{cycle}\"\nmode = \"{}\"\n{}{}",
+            self.mode,
+            (self.tables)(),
+            (self.signals)()
+        )
+    }
+}
+
+/// 16 BOOLs each way on a free bus, and nothing else.
+const PLAIN: Case = Case {
+    name: "exchange.free.16",
+    signals: || bits(16, 8, ""),
+    each_way: 16,
+    mode: "free",
+    is_halved: false,
+    set: None,
+    tables: String::new,
+};
+
 const CASES: &[Case] = &[
-    Case {
-        name: "exchange.free.16",
-        signals: || bits(16, 8, ""),
-        each_way: 16,
-        mode: "free",
-        is_halved: false,
-        set: None,
-    },
+    PLAIN,
     Case {
         name: "receive-send.free.16",
-        signals: || bits(16, 8, ""),
-        each_way: 16,
-        mode: "free",
         is_halved: true,
-        set: None,
+        ..PLAIN
+    },
+    Case {
+        name: "exchange.free.16.waiting",
+        tables: || four_faults("at = \"1000h\""),
+        ..PLAIN
+    },
+    Case {
+        name: "exchange.free.16.active",
+        tables: || four_faults(""),
+        ..PLAIN
+    },
+    Case {
+        name: "exchange.free.16.recorded",
+        tables: || format!("[record]\nfile = '{}'\n", recording().display()),
+        ..PLAIN
     },
     Case {
         name: "set-get.free.16",
-        signals: || bits(16, 8, ""),
-        each_way: 16,
-        mode: "free",
-        is_halved: false,
         set: Some(Copies::set_two),
+        ..PLAIN
     },
     Case {
         name: "set-get.stepped.16",
-        signals: || bits(16, 8, ""),
-        each_way: 16,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_two),
+        ..PLAIN
     },
     Case {
         name: "set-get.stepped.16.latched",
         signals: || bits(16, 8, "latch = \"rising\""),
-        each_way: 16,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_two),
+        ..PLAIN
     },
     Case {
         name: "reals.stepped.1000",
         signals: || reals(1_000),
         each_way: 1_000,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_two),
+        ..PLAIN
     },
     Case {
         name: "reals.stepped.10000",
         signals: || reals(10_000),
         each_way: 10_000,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_two),
+        ..PLAIN
     },
     Case {
         name: "bools.free.2000",
         signals: || bits(2_000, 1, ""),
         each_way: 2_000,
-        mode: "free",
-        is_halved: false,
         set: Some(Copies::set_all),
+        ..PLAIN
     },
     Case {
         name: "bools.free.2000.latched",
         signals: || bits(2_000, 1, "latch = \"rising\""),
         each_way: 2_000,
-        mode: "free",
-        is_halved: false,
         set: Some(Copies::set_all),
+        ..PLAIN
     },
     Case {
         name: "bools.stepped.2000",
         signals: || bits(2_000, 1, ""),
         each_way: 2_000,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_all),
+        ..PLAIN
     },
     Case {
         name: "bools.stepped.2000.latched",
         signals: || bits(2_000, 1, "latch = \"rising\""),
         each_way: 2_000,
         mode: "stepped",
-        is_halved: false,
         set: Some(Copies::set_all),
+        ..PLAIN
     },
 ];
 
@@ -133,6 +158,7 @@ fn main() {
                 println!("{}", case.name);
             }
         }
+        (Some(still), _) if still == "--still" => print!("{}", PLAIN.driver_cfg("1h")),
         // `cargo test` and `cargo bench` want to see that it runs.
         _ => {
             for case in CASES {
@@ -144,14 +170,8 @@ fn main() {
 
 /// Opens the driver of a case and makes `ticks` ticks.
 fn run(case: &Case, ticks: u64) {
-    let signals = (case.signals)();
-    let text = format!(
-        "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
-         scan = \"1ms\"\ncycle = \"1ms\"\nmode = \"{}\"\n{signals}",
-        case.mode
-    );
-    let config =
-        Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
+    let config = Config::parse("driver.cfg", &case.driver_cfg("1ms"), &tickbus::KINDS)
+        .unwrap_or_else(|why| panic!("{why}"));
     let clock = Manual::new();
     let mut driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
     let mut slots = driver.initial_slots();
@@ -171,6 +191,9 @@ fn run(case: &Case, ticks: u64) {
         }
     }
     self::ticks(case, ticks, &mut driver, &mut slots, time);
+    driver.close();
+    // Only a recorded case has the file.
+    let _ = std::fs::remove_file(recording());
 }
 
 /// Valgrind counts the instructions in this function.
@@ -259,6 +282,28 @@ fn bits(each_way: usize, in_a_byte: usize, latch: &str) -> String {
         }
     }
     text
+}
+
+/// Four faults of signals, two in each direction.
+fn four_faults(when: &str) -> String {
+    let mut text = String::new();
+    for (kind, signal) in [
+        ("stuck", "I 3"),
+        ("invert", "Q 2"),
+        ("invert", "I 4"),
+        ("stuck", "Q 11"),
+    ] {
+        let _ = write!(
+            text,
+            "[[fault]]\n{when}\nkind = \"{kind}\"\nsignal = \"{signal}\"\n"
+        );
+    }
+    text
+}
+
+/// A recording for this process alone. The recorder has room for more ticks than are counted.
+fn recording() -> PathBuf {
+    std::env::temp_dir().join(format!("instructions-{}.vcd", std::process::id()))
 }
 
 /// REALs each way, without gaps.

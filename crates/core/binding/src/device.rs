@@ -1,4 +1,8 @@
 //! An open driver with the buffer that it shares with the simulator.
+#![allow(
+    clippy::inline_always,
+    reason = "a tick is part of the function that the simulator calls, and pays for no further call"
+)]
 
 use std::sync::Arc;
 
@@ -40,7 +44,7 @@ impl<K> Device<K> {
     }
 
     /// One tick: sends the slots that the simulation wrote, fills those that it reads, and the header.
-    #[inline]
+    #[inline(always)]
     pub fn exchange(&mut self) -> Code {
         self.ticks += 1;
         let done = self.driver.exchange(self.time(), self.shared.slots());
@@ -48,7 +52,7 @@ impl<K> Device<K> {
     }
 
     /// The first half of a tick: fills the slots that the simulation reads, and the header.
-    #[inline]
+    #[inline(always)]
     pub fn receive(&mut self) -> Code {
         self.ticks += 1;
         let done = self.driver.receive(self.time(), self.shared.slots());
@@ -56,7 +60,7 @@ impl<K> Device<K> {
     }
 
     /// The second half of a tick: sends the slots that the simulation wrote.
-    #[inline]
+    #[inline(always)]
     pub fn send(&mut self) -> Code {
         let done = self.driver.send(self.shared.slots());
         self.tell(done)

@@ -36,7 +36,7 @@ impl Driver {
     /// # Panics
     ///
     /// When there are fewer slots than [`SlotMap::count`](super::SlotMap::count).
-    #[inline]
+    #[inline(always)]
     pub fn exchange(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
         let time = time.into();
         self.prepare(slots);
@@ -62,11 +62,12 @@ impl Driver {
                 let sent = self.put::<W>(tick.now, slots);
                 let (found, done) = self.take::<W>(&tick, slots);
                 tick.taken = self.lap::<W>(tick.now);
-                (found, sent.and(done))
+                // Without an error to carry, the result of a free tick stays in registers.
+                (found, if W::IS_STEPPED { sent.and(done) } else { done })
             }
             Err(error) => (self.last, Err(error)),
         };
-        let found = self.result(found, done);
+        let found = self.result::<W>(found, done);
         self.end::<W>(tick, found, slots);
         found
     }
@@ -80,7 +81,7 @@ impl Driver {
     /// # Panics
     ///
     /// As [`exchange`](Self::exchange).
-    #[inline]
+    #[inline(always)]
     pub fn receive(&mut self, time: impl Into<Option<Nanos>>, slots: &mut [Slot]) -> Exchange {
         let time = time.into();
         self.prepare(slots);
@@ -109,7 +110,7 @@ impl Driver {
             Err(error) => (self.last, Err(error)),
         };
         self.tick = Some(tick);
-        self.result(found, done)
+        self.result::<W>(found, done)
     }
 
     /// Ends the tick that [`receive`](Self::receive) began: sends this end's values from `slots`. Returns the result of
@@ -121,7 +122,7 @@ impl Driver {
     /// # Panics
     ///
     /// As [`exchange`](Self::exchange).
-    #[inline]
+    #[inline(always)]
     pub fn send(&mut self, slots: &mut [Slot]) -> Exchange {
         self.check(slots);
         match self.shape {
@@ -220,11 +221,11 @@ impl Driver {
             self.first_now = now;
         }
         let given = asked.or(self.given);
-        let time = given.unwrap_or(if W::IS_STEPPED {
-            self.last.granted
-        } else {
-            now - self.first_now
-        });
+        let time = match given {
+            Some(given) => given,
+            None if W::IS_STEPPED => self.last.granted,
+            None => now - self.first_now,
+        };
         if is_first {
             self.first_time = time;
         }
@@ -260,7 +261,7 @@ impl Driver {
     /// The simulation has handed its values over.
     #[inline(always)]
     fn handed_over<W: Work>(&mut self, slots: &mut [Slot]) {
-        if W::HAS_EXTRAS && self.extras.is_busy() {
+        if W::HAS_EXTRAS && self.extras.changes_slots() {
             self.extras.handed_over(slots);
         }
     }
@@ -279,13 +280,13 @@ impl Driver {
     /// Sends: the first half.
     #[inline(always)]
     fn put<W: Work>(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), BusError> {
-        let is_busy = W::HAS_EXTRAS && self.extras.is_busy();
-        if is_busy {
+        let is_changing = W::HAS_EXTRAS && self.extras.changes_slots();
+        if is_changing {
             self.extras.beat(now, slots);
             self.extras.sending(slots);
         }
-        self.write::<W>(now, slots);
-        if is_busy {
+        self.write(now, slots);
+        if is_changing {
             self.extras.sent(slots);
         }
         match &mut self.line {
@@ -298,10 +299,10 @@ impl Driver {
 
     /// Hands the values of all stations to the bus at once.
     #[inline(always)]
-    fn write<W: Work>(&mut self, now: Nanos, slots: &[Slot]) {
+    fn write(&mut self, now: Nanos, slots: &[Slot]) {
         let (image, stations) = (&mut self.image, &self.stations);
         let is_written = match &stations[..] {
-            [station] if !W::HAS_EXTRAS => image.write_word(now, station.encode.word(slots)),
+            [station] => image.write_word(now, station.encode.word(slots)),
             stations => image.write_words(now, |index| stations[index].encode.word(slots)),
         };
         if !is_written {
@@ -330,7 +331,7 @@ impl Driver {
         let image = &mut self.image;
         image.update();
         match &mut self.stations[..] {
-            [station] if !W::HAS_EXTRAS => {
+            [station] => {
                 age = station.receive(image, (now, self.max_age), slots, &self.slots);
                 code = station.status;
             }
@@ -351,7 +352,7 @@ impl Driver {
         {
             (code, age) = replay.show(age, image, &mut self.stations, slots);
         }
-        if W::HAS_EXTRAS && self.extras.is_busy() {
+        if W::HAS_EXTRAS && self.extras.changes_slots() {
             self.extras.received(slots);
         }
         let found = Exchange {
@@ -365,10 +366,10 @@ impl Driver {
 
     /// Keeps the result of a call on the bus that found `found`, and returns it.
     #[inline(always)]
-    fn result(&mut self, found: Exchange, done: Result<(), BusError>) -> Exchange {
+    fn result<W: Work>(&mut self, found: Exchange, done: Result<(), BusError>) -> Exchange {
         let found = match done {
-            Ok(()) => found,
-            Err(error) => self.failed(found, &error),
+            Err(error) if W::IS_STEPPED => self.failed(found, &error),
+            _ => found,
         };
         // Field by field: loading the whole struct right after partial stores would stall.
         self.last.code = found.code;

@@ -22,6 +22,8 @@ pub(super) struct Extras {
     faults: Option<Faults>,
     /// True if there is anything to do; an end without extra work pays for this check only.
     is_busy: bool,
+    /// True if anything changes the slots in this tick: faults that wait for their moment do not.
+    changes_slots: bool,
 }
 
 impl Extras {
@@ -49,11 +51,27 @@ impl Extras {
         self.is_busy
     }
 
+    /// Returns true if the slots are to be changed around the rest of this tick.
+    #[inline]
+    pub(super) const fn changes_slots(&self) -> bool {
+        self.changes_slots
+    }
+
     /// Notes whether there is anything left to do: called at the end of a busy tick, whose faults may be over.
-    #[cold]
+    #[inline(never)]
     pub(super) fn rest(&mut self) {
         let is_faulty = || self.faults.as_ref().is_some_and(|faults| !faults.is_idle());
-        self.is_busy = self.reflexes.is_some() || !self.beats.is_empty() || is_faulty();
+        self.is_busy = self.works_on_every_tick() || is_faulty();
+        self.note_changes();
+    }
+
+    const fn works_on_every_tick(&self) -> bool {
+        self.reflexes.is_some() || !self.beats.is_empty()
+    }
+
+    fn note_changes(&mut self) {
+        let is_bent = || self.faults.as_ref().is_some_and(Faults::change_values);
+        self.changes_slots = self.works_on_every_tick() || is_bent();
     }
 
     /// Makes room for faults, so that a tick need not allocate memory for them.
@@ -99,7 +117,7 @@ impl Extras {
     }
 
     /// Runs first in the sending half, when the simulation hands its values over.
-    #[cold]
+    #[inline(never)]
     pub(super) fn handed_over(&mut self, slots: &mut [Slot]) {
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.sending(slots);
@@ -107,15 +125,16 @@ impl Extras {
     }
 
     /// Runs when a tick begins.
-    #[cold]
+    #[inline(never)]
     pub(super) fn begin_tick(&mut self, moment: TickTime, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
             faults.begin_tick(moment, slots);
         }
+        self.note_changes();
     }
 
     /// Runs just before [`sending`](Self::sending): counts up the heartbeats that are due.
-    #[cold]
+    #[inline(never)]
     pub(super) fn beat(&mut self, now: Nanos, slots: &mut [Slot]) {
         for beat in &mut self.beats {
             beat.beat(now, slots);
@@ -123,7 +142,7 @@ impl Extras {
     }
 
     /// Runs just before the slots are sent.
-    #[cold]
+    #[inline(never)]
     pub(super) fn sending(&mut self, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
             faults.sending(slots);
@@ -131,7 +150,7 @@ impl Extras {
     }
 
     /// Runs after the slots were sent.
-    #[cold]
+    #[inline(never)]
     pub(super) fn sent(&mut self, slots: &mut [Slot]) {
         if let Some(faults) = &mut self.faults {
             faults.sent(slots);
@@ -142,7 +161,7 @@ impl Extras {
     }
 
     /// Runs when the slots contain the received values.
-    #[cold]
+    #[inline(never)]
     pub(super) fn received(&mut self, slots: &mut [Slot]) {
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.received(slots);

@@ -192,4 +192,48 @@ mod tests {
         assert_eq!(slots[1], Slot::from_real(0.0));
         driver.close();
     }
+
+    #[test]
+    fn a_fault_that_waits_changes_its_signal_in_its_ticks_alone_in_both_directions() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nmode = \"stepped\"\n\
+                    program = \"mirror\"\nscan = \"1ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IB0\"\n\
+                    [[signal]]\nname = \"b\"\naddress = \"%QB0\"\n";
+        let config =
+            Config::parse("driver.cfg", text, &crate::KINDS).unwrap_or_else(|why| panic!("{why}"));
+        for (is_halved, signal) in [(false, "a"), (false, "b"), (true, "a"), (true, "b")] {
+            let mut driver = Driver::open(config.clone(), Manual::new()).expect("opens");
+            let mut slots = driver.initial_slots();
+            slots[0] = Slot::from_real(3.0);
+            let fault = format!(
+                "kind = \"stuck\"\nsignal = \"{signal}\"\nvalue = 9\ntick = 8\nticks = 4\n"
+            );
+            driver
+                .inject_text(&fault)
+                .unwrap_or_else(|why| panic!("{why}"));
+            let seen = (1..=20).map(|tick| {
+                let time = Nanos::from_millis(tick);
+                if is_halved {
+                    driver.receive(time, &mut slots);
+                    driver.send(&mut slots);
+                } else {
+                    driver.exchange(time, &mut slots);
+                }
+                assert_eq!(slots[0], Slot::from_real(3.0), "the simulation's own");
+                slots[1]
+            });
+            let seen: Vec<Slot> = seen.collect();
+            let [bent, sound] = [9.0, 3.0].map(Slot::from_real);
+            let count = |of| seen[5..].iter().filter(|value| **value == of).count();
+            let (bent, sound) = (count(bent), count(sound));
+            assert_eq!(
+                (bent, sound),
+                (4, 11),
+                "{signal}, halved: {is_halved}: {seen:?}"
+            );
+            if signal == "b" {
+                assert_eq!(seen[7..11], [Slot::from_real(9.0); 4], "at once");
+            }
+            driver.close();
+        }
+    }
 }

@@ -51,7 +51,9 @@ pub trait Clock: Send + Sync + fmt::Debug {
 ///
 /// The tick reads this clock as well, by a [`QuickClock`](crate::QuickClock): on tickbus' platforms that is no system
 /// call (on Linux some 25 ns in the vDSO). A time kept in memory by another thread would cost less, but on a busy
-/// machine it would lag by the tens of milliseconds for which that thread is not scheduled.
+/// machine it would lag by the tens of milliseconds for which that thread is not scheduled. Nor is the kernel's coarse
+/// clock (`CLOCK_MONOTONIC_COARSE`) read: it lags while the one processor that advances it is busy or, in a virtual
+/// machine, is not scheduled, by 15 ms where its resolution is 4 ms, and nothing bounds that.
 ///
 /// The clock stands still while the computer sleeps.
 #[derive(Debug)]

@@ -62,6 +62,15 @@ impl Rig {
             std::thread::yield_now();
         }
     }
+
+    /// Returns what the other end received last: the bytes, and the number of edges of all signals.
+    fn arrived(&mut self) -> (Vec<u8>, Vec<u32>) {
+        let (tick, ..) = &mut self.peer;
+        tick.update();
+        let mut edges = Vec::new();
+        tick.edges(0, |_, count| edges.push(count));
+        (tick.latest(0).to_vec(), edges)
+    }
 }
 
 /// A clock that is 1 ms later at each look.
@@ -133,7 +142,8 @@ fn a_time_that_is_refused_is_not_the_one_before_which_no_other_counts() {
 #[test]
 fn an_exchange_with_nothing_else_to_do_comes_to_the_same_as_any_other() {
     let mut rigs = ["exchanges simply", "exchanges otherwise"].map(Rig::new);
-    let (mut codes, mut random) = ([0; 3], 1_u64);
+    // Per kind of call, how often each status was found.
+    let (mut codes, mut random) = ([[0; 3]; 3], 1_u64);
     for step in 0..1_000 {
         random = random
             .wrapping_mul(6_364_136_223_846_793_005)
@@ -146,10 +156,11 @@ fn an_exchange_with_nothing_else_to_do_comes_to_the_same_as_any_other() {
         // Sometimes longer than data stay valid.
         let pause = Nanos::from_millis([0, 0, 1, 1, 1, 30][draw(30, 6)]);
         let sent = (draw(34, 2) == 0).then_some(draw(36, 256).to_le_bytes()[0]);
-        let (is_halved, is_answered) = (draw(44, 8) == 0, draw(47, 3) != 0);
+        let (is_halved, answers) = (draw(44, 3) != 0, draw(47, 3));
         let seen = [0, 1].map(|index| {
             let rig = &mut rigs[index];
             rig.pass(pause, sent);
+            let arrived = rig.arrived();
             let Rig { driver, slots, .. } = rig;
             let is_plain = step == 0 || driver.shape == Shape::Plain;
             assert!(is_plain || index == 1, "else nothing is compared");
@@ -158,30 +169,33 @@ fn an_exchange_with_nothing_else_to_do_comes_to_the_same_as_any_other() {
             }
             slots[bit] = Slot::from_real(level);
             let found = if is_halved {
-                let found = driver.receive(time, slots);
-                if is_answered {
+                let received = driver.receive(time, slots);
+                // Further answers in the same tick send other values.
+                let sent = (0..answers).map(|_| {
+                    slots[bit] = Slot::from_real(1.0 - slots[bit].real());
                     driver.send(slots)
-                } else {
-                    found
-                }
+                });
+                sent.last().unwrap_or(received)
             } else {
                 driver.exchange(time, slots)
             };
-            (found, slots.iter().map(|slot| slot.0).collect::<Vec<_>>())
+            let slots: Vec<_> = slots.iter().map(|slot| slot.0).collect();
+            (found, slots, arrived)
         });
         assert_eq!(seen[0], seen[1], "step {step}");
         let [one, other] = [0, 1].map(|index: usize| rigs[index].driver.counters);
         assert_eq!(one, other, "step {step}");
-        let open = u64::from(is_halved && !is_answered);
+        let open = u64::from(is_halved && answers == 0);
         assert_eq!(
             one.fresh + one.unchanged + one.stale + open,
             one.ticks,
             "each tick is counted when it ends"
         );
-        codes[usize::try_from(seen[0].0.code.code()).expect("no error")] += 1;
+        let kind = if is_halved { answers.min(1) } else { 2 };
+        codes[kind][usize::try_from(seen[0].0.code.code()).expect("no error")] += 1;
     }
     assert!(
-        codes.iter().all(|count| *count > 20),
+        codes.as_flattened().iter().all(|count| *count > 20),
         "all kinds of ticks: {codes:?}"
     );
     // The bus thread decides when to look at its line.

@@ -28,6 +28,8 @@ pub struct Slots<'a> {
 #[derive(Debug)]
 pub struct Faults {
     entries: Vec<Entry>,
+    /// True if at least one fault of a value is active since the tick began.
+    change_values: bool,
     board: Arc<FaultBoard>,
     /// How long the simulation has run, and its time at the last tick.
     time: Nanos,
@@ -118,12 +120,19 @@ enum Kind {
     Line,
 }
 
+impl Entry {
+    fn changes_values(&self) -> bool {
+        self.schedule.is_active() && !matches!(self.kind, Kind::Line)
+    }
+}
+
 impl Faults {
     /// An empty list, which publishes its state on `board`.
     pub fn new(board: Arc<FaultBoard>) -> Self {
         Self {
             // Forgotten faults may leave the list a little later than new ones join it.
             entries: Vec::with_capacity(2 * LIMIT),
+            change_values: false,
             board,
             given: Nanos::ZERO,
             time: Nanos::ZERO,
@@ -161,6 +170,13 @@ impl Faults {
         entries.all(|entry| entry.cell.phase() == Phase::Over)
     }
 
+    /// Returns true if a fault changes values in this tick. Otherwise [`sending`](Self::sending), [`sent`](Self::sent)
+    /// and [`received`](Self::received) have nothing to do.
+    #[inline]
+    pub const fn change_values(&self) -> bool {
+        self.change_values
+    }
+
     /// Ends a fault at the next tick; false if no fault has this number.
     pub fn end(&mut self, id: u32) -> bool {
         let found = self.entries.iter_mut().find(|entry| entry.id == id);
@@ -179,6 +195,7 @@ impl Faults {
                 self.board.enter(&entry.cell, Phase::Over, moment);
             }
         }
+        self.change_values = false;
         self.board.restart();
         (self.time, self.given) = (Nanos::ZERO, Nanos::ZERO);
     }
@@ -195,13 +212,18 @@ impl Faults {
             time: self.time,
             ..moment
         };
-        for entry in self.entries.iter_mut().rev() {
-            if let Kind::Read(fault) = &mut entry.kind {
-                fault.restore(slots);
+        // Only a fault that was active in the previous tick has changed anything.
+        if std::mem::take(&mut self.change_values) {
+            for entry in self.entries.iter_mut().rev() {
+                if let Kind::Read(fault) = &mut entry.kind {
+                    fault.restore(slots);
+                }
             }
         }
         for entry in &mut self.entries {
-            let phase = match entry.schedule.step(moment, slots) {
+            let step = entry.schedule.step(moment, slots);
+            self.change_values |= entry.changes_values();
+            let phase = match step {
                 Step::Nothing => continue,
                 Step::Begins => Phase::Active,
                 Step::Pauses => Phase::Waiting,

@@ -101,6 +101,25 @@ impl End {
 fn nothing(_: &mut [Slot]) {}
 
 #[test]
+fn values_are_changed_only_while_a_fault_of_a_signal_is_active() {
+    for (kind, is_of_signal) in [("invert\"\nsignal = \"run", true), ("link-down", false)] {
+        let mut end = End::new();
+        end.inject(&format!("kind = \"{kind}\"\ntick = 3\nticks = 2"));
+        let seen = [(); 6].map(|()| {
+            end.tick(nothing);
+            end.faults.change_values()
+        });
+        let active = [false, false, is_of_signal, is_of_signal, false, false];
+        assert_eq!(seen, active, "{kind}");
+    }
+    let mut end = End::new();
+    end.inject("kind = \"invert\"\nsignal = \"run\"");
+    end.tick(nothing);
+    end.faults.restart();
+    assert!(!end.faults.change_values());
+}
+
+#[test]
 fn what_is_written_is_bent_on_its_way_out_only() {
     for (text, sent) in [
         ("kind = \"stuck\"\nsignal = \"level\"\nvalue = 7.5", 7.5),

@@ -221,7 +221,17 @@ fn pack(slots: &[Slot; 8], seen: &mut i64x2) -> u8 {
     let pairs = [pair(0), pair(2), pair(4), pair(6)];
     *seen |= (pairs[0] | pairs[1]) | (pairs[2] | pairs[3]);
     // The upper halves show whether a value is zero.
-    let upper = slots.map(|slot| (slot.signed() >> 32) as i32);
+    let upper = |at: usize| (slots[at].signed() >> 32) as i32;
+    let upper = [
+        upper(0),
+        upper(1),
+        upper(2),
+        upper(3),
+        upper(4),
+        upper(5),
+        upper(6),
+        upper(7),
+    ];
     let words = i16x8::from_i32x8_saturate(i32x8::new(upper));
     let [byte, ..] = (!words.cmp_eq(i16x8::ZERO).move_mask()).to_le_bytes();
     byte
@@ -340,6 +350,7 @@ mod tests {
         let mut slots = vec![Slot::from_real(1.0); 16];
         slots[9] = Slot::from_real(f64::NAN);
         assert_eq!(plan.word(&slots), None);
+        assert_eq!(plan.word(&slots[..15]), None, "too few slots");
         assert_eq!(plan.encode(&slots, &mut frame).not_a_number, 1);
         assert_eq!(frame, [0xFF; 2], "the fail-safe value is 1");
         slots[9] = Slot::from_real(f64::INFINITY);

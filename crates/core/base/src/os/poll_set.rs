@@ -1,11 +1,21 @@
 //! Waiting for sockets, a deadline and a stop, all at once.
 
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+mod each;
+#[cfg(any(target_os = "linux", target_os = "android"))]
+mod epoll;
+
 use std::fmt;
 use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 
 use rustix::fd::AsFd;
+
+#[cfg(not(any(target_os = "linux", target_os = "android")))]
+use each as watch;
+#[cfg(any(target_os = "linux", target_os = "android"))]
+use epoll as watch;
 
 use super::poll::wake;
 use super::pollable::{Pollable, Source};
@@ -169,216 +179,6 @@ impl Drop for PollSet {
     fn drop(&mut self) {
         if self.system.is_some() {
             self.stop.set_waker(None);
-        }
-    }
-}
-
-/// Linux reports the ready sockets without checking each of them.
-#[cfg(any(target_os = "linux", target_os = "android"))]
-mod watch {
-    use rustix::buffer::spare_capacity;
-    use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
-    use rustix::fd::OwnedFd;
-    use rustix::io::Errno;
-
-    use rustix::event::{PollFd, PollFlags};
-
-    use super::{AsFd, Duration, Interest, Ready, io};
-    use crate::os::poll::{poll_once, timespec};
-
-    /// Sockets reported by one wait; further ones are reported by the next.
-    const MOST: usize = 256;
-
-    /// Waits from this span on need not be exact, since they end early.
-    const LONG: Duration = Duration::from_millis(100);
-
-    /// The margin: more than epoll rounds up.
-    const EARLY: Duration = Duration::from_millis(2);
-
-    pub(super) struct Watch {
-        epoll: OwnedFd,
-        events: Vec<Event>,
-    }
-
-    const fn flags(interest: Interest) -> EventFlags {
-        match interest {
-            Interest::Read => EventFlags::IN,
-            Interest::Write => EventFlags::OUT,
-            Interest::ReadWrite => EventFlags::IN.union(EventFlags::OUT),
-        }
-    }
-
-    const fn data(key: usize) -> EventData {
-        EventData::new_u64(key as u64)
-    }
-
-    impl Watch {
-        pub(super) fn new() -> io::Result<Self> {
-            Ok(Self {
-                epoll: epoll::create(CreateFlags::CLOEXEC)?,
-                events: Vec::with_capacity(MOST),
-            })
-        }
-
-        pub(super) fn add(
-            &mut self,
-            key: usize,
-            socket: &impl AsFd,
-            interest: Interest,
-        ) -> io::Result<()> {
-            Ok(epoll::add(&self.epoll, socket, data(key), flags(interest))?)
-        }
-
-        pub(super) fn change(
-            &mut self,
-            key: usize,
-            socket: &impl AsFd,
-            interest: Interest,
-        ) -> io::Result<()> {
-            Ok(epoll::modify(
-                &self.epoll,
-                socket,
-                data(key),
-                flags(interest),
-            )?)
-        }
-
-        pub(super) fn remove(&mut self, _key: usize, socket: &impl AsFd) {
-            // This fails only for a socket that was never added.
-            let _ = epoll::delete(&self.epoll, socket);
-        }
-
-        pub(super) fn wait(
-            &mut self,
-            patience: Option<Duration>,
-            ready: &mut Vec<Ready>,
-        ) -> io::Result<()> {
-            let patience = match patience {
-                // Nobody notices that a long wait ends a little early, and this takes only one system call.
-                Some(span) if span >= LONG => Some(span.saturating_sub(EARLY)),
-                // epoll counts whole milliseconds; `ppoll`, which waits for epoll, has a finer resolution.
-                Some(span) => {
-                    if !span.is_zero() {
-                        let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
-                        poll_once(&mut epoll, Some(span))?;
-                    }
-                    Some(Duration::ZERO)
-                }
-                None => None,
-            };
-            let patience = patience.map(timespec);
-            self.events.clear();
-            match epoll::wait(
-                &self.epoll,
-                spare_capacity(&mut self.events),
-                patience.as_ref(),
-            ) {
-                Ok(_) => {}
-                // A signal interrupted the wait.
-                Err(Errno::INTR) => return Ok(()),
-                Err(error) => return Err(error.into()),
-            }
-            let broken = EventFlags::HUP | EventFlags::ERR;
-            ready.extend(self.events.iter().map(|event| {
-                // Fields of a packed struct have to be copied out before they are borrowed.
-                let (flags, data) = (event.flags, event.data);
-                Ready {
-                    key: usize::try_from(data.u64()).unwrap_or(super::WAKE),
-                    is_readable: flags.intersects(EventFlags::IN | broken),
-                    is_writable: flags.intersects(EventFlags::OUT | broken),
-                }
-            }));
-            Ok(())
-        }
-    }
-}
-
-/// Other systems check every socket, through the set's own handles.
-#[cfg(not(any(target_os = "linux", target_os = "android")))]
-mod watch {
-    use rustix::event::{PollFd, PollFlags};
-
-    use super::{AsFd, Duration, Interest, Ready, io};
-    use crate::os::poll::poll_once;
-
-    #[cfg(unix)]
-    type Owned = std::os::fd::OwnedFd;
-    #[cfg(not(unix))]
-    type Owned = std::os::windows::io::OwnedSocket;
-
-    pub(super) struct Watch {
-        sockets: Vec<(usize, Owned, Interest)>,
-    }
-
-    const fn flags(interest: Interest) -> PollFlags {
-        match interest {
-            Interest::Read => PollFlags::IN,
-            Interest::Write => PollFlags::OUT,
-            Interest::ReadWrite => PollFlags::IN.union(PollFlags::OUT),
-        }
-    }
-
-    impl Watch {
-        #[expect(clippy::unnecessary_wraps, reason = "as on Linux")]
-        pub(super) fn new() -> io::Result<Self> {
-            Ok(Self {
-                sockets: Vec::new(),
-            })
-        }
-
-        pub(super) fn add(
-            &mut self,
-            key: usize,
-            socket: &impl AsFd,
-            interest: Interest,
-        ) -> io::Result<()> {
-            self.sockets
-                .push((key, socket.as_fd().try_clone_to_owned()?, interest));
-            Ok(())
-        }
-
-        #[expect(clippy::unnecessary_wraps, reason = "as on Linux")]
-        pub(super) fn change(
-            &mut self,
-            key: usize,
-            _socket: &impl AsFd,
-            interest: Interest,
-        ) -> io::Result<()> {
-            for entry in &mut self.sockets {
-                if entry.0 == key {
-                    entry.2 = interest;
-                }
-            }
-            Ok(())
-        }
-
-        pub(super) fn remove(&mut self, key: usize, _socket: &impl AsFd) {
-            self.sockets.retain(|entry| entry.0 != key);
-        }
-
-        pub(super) fn wait(
-            &mut self,
-            patience: Option<Duration>,
-            ready: &mut Vec<Ready>,
-        ) -> io::Result<()> {
-            let mut all: Vec<PollFd<'_>> = self
-                .sockets
-                .iter()
-                .map(|(_, socket, interest)| PollFd::new(socket, flags(*interest)))
-                .collect();
-            poll_once(&mut all, patience)?;
-            let broken = PollFlags::HUP | PollFlags::ERR;
-            for ((key, ..), fd) in self.sockets.iter().zip(&all) {
-                let found = Ready {
-                    key: *key,
-                    is_readable: fd.revents().intersects(PollFlags::IN | broken),
-                    is_writable: fd.revents().intersects(PollFlags::OUT | broken),
-                };
-                if found.is_readable || found.is_writable {
-                    ready.push(found);
-                }
-            }
-            Ok(())
         }
     }
 }

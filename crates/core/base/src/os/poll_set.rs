@@ -1,6 +1,6 @@
 //! Waiting for sockets, a deadline and a stop, all at once.
 
-#[cfg(not(any(target_os = "linux", target_os = "android")))]
+#[cfg(any(test, not(any(target_os = "linux", target_os = "android"))))]
 mod each;
 #[cfg(any(target_os = "linux", target_os = "android"))]
 mod epoll;

@@ -12,6 +12,8 @@ type Owned = std::os::windows::io::OwnedSocket;
 
 pub(super) struct Watch {
     sockets: Vec<(usize, Owned, Interest)>,
+    /// The list for the system, empty between waits: its memory is kept.
+    polled: Vec<PollFd<'static>>,
 }
 
 const fn flags(interest: Interest) -> PollFlags {
@@ -27,6 +29,7 @@ impl Watch {
     pub(super) fn new() -> io::Result<Self> {
         Ok(Self {
             sockets: Vec::new(),
+            polled: Vec::new(),
         })
     }
 
@@ -65,11 +68,9 @@ impl Watch {
         patience: Option<Duration>,
         ready: &mut Vec<Ready>,
     ) -> io::Result<()> {
-        let mut all: Vec<PollFd<'_>> = self
-            .sockets
-            .iter()
-            .map(|(_, socket, interest)| PollFd::new(socket, flags(*interest)))
-            .collect();
+        let mut all = emptied(std::mem::take(&mut self.polled));
+        let sockets = self.sockets.iter();
+        all.extend(sockets.map(|(_, socket, interest)| PollFd::new(socket, flags(*interest))));
         poll_once(&mut all, patience)?;
         let broken = PollFlags::HUP | PollFlags::ERR;
         for ((key, ..), fd) in self.sockets.iter().zip(&all) {
@@ -82,6 +83,53 @@ impl Watch {
                 ready.push(found);
             }
         }
+        self.polled = emptied(all);
         Ok(())
+    }
+}
+
+/// An empty list in the memory of `list`, for entries of another lifetime: collecting a list's own entries keeps its
+/// memory.
+fn emptied<'a>(mut list: Vec<PollFd<'_>>) -> Vec<PollFd<'a>> {
+    list.clear();
+    list.into_iter()
+        .map(|_| unreachable!("it is empty"))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::UdpSocket;
+
+    use super::*;
+
+    #[test]
+    fn those_that_are_ready_are_reported_without_a_new_list() {
+        let socket = || UdpSocket::bind("127.0.0.1:0").expect("a free port");
+        let (silent, heard) = (socket(), socket());
+        let mut watch = Watch::new().expect("it needs nothing");
+        watch.add(3, &silent, Interest::Read).expect("it is open");
+        watch.add(4, &heard, Interest::Read).expect("it is open");
+        let mut ready = Vec::new();
+        watch
+            .wait(Some(Duration::ZERO), &mut ready)
+            .expect("it waits");
+        assert!(ready.is_empty(), "nothing was sent");
+        let list = watch.polled.as_ptr();
+        let address = heard.local_addr().expect("it is bound");
+        silent.send_to(&[1], address).expect("it is local");
+        for _ in 0..3 {
+            ready.clear();
+            watch.wait(None, &mut ready).expect("it waits");
+            assert_eq!(ready.iter().map(|ready| ready.key).collect::<Vec<_>>(), [4]);
+        }
+        watch
+            .change(4, &heard, Interest::ReadWrite)
+            .expect("it is open");
+        watch.remove(3, &silent);
+        ready.clear();
+        watch.wait(None, &mut ready).expect("it waits");
+        assert!(ready[0].is_readable && ready[0].is_writable);
+        assert_eq!(watch.polled.as_ptr(), list, "in the same memory");
     }
 }

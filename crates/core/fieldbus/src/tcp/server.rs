@@ -1,5 +1,6 @@
 //! A server for many clients, for any protocol that implements [`Service`].
 
+use std::collections::BTreeSet;
 use std::io::{self, Read as _, Write as _};
 use std::net::SocketAddr;
 
@@ -136,9 +137,12 @@ struct Clients<C> {
     count: usize,
     /// The number of clients that have sent a valid telegram.
     speakers: usize,
-    /// The number of clients that owe something: the rest of a telegram, or the reading of an answer.
-    awaited: usize,
+    awaited: Awaited,
 }
+
+/// The clients that owe something, the rest of a telegram or the reading of an answer: since when, and their places. A
+/// turn looks at the first one only.
+type Awaited = BTreeSet<(Nanos, usize)>;
 
 struct Client<C> {
     stream: TcpStream,
@@ -162,7 +166,7 @@ impl<C> Default for Clients<C> {
             free: Vec::new(),
             count: 0,
             speakers: 0,
-            awaited: 0,
+            awaited: Awaited::new(),
         }
     }
 }
@@ -183,7 +187,9 @@ impl<C> Clients<C> {
         self.free.push(place);
         self.count -= 1;
         self.speakers -= usize::from(client.speaks);
-        self.awaited -= usize::from(client.waits_since.is_some());
+        if let Some(since) = client.waits_since {
+            self.awaited.remove(&(since, place));
+        }
         Some(client)
     }
 
@@ -246,10 +252,8 @@ impl<S: Service> Server<'_, S> {
         if let Some((since, _)) = self.gone {
             deadline = deadline.min(since + port.max_age());
         }
-        if self.clients.awaited > 0 {
-            let waits = self.clients.iter();
-            let since = waits.filter_map(|(_, client)| client.waits_since).min();
-            deadline = deadline.min(since.map_or(Nanos::MAX, |since| since + self.limits.patience));
+        if let Some((since, _)) = self.clients.awaited.first() {
+            deadline = deadline.min(*since + self.limits.patience);
         }
         deadline
     }
@@ -268,8 +272,8 @@ impl<S: Service> Server<'_, S> {
         if !client.unsent.is_empty() {
             if is_writable && client.write_on()? {
                 // The incomplete telegram is timed from now on, since the server did not read from the client before.
-                client.waits_since = (!client.begun.is_empty()).then_some(now);
-                self.clients.awaited -= usize::from(client.waits_since.is_none());
+                let since = (!client.begun.is_empty()).then_some(now);
+                client.owes_since(since, place, &mut self.clients.awaited);
                 let client = &*client;
                 let heard = self.set.change(place, &client.stream, Interest::Read);
                 heard.map_err(|error| no_wait(&error))?;
@@ -289,7 +293,7 @@ impl<S: Service> Server<'_, S> {
         if !port.is_up(now) {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
-            self.clients.awaited -= usize::from(client.waits_since.take().is_some());
+            client.owes_since(None, place, &mut self.clients.awaited);
             self.service.unheard(&mut client.state, now, port);
             return Ok(());
         }
@@ -309,7 +313,8 @@ impl<S: Service> Server<'_, S> {
         if telegrams > 0 {
             client.heard = now;
             // The incomplete part belongs to another telegram, which has its own time.
-            client.waits_since = client.waits_since.map(|_| now);
+            let since = client.waits_since.map(|_| now);
+            client.owes_since(since, place, &mut self.clients.awaited);
             if !client.speaks {
                 client.speaks = true;
                 self.gone = None;
@@ -349,28 +354,20 @@ impl<S: Service> Server<'_, S> {
         }
         let waits = !client.begun.is_empty() || !client.unsent.is_empty();
         if waits != client.waits_since.is_some() {
-            client.waits_since = waits.then_some(now);
-            self.clients.awaited = if waits {
-                self.clients.awaited + 1
-            } else {
-                self.clients.awaited - 1
-            };
+            client.owes_since(waits.then_some(now), place, &mut self.clients.awaited);
         }
         Ok(())
     }
 
     /// Disconnects clients that have kept the server waiting too long.
     fn check_timeouts(&mut self, now: Nanos, port: &mut Port) {
-        if self.clients.awaited == 0 {
-            return;
-        }
         let patience = self.limits.patience;
-        loop {
-            let late = self.clients.iter().find_map(|(place, client)| {
-                let waited = now - client.waits_since?;
-                (waited >= patience).then(|| (place, client.too_slow(patience)))
-            });
-            let Some((place, error)) = late else { break };
+        while let Some((since, place)) = self.clients.awaited.first().copied() {
+            if now - since < patience {
+                break;
+            }
+            let client = self.clients.places[place].as_ref();
+            let error = client.expect("it owes something").too_slow(patience);
             self.drop_client(place, &error, port);
         }
     }
@@ -492,6 +489,20 @@ impl<S: Service> Server<'_, S> {
 }
 
 impl<C> Client<C> {
+    /// The client at `place` owes something since then, or nothing any more.
+    fn owes_since(&mut self, since: Option<Nanos>, place: usize, awaited: &mut Awaited) {
+        let before = std::mem::replace(&mut self.waits_since, since);
+        if before == since {
+            return;
+        }
+        if let Some(before) = before {
+            awaited.remove(&(before, place));
+        }
+        if let Some(since) = since {
+            awaited.insert((since, place));
+        }
+    }
+
     /// Takes in `bytes` and answers the telegrams that they complete into `reply`. Returns the number of
     /// telegrams.
     fn hear<S: Service<Client = C>>(

@@ -91,6 +91,7 @@ pub fn serve<S: Service>(
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
         gone: None,
+        now: port.clock().now(),
     };
     let limit = server.limits.telegram;
     assert!(limit <= BUFFER, "a telegram fits into one read");
@@ -127,6 +128,8 @@ struct Server<'a, S: Service> {
     /// When and why the last client that had spoken left, for as long as it may come back: some clients reconnect for
     /// every request, and that is no broken line.
     gone: Option<(Nanos, BusError)>,
+    /// The time of the last turn.
+    now: Nanos,
 }
 
 /// The clients, each at an index; indices are reused.
@@ -214,9 +217,10 @@ impl<S: Service> Server<'_, S> {
 
     fn turn(&mut self, port: &mut Port) -> Result<(), BusError> {
         let deadline = self.deadline(port);
-        let waited = self.set.wait(&**port.clock(), deadline);
+        let waited = self.set.wait_after(self.now, &**port.clock(), deadline);
         waited.map_err(|error| no_wait(&error))?;
         let now = port.clock().now();
+        self.now = now;
         port.look_at_line(now);
         self.ready.clear();
         self.ready.extend_from_slice(self.set.ready());
@@ -247,7 +251,7 @@ impl<S: Service> Server<'_, S> {
             .min(port.next_look())
             .min(self.acceptor.deadline());
         if self.clients.speakers > 0 {
-            deadline = deadline.min(port.stale_at(port.clock().now()));
+            deadline = deadline.min(port.stale_at(self.now));
         }
         if let Some((since, _)) = self.gone {
             deadline = deadline.min(since + port.max_age());
@@ -466,7 +470,7 @@ impl<S: Service> Server<'_, S> {
         let is_left = matches!(error, BusError::Left(_));
         let nobody = self.clients.speakers == 0;
         if nobody && speakers > 0 && is_left {
-            self.gone = Some((port.clock().now(), error.clone()));
+            self.gone = Some((self.now, error.clone()));
         } else if nobody
             && (speakers > 0 || self.clients.count == 0)
             && !(is_left && self.gone.is_some())

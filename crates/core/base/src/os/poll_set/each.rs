@@ -4,6 +4,7 @@ use rustix::event::{PollFd, PollFlags};
 
 use super::{AsFd, Duration, Interest, Ready, io};
 use crate::os::poll::poll_once;
+use crate::time::{Clock, Nanos};
 
 #[cfg(unix)]
 type Owned = std::os::fd::OwnedFd;
@@ -63,6 +64,16 @@ impl Watch {
         self.sockets.retain(|entry| entry.0 != key);
     }
 
+    pub(super) fn wait_far(
+        &mut self,
+        (_, now): (&dyn Clock, Nanos),
+        deadline: Nanos,
+        ready: &mut Vec<Ready>,
+    ) -> io::Result<()> {
+        let patience = (deadline != Nanos::MAX).then(|| (deadline - now).to_duration());
+        self.wait(patience, ready)
+    }
+
     pub(super) fn wait(
         &mut self,
         patience: Option<Duration>,
@@ -102,6 +113,7 @@ mod tests {
     use std::net::UdpSocket;
 
     use super::*;
+    use crate::time::Manual;
 
     #[test]
     fn those_that_are_ready_are_reported_without_a_new_list() {
@@ -118,9 +130,10 @@ mod tests {
         let list = watch.polled.as_ptr();
         let address = heard.local_addr().expect("it is bound");
         silent.send_to(&[1], address).expect("it is local");
-        for _ in 0..3 {
+        for deadline in [Nanos(1), Nanos::from_secs(9), Nanos::MAX] {
             ready.clear();
-            watch.wait(None, &mut ready).expect("it waits");
+            let waited = watch.wait_far((&*Manual::new(), Nanos::ZERO), deadline, &mut ready);
+            waited.expect("it waits");
             assert_eq!(ready.iter().map(|ready| ready.key).collect::<Vec<_>>(), [4]);
         }
         watch

@@ -13,9 +13,13 @@ use rustix::event::epoll::{self, CreateFlags, Event, EventData, EventFlags};
 use rustix::event::{PollFd, PollFlags, Timespec};
 use rustix::fd::OwnedFd;
 use rustix::io::Errno;
+use rustix::time::{
+    Itimerspec, TimerfdClockId, TimerfdFlags, TimerfdTimerFlags, timerfd_create, timerfd_settime,
+};
 
 use super::{AsFd, Duration, Interest, Ready, io};
 use crate::os::poll::{poll_once, timespec};
+use crate::time::{Clock, Nanos};
 
 /// Sockets reported by one wait; further ones are reported by the next.
 const MOST: usize = 256;
@@ -32,7 +36,19 @@ pub(super) struct Watch {
     /// True until the system has refused the call that waits to the nanosecond: Linux has it since 5.11, and the filter
     /// of an old container runtime may forbid it.
     is_exact: bool,
+    /// For deadlines that are far; made when it is needed.
+    timer: Option<Timer>,
 }
+
+/// A timer of the system, in the set that it wakes.
+struct Timer {
+    system: OwnedFd,
+    /// When it ends a wait; `None` once it has.
+    armed: Option<Nanos>,
+}
+
+/// The key of the timer.
+const TIMER: u64 = u64::MAX - 2;
 
 const fn flags(interest: Interest) -> EventFlags {
     match interest {
@@ -53,6 +69,7 @@ impl Watch {
             events: Vec::with_capacity(MOST),
             // On 32 bits the two sides may differ about the size of a time.
             is_exact: cfg!(target_pointer_width = "64"),
+            timer: None,
         })
     }
 
@@ -84,6 +101,54 @@ impl Watch {
         let _ = epoll::delete(&self.epoll, socket);
     }
 
+    /// As [`wait`](Self::wait), until a `deadline` on `clock` that is far at `now`. Such a deadline mostly moves on before
+    /// it comes: the timer stays armed for an earlier one, and the wait ends then.
+    pub(super) fn wait_far(
+        &mut self,
+        (clock, now): (&dyn Clock, Nanos),
+        deadline: Nanos,
+        ready: &mut Vec<Ready>,
+    ) -> io::Result<()> {
+        let armed = self.timer.as_ref().and_then(|timer| timer.armed);
+        if deadline == Nanos::MAX || armed.is_some_and(|armed| now < armed && armed <= deadline) {
+            return self.wait(None, ready);
+        }
+        // The time may have passed since.
+        let span = (deadline - clock.now()).max(Nanos(1)).to_duration();
+        match self.arm(span) {
+            Ok(timer) => {
+                timer.armed = Some(deadline);
+                self.wait(None, ready)
+            }
+            // No descriptor is left.
+            Err(_) => self.wait(Some(span), ready),
+        }
+    }
+
+    /// Arms the timer anew.
+    fn arm(&mut self, span: Duration) -> Result<&mut Timer, Errno> {
+        let timer = match &mut self.timer {
+            Some(timer) => timer,
+            none => {
+                let flags = TimerfdFlags::CLOEXEC | TimerfdFlags::NONBLOCK;
+                let system = timerfd_create(TimerfdClockId::Monotonic, flags)?;
+                // Nobody reads it: its end is an edge.
+                let interest = EventFlags::IN | EventFlags::ET;
+                epoll::add(&self.epoll, &system, EventData::new_u64(TIMER), interest)?;
+                none.insert(Timer {
+                    system,
+                    armed: None,
+                })
+            }
+        };
+        let spans = Itimerspec {
+            it_interval: timespec(Duration::ZERO),
+            it_value: timespec(span),
+        };
+        timerfd_settime(&timer.system, TimerfdTimerFlags::empty(), &spans)?;
+        Ok(timer)
+    }
+
     pub(super) fn wait(
         &mut self,
         patience: Option<Duration>,
@@ -102,15 +167,19 @@ impl Watch {
             self.wait_long_or_twice(patience)?;
         }
         let broken = EventFlags::HUP | EventFlags::ERR;
-        ready.extend(self.events.iter().map(|event| {
+        for event in &self.events {
             // Fields of a packed struct have to be copied out before they are borrowed.
             let (flags, data) = (event.flags, event.data);
-            Ready {
+            if data.u64() == TIMER {
+                self.timer.iter_mut().for_each(|timer| timer.armed = None);
+                continue;
+            }
+            ready.push(Ready {
                 key: usize::try_from(data.u64()).unwrap_or(super::WAKE),
                 is_readable: flags.intersects(EventFlags::IN | broken),
                 is_writable: flags.intersects(EventFlags::OUT | broken),
-            }
-        }));
+            });
+        }
         Ok(())
     }
 
@@ -144,7 +213,7 @@ impl Watch {
     /// `ppoll` waits for epoll itself.
     fn wait_long_or_twice(&mut self, patience: Option<Duration>) -> io::Result<()> {
         let patience = match patience {
-            Some(span) if span >= LONG => Some(span - EARLY),
+            Some(span) if span >= LONG => Some(span.saturating_sub(EARLY)),
             Some(span) => {
                 if !span.is_zero() {
                     let mut epoll = [PollFd::new(&self.epoll, PollFlags::IN)];
@@ -167,9 +236,9 @@ impl Watch {
 mod tests {
     use std::os::unix::net::UnixDatagram;
     use std::thread;
-    use std::time::Instant;
 
     use super::*;
+    use crate::time::Monotonic;
 
     const KEY: usize = 7;
 
@@ -177,12 +246,12 @@ mod tests {
     fn waits_well(watch: &mut Watch) {
         let (near, far) = UnixDatagram::pair().expect("a pair");
         watch.add(KEY, &near, Interest::Read).expect("it is open");
-        let mut ready = Vec::new();
-        for span in [0, 300, 1_500, 3_000, 5_000, 110_000].map(Duration::from_micros) {
-            let deadline = Instant::now() + span;
+        let (clock, mut ready) = (Monotonic::shared(), Vec::new());
+        for span in [0, 300, 1_500, 3_000, 5_000, 110_000].map(Nanos::from_micros) {
+            let deadline = clock.now() + span;
             let mut waits = 0;
             loop {
-                let left = deadline.saturating_duration_since(Instant::now());
+                let left = (deadline - clock.now()).to_duration();
                 watch.wait(Some(left), &mut ready).expect("it waits");
                 waits += 1;
                 if left.is_zero() {
@@ -191,7 +260,7 @@ mod tests {
             }
             assert!(ready.is_empty(), "nothing was sent");
             // Ahead of a deadline, a wait may end early, but not again and again.
-            assert!(waits < 10, "{waits} waits of {span:?}");
+            assert!(waits < 10, "{waits} waits of {span}");
         }
         far.send(&[1]).expect("there is room");
         for patience in [
@@ -248,6 +317,44 @@ mod tests {
                     &raw const program,
                 ) == 0
         }
+    }
+
+    #[test]
+    fn the_timer_is_armed_again_for_an_earlier_deadline_only() {
+        let clock = Monotonic::shared();
+        let mut watch = Watch::new().expect("a descriptor");
+        let mut ready = Vec::new();
+        let armed = |watch: &Watch| watch.timer.as_ref().and_then(|timer| timer.armed);
+        let (near, far) = UnixDatagram::pair().expect("a pair");
+        watch.add(KEY, &near, Interest::Read).expect("it is open");
+        far.send(&[1]).expect("there is room");
+        let begin = clock.now();
+        let mut wait = |watch: &mut Watch, deadline| {
+            ready.clear();
+            let now = clock.now();
+            let waited = watch.wait_far((&*clock, now), deadline, &mut ready);
+            waited.expect("it waits");
+            ready.iter().map(|ready| ready.key).collect::<Vec<_>>()
+        };
+        let second = begin + Nanos::from_secs(1);
+        assert_eq!(wait(&mut watch, Nanos::MAX), [KEY]);
+        assert_eq!(armed(&watch), None, "never needs no timer");
+        assert_eq!(wait(&mut watch, second), [KEY]);
+        assert_eq!(wait(&mut watch, second + Nanos(1)), [KEY]);
+        assert_eq!(armed(&watch), Some(second), "the deadline has moved on");
+        let soon = begin + Nanos::from_millis(30);
+        assert_eq!(wait(&mut watch, soon), [KEY]);
+        assert_eq!(armed(&watch), Some(soon));
+        watch.remove(KEY, &near);
+        // The timer ends the wait for a later deadline, and each time that it is armed.
+        assert!(wait(&mut watch, second).is_empty());
+        assert!(clock.now() >= soon && armed(&watch).is_none());
+        for _ in 0..2 {
+            let soon = clock.now() + Nanos::from_millis(5);
+            assert!(wait(&mut watch, soon).is_empty());
+            assert!(clock.now() >= soon && clock.now() < second);
+        }
+        assert!(wait(&mut watch, begin).is_empty(), "a deadline of the past");
     }
 
     #[test]

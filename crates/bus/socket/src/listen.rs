@@ -64,8 +64,9 @@ pub(super) fn listen(
     }
     let mut set = PollSet::new(stop);
     port.begin_to_look(since);
+    let mut now = port.clock().now();
     while !stop.is_stopped() {
-        turn(&mut servers, &mut lines, &mut set, port)?;
+        now = turn(now, &mut servers, &mut lines, &mut set, port)?;
     }
     for server in &mut servers {
         if let Some((call, _)) = &mut server.served {
@@ -75,37 +76,38 @@ pub(super) fn listen(
     Ok(())
 }
 
-/// Waits for all servers, and lets each do its due work.
+/// Waits for all servers, and lets each do its due work. `before` is the time of the turn before; returns that of this one.
 fn turn(
+    before: Nanos,
     servers: &mut [Server<'_>],
     lines: &mut ConnectionStates,
     set: &mut PollSet,
     port: &mut Port,
-) -> Result<(), BusError> {
-    let now = port.clock().now();
+) -> Result<Nanos, BusError> {
     // Held-back frames must be passed on in time, even without a client.
     let mut deadline = port.due().min(port.next_look());
     for server in &mut *servers {
-        server.watch(now, set).map_err(|error| no_wait(&error))?;
+        server.watch(before, set).map_err(|error| no_wait(&error))?;
         if let Some((_, served)) = &server.served {
             deadline = deadline.min(served.deadline());
         }
         deadline = deadline.min(server.acceptor.deadline());
     }
-    set.wait(&**port.clock(), deadline)
+    set.wait_after(before, &**port.clock(), deadline)
         .map_err(|error| no_wait(&error))?;
-    port.look_at_line(port.clock().now());
+    let now = port.clock().now();
+    port.look_at_line(now);
     for server in servers {
         let ready = |key| set.ready().iter().find(|ready| ready.key == key);
         let readable = ready(key(server.line)).is_some_and(|ready| ready.is_readable);
         let knocked = ready(key(server.line) + 1).is_some();
-        server.serve(readable, knocked, lines, set, port);
+        server.serve(now, readable, knocked, lines, set, port);
         if knocked {
             server.accept(lines, set, port);
         }
     }
-    port.observe(port.clock().now());
-    Ok(())
+    port.observe(now);
+    Ok(now)
 }
 
 /// The key of a connection in the poll set; its listener's is the next one.
@@ -154,6 +156,7 @@ impl Server<'_> {
     /// Lets the connection do its due work.
     fn serve(
         &mut self,
+        now: Nanos,
         readable: bool,
         knocked: bool,
         lines: &mut ConnectionStates,
@@ -169,7 +172,7 @@ impl Server<'_> {
             line: self.line,
             lines,
         };
-        let mut turned = call.turn(readable, &mut transfer, port);
+        let mut turned = call.turn(now, readable, &mut transfer, port);
         if turned.is_ok() && knocked {
             // A new client may be the current one, which has reconnected: read the end of its old connection
             // before judging the new one.

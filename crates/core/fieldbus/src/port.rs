@@ -63,6 +63,7 @@ impl Port {
                 is_held: false,
                 blind: None,
                 ending: None,
+                fresh_until: Nanos::ZERO,
             },
             clock,
             role,

@@ -25,6 +25,8 @@ pub(super) struct ImagePort {
     /// Per station, true if the last cycle found the peer stale; `None` if staleness does not change the sent values.
     pub(super) blind: Option<Box<[bool]>>,
     pub(super) ending: Option<Ending>,
+    /// A running line cannot become stale before this time.
+    pub(super) fresh_until: Nanos,
 }
 
 impl ImagePort {
@@ -75,6 +77,7 @@ impl ImagePort {
         {
             self.status.cycle(now - last);
         }
+        self.is_heard(now);
         // The validity is updated before the frame: edges of invalid data do not count.
         let is_news = self.validity.arrived(station, now, bytes);
         let is_valid = self.validity.is_valid(station);
@@ -99,6 +102,7 @@ impl ImagePort {
     #[inline]
     pub(super) fn touch(&mut self, station: usize, now: Nanos) {
         self.image.touch(station, now);
+        self.is_heard(now);
         if self.validity.heard(station) {
             self.update_validity(station, now);
         }
@@ -155,8 +159,19 @@ impl ImagePort {
             self.update_validity(station, now);
         }
         self.hand_over();
+        if now < self.fresh_until && self.status.state() == LinkState::Running {
+            return;
+        }
         let (status, ages) = self.ages(now);
-        status.observe(now, ages);
+        status.observe(now, ages.clone());
+        let oldest = ages.max().unwrap_or(Nanos::ZERO);
+        self.fresh_until = now + (self.status.max_age() - oldest) + Nanos(1);
+    }
+
+    /// Data of this time have arrived, perhaps older ones than before.
+    #[inline]
+    fn is_heard(&mut self, at: Nanos) {
+        self.fresh_until = self.fresh_until.min(at + self.status.max_age() + Nanos(1));
     }
 
     /// Passes the validity of `station`'s data to the image and the line.

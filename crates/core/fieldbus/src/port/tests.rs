@@ -108,6 +108,32 @@ impl Rig {
 }
 
 #[test]
+fn a_line_is_looked_at_again_when_data_can_be_too_old_and_older_data_come_sooner() {
+    let mut rig = Rig::new();
+    rig.port.running("it is there");
+    let state = |rig: &mut Rig, now| {
+        rig.port.observe(Nanos(now));
+        rig.port.image.status.state()
+    };
+    for station in 0..STATIONS {
+        rig.port.received(station, Nanos(100), &[0]);
+    }
+    assert_eq!(state(&mut rig, 100), LinkState::Running);
+    for station in 0..STATIONS {
+        rig.port.touch(station, Nanos(130));
+    }
+    assert_eq!(state(&mut rig, 131), LinkState::Running);
+    // Found long after the bus looked before.
+    rig.port.came_at(Nanos(115));
+    rig.port.received(1, Nanos(132), &[0]);
+    assert_eq!(state(&mut rig, 115 + MAX_AGE), LinkState::Running);
+    assert_eq!(state(&mut rig, 116 + MAX_AGE), LinkState::Stale);
+    rig.port.came_at(Nanos(160));
+    rig.port.touch(1, Nanos(160));
+    assert_eq!(state(&mut rig, 160), LinkState::Running);
+}
+
+#[test]
 fn a_fault_that_begins_while_stations_are_handed_in_together_meets_none_of_them() {
     let mut rig = Rig::new();
     rig.add(LineEffect::LinkDown);

@@ -133,24 +133,25 @@ impl<S: Stream> Call<S> {
         let added = set.add(0, &self.stream, interest);
         added.map_err(|error| no_wait(&error))?;
         let mut readable = false;
-        let since = self.since.take();
-        port.begin_to_look(since.unwrap_or_else(|| port.clock().now()));
+        let mut now = port.clock().now();
+        port.begin_to_look(self.since.take().unwrap_or(now));
         let mut is_first = true;
         while !stop.is_stopped() {
-            port.look_at_line(port.clock().now());
+            port.look_at_line(now);
             if std::mem::take(&mut is_first) {
                 // The first turn reads nothing, because the system has not reported any bytes yet.
                 port.look_leaves_some();
             }
-            self.turn(readable, caller, port)?;
+            self.turn(now, readable, caller, port)?;
             let deadline = caller.deadline(port).min(port.due()).min(port.next_look());
             if interest != self.interest() {
                 interest = self.interest();
                 let changed = set.change(0, &self.stream, interest);
                 changed.map_err(|error| no_wait(&error))?;
             }
-            let waited = set.wait(&**port.clock(), deadline);
+            let waited = set.wait_after(now, &**port.clock(), deadline);
             waited.map_err(|error| no_wait(&error))?;
+            now = port.clock().now();
             readable = set.ready().iter().any(|ready| ready.is_readable);
         }
         self.end(port);
@@ -176,19 +177,19 @@ impl<S: Stream> Call<S> {
         }
     }
 
-    /// One turn of `caller`, for an owner that waits for several streams and has [looked](Port::look_at_line) at these;
-    /// see [`run`](Self::run).
+    /// One turn of `caller`, for an owner that waits for several streams and has [looked](Port::look_at_line) at these at
+    /// `now`; see [`run`](Self::run).
     ///
     /// # Errors
     ///
     /// The reason why the connection has ended.
     pub fn turn(
         &mut self,
+        now: Nanos,
         readable: bool,
         caller: &mut impl Caller,
         port: &mut Port,
     ) -> Result<(), BusError> {
-        let now = port.clock().now();
         if readable {
             self.read(now, caller, port)?;
         }

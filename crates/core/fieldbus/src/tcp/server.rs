@@ -1,5 +1,6 @@
 //! A server for many clients, for any protocol that implements [`Service`].
 
+use std::collections::BTreeSet;
 use std::io::{self, Read as _, Write as _};
 use std::net::SocketAddr;
 
@@ -90,6 +91,7 @@ pub fn serve<S: Service>(
         reply: Vec::with_capacity(BUFFER),
         ready: Vec::new(),
         gone: None,
+        now: port.clock().now(),
     };
     let limit = server.limits.telegram;
     assert!(limit <= BUFFER, "a telegram fits into one read");
@@ -126,6 +128,8 @@ struct Server<'a, S: Service> {
     /// When and why the last client that had spoken left, for as long as it may come back: some clients reconnect for
     /// every request, and that is no broken line.
     gone: Option<(Nanos, BusError)>,
+    /// The time of the last turn.
+    now: Nanos,
 }
 
 /// The clients, each at an index; indices are reused.
@@ -136,9 +140,12 @@ struct Clients<C> {
     count: usize,
     /// The number of clients that have sent a valid telegram.
     speakers: usize,
-    /// The number of clients that owe something: the rest of a telegram, or the reading of an answer.
-    awaited: usize,
+    awaited: Awaited,
 }
+
+/// The clients that owe something, the rest of a telegram or the reading of an answer: since when, and their places. A
+/// turn looks at the first one only.
+type Awaited = BTreeSet<(Nanos, usize)>;
 
 struct Client<C> {
     stream: TcpStream,
@@ -162,7 +169,7 @@ impl<C> Default for Clients<C> {
             free: Vec::new(),
             count: 0,
             speakers: 0,
-            awaited: 0,
+            awaited: Awaited::new(),
         }
     }
 }
@@ -183,7 +190,9 @@ impl<C> Clients<C> {
         self.free.push(place);
         self.count -= 1;
         self.speakers -= usize::from(client.speaks);
-        self.awaited -= usize::from(client.waits_since.is_some());
+        if let Some(since) = client.waits_since {
+            self.awaited.remove(&(since, place));
+        }
         Some(client)
     }
 
@@ -208,9 +217,10 @@ impl<S: Service> Server<'_, S> {
 
     fn turn(&mut self, port: &mut Port) -> Result<(), BusError> {
         let deadline = self.deadline(port);
-        let waited = self.set.wait(&**port.clock(), deadline);
+        let waited = self.set.wait_after(self.now, &**port.clock(), deadline);
         waited.map_err(|error| no_wait(&error))?;
         let now = port.clock().now();
+        self.now = now;
         port.look_at_line(now);
         self.ready.clear();
         self.ready.extend_from_slice(self.set.ready());
@@ -241,15 +251,13 @@ impl<S: Service> Server<'_, S> {
             .min(port.next_look())
             .min(self.acceptor.deadline());
         if self.clients.speakers > 0 {
-            deadline = deadline.min(port.stale_at(port.clock().now()));
+            deadline = deadline.min(port.stale_at(self.now));
         }
         if let Some((since, _)) = self.gone {
             deadline = deadline.min(since + port.max_age());
         }
-        if self.clients.awaited > 0 {
-            let waits = self.clients.iter();
-            let since = waits.filter_map(|(_, client)| client.waits_since).min();
-            deadline = deadline.min(since.map_or(Nanos::MAX, |since| since + self.limits.patience));
+        if let Some((since, _)) = self.clients.awaited.first() {
+            deadline = deadline.min(*since + self.limits.patience);
         }
         deadline
     }
@@ -268,8 +276,8 @@ impl<S: Service> Server<'_, S> {
         if !client.unsent.is_empty() {
             if is_writable && client.write_on()? {
                 // The incomplete telegram is timed from now on, since the server did not read from the client before.
-                client.waits_since = (!client.begun.is_empty()).then_some(now);
-                self.clients.awaited -= usize::from(client.waits_since.is_none());
+                let since = (!client.begun.is_empty()).then_some(now);
+                client.owes_since(since, place, &mut self.clients.awaited);
                 let client = &*client;
                 let heard = self.set.change(place, &client.stream, Interest::Read);
                 heard.map_err(|error| no_wait(&error))?;
@@ -289,7 +297,7 @@ impl<S: Service> Server<'_, S> {
         if !port.is_up(now) {
             // The line is down: nothing arrives, and half a telegram is useless.
             client.begun.clear();
-            self.clients.awaited -= usize::from(client.waits_since.take().is_some());
+            client.owes_since(None, place, &mut self.clients.awaited);
             self.service.unheard(&mut client.state, now, port);
             return Ok(());
         }
@@ -309,7 +317,8 @@ impl<S: Service> Server<'_, S> {
         if telegrams > 0 {
             client.heard = now;
             // The incomplete part belongs to another telegram, which has its own time.
-            client.waits_since = client.waits_since.map(|_| now);
+            let since = client.waits_since.map(|_| now);
+            client.owes_since(since, place, &mut self.clients.awaited);
             if !client.speaks {
                 client.speaks = true;
                 self.gone = None;
@@ -349,28 +358,20 @@ impl<S: Service> Server<'_, S> {
         }
         let waits = !client.begun.is_empty() || !client.unsent.is_empty();
         if waits != client.waits_since.is_some() {
-            client.waits_since = waits.then_some(now);
-            self.clients.awaited = if waits {
-                self.clients.awaited + 1
-            } else {
-                self.clients.awaited - 1
-            };
+            client.owes_since(waits.then_some(now), place, &mut self.clients.awaited);
         }
         Ok(())
     }
 
     /// Disconnects clients that have kept the server waiting too long.
     fn check_timeouts(&mut self, now: Nanos, port: &mut Port) {
-        if self.clients.awaited == 0 {
-            return;
-        }
         let patience = self.limits.patience;
-        loop {
-            let late = self.clients.iter().find_map(|(place, client)| {
-                let waited = now - client.waits_since?;
-                (waited >= patience).then(|| (place, client.too_slow(patience)))
-            });
-            let Some((place, error)) = late else { break };
+        while let Some((since, place)) = self.clients.awaited.first().copied() {
+            if now - since < patience {
+                break;
+            }
+            let client = self.clients.places[place].as_ref();
+            let error = client.expect("it owes something").too_slow(patience);
             self.drop_client(place, &error, port);
         }
     }
@@ -469,7 +470,7 @@ impl<S: Service> Server<'_, S> {
         let is_left = matches!(error, BusError::Left(_));
         let nobody = self.clients.speakers == 0;
         if nobody && speakers > 0 && is_left {
-            self.gone = Some((port.clock().now(), error.clone()));
+            self.gone = Some((self.now, error.clone()));
         } else if nobody
             && (speakers > 0 || self.clients.count == 0)
             && !(is_left && self.gone.is_some())
@@ -492,6 +493,20 @@ impl<S: Service> Server<'_, S> {
 }
 
 impl<C> Client<C> {
+    /// The client at `place` owes something since then, or nothing any more.
+    fn owes_since(&mut self, since: Option<Nanos>, place: usize, awaited: &mut Awaited) {
+        let before = std::mem::replace(&mut self.waits_since, since);
+        if before == since {
+            return;
+        }
+        if let Some(before) = before {
+            awaited.remove(&(before, place));
+        }
+        if let Some(since) = since {
+            awaited.insert((since, place));
+        }
+    }
+
     /// Takes in `bytes` and answers the telegrams that they complete into `reply`. Returns the number of
     /// telegrams.
     fn hear<S: Service<Client = C>>(

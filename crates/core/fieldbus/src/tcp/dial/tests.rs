@@ -215,7 +215,7 @@ fn what_has_arrived_in_the_meantime_counts_before_the_time_is_checked() {
     let added = set.add(0, call.stream(), Interest::Read);
     added.expect("it is open");
     set.wait(&*clock, Nanos::MAX).expect("it can wait");
-    let turned = call.turn(true, &mut speaker, &mut port);
+    let turned = call.turn(port.clock().now(), true, &mut speaker, &mut port);
     turned.expect("it goes on");
     assert_eq!(speaker.calls, ["hear", "turn", "wrote", "wrote", "check"]);
     let mut said = [0; 2];
@@ -241,7 +241,7 @@ fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
         turns: usize::MAX,
         ..Speaker::default()
     };
-    let turned = call.turn(false, &mut speaker, &mut port);
+    let turned = call.turn(port.clock().now(), false, &mut speaker, &mut port);
     turned.expect("it goes on");
     assert_eq!(call.interest(), Interest::ReadWrite);
     assert!(!speaker.says.is_empty());
@@ -256,7 +256,7 @@ fn what_the_peer_does_not_take_waits_for_it_and_nothing_is_lost() {
         taken
     });
     assert!(taken == all, "other bytes");
-    let turned = call.turn(false, &mut speaker, &mut port);
+    let turned = call.turn(port.clock().now(), false, &mut speaker, &mut port);
     turned.expect("it goes on");
     assert_eq!(call.interest(), Interest::Read);
 }

@@ -327,6 +327,26 @@ fn half_a_telegram_has_its_time() {
 }
 
 #[test]
+fn each_of_those_who_owe_has_a_time_of_its_own() {
+    let server = Running::new();
+    let (mut early, mut late) = (server.client(), server.client());
+    let half = LIMITS.patience.0 / 2;
+    for client in [&mut early, &mut late] {
+        // One segment: with the answer, the server has also read the half.
+        client.write_all(&[1, 1, 5, 1]).expect("the server reads");
+        client.read_exact(&mut [0; 2]).expect("an answer");
+        server.pass(Nanos(half));
+    }
+    await_end(&mut early);
+    late.write_all(&[1, 1, 1, 1]).expect("the server reads");
+    let mut reply = [0; 6];
+    late.read_exact(&mut reply).expect("it is complete in time");
+    server.pass(LIMITS.patience);
+    ask(&mut late, &[1, 2]);
+    assert_eq!(server.fact("clients.dropped").as_deref(), Some("1"));
+}
+
+#[test]
 fn who_completes_each_telegram_in_time_is_served_though_another_one_is_always_begun() {
     let server = Running::new();
     let mut client = server.client();

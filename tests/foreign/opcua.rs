@@ -68,6 +68,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         served::tells_of_itself,
     ),
     (
+        "the_server_counts_its_sessions_and_lists_the_items_of_a_subscription",
+        served::tells_of_its_sessions,
+    ),
+    (
         "a_client_with_the_certificate_of_another_application_gets_no_values",
         served::impostor,
     ),

@@ -144,6 +144,53 @@ pub(super) fn tells_of_itself() -> Result<(), Absent> {
     let urls = client.ask(&json!({"endpoints": true}))["urls"].take();
     let port = device.address().port();
     assert_eq!(urls, json!([format!("opc.tcp://plc-side.example:{port}/")]));
+    let mut value = |node: &str| client.ask(&json!({"read": node}))["value"].take();
+    let (namespaces, servers) = (value("Server_NamespaceArray"), value("Server_ServerArray"));
+    assert_eq!(namespaces[0], json!("http://opcfoundation.org/UA/"));
+    assert_eq!(namespaces[1], servers[0], "its own URI");
+    assert_eq!(namespaces[2], json!("urn:tickbus:signals"));
+    for (node, right) in [
+        ("Server_ServerStatus_State", json!(0)),
+        (
+            "Server_ServerStatus_BuildInfo_ProductName",
+            json!("tickbus"),
+        ),
+        (
+            "Server_ServerCapabilities_OperationLimits_MaxNodesPerRead",
+            json!(10_000),
+        ),
+        (
+            "HistoryServerCapabilities_AccessHistoryDataCapability",
+            json!(false),
+        ),
+    ] {
+        assert_eq!(value(node), right, "{node}");
+    }
+    Ok(())
+}
+
+/// The server counts its sessions for a subscriber, and returns its items by the standard method.
+pub(super) fn tells_of_its_sessions() -> Result<(), Absent> {
+    const SESSIONS: &str = "Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount";
+    let mut device = Device::open("opcua-server", OPEN);
+    let mut first = client(&device)?;
+    first.ask(&json!({"subscribe": [[SESSIONS, "position"], 10, 1]}));
+    let items = first.ask(&json!({"items": true}));
+    for list in ["ids", "handles"] {
+        assert_eq!(items[list].as_array().map(Vec::len), Some(2), "{items}");
+    }
+    let mut counts = Vec::new();
+    let second = client(&device)?;
+    let mut until = |count| {
+        device.until("the count", |_| {
+            let values = first.ask(&json!({"changes": SESSIONS}))["values"].take();
+            counts.extend(values.as_array().into_iter().flatten().cloned());
+            counts.last() == Some(&json!(count))
+        });
+    };
+    until(2);
+    drop(second);
+    until(1);
     Ok(())
 }
 

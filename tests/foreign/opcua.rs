@@ -68,8 +68,8 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         served::tells_of_itself,
     ),
     (
-        "the_server_counts_its_sessions_and_lists_the_items_of_a_subscription",
-        served::tells_of_its_sessions,
+        "the_time_of_the_server_goes_on_for_a_subscriber_whose_items_it_lists",
+        served::tells_the_time,
     ),
     (
         "a_client_with_the_certificate_of_another_application_gets_no_values",

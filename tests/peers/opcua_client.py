@@ -112,7 +112,7 @@ async def serve(client):
             answer["urls"] = [one.EndpointUrl for one in await client.get_endpoints()]
         if "stop" in line:
             return
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(answer, default=str), flush=True)
 
 
 async def main():

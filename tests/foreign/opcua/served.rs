@@ -169,28 +169,29 @@ pub(super) fn tells_of_itself() -> Result<(), Absent> {
     Ok(())
 }
 
-/// The server counts its sessions for a subscriber, and returns its items by the standard method.
-pub(super) fn tells_of_its_sessions() -> Result<(), Absent> {
-    const SESSIONS: &str = "Server_ServerDiagnostics_ServerDiagnosticsSummary_CurrentSessionCount";
+/// A subscriber receives the server's time again and again, and the server returns its items by the standard method.
+pub(super) fn tells_the_time() -> Result<(), Absent> {
+    const TIME: &str = "Server_ServerStatus_CurrentTime";
     let mut device = Device::open("opcua-server", OPEN);
-    let mut first = client(&device)?;
-    first.ask(&json!({"subscribe": [[SESSIONS, "position"], 10, 1]}));
-    let items = first.ask(&json!({"items": true}));
+    let mut client = client(&device)?;
+    client.ask(&json!({"subscribe": [[TIME, "position"], 10, 1]}));
+    let items = client.ask(&json!({"items": true}));
     for list in ["ids", "handles"] {
         assert_eq!(items[list].as_array().map(Vec::len), Some(2), "{items}");
     }
-    let mut counts = Vec::new();
-    let second = client(&device)?;
-    let mut until = |count| {
-        device.until("the count", |_| {
-            let values = first.ask(&json!({"changes": SESSIONS}))["values"].take();
-            counts.extend(values.as_array().into_iter().flatten().cloned());
-            counts.last() == Some(&json!(count))
-        });
-    };
-    until(2);
-    drop(second);
-    until(1);
+    let mut times = Vec::new();
+    device.until("three times", |_| {
+        let values = client.ask(&json!({"changes": TIME}))["values"].take();
+        times.extend(
+            values
+                .as_array()
+                .into_iter()
+                .flatten()
+                .map(Value::to_string),
+        );
+        times.len() > 2
+    });
+    assert!(times.is_sorted_by(|one, next| one < next), "{times:?}");
     Ok(())
 }
 

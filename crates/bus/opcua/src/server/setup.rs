@@ -129,11 +129,9 @@ pub(super) fn build(
         signals
     };
     let wall = pki.wall;
-    let standard =
-        move |context: ServerContext, space: &mut _| Standard::new(&context, space, wall);
     let built = builder
         // The signals' own manager must be the last.
-        .with_node_manager(InMemoryNodeManagerBuilder::new(standard))
+        .with_node_manager(move |context| Standard::new(context, wall))
         .with_node_manager(DiagnosticsNodeManagerBuilder)
         .with_node_manager(InMemoryNodeManagerBuilder::new(nodes))
         .build();

@@ -51,7 +51,11 @@ impl Live {
             return Some(if permissions.read_diagnostics {
                 info.diagnostics.get(id).unwrap_or_default()
             } else {
-                DataValue::new_now_status(Variant::Empty, StatusCode::BadUserAccessDenied)
+                DataValue::new_at_status(
+                    Variant::Empty,
+                    self.now(),
+                    StatusCode::BadUserAccessDenied,
+                )
             });
         }
         let value = if id == VariableId::Server_NamespaceArray {
@@ -102,7 +106,7 @@ impl Live {
             _ => match live.status(id)? {
                 // The server is not about to end.
                 Variant::Empty => None,
-                value => Some(DataValue::new_now(value)),
+                value => Some(DataValue::new_at(value, live.now())),
             },
         })
     }
@@ -156,7 +160,8 @@ impl Live {
             }
             Id::Server_ServiceLevel => info.service_level.load(Ordering::Relaxed).into(),
             Id::Server_LocalTime => {
-                let minutes = chrono::Local::now().offset().fix().local_minus_utc() / 60;
+                let here = self.now().as_chrono().with_timezone(&chrono::Local);
+                let minutes = here.offset().fix().local_minus_utc() / 60;
                 ExtensionObject::from_message(TimeZoneDataType {
                     offset: minutes.try_into().ok()?,
                     daylight_saving_in_offset: false,

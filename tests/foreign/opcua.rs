@@ -68,6 +68,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         served::tells_of_itself,
     ),
     (
+        "the_time_of_the_server_goes_on_for_a_subscriber_whose_items_it_lists",
+        served::tells_the_time,
+    ),
+    (
         "a_client_with_the_certificate_of_another_application_gets_no_values",
         served::impostor,
     ),

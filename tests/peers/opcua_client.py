@@ -8,6 +8,7 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"write": {node: [type, value]}} {"statuses": […]}, all in one Write
     {"subscribe": [nodes, interval, queue]}  {}
     {"changes": node}                {"values": […]} since the last time
+    {"items": true}                  {"ids", "handles"} of that subscription, by the server's method
     {"properties": node}             {name: value as text}
     {"status": true}                 {"start", "time"}, of the structure ServerStatus, in seconds
     {"endpoints": true}              {"urls": […]}, as the server announces them
@@ -56,7 +57,8 @@ async def serve(client):
     changes, subscription = Changes(), None
 
     def node(name):
-        return client.get_node(ua.NodeId(name, 2))
+        standard = getattr(ua.ObjectIds, name, None)
+        return client.get_node(ua.NodeId(standard) if standard else ua.NodeId(name, 2))
 
     async for line in lines():
         answer = {}
@@ -95,7 +97,11 @@ async def serve(client):
                 [node(name) for name in names], queuesize=queue, sampling_interval=0
             )
         if "changes" in line:
-            answer["values"] = changes.of.pop(line["changes"], [])
+            answer["values"] = changes.of.pop(node(line["changes"]).nodeid.Identifier, [])
+        if "items" in line:
+            asked = ua.Variant(subscription.subscription_id, ua.VariantType.UInt32)
+            method = ua.NodeId(ua.ObjectIds.Server_GetMonitoredItems)
+            answer["ids"], answer["handles"] = await node("Server").call_method(method, asked)
         if "properties" in line:
             for one in await node(line["properties"]).get_properties():
                 answer[(await one.read_browse_name()).Name] = str(await one.read_value())
@@ -106,7 +112,7 @@ async def serve(client):
             answer["urls"] = [one.EndpointUrl for one in await client.get_endpoints()]
         if "stop" in line:
             return
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(answer, default=str), flush=True)
 
 
 async def main():

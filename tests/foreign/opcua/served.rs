@@ -144,6 +144,54 @@ pub(super) fn tells_of_itself() -> Result<(), Absent> {
     let urls = client.ask(&json!({"endpoints": true}))["urls"].take();
     let port = device.address().port();
     assert_eq!(urls, json!([format!("opc.tcp://plc-side.example:{port}/")]));
+    let mut value = |node: &str| client.ask(&json!({"read": node}))["value"].take();
+    let (namespaces, servers) = (value("Server_NamespaceArray"), value("Server_ServerArray"));
+    assert_eq!(namespaces[0], json!("http://opcfoundation.org/UA/"));
+    assert_eq!(namespaces[1], servers[0], "its own URI");
+    assert_eq!(namespaces[2], json!("urn:tickbus:signals"));
+    for (node, right) in [
+        ("Server_ServerStatus_State", json!(0)),
+        (
+            "Server_ServerStatus_BuildInfo_ProductName",
+            json!("tickbus"),
+        ),
+        (
+            "Server_ServerCapabilities_OperationLimits_MaxNodesPerRead",
+            json!(10_000),
+        ),
+        (
+            "HistoryServerCapabilities_AccessHistoryDataCapability",
+            json!(false),
+        ),
+    ] {
+        assert_eq!(value(node), right, "{node}");
+    }
+    Ok(())
+}
+
+/// A subscriber receives the server's time again and again, and the server returns its items by the standard method.
+pub(super) fn tells_the_time() -> Result<(), Absent> {
+    const TIME: &str = "Server_ServerStatus_CurrentTime";
+    let mut device = Device::open("opcua-server", OPEN);
+    let mut client = client(&device)?;
+    client.ask(&json!({"subscribe": [[TIME, "position"], 10, 1]}));
+    let items = client.ask(&json!({"items": true}));
+    for list in ["ids", "handles"] {
+        assert_eq!(items[list].as_array().map(Vec::len), Some(2), "{items}");
+    }
+    let mut times = Vec::new();
+    device.until("three times", |_| {
+        let values = client.ask(&json!({"changes": TIME}))["values"].take();
+        times.extend(
+            values
+                .as_array()
+                .into_iter()
+                .flatten()
+                .map(Value::to_string),
+        );
+        times.len() > 2
+    });
+    assert!(times.is_sorted_by(|one, next| one < next), "{times:?}");
     Ok(())
 }
 

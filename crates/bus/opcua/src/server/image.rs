@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use opcua::server::SubscriptionCache;
-use opcua::server::address_space::NodeType;
 use opcua::types::{DataValue, NodeId, StatusCode, Variant};
+use opcua_server::SubscriptionCache;
+use opcua_server::address_space::NodeType;
 
 use crate::pki::date;
 use crate::values;

@@ -7,15 +7,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
-use opcua::server::address_space::{AddressSpace, NodeType};
-use opcua::server::diagnostics::NamespaceMetadata;
-use opcua::server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
-use opcua::server::node_manager::{
+use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
+use opcua_server::address_space::{AddressSpace, NodeType};
+use opcua_server::diagnostics::NamespaceMetadata;
+use opcua_server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
+use opcua_server::node_manager::{
     MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue, RequestContext,
     ServerContext, WriteNode,
 };
-use opcua::server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
-use opcua::types::{AttributeId, DataValue, NodeId, NumericRange, StatusCode, TimestampsToReturn};
+use opcua_server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use tokio::sync::oneshot;
 
 use crate::pki::date;

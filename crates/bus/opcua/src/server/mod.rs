@@ -5,7 +5,7 @@ mod manager;
 mod peers;
 mod setup;
 mod space;
-mod status;
+mod standard;
 mod units;
 mod visitor;
 mod watched;
@@ -15,8 +15,8 @@ use std::net::TcpListener;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use opcua::server::ServerHandle;
 use opcua::types::{VariableId, Variant};
+use opcua_server::ServerHandle;
 use socket2::SockRef;
 use tokio::sync::Notify;
 

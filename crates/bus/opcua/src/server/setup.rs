@@ -3,13 +3,13 @@
 use std::net::{IpAddr, SocketAddr};
 
 use opcua::crypto::X509Data;
-use opcua::server::diagnostics::DiagnosticsNodeManagerBuilder;
-use opcua::server::node_manager::ServerContext;
-use opcua::server::node_manager::memory::{CoreNodeManagerBuilder, InMemoryNodeManagerBuilder};
-use opcua::server::{
+use opcua::types::{BuildInfo, DateTime, MessageSecurityMode};
+use opcua_server::diagnostics::DiagnosticsNodeManagerBuilder;
+use opcua_server::node_manager::ServerContext;
+use opcua_server::node_manager::memory::InMemoryNodeManagerBuilder;
+use opcua_server::{
     ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
 };
-use opcua::types::{BuildInfo, DateTime, MessageSecurityMode};
 
 use crate::pki::{PRODUCT, PRODUCT_URI, security_policy};
 use crate::{Mode, Policy, Trust};
@@ -17,7 +17,7 @@ use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
 
 use super::manager::{self, Signals};
-use super::status::Status;
+use super::standard::Standard;
 use super::{SESSIONS, space};
 
 /// The crate's name for the only user.
@@ -123,17 +123,15 @@ pub(super) fn build(
             .namespaces_mut()
             .add_namespace(uri);
         debug_assert_eq!(index, space::NAMESPACE, "node ids promise it");
-        let address_space: &mut opcua::server::address_space::AddressSpace = address_space;
+        let address_space: &mut opcua_server::address_space::AddressSpace = address_space;
         address_space.add_namespace(uri, index);
         space::build(address_space, &name, &table, reads);
         signals
     };
     let wall = pki.wall;
     let built = builder
-        // The first node manager that owns a node wins, and the signals' own manager must be the last.
-        .without_node_managers()
-        .with_node_manager(move |context| Status::new(context, wall))
-        .with_node_manager(InMemoryNodeManagerBuilder::new(CoreNodeManagerBuilder))
+        // The signals' own manager must be the last.
+        .with_node_manager(move |context| Standard::new(context, wall))
         .with_node_manager(DiagnosticsNodeManagerBuilder)
         .with_node_manager(InMemoryNodeManagerBuilder::new(nodes))
         .build();

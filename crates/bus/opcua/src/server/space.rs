@@ -1,11 +1,11 @@
 //! The nodes of a driver: a folder, containing a folder per station, which contain the signals.
 
-use opcua::nodes::{ObjectBuilder, VariableBuilder};
-use opcua::server::address_space::AddressSpace;
 use opcua::types::{
     DataTypeId, ExtensionObject, LocalizedText, NodeId, ObjectId, QualifiedName, Range,
     VariableTypeId, Variant,
 };
+use opcua_server::address_space::AddressSpace;
+use opcua_server::address_space::{ObjectBuilder, VariableBuilder};
 
 use crate::values::{data_type_id, variant};
 use tickbus_image::signal::{Area, Scale, Signal, SignalTable};

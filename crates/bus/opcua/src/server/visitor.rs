@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use opcua::server::node_manager::RequestContext;
+use opcua_server::node_manager::RequestContext;
 
 /// A client's session, accessed through closures because the crate does not export its type.
 pub(super) struct Visitor {

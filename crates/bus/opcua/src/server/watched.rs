@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use opcua::server::{MonitoredItemHandle, SubscriptionCache};
 use opcua::types::{AttributeId, DataValue, DateTime, NodeId};
+use opcua_server::{MonitoredItemHandle, SubscriptionCache};
 
 use tickbus_base::time::Nanos;
 

@@ -59,7 +59,7 @@ impl Server {
         (!server.address.is_empty()).then_some(server)
     }
 
-    /// Its resident memory, in bytes.
+    /// Returns the resident memory of the process, in bytes.
     pub(crate) fn resident(&self) -> f64 {
         let statm = format!("/proc/{}/statm", self.process.id());
         let text = std::fs::read_to_string(statm).unwrap_or_default();
@@ -199,7 +199,8 @@ pub(crate) fn median(values: &mut [f64]) -> f64 {
     values[values.len() / 2]
 }
 
-/// What takes turns with a bare server: a name, its client, and its rates with their ratios to the bare one's of the round.
+/// A client that takes turns with others: its name, an exchange, and its rates with their ratios to the bare one's of the
+/// round.
 pub(crate) struct Turn<'a> {
     pub(crate) name: &'a str,
     pub(crate) once: Box<dyn FnMut() + 'a>,

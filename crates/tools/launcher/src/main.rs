@@ -68,7 +68,7 @@ fn call(file: &Path) -> Result<u8, String> {
 mod tests {
     use super::*;
 
-    /// What the launcher says in a folder with these bytes as the library.
+    /// Returns what the launcher says in a folder with these bytes as the library, and the path of the library.
     fn said(name: &str, bytes: Option<&[u8]>) -> (String, String) {
         let folder =
             std::env::temp_dir().join(format!("tickbus launcher {} {name}", std::process::id()));

@@ -58,7 +58,7 @@ at_least() {
     [ "$(printf '%s\n%s\n' "$1" "$2" | sort -V | head -n 1)" = "$1" ]
 }
 
-# The zip's features beyond a plain build; with all others it would be larger than 15.5 MB.
+# The zip's features beyond a plain build. Not all, since the zip has a limit (tools/dist-check).
 # shellcheck disable=SC2034 # for the scripts that source this
 PRODUCT_FEATURES=opcua,page
 

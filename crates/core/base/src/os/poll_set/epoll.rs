@@ -158,8 +158,12 @@ impl Watch {
         if self.is_exact {
             match self.wait_exactly(patience.map(timespec)) {
                 Err(Errno::NOSYS | Errno::PERM) => self.is_exact = false,
-                // A signal interrupted the wait.
-                Err(Errno::INTR) => {}
+                // A signal interrupted the wait, such as that which lets a suspended process go on: what has arrived
+                // meanwhile belongs to this wait.
+                Err(Errno::INTR) => match self.wait_exactly(Some(timespec(Duration::ZERO))) {
+                    Err(Errno::INTR) => {}
+                    waited => waited?,
+                },
                 waited => waited?,
             }
         }
@@ -225,7 +229,12 @@ impl Watch {
         };
         let patience = patience.map(timespec);
         let room = spare_capacity(&mut self.events);
-        match epoll::wait(&self.epoll, room, patience.as_ref()) {
+        let mut waited = epoll::wait(&self.epoll, room, patience.as_ref());
+        if waited == Err(Errno::INTR) {
+            let room = spare_capacity(&mut self.events);
+            waited = epoll::wait(&self.epoll, room, Some(&timespec(Duration::ZERO)));
+        }
+        match waited {
             Ok(_) | Err(Errno::INTR) => Ok(()),
             Err(error) => Err(error.into()),
         }

@@ -9,9 +9,6 @@ RUNNER=()
 # Packages and programs with tests that must answer within milliseconds, and how these run.
 IN_TIME='^$'
 AT_ITS_TIME=()
-# Set where emulators run the tests: what fails beside others then runs again alone, since an emulator that shares two cores
-# misses deadlines that the platform itself keeps.
-AGAIN_ALONE=
 # The folders with the reports of JUnit, as a pattern.
 JAVA_REPORTS='java/*/target/surefire-reports'
 
@@ -34,8 +31,16 @@ compile() {
         -e 's/.*"manifest_path":"(.*)\/Cargo\.toml(\t.*\t[^"]*)".*/\1\2/p' >"$LOGS/$list.built"
 }
 
+# Sets the array way to the command that the program of a folder is run by.
+way_of() {
+    way=()
+    # One of these at a time: in real time they would keep each other waiting.
+    [[ ! $1 =~ $IN_TIME ]] || way=(flock -o "$ROOT/$LOGS/in_time" "${AT_ITS_TIME[@]}")
+}
+
 # run_compiled LIST PATTERN [ARGUMENT...]: runs the programs of a list whose kind:name matches, like cargo, but several at
-# once. The output of failing programs comes last.
+# once. What fails runs again alone, since a program that shares two cores with others, or with a compiler, may miss a deadline;
+# the end of the whole run names it. The output of failing programs comes last.
 run_compiled() {
     local list=$LOGS/$1.built pattern=$2 folder program name way running=0 said failed
     shift 2
@@ -50,16 +55,14 @@ run_compiled() {
             running=$((running + 1))
         fi
         name=${program##*/}
-        way=()
-        # One of these at a time: in real time they would keep each other waiting.
-        [[ ! ${folder#"$ROOT"}/$name =~ $IN_TIME ]] || way=(flock -o "$ROOT/$LOGS/in_time" "${AT_ITS_TIME[@]}")
+        way_of "${folder#"$ROOT"}/$name"
         {
             (echo "     Running $program" && cd "$folder" && exec "${way[@]}" "${RUNNER[@]}" "$program" "$@") >"$said/$name" 2>&1 </dev/null ||
                 mv "$said/$name" "$failed/"
         } &
     done < <(awk -F '\t' -v pattern="$pattern" '$2 ~ pattern { print ($2 !~ /:foreign/ && $1 !~ /profibus/) "\t" $1 "\t" $3 }' "$list" | sort)
     wait
-    [ -z "$AGAIN_ALONE" ] || again_alone "$list" "$said" "$@"
+    again_alone "$list" "$said" "$@"
     find "$said" -maxdepth 1 -type f -exec cat {} +
     find "$failed" -type f -exec cat {} +
     [ -z "$(ls "$failed")" ] || return 1
@@ -69,19 +72,23 @@ run_compiled() {
 # again_alone LIST FOLDER [ARGUMENT...]: runs the failed tests of failed programs again, one program after the other. The output of
 # a program whose tests then pass moves from FOLDER/failed to FOLDER, with that of the second run.
 again_alone() {
-    local list=$1 said=$2 folder program name tests
+    local list=$1 said=$2 folder program name way tests
     shift 2
+    [[ " $* " == *" --exact "* ]] || set -- "$@" --exact
     while IFS=$'\t' read -r folder _ program; do
         name=${program##*/}
         [ -f "$said/failed/$name" ] || continue
+        way_of "${folder#"$ROOT"}/$name"
         mapfile -t tests < <(sed -nE 's/^test (.*) \.\.\. FAILED$/\1/p' "$said/failed/$name")
         [ ${#tests[@]} -gt 0 ] || continue
-        echo "failed beside others: ${tests[*]}"
-        (cd "$folder" && exec "${RUNNER[@]}" "$program" "$@" "${tests[@]}") >"$said/again" 2>&1 </dev/null || continue
+        (cd "$folder" && exec "${way[@]}" "${RUNNER[@]}" "$program" "$@" "${tests[@]}") >"$said/again" 2>&1 </dev/null || continue
         # Those that passed at once still count.
         sed -E 's/^test result: FAILED\. ([0-9]+) passed; [0-9]+ failed;/test result: the others ok. \1 passed; 0 failed;/' \
             "$said/failed/$name" >"$said/$name"
-        cat "$said/again" >>"$said/$name"
+        {
+            cat "$said/again"
+            printf 'passed only alone: %s\n' "${tests[@]}"
+        } >>"$said/$name"
         rm "$said/failed/$name"
     done <"$list"
     rm -f "$said/again"
@@ -127,6 +134,16 @@ skipped_tests() {
                  print name "." test ": " reason }'
 }
 
+# failures FUNCTION: what the log of a failed stage says of its failed tests, or else its last lines.
+failures() {
+    local told
+    told=$(awk '/^---- .* stdout ----$/ { print $2; next }
+        /panicked at / { lines = 4 }
+        lines-- > 0 { print "    " $0; next }
+        /^(FAILED|ERROR) .* - / || /^\[ERROR\]   / { print }' "$LOGS/$1.log")
+    printf '%s\n' "${told:-$(tail -n 5 "$LOGS/$1.log")}" | cut -c -300
+}
+
 # Sums the processor time of a stage and its commands from the lines of `times`. Lanes wait for one another, so this is what
 # a stage costs, and its duration is not.
 processor_seconds() {
@@ -136,6 +153,7 @@ processor_seconds() {
 passed=0 failed=0 skipped=0
 table=()
 named_skips=()
+named_failures=()
 
 # stage HEADING FUNCTION [surefire | pytest]: runs one stage, and writes its result to a .result file and its messages to a
 # .said file.
@@ -198,13 +216,17 @@ account() {
         return
     fi
     IFS=$'\t' read -r verdict p f s seconds processor heading <"$LOGS/$function.result"
-    [ "$verdict" != skipped ] || named_skips+=("$heading: $(tail -n 1 "$LOGS/$function.log")")
+    case $verdict in
+        skipped) named_skips+=("$heading: $(tail -n 1 "$LOGS/$function.log")") ;;
+        FAILED) named_failures+=("$heading:" "$(failures "$function")") ;;
+    esac
     table+=("$(printf '%-34s %-8s %6d %6d %7d %5d s %7d s' "$heading" "$verdict" "$p" "$f" "$s" "$seconds" \
         "$processor")")
     passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
 }
 
-# conclude WHAT FUNCTION...: prints the table of these stages, what was skipped, and the counts. Fails if a stage did.
+# conclude WHAT FUNCTION...: prints the table of these stages, what was skipped or passed only alone, what failed and why, and the
+# counts. Fails if a stage did.
 conclude() {
     local what=$1 function line
     shift
@@ -219,6 +241,14 @@ conclude() {
     if [ ${#named_skips[@]} -gt 0 ]; then
         printf '\nskipped:\n'
         printf '  %s\n' "${named_skips[@]}"
+    fi
+    if cat "$LOGS"/*.log | sed -n 's/^passed only alone: /  /p' | grep . >"$LOGS/alone"; then
+        printf '\nfailed beside others, and passed alone:\n'
+        cat "$LOGS/alone"
+    fi
+    if [ ${#named_failures[@]} -gt 0 ]; then
+        printf '\nfailed:\n'
+        printf '%s\n' "${named_failures[@]}"
     fi
     printf '\n%s: %d passed, %d failed, %d skipped\n' "$what" "$passed" "$failed" "$skipped"
     [ "$failed" = 0 ]

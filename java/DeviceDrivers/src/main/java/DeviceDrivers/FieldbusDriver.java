@@ -55,27 +55,27 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
 
     private FieldbusDriver(Tickbus bus) {
         this.bus = bus;
-        latched = bus.signals().stream().filter(Signal::isLatched).toArray(Signal[]::new);
-        components = describe(bus.signals());
-        inputs = new double[(int) components.stream()
-            .filter(component -> component.direction() == Direction.READ_BY_SIMULATION).count()];
-    }
-
-    private static List<HardwareComponent> describe(List<Signal> signals) {
-        List<HardwareComponent> components = new ArrayList<>();
-        for (Signal signal : signals) {
+        // Without streams and lambdas, as in Signal.
+        List<Signal> counting = new ArrayList<>();
+        List<HardwareComponent> all = new ArrayList<>();
+        int written = 0;
+        for (Signal signal : bus.signals()) {
             Direction direction = signal.isWritten() ? Direction.WRITTEN_BY_SIMULATION : Direction.READ_BY_SIMULATION;
-            components.add(new HardwareComponent(signal.name(), direction, signal.type(), signal.unit()));
-        }
-        for (Signal signal : signals) {
+            all.add(new HardwareComponent(signal.name(), direction, signal.type(), signal.unit()));
+            written += signal.isWritten() ? 1 : 0;
             if (signal.isLatched()) {
-                components.add(read(signal.name() + ".edges", "UDINT", ""));
+                counting.add(signal);
             }
         }
-        components.add(read("bus.age", "LREAL", "s"));
-        components.add(read("bus.sequence", "ULINT", ""));
-        components.add(read("bus.status", "INT", ""));
-        return List.copyOf(components);
+        for (Signal signal : counting) {
+            all.add(read(signal.name() + ".edges", "UDINT", ""));
+        }
+        all.add(read("bus.age", "LREAL", "s"));
+        all.add(read("bus.sequence", "ULINT", ""));
+        all.add(read("bus.status", "INT", ""));
+        components = List.copyOf(all);
+        latched = counting.toArray(new Signal[0]);
+        inputs = new double[all.size() - written];
     }
 
     private static HardwareComponent read(String name, String type, String unit) {

@@ -50,7 +50,10 @@ final class Layout {
 
     /** Memory for a driver that is described but not opened. */
     void allocateAlone() {
-        int slots = signals.size() + (int) signals.stream().filter(signal -> signal.edgesSlot() >= 0).count();
+        int slots = signals.size();
+        for (Entry signal : signals) {
+            slots += signal.edgesSlot() >= 0 ? 1 : 0;
+        }
         allocate((SLOTS + slots) * Long.BYTES);
         words.put(WORD_SLOT_COUNT, slots);
     }

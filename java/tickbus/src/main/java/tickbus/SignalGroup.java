@@ -2,6 +2,8 @@ package tickbus;
 
 import java.nio.DoubleBuffer;
 import java.nio.LongBuffer;
+import java.util.ArrayList;
+import java.util.Arrays;
 import java.util.List;
 
 /** All signals that one end writes, or all that it reads, as one array of doubles. */
@@ -19,16 +21,33 @@ final class SignalGroup {
     private final long[] failSafe;
     private final Conversions conversions;
 
-    /** Created while the slots hold the fail-safe values, before the driver's first tick. */
-    SignalGroup(Layout layout, List<Signal> signals, Conversions conversions) {
+    /** The signals that this end writes, or those that it reads. Created while the slots hold the fail-safe values. */
+    SignalGroup(Layout layout, List<Signal> all, boolean written, Conversions conversions) {
+        List<Signal> signals = new ArrayList<>();
+        for (Signal signal : all) {
+            if (signal.isWritten() == written) {
+                signals.add(signal);
+            }
+        }
         this.slots = layout.slots();
         this.doubles = layout.doubles();
-        this.at = signals.stream().mapToInt(Signal::slot).toArray();
+        this.at = new int[signals.size()];
+        int[] wide = new int[at.length];
+        int count = 0;
+        for (int i = 0; i < at.length; i++) {
+            at[i] = signals.get(i).slot();
+            if (signals.get(i).integer() != null) {
+                wide[count++] = i;
+            }
+        }
         this.dense = at.length > 0 && at[at.length - 1] - at[0] == at.length - 1;
-        List<Signal> wide = signals.stream().filter(signal -> signal.integer() != null).toList();
-        this.integers = wide.stream().mapToInt(signals::indexOf).toArray();
-        this.kinds = wide.stream().map(Signal::integer).toArray(IntegerKind[]::new);
-        this.failSafe = wide.stream().mapToLong(signal -> slots.get(signal.slot())).toArray();
+        this.integers = Arrays.copyOf(wide, count);
+        this.kinds = new IntegerKind[count];
+        this.failSafe = new long[count];
+        for (int i = 0; i < count; i++) {
+            kinds[i] = signals.get(integers[i]).integer();
+            failSafe[i] = slots.get(at[integers[i]]);
+        }
         this.conversions = conversions;
     }
 

@@ -110,12 +110,12 @@ public final class Tickbus implements AutoCloseable {
         this.name = layout.name();
         this.words = layout.words();
         this.conversions = new Conversions(words);
-        LongBuffer slots = layout.slots();
-        this.signals = layout.signals().stream().map(entry -> new Signal(this, slots, entry)).toList();
-        signals.forEach(signal -> byName.put(signal.name(), signal));
-        this.written = new SignalGroup(layout, signals.stream().filter(Signal::isWritten).toList(), conversions);
-        this.read = new SignalGroup(layout, signals.stream().filter(signal -> !signal.isWritten()).toList(),
-            conversions);
+        this.signals = Signal.all(this, layout);
+        for (Signal signal : signals) {
+            byName.put(signal.name(), signal);
+        }
+        this.written = new SignalGroup(layout, signals, true, conversions);
+        this.read = new SignalGroup(layout, signals, false, conversions);
         this.forgotten = new Forgotten(handle);
         this.cleanable = CLEANER.register(this, forgotten);
     }
@@ -578,7 +578,9 @@ public final class Tickbus implements AutoCloseable {
 
     private void closed() {
         closed = true;
-        signals.forEach(Signal::close);
+        for (Signal signal : signals) {
+            signal.close();
+        }
         forgotten.closed = true;
         cleanable.clean();
     }

@@ -13,6 +13,7 @@
 #[path = "modbus/libmodbus.rs"]
 mod libmodbus;
 mod servers;
+mod signals;
 
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
@@ -69,7 +70,7 @@ fn main() {
 
 /// A device like the rig, with further keys of its bus.
 fn device(keys: &str) -> Server {
-    let (bytes, signals) = (2 * usize::from(REGISTERS), servers::latched_bits());
+    let (bytes, signals) = (2 * usize::from(REGISTERS), signals::latched_bits());
     Server::device(&format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n\
          inputs = \"offset:{WINDOW}\"\ninput_bytes = {bytes}\noutput_bytes = {bytes}\n{keys}\n{signals}"

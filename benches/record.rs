@@ -6,6 +6,8 @@
 //! Prints one `rust NAME VALUE` per line on stdout.
 #![allow(missing_docs, reason = "a bench")]
 
+mod signals;
+
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::path::Path;
@@ -56,15 +58,7 @@ fn open(folder: &Path, fieldbus: &str, record: &str) -> Driver {
     if !record.is_empty() {
         let _ = write!(text, "[record]\nfile = \"{record}\"\n");
     }
-    for area in ['Q', 'I'] {
-        for bit in 0..16 {
-            let (byte, bit) = (1 - bit / 8, bit % 8);
-            let _ = write!(
-                text,
-                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\nlatch = \"rising\"\n"
-            );
-        }
-    }
+    text += &signals::latched_bits();
     let path = folder.join("driver.cfg");
     let config = Config::parse(path.to_str().expect("UTF-8"), &text, &tickbus::KINDS)
         .unwrap_or_else(|why| panic!("{why}"));

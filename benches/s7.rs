@@ -9,6 +9,7 @@
 #![allow(missing_docs, reason = "a bench")]
 
 mod servers;
+mod signals;
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -54,7 +55,7 @@ fn main() {
 
 /// A device like the rig.
 fn device() -> Server {
-    let signals = servers::latched_bits();
+    let signals = signals::latched_bits();
     Server::device(&format!(
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"s7-server\"\naddress = \"127.0.0.1:0\"\n\
          input_bytes = {ANSWER}\noutput_bytes = {REQUEST}\n\

@@ -6,7 +6,8 @@
 //! numbers of exchanges leaves out the start.
 #![allow(missing_docs, reason = "a bench")]
 
-use std::fmt::Write as _;
+mod signals;
+
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::process::Command;
@@ -105,20 +106,11 @@ fn number(text: &str) -> u32 {
 
 /// Opens a Device with 16 latched bits each way, like the rig, and waits until its client has ended.
 fn serve(kind: &Kind, max_age: &str, exchanges: u32) {
-    let mut text = format!(
-        "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\naddress = \"127.0.0.1:0\"\nmax_age = \"{max_age}\"\n{}\n",
-        kind.keys
+    let text = format!(
+        "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\naddress = \"127.0.0.1:0\"\nmax_age = \"{max_age}\"\n{}\n{}",
+        kind.keys,
+        signals::latched_bits()
     );
-    for area in ['Q', 'I'] {
-        for bit in 0..16 {
-            let (byte, bit) = (1 - bit / 8, bit % 8);
-            let _ = write!(
-                text,
-                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\n\
-                 latch = \"rising\"\n"
-            );
-        }
-    }
     let config =
         Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"));
     let clock = Monotonic::shared();

@@ -5,11 +5,14 @@
 //! stepped one every exchange runs a bus cycle and a scan of the hosted program, on the same thread.
 #![allow(missing_docs, reason = "a bench")]
 
+mod signals;
+
 use std::fmt::Write as _;
 use std::hint::black_box;
 use std::sync::Arc;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
+use signals::{bits, latched_bits};
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::image::triple_buffer;
@@ -48,20 +51,6 @@ fn config(mode: &str, signals: &str) -> Config {
          scan = \"1ms\"\ncycle = \"1ms\"\nmode = \"{mode}\"\n{signals}"
     );
     Config::parse("driver.cfg", &text, &tickbus::KINDS).unwrap_or_else(|why| panic!("{why}"))
-}
-
-fn bits(latch: &str) -> String {
-    let mut text = String::new();
-    for area in ['Q', 'I'] {
-        for bit in 0..16 {
-            let (byte, bit) = (1 - bit / 8, bit % 8);
-            let _ = write!(
-                text,
-                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\n{latch}\n"
-            );
-        }
-    }
-    text
 }
 
 /// Bits each in a byte of its own, like the `Execute` bits of `count` axes.
@@ -119,7 +108,7 @@ fn latches(criterion: &mut Criterion) {
 fn exchange(criterion: &mut Criterion) {
     let clock = Monotonic::shared();
     let mut group = criterion.benchmark_group("exchange");
-    let latched = bits("latch = \"rising\"");
+    let latched = latched_bits();
     // Waiting faults, and active faults.
     let wait = FAULTS.replace("[[fault]]", "[[fault]]\nat = \"1000h\"");
     let tables = [

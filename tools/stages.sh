@@ -79,15 +79,15 @@ again_alone() {
         name=${program##*/}
         [ -f "$said/failed/$name" ] || continue
         way_of "${folder#"$ROOT"}/$name"
+        # None where the program was ended in the middle of a test: then all of them.
         mapfile -t tests < <(sed -nE 's/^test (.*) \.\.\. FAILED$/\1/p' "$said/failed/$name")
-        [ ${#tests[@]} -gt 0 ] || continue
         (cd "$folder" && exec "${way[@]}" "${RUNNER[@]}" "$program" "$@" "${tests[@]}") >"$said/again" 2>&1 </dev/null || continue
         # Those that passed at once still count.
-        sed -E 's/^test result: FAILED\. ([0-9]+) passed; [0-9]+ failed;/test result: the others ok. \1 passed; 0 failed;/' \
+        [ ${#tests[@]} = 0 ] || sed -E 's/^test result: FAILED\. ([0-9]+) passed; [0-9]+ failed;/test result: the others ok. \1 passed; 0 failed;/' \
             "$said/failed/$name" >"$said/$name"
         {
             cat "$said/again"
-            printf 'passed only alone: %s\n' "${tests[@]}"
+            printf 'passed only alone: %s\n' "${tests[@]:-$name}"
         } >>"$said/$name"
         rm "$said/failed/$name"
     done <"$list"

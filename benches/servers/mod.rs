@@ -1,8 +1,7 @@
 //! Servers in processes of their own, as every client meets one: this program again, with its role in the arguments, or a
-//! program of others. Processes share nothing, so a server that is a thread of its client would look better than it is.
+//! program of others. A server that is a thread of its client would look better than it is.
 #![allow(dead_code, reason = "each bench needs a part of it")]
 
-use std::fmt::Write as _;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
@@ -162,22 +161,6 @@ fn serve_bare(sizes: &[usize]) -> ! {
             }
         }
     }
-}
-
-/// 16 latched bits each way, like the rig.
-pub(crate) fn latched_bits() -> String {
-    let mut text = String::new();
-    for area in ['Q', 'I'] {
-        for bit in 0..16 {
-            let (byte, bit) = (1 - bit / 8, bit % 8);
-            let _ = write!(
-                text,
-                "[[signal]]\nname = \"{area} {byte}.{bit}\"\naddress = \"%{area}X{byte}.{bit}\"\n\
-                 latch = \"rising\"\n"
-            );
-        }
-    }
-    text
 }
 
 /// The rate of `once` per second.

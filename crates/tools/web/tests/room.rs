@@ -422,7 +422,7 @@ fn nobody_is_asked_while_nobody_looks() {
 
 #[test]
 fn who_does_not_read_keeps_nobody_waiting_and_gets_the_newest() {
-    // It is not given up, however slow this computer is.
+    // However slow this computer is, the room does not give the viewer up.
     let fixture = serve(Limits {
         patience: Duration::from_secs(3600),
         ..Limits::default()

@@ -102,7 +102,7 @@ impl Watch {
     }
 
     /// As [`wait`](Self::wait), until a `deadline` on `clock` that is far at `now`. Such a deadline mostly moves on before
-    /// it comes: the timer stays armed for an earlier one, and the wait ends then.
+    /// it comes, so the timer is left as it is if it ends before that: this wait then ends early.
     pub(super) fn wait_far(
         &mut self,
         (clock, now): (&dyn Clock, Nanos),
@@ -125,7 +125,7 @@ impl Watch {
         }
     }
 
-    /// Arms the timer anew.
+    /// Sets the timer, whether it is armed or not.
     fn arm(&mut self, span: Duration) -> Result<&mut Timer, Errno> {
         let timer = match &mut self.timer {
             Some(timer) => timer,
@@ -244,7 +244,11 @@ impl Watch {
 #[cfg(test)]
 mod tests {
     use std::os::unix::net::UnixDatagram;
+    use std::os::unix::thread::JoinHandleExt as _;
+    use std::sync::atomic::{AtomicI32, Ordering};
+    use std::sync::mpsc::channel;
     use std::thread;
+    use std::{fs, ptr};
 
     use super::*;
     use crate::time::Monotonic;
@@ -364,6 +368,59 @@ mod tests {
             assert!(clock.now() >= soon && clock.now() < second);
         }
         assert!(wait(&mut watch, begin).is_empty(), "a deadline of the past");
+    }
+
+    /// The socket that [`send_in_handler`] writes to.
+    static SENDER: AtomicI32 = AtomicI32::new(-1);
+
+    extern "C" fn send_in_handler(_: i32) {
+        let sender = SENDER.load(Ordering::Relaxed);
+        // SAFETY: one byte of a constant; handlers of signals may call `send`.
+        unsafe { libc::send(sender, c"!".as_ptr().cast(), 1, libc::MSG_DONTWAIT) };
+    }
+
+    /// The system ends a wait by a signal before it runs the handler, so what the handler sends has come by the time that
+    /// the wait returns, and is not among its events.
+    #[test]
+    fn a_wait_that_a_signal_interrupts_reports_what_has_come_meanwhile() {
+        // SAFETY: all zeros is a valid action, and the handler stays as long as the program.
+        unsafe {
+            let mut action: libc::sigaction = std::mem::zeroed();
+            action.sa_sigaction = send_in_handler as extern "C" fn(i32) as usize;
+            assert_eq!(
+                libc::sigaction(libc::SIGURG, &raw const action, ptr::null_mut()),
+                0
+            );
+        }
+        for (is_exact, patience) in [(true, None), (false, None), (false, Some(9))] {
+            let (near, far) = UnixDatagram::pair().expect("a pair");
+            SENDER.store(far.as_raw_fd(), Ordering::Relaxed);
+            let (told, thread_number) = channel();
+            let waiting = thread::spawn(move || {
+                let mut watch = Watch::new().expect("a descriptor");
+                watch.add(KEY, &near, Interest::Read).expect("it is open");
+                watch.is_exact = is_exact;
+                let mut ready = Vec::new();
+                told.send(rustix::thread::gettid()).expect("it is awaited");
+                let waited = watch.wait(patience.map(Duration::from_secs), &mut ready);
+                waited.expect("it waits");
+                ready.iter().map(|ready| ready.key).collect::<Vec<_>>()
+            });
+            let number = thread_number.recv().expect("it has started");
+            let state = format!("/proc/self/task/{}/stat", number.as_raw_nonzero());
+            while !fs::read_to_string(&state)
+                .expect("it runs")
+                .contains(") S ")
+            {
+                thread::yield_now();
+            }
+            // SAFETY: the thread is not joined yet.
+            assert_eq!(
+                unsafe { libc::pthread_kill(waiting.as_pthread_t(), libc::SIGURG) },
+                0
+            );
+            assert_eq!(waiting.join().expect("no panic"), [KEY]);
+        }
     }
 
     #[test]

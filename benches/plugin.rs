@@ -9,6 +9,9 @@
 #![allow(missing_docs, reason = "a bench")]
 
 #[cfg(all(target_os = "linux", not(no_cc)))]
+mod processor;
+
+#[cfg(all(target_os = "linux", not(no_cc)))]
 fn main() {
     plugin::main();
 }
@@ -22,11 +25,11 @@ fn main() {
 
 #[cfg(all(target_os = "linux", not(no_cc)))]
 mod plugin {
-    use std::fs;
     use std::path::{Path, PathBuf};
     use std::process::Command;
     use std::sync::Arc;
 
+    use crate::processor::processor_us;
     use tickbus::driver::Driver;
     use tickbus::driver_cfg::Config;
     use tickbus::time::{Clock as _, Monotonic, Nanos, Stop};
@@ -98,34 +101,10 @@ mod plugin {
         while cycles() < 2.0 {
             wait(Nanos::from_millis(10));
         }
-        let (before, begun) = (cycles(), processor_us());
+        let (before, begun) = (cycles(), processor_us(true));
         wait(time);
-        let cost = (processor_us() - begun) / (cycles() - before);
+        let cost = (processor_us(true) - begun) / (cycles() - before);
         driver.close();
         cost
-    }
-
-    /// The processor time of this process and of its children, in microseconds. The first number of `schedstat` is the
-    /// time of a thread on a processor, in nanoseconds.
-    fn processor_us() -> f64 {
-        let own = std::process::id().to_string();
-        let listed = |folder: &Path| -> Vec<PathBuf> {
-            let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-            entries.map(|entry| entry.path()).collect()
-        };
-        let mut all = 0.0;
-        for process in listed(Path::new("/proc")) {
-            let status = fs::read_to_string(process.join("status")).unwrap_or_default();
-            let parent = status.lines().find_map(|line| line.strip_prefix("PPid:\t"));
-            if !process.ends_with(&own) && parent != Some(&own) {
-                continue;
-            }
-            for task in listed(&process.join("task")) {
-                let times = fs::read_to_string(task.join("schedstat")).unwrap_or_default();
-                let time = times.split(' ').next().and_then(|time| time.parse().ok());
-                all += time.unwrap_or(0.0) / 1000.0;
-            }
-        }
-        all
     }
 }

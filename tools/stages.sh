@@ -163,7 +163,8 @@ stage() {
     set +e
     (
         set -e
-        trap 'times >"$LOGS/$function.times"' EXIT
+        # Wherever the stage has gone.
+        trap 'times >"$ROOT/$LOGS/$function.times"' EXIT
         "$function"
     ) >"$log" 2>&1 </dev/null
     code=$?

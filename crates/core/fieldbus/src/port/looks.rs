@@ -49,6 +49,8 @@ impl Looks {
         // The limit is twice the promised time, because threads often wake up a little late.
         if now - last > self.rest() + self.rest() {
             self.kept_since.get_or_insert(last);
+            // The process may have been suspended after it was told what is there, and before it read the time.
+            self.is_unfinished = true;
         }
     }
 
@@ -118,8 +120,11 @@ mod tests {
         let mut looks = looks();
         looks.look(at(1051));
         assert_eq!(looks.arrival(at(1051)), at(1000));
+        // Suspended in the middle of that look, it has not seen what came meanwhile.
         looks.look(at(1052));
-        assert_eq!(looks.arrival(at(1052)), at(1052));
+        assert_eq!(looks.arrival(at(1052)), at(1000));
+        looks.look(at(1053));
+        assert_eq!(looks.arrival(at(1053)), at(1053));
     }
 
     #[test]
@@ -132,7 +137,9 @@ mod tests {
         looks.look(at(9000));
         assert_eq!(looks.arrival(at(9000)), at(1000));
         looks.look(at(9001));
-        assert_eq!(looks.arrival(at(9001)), at(9001));
+        assert_eq!(looks.arrival(at(9001)), at(1000));
+        looks.look(at(9002));
+        assert_eq!(looks.arrival(at(9002)), at(9002));
     }
 
     #[test]

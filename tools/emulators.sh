@@ -12,9 +12,9 @@ ARM64_LIBRARIES=/usr/aarch64-linux-gnu
 # shellcheck disable=SC2034 # for the scripts that source this
 run_by() {
     case $1 in
-        windows) RUNNER=(timeout --foreground "${2:-400}" "$WINE") ;;
-        arm64) RUNNER=(timeout --foreground "${2:-400}" qemu-aarch64 -L "$ARM64_LIBRARIES") ;;
-        musl) RUNNER=(timeout --foreground "${2:-400}") ;;
+        windows) RUNNER=(timeout --foreground "${2:-900}" "$WINE") ;;
+        arm64) RUNNER=(timeout --foreground "${2:-900}" qemu-aarch64 -L "$ARM64_LIBRARIES") ;;
+        musl) RUNNER=(timeout --foreground "${2:-900}") ;;
     esac
 }
 

@@ -366,6 +366,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
         },
         // The pulses may be shorter than a tick or a bus cycle.
         latch: matches!(field, Field::Execute | Field::Acknowledge).then_some(Latch::Rising),
+        count_swallowed: None,
         states_fail_safe: false,
         hold: Nanos::ZERO,
         fail_safe: scale.map_or_else(Slot::default, |scale| Slot::from_real(scale.offset)),

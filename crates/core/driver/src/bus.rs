@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::loopback::{Mode, Options, Peer};
 use tickbus_fieldbus::loopback::{self, FreeLoopback, private_link};
-use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role};
+use tickbus_fieldbus::{Bus, BusSetup, Hosted, OpenError, Role, SwallowedSignals};
 use tickbus_image::signal::Area;
 use tickbus_plc as plc;
 
@@ -18,11 +18,13 @@ use super::replay::Replay;
 use tickbus_driver_cfg::Config;
 
 /// Creates the bus that `config` names and, if a program is hosted at its other end, starts it. `hosted` is a program
-/// at this end.
+/// at this end. The stages of the line between this end and a hosted program count their swallowed changes into
+/// `swallowed`.
 pub(super) fn open(
     config: &Config,
     clock: &Arc<dyn Clock>,
     hosted: Option<Hosted<'_>>,
+    swallowed: &SwallowedSignals,
 ) -> Result<(OpenBus, Option<OtherEnd>), DriverError> {
     if let Some(options) = config.bus.downcast_ref::<Options>() {
         match &options.peer {
@@ -38,7 +40,7 @@ pub(super) fn open(
                 name,
                 options: given,
                 scan,
-            } => return open_hosted(config, options.mode, (name, given, *scan), clock),
+            } => return open_hosted(config, options.mode, (name, given, *scan), clock, swallowed),
         }
     }
     let setup = BusSetup {
@@ -69,6 +71,7 @@ fn open_hosted(
     mode: Mode,
     (name, options, scan): (&str, &[(String, String)], Option<Nanos>),
     clock: &Arc<dyn Clock>,
+    swallowed: &SwallowedSignals,
 ) -> Result<(OpenBus, Option<OtherEnd>), DriverError> {
     let cycle = config.timing.cycle.unwrap_or(loopback::CYCLE);
     let folder = config.path.parent().unwrap_or(Path::new(""));
@@ -78,8 +81,9 @@ fn open_hosted(
         .map_err(|source| program_error(config, source))?;
     check_fit(config, &mut *program, Role::Controller)?;
     let scan = plc::interval(&*program, scan);
+    swallowed.scanned_every(scan);
     if mode == Mode::Stepped {
-        let (host, scan_counters) = SteppedHost::new(program, config, scan);
+        let (host, scan_counters) = SteppedHost::new(program, config, scan, swallowed.counts());
         return Ok((
             OpenBus::Stepped(SteppedBus::Any(Box::new(host))),
             Some(OtherEnd::stepped(scan_counters)),
@@ -96,6 +100,7 @@ fn open_hosted(
         interval: scan,
         has_watchdog: true,
         recorder: None,
+        swallowed: swallowed.clone(),
     };
     let line = (Bus::Free(bus(controller)), Stop::new());
     let host = HostThread::start(hosted, (config, Role::Controller), line, Arc::clone(clock))?;

@@ -10,6 +10,7 @@ use tickbus_plc::Program;
 
 use super::bus_handle::{OpenBus, SteppedBus};
 use super::host::{HostThread, ScanSetup, check_fit};
+use super::open::swallowed_of;
 use super::recording::recorder;
 use super::watch::Watch;
 use super::{DriverError, SlotMap, bus};
@@ -77,7 +78,8 @@ impl Host {
             interval,
             stop: &stop,
         };
-        let bus = match bus::open(config, &clock, Some(hosted))?.0 {
+        let swallowed = swallowed_of(config, &format!("plc {}", program.name()));
+        let bus = match bus::open(config, &clock, Some(hosted), &swallowed)?.0 {
             OpenBus::Free(bus) => Bus::Free(bus),
             OpenBus::Stepped(SteppedBus::Any(bus)) if bus.lead() != Lead::Simulation => {
                 Bus::Stepped(bus)
@@ -96,6 +98,7 @@ impl Host {
             interval,
             has_watchdog,
             recorder: recorder(config, &map, None, is_stepped, &clock)?,
+            swallowed,
         };
         HostThread::start(hosted, (config, config.role), (bus, stop), clock).map(Self)
     }
@@ -153,6 +156,7 @@ impl Host {
 
     /// Stops scanning and closes the bus. If the program did not end, returns why.
     pub fn close(mut self) -> Option<String> {
+        self.0.figures.swallowed.log();
         self.0.end()
     }
 }

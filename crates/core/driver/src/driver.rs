@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Lead, Link, LinkStatus};
+use tickbus_fieldbus::{Lead, Link, LinkStatus, SwallowedSignals};
 use tickbus_image::signal::Slot;
 use tickbus_image::{Event, TickEnd};
 use tickbus_record::Recorder;
@@ -52,6 +52,7 @@ pub struct Driver {
     /// The work of the next tick besides carrying values.
     pub(super) shape: Shape,
     pub(super) board: Arc<FaultBoard>,
+    pub(super) swallowed: SwallowedSignals,
     pub(super) program: Option<OtherEnd>,
     pub(super) program_counters: ProgramCounters,
     pub(super) recorder: Option<Recorder>,
@@ -135,6 +136,7 @@ impl Driver {
         Figures {
             status: self.status.clone(),
             board: Arc::clone(&self.board),
+            swallowed: self.swallowed.clone(),
             program: self.program_counters.clone(),
             record: recorder.map(|recorder| Arc::clone(recorder.counters())),
         }

@@ -2,7 +2,7 @@
 
 use tickbus_fieldbus::Role;
 use tickbus_image::signal::{Area, SignalTable, fail_safe_frame};
-use tickbus_image::{StationStreams, latched_bits};
+use tickbus_image::{StationStreams, counted_signals, latched_bits};
 
 /// Returns the size of a station's area in bytes.
 pub(super) fn area_bytes(table: &SignalTable, station: usize, area: Area) -> usize {
@@ -19,8 +19,10 @@ pub(super) fn directions(table: &SignalTable, role: Role) -> Vec<StationStreams>
         .map(|station| StationStreams {
             tx_fail_safe: fail_safe_frame(table, station, tx),
             tx_latched: latched_bits(table, station, tx),
+            tx_counted: counted_signals(table, station, tx),
             rx_fail_safe: fail_safe_frame(table, station, rx),
             rx_latched: latched_bits(table, station, rx),
+            rx_counted: counted_signals(table, station, rx),
         })
         .collect()
 }

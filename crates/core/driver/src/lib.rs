@@ -21,6 +21,8 @@ mod station;
 mod statistics;
 mod status;
 mod supervise;
+#[cfg(test)]
+mod swallowed_tests;
 mod tap;
 mod tick;
 mod tick_counters;

@@ -6,8 +6,10 @@ use tickbus_axis::Reflexes;
 use tickbus_base::QuickClock;
 use tickbus_base::time::{Clock, Manual, Nanos};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role};
-use tickbus_image::{BusEnd, EVENT_CAPACITY, TickEnd, image_with_events};
+use tickbus_fieldbus::{
+    Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role, Steps, SwallowedSignals,
+};
+use tickbus_image::{BusEnd, EVENT_CAPACITY, TickEnd, image_counting};
 
 use super::bus;
 use super::bus_handle::{BusHandle, OpenBus};
@@ -33,11 +35,12 @@ impl Driver {
     /// See [`DriverError`].
     pub fn open(mut config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
         let areas = config.role.areas();
-        let (tick, bus_end) = image_of(&config);
+        let swallowed = swallowed_of(&config, &config.name);
+        let (tick, bus_end) = image_of(&config, &swallowed);
         let names = config.table.stations.iter();
         let names = names.map(|station| station.name.clone()).collect();
         let status = LinkStatus::of_stations(&config.name, config.timing.max_age, names);
-        let (bus, program) = bus::open(&config, &clock, None)?;
+        let (bus, program) = bus::open(&config, &clock, None, &swallowed)?;
         let slots = SlotMap::new(&config.table, config.role);
         // On a stepped bus the tick may wait for the recorder, so that none of its ticks is dropped.
         let recorder = recorder(
@@ -56,7 +59,7 @@ impl Driver {
         let quick = QuickClock::new(Arc::clone(&clock));
         let board = Arc::<FaultBoard>::default();
         let times = (&clock, &simulation_time);
-        let line = start(&config, bus, bus_end, times, (&status, &board))?;
+        let line = start(&config, bus, bus_end, times, (&status, &board, &swallowed))?;
         // A reset finds the files again though the working folder has changed. Mistakes have named the path as given.
         if let Ok(path) = std::path::absolute(&config.path) {
             config.path = path;
@@ -84,6 +87,7 @@ impl Driver {
             extras: extras(&config),
             shape: Shape::Extended,
             board,
+            swallowed,
             program_counters: ProgramCounters::new(counters_of(program.as_ref())),
             program,
             recorded: Recorded::default(),
@@ -107,6 +111,7 @@ impl Driver {
     /// [`end_tick`](Self::end_tick) has ended it.
     pub fn close(self) {
         self.board.tell(self.status.driver());
+        self.swallowed.log();
         if log::log_enabled!(log::Level::Info) {
             let statistics = self.statistics().replace('\n', " ");
             log::info!("driver \"{}\" closes: {statistics}", self.config.name);
@@ -119,12 +124,30 @@ impl Driver {
 }
 
 /// Creates the two ends of the image.
-pub(super) fn image_of(config: &Config) -> (TickEnd, BusEnd) {
+pub(super) fn image_of(config: &Config, swallowed: &SwallowedSignals) -> (TickEnd, BusEnd) {
     let events = match config.events {
         Events::None => 0,
         _ => EVENT_CAPACITY,
     };
-    image_with_events(directions(&config.table, config.role), events)
+    let streams = directions(&config.table, config.role);
+    image_counting(streams, events, swallowed.counts())
+}
+
+/// Creates the counters of swallowed changes at this end of a line, which is called `name` in the log.
+pub(super) fn swallowed_of(config: &Config, name: &str) -> SwallowedSignals {
+    let cycles = Steps {
+        name: "bus cycles",
+        span: config.timing.cycle.or(config.bus.cycle()),
+    };
+    let own = match config.role {
+        Role::Device => "ticks",
+        Role::Controller => "scans",
+    };
+    let own = Steps {
+        name: own,
+        span: None,
+    };
+    SwallowedSignals::new(name, &config.table, config.role, [cycles, own])
 }
 
 /// Starts a bus on its own thread, or prepares it for the tick, which advances `time`; `clock` is the clock of the line.
@@ -133,12 +156,13 @@ pub(super) fn start(
     bus: OpenBus,
     image: BusEnd,
     (clock, time): (&Arc<dyn Clock>, &Arc<Manual>),
-    (status, board): (&LinkStatus, &Arc<FaultBoard>),
+    (status, board, swallowed): (&LinkStatus, &Arc<FaultBoard>, &SwallowedSignals),
 ) -> Result<BusHandle, DriverError> {
     let (table, role, timing) = (&config.table, config.role, &config.timing);
     let (clock, watchdog) = (Arc::clone(clock), timing.watchdog);
     let mut port = Port::new(image, clock, role, watchdog, status.clone())
         .with_faults(Arc::clone(board))
+        .with_swallowed(swallowed.clone())
         .with_life_signs(config.life_signs.watches(table, role, timing.max_age))
         .with_names(table.stations.iter().map(|s| s.name.as_str()));
     if config.events != Events::None {

@@ -9,7 +9,7 @@ use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{LinkStatus, is_stale};
+use tickbus_fieldbus::{LinkStatus, SwallowedSignals, is_stale};
 use tickbus_record::RecorderCounters;
 
 /// Counters that any thread can read.
@@ -49,6 +49,7 @@ impl ProgramCounters {
 pub(super) struct Figures {
     pub(super) status: LinkStatus,
     pub(super) board: Arc<FaultBoard>,
+    pub(super) swallowed: SwallowedSignals,
     pub(super) program: ProgramCounters,
     pub(super) record: Option<Arc<RecorderCounters>>,
 }
@@ -104,6 +105,7 @@ impl Figures {
             ticks.write_stations(&mut statistics);
             ticks.samples.write(&mut statistics);
         }
+        self.swallowed.write(&mut statistics);
         self.board.tell(self.status.driver());
         self.board.write(&mut statistics);
         self.program.write(&mut statistics);

@@ -15,6 +15,7 @@ mod port;
 mod rarely;
 mod renewal;
 mod role;
+mod swallowed;
 mod validity;
 mod write_guard;
 
@@ -37,6 +38,7 @@ pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use renewal::Renewal;
 pub use role::Role;
+pub use swallowed::{Steps, SwallowedSignals};
 pub use tickbus_image::is_stale;
 pub use validity::{PlcState, Validity};
 pub use write_guard::WriteGuard;

@@ -23,7 +23,9 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_image::{BusEnd, Event};
 
 use super::validity::Validity;
-use super::{BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, Watch};
+use super::{
+    BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, SwallowedSignals, Watch,
+};
 use crate::faults::{Diagnosis, FaultBoard};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
@@ -64,6 +66,8 @@ impl Port {
                 blind: None,
                 ending: None,
                 fresh_until: Nanos::ZERO,
+                swallowed: None,
+                next_log: Nanos::ZERO,
             },
             clock,
             role,
@@ -88,6 +92,13 @@ impl Port {
     #[must_use]
     pub fn with_life_signs(mut self, watches: Vec<Watch>) -> Self {
         self.image.validity.watch(watches);
+        self
+    }
+
+    /// The same port, which logs the signals whose changes were swallowed.
+    #[must_use]
+    pub fn with_swallowed(mut self, swallowed: SwallowedSignals) -> Self {
+        self.image.swallowed = Some(swallowed);
         self
     }
 
@@ -388,12 +399,14 @@ impl Port {
         self.image.last_cycle = None;
         // A bus that panicked may have left something half handed in.
         self.image.is_held = false;
+        self.image.image.peers_left();
         self.enter(LinkState::Opening, Cause::Waiting, reason);
     }
 
     /// The peer was lost because of `error`, and the bus continues without a pause, as `next` describes.
     pub fn lost(&mut self, error: &BusError, next: &str) {
         self.image.last_cycle = None;
+        self.image.image.peers_left();
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
     }

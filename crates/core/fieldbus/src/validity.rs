@@ -265,6 +265,8 @@ mod tests {
         let station = || StationStreams {
             tx_fail_safe: Box::new([]),
             tx_latched: Box::new([]),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0]),
             rx_latched: Box::new([]),
         };

@@ -2,7 +2,8 @@
 
 use tickbus_base::time::Nanos;
 
-use crate::{EdgeCounter, LatchedBit, PulseShaper, copy_frame};
+use super::swallowed::Returns;
+use crate::{Counted, EdgeCounter, LatchedBit, PulseShaper, Swallowed, copy_frame};
 
 /// A stream of frames whose writer and reader take turns on one thread. As through the two ends of an
 /// [`image`](fn@crate::image), no edge of a latched signal is lost, but no hand-over is needed.
@@ -13,6 +14,9 @@ pub struct DirectStream {
     shaper: PulseShaper,
     /// The frame with its pulses shaped, if they need it.
     shaped: Box<[u8]>,
+    returns: Returns,
+    /// True if the frame was read at least once.
+    is_read: bool,
 }
 
 impl DirectStream {
@@ -22,8 +26,17 @@ impl DirectStream {
             edges: EdgeCounter::new(&latched, &fail_safe),
             shaper: PulseShaper::new(latched, &fail_safe),
             shaped: fail_safe.clone(),
+            returns: Returns::new(&[], &[], &Swallowed::new(0)),
+            is_read: false,
             bytes: fail_safe,
         }
+    }
+
+    /// The same stream, which counts the changes of these signals that no reader sees.
+    #[must_use]
+    pub fn with_counted(mut self, counted: &[Counted], swallowed: &Swallowed) -> Self {
+        self.returns = Returns::new(counted, &self.bytes, swallowed);
+        self
     }
 
     /// Lets `write` change the frame, and counts the resulting edges.
@@ -33,6 +46,9 @@ impl DirectStream {
         if self.has_latched() {
             self.edges.observe(&self.bytes);
         }
+        if !self.returns.is_empty() {
+            self.returns.observe(&self.bytes, || self.is_read);
+        }
         result
     }
 
@@ -40,6 +56,7 @@ impl DirectStream {
     pub fn pass(&mut self, bytes: &[u8]) {
         copy_frame(&mut self.bytes, bytes);
         self.edges.pass(bytes);
+        self.returns.pass(bytes);
     }
 
     /// The frame as written, for a reader to which its edges do not count: the edges wait.
@@ -50,6 +67,8 @@ impl DirectStream {
     /// The reader's view at `now`: the frame, with every edge since the last call made visible.
     #[inline]
     pub fn read(&mut self, now: Nanos) -> &[u8] {
+        self.returns.taken();
+        self.is_read = true;
         if !self.has_latched() {
             return &self.bytes;
         }
@@ -107,6 +126,8 @@ mod tests {
         let (mut tick, mut bus) = image(vec![StationStreams {
             tx_fail_safe: fail_safe.clone(),
             tx_latched: latched.clone(),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: fail_safe.clone(),
             rx_latched: latched,
         }]);

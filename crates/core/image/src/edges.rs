@@ -6,6 +6,7 @@
 
 use std::ops::Range;
 
+use super::word::{among, word_at};
 use crate::signal::{Area, Latch, SignalTable};
 use tickbus_base::time::Nanos;
 
@@ -84,13 +85,7 @@ impl Word {
     /// The levels of the latched bits.
     #[inline]
     fn levels(&self, bytes: &[u8]) -> u64 {
-        let rest = &bytes[self.byte..];
-        let word = rest.first_chunk().copied().unwrap_or_else(|| {
-            let mut word = [0; 8];
-            word[..rest.len()].copy_from_slice(rest);
-            word
-        });
-        u64::from_le_bytes(word) & self.latched
+        word_at(bytes, self.byte) & self.latched
     }
 
     /// Toggles the latched bits in `changes`.
@@ -112,11 +107,7 @@ impl Word {
 
     /// The latched bits that are among `bits` of the frame.
     fn among(&self, bits: &Range<usize>) -> u64 {
-        let below = |end: usize| match end.saturating_sub(self.byte * 8) {
-            end @ 0..64 => (1 << end) - 1,
-            _ => u64::MAX,
-        };
-        below(bits.end) & !below(bits.start)
+        among(self.byte, bits)
     }
 }
 

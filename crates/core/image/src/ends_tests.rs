@@ -20,6 +20,8 @@ fn latched_bytes(stations: usize) -> (TickEnd, BusEnd) {
         StationStreams {
             tx_fail_safe: Box::new([0x80]),
             tx_latched: latched.clone(),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0]),
             rx_latched: latched,
         }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::LatchedBit;
 use super::stale::NEVER;
+use super::swallowed::Counted;
 
 /// The fail-safe bytes and the latched signals of one station's two streams; tx and rx are as seen from the tick.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -12,10 +13,14 @@ pub struct StationStreams {
     pub tx_fail_safe: Box<[u8]>,
     /// The latched signals of the tx bytes.
     pub tx_latched: Box<[LatchedBit]>,
+    /// The signals of the tx bytes whose swallowed changes are counted.
+    pub tx_counted: Box<[Counted]>,
     /// The rx bytes before the first bus cycle.
     pub rx_fail_safe: Box<[u8]>,
     /// The latched signals of the rx bytes.
     pub rx_latched: Box<[LatchedBit]>,
+    /// The signals of the rx bytes whose swallowed changes are counted.
+    pub rx_counted: Box<[Counted]>,
 }
 
 /// The state of one station's bytes: handed over with them, so that no reader takes old bytes for young ones.

@@ -23,9 +23,11 @@ mod frame;
 mod peers;
 mod row_ring;
 mod stale;
+mod swallowed;
 mod sync;
 mod tick_end;
 mod triple;
+mod word;
 
 #[cfg(all(test, not(loom)))]
 mod ends_tests;
@@ -33,6 +35,8 @@ mod ends_tests;
 mod loom_tests;
 #[cfg(all(test, not(loom)))]
 mod model_tests;
+#[cfg(all(test, not(loom)))]
+mod swallowed_tests;
 
 pub mod signal;
 
@@ -46,6 +50,7 @@ pub use frame::StationStreams;
 pub use peers::Peers;
 pub use row_ring::{RowReader, RowWriter, row_ring};
 pub use stale::is_stale;
+pub use swallowed::{Counted, Swallowed, counted_signals};
 pub use tick_end::{Arrival, Receiver, TickEnd};
 pub use triple::{Reader, Writer, triple_buffer};
 
@@ -86,6 +91,20 @@ pub fn image(stations: Vec<StationStreams>) -> (TickEnd, BusEnd) {
 
 /// As [`image`], with room for this many events. A full ring has 100 kB, which a driver without events does not need.
 pub fn image_with_events(stations: Vec<StationStreams>, events: usize) -> (TickEnd, BusEnd) {
+    let counted = |of: &StationStreams| {
+        let counted = of.tx_counted.iter().chain(&of.rx_counted);
+        counted.map(|one| one.signal + 1).max()
+    };
+    let signals = stations.iter().filter_map(counted).max();
+    image_counting(stations, events, &Swallowed::new(signals.unwrap_or(0)))
+}
+
+/// As [`image_with_events`], with counters that other parts of the line may share.
+pub fn image_counting(
+    stations: Vec<StationStreams>,
+    events: usize,
+    swallowed: &Swallowed,
+) -> (TickEnd, BusEnd) {
     let (producer, consumer) = event_ring(events);
     let (sent, tx) = Place::all(stations.iter().map(|s| (&*s.tx_fail_safe, &*s.tx_latched)));
     let (received, rx) = Place::all(stations.iter().map(|s| (&*s.rx_fail_safe, &*s.rx_latched)));
@@ -93,13 +112,13 @@ pub fn image_with_events(stations: Vec<StationStreams>, events: usize) -> (TickE
     let (rx_writer, rx_reader) = triple_buffer(&rx);
     let (alive, peers) = (tick_end::never(), Peers::new(stations.len()));
     let tick = TickEnd::new(
-        &stations,
+        (&stations, swallowed),
         (tx_writer, sent.clone()),
         (rx_reader, received.clone()),
         (sync::Arc::clone(&alive), peers.clone(), consumer),
     );
     let bus = BusEnd::new(
-        stations,
+        (stations, swallowed),
         (tx_reader, sent),
         (rx_writer, received, rx),
         (alive, peers, producer),

@@ -17,6 +17,8 @@ fn two_stations() -> (TickEnd, BusEnd) {
         StationStreams {
             tx_fail_safe: Box::new([0]),
             tx_latched: latched.clone(),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0]),
             rx_latched: latched,
         }

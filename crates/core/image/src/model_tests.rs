@@ -202,6 +202,8 @@ fn received(mut random: Random) {
     let streams = bits.iter().map(|bits| StationStreams {
         tx_fail_safe: Box::new([]),
         tx_latched: Box::new([]),
+        tx_counted: Box::default(),
+        rx_counted: Box::default(),
         rx_fail_safe: Box::new(FAIL_SAFE),
         rx_latched: bits.clone().into(),
     });
@@ -367,6 +369,8 @@ fn sent(mut random: Random, stations: usize) {
     let streams = bits.iter().map(|bits| StationStreams {
         tx_fail_safe: Box::new(FAIL_SAFE),
         tx_latched: bits.clone().into(),
+        tx_counted: Box::default(),
+        rx_counted: Box::default(),
         rx_fail_safe: Box::new([]),
         rx_latched: Box::new([]),
     });

@@ -16,6 +16,7 @@ struct Peer {
     heard: AtomicI64,
     sequence: AtomicU64,
     is_valid: AtomicBool,
+    takes: AtomicBool,
 }
 
 impl Peers {
@@ -24,6 +25,7 @@ impl Peers {
             heard: NEVER.into(),
             sequence: 0.into(),
             is_valid: true.into(),
+            takes: false.into(),
         });
         Self(peers.collect())
     }
@@ -40,6 +42,16 @@ impl Peers {
             peer.sequence.store(sequence, Ordering::Relaxed);
             peer.is_valid.store(is_valid, Ordering::Relaxed);
         }
+    }
+
+    /// Notes whether the peer of a station has taken frames since it was connected.
+    pub(super) fn note_takes(&self, station: usize, takes: bool) {
+        self.0[station].takes.store(takes, Ordering::Relaxed);
+    }
+
+    /// Returns true if the peer of a station has taken frames since it was connected.
+    pub(super) fn takes(&self, station: usize) -> bool {
+        self.0[station].takes.load(Ordering::Relaxed)
     }
 
     /// Returns the time since the peer of a station was last heard; [`Nanos::MAX`] if it never was. The age of the data

@@ -6,7 +6,9 @@
 
 use super::frame::{Frame, Head, Place, StationStreams};
 use super::stale::{NEVER, age, is_stale};
+use super::swallowed::{Returns, Swallowed};
 use super::sync::{Arc, AtomicI64, Ordering};
+use super::word::word_at;
 use super::{Consumer, EVENT_CAPACITY, EdgeCounter, Peers, PulseShaper, Reader, Writer};
 use tickbus_base::time::Nanos;
 
@@ -27,6 +29,8 @@ pub struct TickEnd {
     cycles: u64,
     /// The bus's notes about each peer, for statistics: a tick reads the same from its frame.
     pub peers: Peers,
+    /// The changes that came and went between two frames that the other side took.
+    pub swallowed: Swallowed,
     /// The peer's writes, for applications to which every write matters.
     pub events: Consumer,
 }
@@ -42,6 +46,7 @@ struct Sent {
     word: u64,
     /// The bytes of this tick, likewise.
     kept: u64,
+    returns: Returns,
 }
 
 /// The incoming half of a station.
@@ -82,15 +87,6 @@ pub struct Arrival {
     pub sequence: u64,
 }
 
-/// The first eight bytes, or as many as there are, as a number whose least significant byte comes first.
-fn as_word(bytes: &[u8]) -> u64 {
-    let mut word = [0; size_of::<u64>()];
-    for (to, from) in word.iter_mut().zip(bytes) {
-        *to = *from;
-    }
-    u64::from_le_bytes(word)
-}
-
 /// True if two frames differ. Small frames were just written byte by byte; a word-wide load would stall on store
 /// forwarding.
 #[inline]
@@ -103,7 +99,7 @@ fn differ(one: &[u8], other: &[u8]) -> bool {
 
 impl TickEnd {
     pub(super) fn new(
-        stations: &[StationStreams],
+        (stations, swallowed): (&[StationStreams], &Swallowed),
         (tx, sent): (Writer<Frame>, Vec<Place>),
         (rx, shown): (Reader<Frame>, Vec<Place>),
         (alive, peers, events): (Arc<AtomicI64>, Peers, Consumer),
@@ -112,8 +108,9 @@ impl TickEnd {
             place,
             edges: EdgeCounter::new(&streams.tx_latched, &streams.tx_fail_safe),
             signals: streams.tx_latched.iter().map(|bit| bit.signal).collect(),
-            word: as_word(&streams.tx_fail_safe),
+            word: word_at(&streams.tx_fail_safe, 0),
             kept: 0,
+            returns: Returns::new(&streams.tx_counted, &streams.tx_fail_safe, swallowed),
         });
         let shown = stations.iter().zip(shown).map(|(streams, place)| Shown {
             place,
@@ -131,6 +128,7 @@ impl TickEnd {
             shown: shown.collect(),
             cycles: 0,
             peers,
+            swallowed: swallowed.clone(),
             events,
         }
     }
@@ -156,7 +154,7 @@ impl TickEnd {
             changed
         });
         if changed {
-            self.tx.publish();
+            self.publish();
         }
         self.ticks(now);
     }
@@ -201,7 +199,10 @@ impl TickEnd {
     #[inline(never)]
     fn publish_word(&mut self, word: u64) {
         let Sent {
-            edges, word: last, ..
+            edges,
+            word: last,
+            returns,
+            ..
         } = &mut self.sent[0];
         *last = word;
         self.tx.with_buffer(|frame| {
@@ -210,7 +211,13 @@ impl TickEnd {
             }
             edges.count(&frame.bytes, &mut frame.edges);
         });
-        self.tx.publish();
+        let was_taken = self.tx.publish();
+        if !returns.is_empty() {
+            if was_taken {
+                returns.taken();
+            }
+            returns.observe_word(word, || self.peers.takes(0));
+        }
     }
 
     #[inline(never)]
@@ -227,7 +234,26 @@ impl TickEnd {
                 station.edges.count(bytes, edges);
             }
         });
-        self.tx.publish();
+        self.publish();
+    }
+
+    /// Publishes the frame of a tick that changed something, and counts what no bus will see of the ones before.
+    #[inline(never)]
+    fn publish(&mut self) {
+        let was_taken = self.tx.publish();
+        let (sent, peers) = (&mut self.sent, &self.peers);
+        self.tx.with_last(|_, frame| {
+            for (index, Sent { place, returns, .. }) in sent.iter_mut().enumerate() {
+                if returns.is_empty() {
+                    continue;
+                }
+                if was_taken {
+                    returns.taken();
+                }
+                let bytes = &frame.bytes[place.bytes.clone()];
+                returns.observe(bytes, || peers.takes(index));
+            }
+        });
     }
 
     /// The simulation has ticked. Its values of this tick must be handed over before.
@@ -416,7 +442,7 @@ fn count(sent: &mut [Sent], frame: &mut Frame) {
     {
         let bytes = &frame.bytes[place.bytes.clone()];
         edges.count(bytes, &mut frame.edges[place.edges.clone()]);
-        *word = as_word(bytes);
+        *word = word_at(bytes, 0);
     }
 }
 

@@ -86,11 +86,14 @@ impl<T> Writer<T> {
         })
     }
 
-    /// Publishes the writer's buffer.
+    /// Publishes the writer's buffer. Returns true if the reader has taken over the value published before, or if there
+    /// is none before.
     #[inline]
-    pub fn publish(&mut self) {
+    pub fn publish(&mut self) -> bool {
         self.last = self.index;
-        self.index = self.shared.state.swap(self.index | FRESH, Ordering::AcqRel) & INDEX;
+        let before = self.shared.state.swap(self.index | FRESH, Ordering::AcqRel);
+        self.index = before & INDEX;
+        before & FRESH == 0
     }
 }
 

@@ -1,7 +1,7 @@
 //! Makes a test process fail on any unexpected warning in the log.
 //!
 //! Most of these tests are about line states, which they check on the line itself. So changes of state are
-//! always expected in the log, unless the cause is a defect, and so are injected faults. Every other warning
+//! always expected in the log, unless the cause is a defect, and so are injected faults and swallowed changes. Every other warning
 //! must be [expected](expect).
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -57,9 +57,16 @@ impl Ledger {
     }
 }
 
-/// True if a line reports a line state other than a defect, or a fault that a test has injected.
+/// True if a line reports a line state other than a defect, a fault that a test has injected, or what the steps of a test
+/// have swallowed.
 fn is_asked_for(line: &str) -> bool {
-    if line.contains("\": injected fault \"") {
+    let is_asked_for = [
+        "\": injected fault \"",
+        "changed and changed back",
+        "were swallowed",
+        "simulation ticks every",
+    ];
+    if is_asked_for.iter().any(|words| line.contains(words)) {
         return true;
     }
     let state = line

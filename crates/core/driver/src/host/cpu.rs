@@ -6,7 +6,9 @@ use crate::frames::directions;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
-use tickbus_image::{BusEnd, Peers, Receiver, TickEnd, copy_frame, image};
+use tickbus_image::{
+    BusEnd, EVENT_CAPACITY, Peers, Receiver, Swallowed, TickEnd, copy_frame, image_counting,
+};
 use tickbus_plc::Program;
 
 use super::ScanCounters;
@@ -111,9 +113,13 @@ impl Cpu {
 
 /// Creates the program's half of a line: the CPU with its counters, and the bus's end of its image. A program that can
 /// serve several stations serves all of them.
-pub(super) fn half(program: Box<dyn Program>, config: &Config, role: Role) -> (Cpu, BusEnd) {
+pub(super) fn half(
+    program: Box<dyn Program>,
+    (config, role): (&Config, Role),
+    swallowed: &Swallowed,
+) -> (Cpu, BusEnd) {
     let scan_counters = Arc::new(ScanCounters::new(&config.table));
-    let (tick, bus) = image(directions(&config.table, role));
+    let (tick, bus) = image_counting(directions(&config.table, role), EVENT_CAPACITY, swallowed);
     let cpu = Cpu {
         units: units(program, (config, role), &scan_counters),
         tick,
@@ -171,7 +177,11 @@ mod tests {
             tickbus_driver_cfg::Config::parse("driver.cfg", &text, &crate::KINDS).expect("right");
         let told = Arc::new(Mutex::new(Vec::new()));
         let program = Box::new(Witness(Arc::clone(&told)));
-        let (mut cpu, mut bus) = half(program, &config, Role::Controller);
+        let (mut cpu, mut bus) = half(
+            program,
+            (&config, Role::Controller),
+            &Swallowed::new(config.table.signals.len()),
+        );
         for (millis, in_time) in [(10, true), (500, false), (510, true)] {
             let now = Nanos::from_millis(millis);
             // The peer sends faster than the delayed scan runs.
@@ -217,7 +227,11 @@ mod tests {
             tickbus_driver_cfg::Config::parse("driver.cfg", text, &crate::KINDS).expect("right");
         let seen = Arc::default();
         let program = Box::new(Seen(Arc::clone(&seen)));
-        let (mut cpu, mut bus) = half(program, &config, Role::Device);
+        let (mut cpu, mut bus) = half(
+            program,
+            (&config, Role::Device),
+            &Swallowed::new(config.table.signals.len()),
+        );
         // The PLC is alive, but has written nothing yet.
         bus.touch(0, Nanos::from_millis(5));
         bus.hand_over();

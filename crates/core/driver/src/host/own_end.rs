@@ -302,10 +302,16 @@ mod tests {
     fn with_own_end(text: &str) -> (Cpu, BusEnd) {
         let config = Config::parse("driver.cfg", text, &crate::KINDS)
             .unwrap_or_else(|mistakes| panic!("{mistakes}"));
-        let (mut cpu, bus) = half(Box::new(Once(false)), &config, Role::Controller);
+        let swallowed = crate::open::swallowed_of(&config, "x");
+        let (mut cpu, bus) = half(
+            Box::new(Once(false)),
+            (&config, Role::Controller),
+            swallowed.counts(),
+        );
         let figures = Figures {
             status: LinkStatus::new("x", config.timing.max_age),
             board: Arc::default(),
+            swallowed,
             program: crate::statistics::ProgramCounters::new(None),
             record: None,
         };

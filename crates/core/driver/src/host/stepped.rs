@@ -5,7 +5,7 @@ use std::sync::Arc;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, Port, Role, Stepped, Validity};
-use tickbus_image::{Arrival, DirectStream, StationStreams, copy_frame, is_stale};
+use tickbus_image::{Arrival, DirectStream, StationStreams, Swallowed, copy_frame, is_stale};
 use tickbus_plc::Program;
 
 use super::ScanCounters;
@@ -55,11 +55,13 @@ impl SteppedHost {
         program: Box<dyn Program>,
         config: &Config,
         interval: Nanos,
+        swallowed: &Swallowed,
     ) -> (Self, Arc<ScanCounters>) {
         let (role, max_age, table) = (Role::Controller, config.timing.max_age, &config.table);
         let scan_counters = Arc::new(ScanCounters::new(table));
         let units = units(program, (config, role), &scan_counters);
-        let lines = directions(table, role).into_iter().map(Line::new);
+        let lines = directions(table, role).into_iter();
+        let lines = lines.map(|streams| Line::new(streams, swallowed));
         let mut validity = Validity::new(table.stations.len());
         validity.watch(config.life_signs.watches(table, role, max_age));
         let host = Self {
@@ -121,10 +123,12 @@ impl SteppedHost {
 }
 
 impl Line {
-    fn new(streams: StationStreams) -> Self {
+    fn new(streams: StationStreams, swallowed: &Swallowed) -> Self {
         Self {
-            inputs: DirectStream::new(streams.rx_fail_safe, streams.rx_latched),
-            outputs: DirectStream::new(streams.tx_fail_safe, streams.tx_latched),
+            inputs: DirectStream::new(streams.rx_fail_safe, streams.rx_latched)
+                .with_counted(&streams.rx_counted, swallowed),
+            outputs: DirectStream::new(streams.tx_fail_safe, streams.tx_latched)
+                .with_counted(&streams.tx_counted, swallowed),
         }
     }
 }

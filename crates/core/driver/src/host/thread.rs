@@ -14,7 +14,9 @@ use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
 use tickbus_driver_cfg::{Config, Timing};
 use tickbus_fieldbus::faults::FaultBoard;
-use tickbus_fieldbus::{Bus, BusError, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped};
+use tickbus_fieldbus::{
+    Bus, BusError, Lead, LinkState, LinkStatus, Outputs, Port, Role, Stepped, SwallowedSignals,
+};
 use tickbus_image::Peers;
 use tickbus_plc::{Program, Report};
 use tickbus_record::Recorder;
@@ -55,6 +57,8 @@ pub(crate) struct ScanSetup {
     pub(crate) has_watchdog: bool,
     /// Records its scans.
     pub(crate) recorder: Option<Recorder>,
+    /// Counts the changes that are swallowed at its end of the line.
+    pub(crate) swallowed: SwallowedSignals,
 }
 
 /// The counters and the state that a program's thread publishes.
@@ -101,7 +105,7 @@ impl HostThread {
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
         let record = hosted.recorder.as_ref();
         let record = record.map(|recorder| Arc::clone(recorder.counters()));
-        let (mut cpu, bus_end) = half(hosted.program, config, role);
+        let (mut cpu, bus_end) = half(hosted.program, (config, role), hosted.swallowed.counts());
         let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
         // `Watch`.
@@ -114,7 +118,7 @@ impl HostThread {
             Bus::Stepped(_) => (Arc::clone(&virtual_time) as _, None),
         };
         let board = Arc::<FaultBoard>::default();
-        let port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
+        let mut port = Port::new(bus_end, Arc::clone(&clock), role, limit, status.clone())
             .with_faults(Arc::clone(&board))
             .with_life_signs(config.life_signs.watches(&config.table, role, max_age))
             .with_names(config.table.stations.iter().map(|s| s.name.as_str()));
@@ -131,11 +135,13 @@ impl HostThread {
         let figures = Figures {
             status: status.clone(),
             board: Arc::clone(&board),
+            swallowed: hosted.swallowed.clone(),
             program: ProgramCounters::new(Some(Arc::clone(&counters) as _)),
             record,
         };
         let mut watch = None;
         if is_own {
+            port = port.with_swallowed(hosted.swallowed);
             let (config, clock) = (Arc::new(config.clone()), Arc::clone(&counters.clock));
             let (tap, own) = Watch::new(Arc::clone(&config), clock, figures.clone(), false);
             watch = Some(own);

@@ -240,6 +240,8 @@ mod tests {
         let streams = StationStreams {
             tx_fail_safe: Box::new([0]),
             tx_latched: Box::new([]),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0]),
             rx_latched: Box::new([]),
         };

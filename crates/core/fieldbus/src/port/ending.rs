@@ -261,6 +261,8 @@ mod tests {
         let streams = sizes.iter().map(|size| StationStreams {
             tx_fail_safe: vec![0; *size].into(),
             tx_latched: Box::new([]),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([]),
             rx_latched: Box::new([]),
         });

@@ -6,8 +6,9 @@ use tickbus_base::time::Nanos;
 use tickbus_image::{BusEnd, Event, is_stale};
 
 use super::ending::Ending;
+use crate::swallowed::LOOK;
 use crate::validity::Validity;
-use crate::{Cause, ChangeEvents, LinkState, LinkStatus, PlcState};
+use crate::{Cause, ChangeEvents, LinkState, LinkStatus, PlcState, SwallowedSignals};
 
 /// A bus's access to the image and to the state of its line, without injected faults.
 #[derive(Debug)]
@@ -27,6 +28,9 @@ pub(super) struct ImagePort {
     pub(super) ending: Option<Ending>,
     /// A running line cannot become stale before this time.
     pub(super) fresh_until: Nanos,
+    /// Logs the signals whose changes were swallowed, at this time.
+    pub(super) swallowed: Option<SwallowedSignals>,
+    pub(super) next_log: Nanos,
 }
 
 impl ImagePort {
@@ -159,6 +163,9 @@ impl ImagePort {
             self.update_validity(station, now);
         }
         self.hand_over();
+        if now >= self.next_log {
+            self.log_swallowed(now);
+        }
         if now < self.fresh_until && self.status.state() == LinkState::Running {
             return;
         }
@@ -166,6 +173,15 @@ impl ImagePort {
         status.observe(now, ages.clone());
         let oldest = ages.max().unwrap_or(Nanos::ZERO);
         self.fresh_until = now + (self.status.max_age() - oldest) + Nanos(1);
+    }
+
+    #[cold]
+    fn log_swallowed(&mut self, now: Nanos) {
+        self.next_log = self.swallowed.as_ref().map_or(Nanos::MAX, |_| now + LOOK);
+        if let Some(swallowed) = &self.swallowed {
+            swallowed.log();
+            swallowed.log_ticks(self.image.take_ticks());
+        }
     }
 
     /// Data of this time have arrived, perhaps older ones than before.

@@ -53,6 +53,8 @@ impl Rig {
                 latch: Latch::Rising,
                 hold: Nanos::ZERO,
             }]),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0]),
             rx_latched: Box::new([]),
         };

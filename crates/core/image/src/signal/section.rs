@@ -41,6 +41,13 @@ pub const DEAD_BAND_KEY: Key = Key::new(
     "How far the value may move without being sent, on buses that send on change; not negative",
 );
 
+/// The key `count_swallowed`.
+const COUNT_SWALLOWED: Key = Key::new(
+    "count_swallowed",
+    Shape::Boolean,
+    "Whether changes are counted that came and went unseen: so on a BOOL without \"latch\" by default",
+);
+
 /// The key `station`.
 pub const STATION_KEY: Key = Key::new(
     "station",
@@ -83,6 +90,7 @@ pub const KEYS: &[Key] = &[
         Shape::Duration,
         "On a latched %I: how long a pulse is held beyond the exchange that carries it",
     ),
+    COUNT_SWALLOWED,
     Key::new(
         "fail_safe",
         Shape::Any(&[Shape::Number, Shape::Boolean]),
@@ -186,6 +194,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
     let unit = table.take("unit");
     let latch = table.take("latch");
     let hold = table.take("hold");
+    let count = table.take("count_swallowed");
     let fail_safe = table.take("fail_safe");
     let dead_band = table.take("dead_band");
     let station = table.take("station");
@@ -235,6 +244,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
         scale: None,
         unit: unit.map(str::to_owned),
         latch: latch.and_then(|value| fitting_latch(&value, latched.flatten()?, data_type)),
+        count_swallowed: count.and_then(|value| value.boolean()),
         hold: Nanos::ZERO,
         fail_safe: Slot::default(),
         states_fail_safe: fail_safe.is_some(),

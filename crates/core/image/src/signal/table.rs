@@ -39,6 +39,8 @@ pub struct Signal {
     pub unit: Option<String>,
     /// Edges that must not be lost; only on BOOL.
     pub latch: Option<Latch>,
+    /// True if its swallowed changes are counted, false if they are not; `None` counts those of a BOOL without a latch.
+    pub count_swallowed: Option<bool>,
     /// On a `%I`: how long a latched pulse is held at least, in addition to the one completed exchange that
     /// always carries it.
     pub hold: Nanos,
@@ -69,6 +71,7 @@ impl Signal {
             scale: None,
             unit: None,
             latch: None,
+            count_swallowed: None,
             hold: Nanos::ZERO,
             fail_safe: Slot::default(),
             states_fail_safe: false,
@@ -84,6 +87,12 @@ impl Signal {
                 self.data_type,
                 DataType::Lword | DataType::Lint | DataType::Ulint
             )
+    }
+
+    /// True if changes that no other side sees are counted.
+    pub fn counts_swallowed(&self) -> bool {
+        let is_plain = self.data_type == DataType::Bool && self.latch.is_none();
+        self.count_swallowed.unwrap_or(is_plain)
     }
 
     /// The address in the image of the station.

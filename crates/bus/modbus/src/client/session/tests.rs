@@ -67,6 +67,8 @@ impl Client {
         let directions = || StationStreams {
             tx_fail_safe: Box::new([0; 2]),
             tx_latched: Box::new([]),
+            tx_counted: Box::default(),
+            rx_counted: Box::default(),
             rx_fail_safe: Box::new([0; 2]),
             rx_latched: Box::new([]),
         };

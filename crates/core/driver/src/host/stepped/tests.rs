@@ -55,7 +55,11 @@ struct Reference {
 impl Reference {
     fn new(config: &Config, interval: Nanos) -> Self {
         let (role, max_age) = (Role::Controller, config.timing.max_age);
-        let (cpu, bus) = half(Box::new(Witness { scans: 0 }), config, role);
+        let (cpu, bus) = half(
+            Box::new(Witness { scans: 0 }),
+            (config, role),
+            &Swallowed::new(config.table.signals.len()),
+        );
         let watches = config.life_signs.watches(&config.table, role, max_age);
         let status = LinkStatus::new("reference", max_age);
         Self {
@@ -168,8 +172,9 @@ fn a_program_on_the_tick_sees_and_shows_what_one_behind_an_image_does() {
     let hosts: [Box<dyn Stepped>; 2] = {
         let config = config();
         let program = Box::new(Witness { scans: 0 });
+        let swallowed = Swallowed::new(config.table.signals.len());
         [
-            Box::new(SteppedHost::new(program, &config, interval).0),
+            Box::new(SteppedHost::new(program, &config, interval, &swallowed).0),
             Box::new(Reference::new(&config, interval)),
         ]
     };

@@ -105,6 +105,7 @@ fn a_bus_that_is_stuck_cannot_hide_it_from_who_asks_for_the_state_of_the_line() 
         interval: Nanos::from_millis(1),
         has_watchdog: true,
         recorder: None,
+        swallowed: crate::open::swallowed_of(&config, "x"),
     };
     let (role, wall) = (Role::Controller, Arc::clone(&clock) as Arc<dyn Clock>);
     let bus = Bus::Free(Box::new(Stuck(end)));

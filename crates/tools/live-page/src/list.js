@@ -180,6 +180,12 @@ const list = (() => {
     },
   };
 
+  /** The changes of a signal without a latch that the other side never saw. */
+  function swallowed({ driver, name }) {
+    const count = driver.line?.counters?.[`swallowed.${name.replace(/[=\\]/g, "\\$&")}`];
+    return count ? `${Number(count).toLocaleString("en")} swallowed` : "";
+  }
+
   const paint = {
     station(element, { driver, station }) {
       const line = driver.line?.stations?.[station];
@@ -198,7 +204,7 @@ const list = (() => {
       text(element, "number", value);
       text(element, "unit", signal.unit);
       text(element, "raw", signal.isBool ? "" : signal.raw);
-      text(element, "edges", signal.latch ? signal.edges.toLocaleString("en") : "");
+      text(element, "edges", signal.latch ? signal.edges.toLocaleString("en") : swallowed(signal));
       text(element, "age", words.span(plant.age(signal)));
       text(element, "mark", signal.isForced ? "forced" : signal.isFailSafe ? "fail-safe" : signal.isStale ? "stale" : "");
       text(element, "open", signal.isOpen ? "▾" : "▸");

@@ -248,6 +248,7 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
             @if !states.is_empty() { (tables::states(&states, scale)) }
         }))
         (section("timing", "Timing", &html! {
+            @if let Some(statistics) = contents.statistics { (swallowed(statistics)) }
             @if let Some((intervals, shortest, longest)) = run.intervals() {
                 h3 { "From one tick to the next, in simulation time" }
                 (figures::histogram("interval", intervals, shortest, longest))
@@ -288,6 +289,20 @@ fn line(statistics: &RunStatistics) -> Markup {
             @if let Some(address) = statistics.get("address") { " (" (address) ")" }
         }
         @if !entered.is_empty() { p { "How often each state was entered: " (entered.join(", ")) "." } }
+    }
+}
+
+/// The signals whose changes came and went before the other side took a frame, if there are any.
+fn swallowed(statistics: &RunStatistics) -> Markup {
+    let signals = statistics.all().iter().filter_map(|(key, value)| {
+        let signal = key.strip_prefix("swallowed.")?;
+        Some(format!("{signal} {value}"))
+    });
+    let signals: Vec<String> = signals.collect();
+    html! {
+        @if !signals.is_empty() {
+            p { "Swallowed: changed and changed back before the other side took a frame: " (signals.join(", ")) "." }
+        }
     }
 }
 
@@ -408,4 +423,21 @@ fn activity(run: &Run) -> Vec<u64> {
         }
     }
     bars
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn swallowed_signals_are_named_and_nothing_is_said_without_any() {
+        let page = |text| swallowed(&RunStatistics::read(text)).into_string();
+        assert_eq!(
+            page("ticks=9\nswallowed_inputs=0\nswallowed_outputs=0\n"),
+            ""
+        );
+        let found =
+            page("swallowed_inputs=5\nswallowed_outputs=2\nswallowed.In=5\nswallowed.Out 2=2\n");
+        assert!(found.contains("took a frame: In 5, Out 2 2."), "{found}");
+    }
 }

@@ -66,6 +66,9 @@ fn report(config: &Config) -> String {
         );
     }
     line("timing", &timing(&config.timing));
+    for contradiction in config.contradictions() {
+        line("warning", &contradiction.to_string());
+    }
     life_signs(config, &mut line);
     if let Some(record) = &config.record {
         line("record", &recording(record));

@@ -51,6 +51,20 @@ fn files(folder: &str) -> Vec<PathBuf> {
     files
 }
 
+#[test]
+fn times_that_contradict_each_other_are_warnings() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\ncycle = \"10ms\"\n\
+                max_age = \"15ms\"\n[[signal]]\nname = \"a\"\naddress = \"%IX0.0\"\n";
+    fs::write(folder.path().join("x.cfg"), text).expect("the file is written");
+    let output = check(folder.path(), "x.cfg");
+    let told = String::from_utf8_lossy(&output.stdout);
+    let warning = "warning   max_age is 15ms, less than two bus cycles of 10ms: one late cycle makes all data stale; \
+                   set max_age to 30ms or more\n";
+    assert!(told.contains(warning), "{told}");
+    assert_eq!(output.status.code(), Some(0));
+}
+
 /// Each `tests/wrong/NAME.cfg` has its mistakes in `NAME.txt`. If the environment variable `BLESS` is set, the files
 /// are rewritten instead: review the difference before committing it.
 #[test]

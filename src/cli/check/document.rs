@@ -46,6 +46,7 @@ pub(super) fn document(config: &Config) -> Value {
         "role": config.role.name(),
         "bus": bus(config),
         "timing": timing(config),
+        "warnings": config.contradictions().iter().map(ToString::to_string).collect::<Value>(),
         "alive": watches.collect::<Value>(),
         "heartbeat": beats.collect::<Value>(),
         "record": config.record.as_ref().map(|record| json!({
@@ -139,6 +140,7 @@ fn row(signal: &Signal, config: &Config, taken: &HashSet<WordKey>) -> Value {
         "order": signal.order.name(),
         "area": match signal.area { Area::Input => "input", Area::Output => "output" },
         "latch": signal.latch.map(edge),
+        "count_swallowed": signal.counts_swallowed(),
         "hold_ns": (signal.hold != Nanos::ZERO).then_some(signal.hold.0),
         "scale": signal.scale.map(|scale| json!({ "gain": scale.gain, "offset": scale.offset })),
         "unit": signal.unit,

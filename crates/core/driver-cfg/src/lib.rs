@@ -3,6 +3,7 @@
 //! [`Config`] is the checked content of a file. The caller passes in the [bus kinds](Kinds) that the file can name.
 
 mod config;
+mod contradictions;
 mod driver_table;
 pub mod keys;
 mod kind_keys;

@@ -526,6 +526,8 @@ proptest::proptest! {
             lab.told();
         }
         lab.serial("\r");
-        proptest::prop_assert_eq!(lab.serial("PING\r"), ["OK PING"]);
+        // A short line that begins like what browsers send is refused only when the next one comes.
+        let heard = lab.serial("PING\r");
+        proptest::prop_assert_eq!(heard.last().map(String::as_str), Some("OK PING"));
     }
 }

@@ -415,10 +415,8 @@ mod tests {
                 thread::yield_now();
             }
             // SAFETY: the thread is not joined yet.
-            assert_eq!(
-                unsafe { libc::pthread_kill(waiting.as_pthread_t(), libc::SIGURG) },
-                0
-            );
+            let sent = unsafe { libc::pthread_kill(waiting.as_pthread_t(), libc::SIGURG) };
+            assert_eq!(sent, 0);
             assert_eq!(waiting.join().expect("no panic"), [KEY]);
         }
     }

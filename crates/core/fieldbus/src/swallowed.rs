@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// All signals of a station and area go on and off so many times unseen.
+    /// All signals of a station and area go on and off this many times, and nobody sees it.
     fn pulse(of: &SwallowedSignals, station: usize, area: Area, times: usize) {
         let counted = counted_signals(&of.0.table, station, area);
         let stream = DirectStream::new(vec![0; 8].into(), Box::default());

@@ -86,8 +86,8 @@ impl<T> Writer<T> {
         })
     }
 
-    /// Publishes the writer's buffer. Returns true if the reader has taken over the value published before, or if there
-    /// is none before.
+    /// Publishes the writer's buffer. Returns true if the reader has taken over the value published before, or if
+    /// nothing was published before.
     #[inline]
     pub fn publish(&mut self) -> bool {
         self.last = self.index;

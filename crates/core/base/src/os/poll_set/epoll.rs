@@ -102,7 +102,7 @@ impl Watch {
     }
 
     /// As [`wait`](Self::wait), until a `deadline` on `clock` that is far at `now`. Such a deadline mostly moves on before
-    /// it comes, so the timer is left as it is if it ends before that: this wait then ends early.
+    /// it comes, so a timer that ends earlier stays set, and its end also ends this wait.
     pub(super) fn wait_far(
         &mut self,
         (clock, now): (&dyn Clock, Nanos),

@@ -11,6 +11,9 @@ pub const JOB_HEADER: usize = 10;
 /// Bytes of the header of an answer, with an error.
 pub const ANSWER_HEADER: usize = 12;
 
+/// The most jobs that client and server agree to have pending at once on a connection.
+pub const JOBS: u16 = 8;
+
 /// Function codes: the first byte of the parameters of a job and its answer.
 pub mod function {
     /// Read variables.

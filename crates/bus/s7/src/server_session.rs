@@ -4,15 +4,12 @@ use std::ops::Range;
 
 use super::item::{self, Addresses, Data, Element, Item, Object, ReturnCode};
 use super::length::{LONGEST, SHORTEST};
-use super::pdu::{Draft, Kind, Pdu, error, function};
+use super::pdu::{Draft, JOBS, Kind, Pdu, error, function};
 use super::szl::Facts;
 use super::transport::{self, Connect, Tpdu};
 use super::userdata::{self, Ask, Rest};
 use super::{ProtocolError, Tsap};
 use tickbus_base::time::Nanos;
-
-/// The most jobs that a client may have pending; they are answered in order.
-const JOBS: u16 = 8;
 
 /// The largest transport size agreed to: 1024 bytes.
 const LARGEST_TPDU: u8 = 10;

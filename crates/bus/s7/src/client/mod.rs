@@ -2,6 +2,7 @@
 
 mod connection;
 mod frames;
+mod in_flight;
 mod options;
 mod parameters;
 mod plan;

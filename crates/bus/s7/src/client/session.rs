@@ -1,13 +1,14 @@
 //! The client's side of one connection, without I/O: time and received bytes go in, bytes to send and the
 //! next deadline come out.
 
+use super::in_flight::InFlight;
 use super::plan::{Job, JobDirection};
 use super::traffic::{Traffic, function_of, write_data};
 use super::{ConnectionParameters, End, FrameFields, Refusal, SessionEvent};
 use crate::ProtocolError;
 use crate::item::{self, Data, ReturnCode};
 use crate::length::{LONGEST, SHORTEST};
-use crate::pdu::{Draft, Kind, Pdu, error, function};
+use crate::pdu::{Draft, JOBS, Kind, Pdu, error, function};
 use crate::szl::{self, Identity};
 use crate::transport::{self, Connect, Tpdu};
 use tickbus_base::time::Nanos;
@@ -46,9 +47,11 @@ pub struct ClientSession {
     pdu: u16,
     /// Power of two of the longest TPDU.
     size: u8,
+    /// The reference of the last request.
     reference: u16,
-    /// The time since which an answer has been pending.
+    /// The time since which an answer has been pending: that of the last request or answer.
     asked: Option<Nanos>,
+    in_flight: InFlight,
     identity: Identity,
     /// The received part of the list being read.
     list: Vec<u8>,
@@ -65,8 +68,8 @@ enum Phase {
     Asking(usize),
     /// Nothing is pending.
     Idle,
-    /// The job with this index is pending.
-    Working(usize),
+    /// Jobs are pending.
+    Working,
 }
 
 impl FrameFields {
@@ -88,6 +91,7 @@ impl ClientSession {
             size: TPDU,
             reference: 0,
             asked: Some(now),
+            in_flight: InFlight::new(),
             identity: Identity::default(),
             list: Vec::new(),
             traffic: Traffic::new(frames),
@@ -154,8 +158,7 @@ impl ClientSession {
     /// When the session is not idle.
     pub fn begin(&mut self, now: Nanos) -> Option<SessionEvent> {
         assert!(self.is_idle(), "one cycle at a time");
-        self.traffic.refused.fill(None);
-        self.work(now, 0)
+        self.restart(now)
     }
 
     /// Asks for the operating state at `now`.
@@ -272,6 +275,12 @@ impl ClientSession {
         if answer.kind == Kind::Job {
             return Err(ProtocolError::Asks.into());
         }
+        if self.phase == Phase::Working {
+            let job = self.in_flight.take(answer.reference);
+            let job = job.ok_or(ProtocolError::NotAsked)?;
+            self.asked = (!self.in_flight.is_empty()).then_some(now);
+            return self.done(now, job, &answer);
+        }
         if self.asked.is_none() || answer.reference != self.reference {
             return Err(ProtocolError::NotAsked.into());
         }
@@ -279,8 +288,7 @@ impl ClientSession {
         match self.phase {
             Phase::Agreeing => self.agreed(now, &answer),
             Phase::Asking(index) => self.told(now, index, &answer),
-            Phase::Working(job) => self.done(now, job, &answer),
-            Phase::Connecting | Phase::Idle => Err(ProtocolError::NotAsked.into()),
+            Phase::Connecting | Phase::Idle | Phase::Working => Err(ProtocolError::NotAsked.into()),
         }
     }
 
@@ -298,22 +306,27 @@ impl ClientSession {
 
     fn agree(&mut self, now: Nanos) {
         self.phase = Phase::Agreeing;
-        let [high, low] = self.terms.pdu.to_be_bytes();
+        let pdu = self.terms.pdu;
         self.ask(now, Kind::Job, |_, out| {
-            out.extend_from_slice(&[function::SETUP, 0, 0, 1, 0, 1, high, low]);
+            out.extend_from_slice(&[function::SETUP, 0]);
+            for number in [JOBS, JOBS, pdu] {
+                out.extend_from_slice(&number.to_be_bytes());
+            }
         });
     }
 
     fn agreed(&mut self, now: Nanos, answer: &Pdu<'_>) -> Result<Option<SessionEvent>, End> {
         whole(answer)?;
-        let [function::SETUP, _, _, _, _, _, high, low] = *answer.parameters else {
+        let [function::SETUP, _, g0, g1, d0, d1, l0, l1] = *answer.parameters else {
             return Err(ProtocolError::Answer("no agreement on the length of units").into());
         };
-        let length = u16::from_be_bytes([high, low]);
+        let [calling, called, length] = [[g0, g1], [d0, d1], [l0, l1]].map(u16::from_be_bytes);
         if !(SHORTEST..=LONGEST).contains(&length) {
             return Err(ProtocolError::Agreed(length).into());
         }
         self.pdu = length;
+        // Which of the two counts the jobs of a client is read differently by the makers.
+        self.in_flight.agree(calling.min(called).clamp(1, JOBS));
         if self.terms.asks_who {
             self.ask_list(now, 0);
             return Ok(None);
@@ -390,13 +403,29 @@ impl ClientSession {
         Ok(Some(self.meet(Some(identity))))
     }
 
-    /// Starts the job with this index; after the last one, returns the event that the cycle is over.
-    fn work(&mut self, now: Nanos, index: usize) -> Option<SessionEvent> {
-        if index == self.traffic.jobs.len() {
-            self.phase = Phase::Idle;
-            return Some(SessionEvent::Done);
+    /// Starts the cycle from its first job.
+    fn restart(&mut self, now: Nanos) -> Option<SessionEvent> {
+        self.traffic.refused.fill(None);
+        self.in_flight.begin();
+        self.phase = Phase::Working;
+        self.work(now)
+    }
+
+    /// Sends as many of the remaining jobs as may be pending; after the last answer, returns the event that the cycle is
+    /// over.
+    fn work(&mut self, now: Nanos) -> Option<SessionEvent> {
+        while let Some(index) = self.in_flight.next(self.traffic.jobs.len()) {
+            self.send(now, index);
+            self.in_flight.sent(self.reference);
         }
-        self.phase = Phase::Working(index);
+        if !self.in_flight.is_empty() {
+            return None;
+        }
+        self.phase = Phase::Idle;
+        Some(SessionEvent::Done)
+    }
+
+    fn send(&mut self, now: Nanos, index: usize) {
         let jobs = std::mem::take(&mut self.traffic.jobs);
         let frames = std::mem::take(&mut self.traffic.out);
         let Job { way, pieces } = &jobs[index];
@@ -413,7 +442,6 @@ impl ClientSession {
         });
         self.traffic.jobs = jobs;
         self.traffic.out = frames;
-        None
     }
 
     /// A job has been answered.
@@ -428,10 +456,15 @@ impl ClientSession {
         let asked = function_of(*way, pieces);
         if answer.parameters == [asked[0], 1] && asked[1] > 1 {
             // Some servers answer only the first item. The cycle restarts; writing the same value twice does no harm.
+            self.in_flight.void();
+        }
+        if self.in_flight.is_void() {
+            if !self.in_flight.is_empty() {
+                return Ok(None);
+            }
             self.traffic.one_by_one = true;
             self.traffic.plan(usize::from(self.pdu));
-            self.traffic.refused.fill(None);
-            return Ok(self.work(now, 0));
+            return Ok(self.restart(now));
         }
         if answer.parameters != asked {
             return Err(
@@ -463,7 +496,7 @@ impl ClientSession {
                 }
             }
         }
-        Ok(self.work(now, index + 1))
+        Ok(self.work(now))
     }
 }
 

@@ -93,7 +93,8 @@ fn the_captured_conversation_goes_as_it_went() {
     assert_eq!(hears(&mut session, CONFIRM), Ok(None));
     says(
         &mut session,
-        "03 00 00 19 02 f0 80 32 01 0000 0001 0008 0000 f0 00 0001 0001 01e0",
+        // But for the number of jobs at once: the client that was captured had one.
+        "03 00 00 19 02 f0 80 32 01 0000 0001 0008 0000 f0 00 0008 0008 01e0",
     );
     assert_eq!(
         hears(&mut session, AGREED),
@@ -142,6 +143,111 @@ fn answers_come_in_any_pieces() {
         }
     }
     assert!(session.is_idle());
+}
+
+/// A session as `session`, before its first cycle: the CPU allows so many jobs at once, each way.
+fn met_with(session: ClientSession, calling: u16, called: u16) -> ClientSession {
+    let mut session = session;
+    said(&mut session);
+    assert_eq!(hears(&mut session, CONFIRM), Ok(None));
+    said(&mut session);
+    let agreed = AGREED.replace("0001 0001", &format!("{calling:04x} {called:04x}"));
+    assert_eq!(
+        hears(&mut session, &agreed),
+        Ok(Some(SessionEvent::Met(480, None)))
+    );
+    session.allow(true);
+    session
+}
+
+/// The functions of the requests in these bytes.
+fn functions(mut said: &[u8]) -> Vec<u8> {
+    let mut functions = Vec::new();
+    while let [3, 0, high, low, ..] = *said {
+        functions.push(said[17]);
+        said = &said[usize::from(u16::from_be_bytes([high, low]))..];
+    }
+    functions
+}
+
+#[test]
+fn as_many_jobs_are_pending_as_the_cpu_allows_and_their_answers_come_in_any_order() {
+    for (allowed, at_once) in [
+        ([2, 2], 2),
+        ([1, 8], 1),
+        ([8, 1], 1),
+        ([0, 0], 1),
+        ([99, 99], 2),
+    ] {
+        let mut session = met_with(session(false), allowed[0], allowed[1]);
+        assert_eq!(session.begin(Nanos::ZERO), None);
+        let requests = functions(&said(&mut session));
+        assert_eq!(requests, [function::WRITE, function::READ][..at_once]);
+    }
+    for order in [[WRITTEN, READ], [READ, WRITTEN]] {
+        let mut session = met_with(session(false), 2, 2);
+        session.begin(Nanos::ZERO);
+        assert_eq!(hears(&mut session, order[0]), Ok(None));
+        assert!(!session.is_idle());
+        assert_eq!(
+            hears(&mut session, order[0]),
+            Err(End::Broken(ProtocolError::NotAsked)),
+            "twice"
+        );
+        assert_eq!(hears(&mut session, order[1]), Ok(Some(SessionEvent::Done)));
+        assert_eq!(session.frame_read(0), [1, 2, 3, 4]);
+        assert_eq!(session.deadline(), Nanos::MAX);
+    }
+}
+
+#[test]
+fn the_next_job_follows_the_first_answer() {
+    // Twenty items per job.
+    let written: Vec<_> = (0..41).map(|index| (200 * index, 2)).collect();
+    let mut session = met_with(session_of(false, &written, &[(0, 4)]), 2, 2);
+    session.begin(Nanos::ZERO);
+    assert_eq!(functions(&said(&mut session)), [function::WRITE; 2]);
+    let codes = "ff".repeat(20);
+    let answer = format!("03 00 00 29 02 f0 80 32 03 0000 0002 0002 0014 00 00 05 14 {codes}");
+    assert_eq!(hears(&mut session, &answer), Ok(None));
+    assert_eq!(functions(&said(&mut session)), [function::WRITE]);
+}
+
+#[test]
+fn each_pending_answer_has_its_whole_time_since_the_one_before() {
+    let mut session = met_with(session(false), 2, 2);
+    session.begin(Nanos::ZERO);
+    let later = PATIENCE - Nanos(1);
+    assert_eq!(session.hear(later, &hex(WRITTEN)), Ok(None));
+    assert_eq!(session.check(later + PATIENCE), Ok(()));
+    assert_eq!(
+        session.check(session.deadline()),
+        Err(End::Silent(PATIENCE))
+    );
+}
+
+#[test]
+fn a_peer_that_answers_one_of_several_items_is_asked_again_when_all_answers_have_come() {
+    let mut session = met_with(session_of(false, &[(0, 2), (200, 2)], &[(0, 4)]), 8, 8);
+    session.begin(Nanos::ZERO);
+    assert_eq!(
+        functions(&said(&mut session)),
+        [function::WRITE, function::READ]
+    );
+    assert_eq!(hears(&mut session, WRITTEN), Ok(None));
+    assert_eq!(said(&mut session), [], "the other answer is pending");
+    assert_eq!(hears(&mut session, READ), Ok(None));
+    assert_eq!(
+        functions(&said(&mut session)),
+        [function::WRITE, function::WRITE, function::READ]
+    );
+    for (answer, from, to) in [(WRITTEN, "0002", "0004"), (WRITTEN, "0002", "0005")] {
+        let answer = answer.replacen(from, to, 1);
+        assert_eq!(hears(&mut session, &answer), Ok(None));
+    }
+    let read = READ.replacen("0003", "0006", 1);
+    assert_eq!(hears(&mut session, &read), Ok(Some(SessionEvent::Done)));
+    assert_eq!(session.refusal(0), None);
 }
 
 #[test]

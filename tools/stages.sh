@@ -140,7 +140,7 @@ failures() {
     told=$(awk '/^---- .* stdout ----$/ { print $2; next }
         /panicked at / { lines = 4 }
         lines-- > 0 { print "    " $0; next }
-        /^(FAILED|ERROR) .* - / || /^\[ERROR\]   / { print }' "$LOGS/$1.log")
+        /^(FAILED|ERROR) .* - / || /^\[ERROR\]   / || /^  JUnit Jupiter:/ || /^    => / { print }' "$LOGS/$1.log")
     printf '%s\n' "${told:-$(tail -n 5 "$LOGS/$1.log")}" | cut -c -300
 }
 

@@ -98,8 +98,8 @@ struct Intervals {
 }
 
 impl Intervals {
-    /// Receives `cycles` records and one more, and records the times between them.
-    fn receive(&mut self, stream: &mut TcpStream, cycles: usize) {
+    /// Receives `cycles` records and one more, answers each with `said`, and records the times between them.
+    fn receive(&mut self, stream: &mut TcpStream, said: &[u8], cycles: usize) {
         let mut record = [0; ANSWER];
         stream.read_exact(&mut record).expect("a first record");
         let begin = Instant::now();
@@ -108,6 +108,7 @@ impl Intervals {
         for _ in 0..cycles {
             stream.read_exact(&mut record).expect("a record");
             let now = Instant::now();
+            stream.write_all(said).expect("the server reads");
             let interval = now - last;
             last = now;
             self.deviations
@@ -145,9 +146,10 @@ fn cycle(extent: &Extent) {
     let (mut device_records, mut bare_records) = (Intervals::default(), Intervals::default());
     for _ in 0..extent.rounds {
         let server = device("cycle = \"10ms\"");
-        device_records.receive(&mut server.connect(), extent.cycles);
+        // A device drops a peer that says nothing.
+        device_records.receive(&mut server.connect(), &[0; REQUEST], extent.cycles);
         let server = Server::own(&["--deadlines"]);
-        bare_records.receive(&mut server.connect(), extent.cycles);
+        bare_records.receive(&mut server.connect(), &[], extent.cycles);
     }
     device_records.print("socket.cycle");
     bare_records.print("socket.cycle.bare");

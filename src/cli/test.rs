@@ -1,6 +1,9 @@
 //! `tickbus test DIR`: runs the tests of PLC programs in a folder.
 
+mod sweep;
+
 use std::io::Write as _;
+use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -10,14 +13,15 @@ use super::Outcome;
 use super::json::{Format, print_document};
 use super::progress::Progress;
 use tickbus_base::toml_text::{Mistakes, load_text};
+use tickbus_driver::DriverError;
 use tickbus_driver_cfg::Kinds;
 use tickbus_report::page_beside;
-use tickbus_testing::{Case, Group, Suite, Test, Verdict, junit_xml};
+use tickbus_testing::{Case, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///
 /// Each *.toml in DIR and its subfolders with a config or a [[test]] is a test file; docs/testing.md describes them.
-/// Exit code 0 when all tests pass, 1 when one fails or a file is wrong.
+/// A file with a [sweep] also runs its scenario with each fault at each moment. Exit code 0 when all tests pass, 1 when one fails or a file is wrong.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// Folders with test files, or test files.
@@ -28,17 +32,25 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 
-    /// Write a recording of each failed test, as VCD, and a report about it to DIR.
+    /// Write a recording of each failed test, as VCD, and a report about it to DIR; of a sweep those of 20 runs.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
 
-    /// Run only tests whose name or file name contains this text.
+    /// Run only tests whose name or file name contains this text; of a sweep the one run with this name, if there is one.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
 
     /// List the tests without running them.
     #[arg(long)]
     list: bool,
+
+    /// Accept all verdicts of the sweeps: write them to accepted.toml beside the test file.
+    #[arg(long, conflicts_with_all = ["only", "list"])]
+    accept: bool,
+
+    /// Make this many runs of a sweep at once; by default as many as there are cores.
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroU16>,
 
     #[command(flatten)]
     format: Format,
@@ -51,6 +63,8 @@ struct Count {
     failed: usize,
     wrong: usize,
     ticks: u64,
+    /// The verdicts of the sweeps, in the order of their lists.
+    verdicts: Vec<(String, Judgement)>,
 }
 
 /// The data that each file of a run needs.
@@ -104,10 +118,10 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         kinds,
         progress: Progress::begin("test", "reading the tests"),
     };
-    let groups: Vec<Group> = files
+    let (groups, sweeps): (Vec<Group>, Vec<Value>) = files
         .iter()
         .map(|file| run_file(file, &job, &mut count))
-        .collect();
+        .unzip();
     if let Some(path) = &arguments.junit
         && !arguments.list
         && let Err(error) = write_file(path, &junit_xml(&groups))
@@ -115,16 +129,17 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         let reason = format!("test: {}: cannot be written: {error}", path.display());
         return arguments.format.fail("test", &reason, Outcome::WrongInput);
     }
-    conclude(&job, &groups, &count)
+    conclude(&job, (&groups, &sweeps), &count)
 }
 
-fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
+fn conclude(job: &Job<'_>, results: (&[Group], &[Value]), count: &Count) -> Outcome {
     let arguments = job.arguments;
     let Count {
         passed,
         failed,
         wrong,
         ticks,
+        verdicts,
     } = count;
     let green = failed + wrong == 0 && (*passed > 0 || arguments.list);
     if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
@@ -132,12 +147,18 @@ fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
     }
     let mut printed = Outcome::Done;
     if arguments.format.is_json() {
-        let document = document(arguments, groups, count, green);
+        let document = document(arguments, results, count, green);
         printed = job.progress.aside(|| print_document("test", document));
     }
     if !arguments.list {
+        let pairs = verdicts.iter().map(|(name, found)| (name.as_str(), found));
+        let hash = if verdicts.is_empty() {
+            String::new()
+        } else {
+            format!(" hash={:016x}", verdict_hash(pairs))
+        };
         job.tell(&format!(
-            "test: {} passed={passed} failed={failed} wrong={wrong} ticks={ticks}",
+            "test: {} passed={passed} failed={failed} wrong={wrong} ticks={ticks}{hash}",
             if green { "ok" } else { "failed" }
         ));
     }
@@ -145,7 +166,12 @@ fn conclude(job: &Job<'_>, groups: &[Group], count: &Count) -> Outcome {
 }
 
 /// Returns the results as a JSON document.
-fn document(arguments: &Arguments, groups: &[Group], count: &Count, green: bool) -> Value {
+fn document(
+    arguments: &Arguments,
+    (groups, sweeps): (&[Group], &[Value]),
+    count: &Count,
+    green: bool,
+) -> Value {
     let of_case = |case: &Case| {
         let (verdict, what, details) = match &case.verdict {
             Verdict::Passed if arguments.list => (None, None, None),
@@ -162,8 +188,9 @@ fn document(arguments: &Arguments, groups: &[Group], count: &Count, green: bool)
             "seconds": case.took.as_secs_f64(),
         })
     };
-    let files = groups.iter().map(|group| {
-        json!({ "file": group.name, "tests": group.cases.iter().map(of_case).collect::<Value>() })
+    let files = groups.iter().zip(sweeps).map(|(group, sweep)| {
+        let tests: Value = group.cases.iter().map(of_case).collect();
+        json!({ "file": group.name, "tests": tests, "sweep": sweep })
     });
     json!({
         "ok": green,
@@ -222,7 +249,8 @@ fn is_test_file(path: &Path) -> bool {
     })
 }
 
-fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> Group {
+/// Runs the tests of a file, and its sweep, which is also returned as JSON.
+fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> (Group, Value) {
     let arguments = job.arguments;
     let name = file.display().to_string();
     let suite = match Suite::load(file, job.kinds) {
@@ -231,7 +259,7 @@ fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> Group {
             count.wrong += mistakes.len();
             job.report(&mistakes);
             let cases = vec![wrong_file(&mistakes)];
-            return Group { name, cases };
+            return (Group { name, cases }, Value::Null);
         }
     };
     let wanted = |test: &&Test| {
@@ -251,7 +279,13 @@ fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> Group {
             cases.push(run_test(&suite, test, job, count));
         }
     }
-    Group { name, cases }
+    let mut swept = Value::Null;
+    if let Some(sweep) = &suite.sweep {
+        let (runs, document) = sweep::run(&suite, sweep, job, count);
+        cases.extend(runs);
+        swept = document;
+    }
+    (Group { name, cases }, swept)
 }
 
 /// Describes a file that cannot be read, in the form that a CI server shows.
@@ -304,7 +338,10 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
                         full.push_str(more);
                     }
                     if let Some(folder) = &job.arguments.keep {
-                        let kept = record(suite, test, folder, &full);
+                        let names = (suite.file.as_str(), test.name.as_str());
+                        let kept = record(names, folder, &full, |path| {
+                            suite.run(test, Some(path)).map(drop)
+                        });
                         full.push_str(&kept);
                     }
                     job.tell(&format!("FAIL  {}\n      {full}", test.name));
@@ -322,11 +359,16 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
     }
 }
 
-/// Runs a failed test again with a recorder. Tests are deterministic, so it fails in the same way. Returns the path of
-/// the recording.
-fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
-    let stem = Path::new(&suite.file).file_stem().unwrap_or_default();
-    let name = format!("{} - {}", stem.to_string_lossy(), test.name);
+/// Runs a failed test of a file again with a recorder. Tests are deterministic, so it fails in the same way. Returns the
+/// path of the recording.
+fn record(
+    (file, test): (&str, &str),
+    folder: &Path,
+    failure: &str,
+    run: impl FnOnce(&Path) -> Result<(), DriverError>,
+) -> String {
+    let stem = Path::new(file).file_stem().unwrap_or_default();
+    let name = format!("{} - {test}", stem.to_string_lossy());
     // Replaces characters that some file systems do not allow.
     let name: String = name
         .chars()
@@ -339,9 +381,7 @@ fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
     let file = std::path::absolute(folder.join(format!("{name}.vcd")));
     let recorded = file.and_then(|file| {
         std::fs::create_dir_all(folder)?;
-        suite
-            .run(test, Some(&file))
-            .map_err(std::io::Error::other)?;
+        run(&file).map_err(std::io::Error::other)?;
         Ok(file)
     });
     let file = match recorded {
@@ -349,7 +389,7 @@ fn record(suite: &Suite, test: &Test, folder: &Path, failure: &str) -> String {
         Err(error) => return format!("\n      it could not be recorded: {error}"),
     };
     let texts = [("What failed".to_owned(), failure.to_owned())];
-    let page = match page_beside(&file, &test.name, None, &texts) {
+    let page = match page_beside(&file, test, None, &texts) {
         Ok(page) => page.display().to_string(),
         Err(error) => error,
     };

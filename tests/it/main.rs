@@ -24,5 +24,6 @@ mod peeler;
 mod record;
 mod report;
 mod sessions;
+mod sweep;
 mod sync;
 mod testing;

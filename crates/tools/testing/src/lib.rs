@@ -3,21 +3,29 @@
 //! A test file names a driver.cfg and a PLC program, describes as much of the machine as necessary, and contains tests:
 //! steps that set signals, let time pass, and expect something. [`Suite::load`] reads a file, [`Suite::run`] runs one
 //! of its tests, and [`junit_xml`] writes the results for a CI server. Wall time has no influence: the program and the
-//! machine take turns on one thread, and the same test always gives the same run.
+//! machine take turns on one thread, and the same test always gives the same run. A [`Sweep`] repeats a scenario with
+//! each fault of a list at each moment of a list, and judges what the program makes of it.
 
 mod condition;
+mod failure;
 mod junit;
 mod machine;
+mod observer;
 mod plant;
 mod playback;
 mod run;
 mod sections;
 mod suite;
+mod sweep;
+mod sweeping;
 mod test;
 mod watch;
 
 pub use condition::{Condition, Demand};
+pub use failure::Failure;
 pub use junit::{Case, Group, Verdict, junit_xml};
-pub use run::{Failure, Ran};
+pub use run::Ran;
 pub use suite::Suite;
+pub use sweep::{Accepted, Cell, CellMark, Judgement, Plan, Sweep, matrix, verdict_hash};
+pub use sweeping::{Judged, Refused};
 pub use test::{Test, TextPosition};

@@ -22,6 +22,11 @@ pub(super) struct Plant {
 }
 
 impl Plant {
+    /// True if each run has a process of its own.
+    pub(super) const fn is_isolated(&self) -> bool {
+        self.options.isolated
+    }
+
     /// Starts a run of the FMU; sets `slots` to the initial sensor values.
     pub(super) fn start(&self, table: &SignalTable, slots: &mut [Slot]) -> Result<Machine, String> {
         let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);

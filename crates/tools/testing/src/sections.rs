@@ -72,7 +72,7 @@ impl Reader<'_> {
     }
 
     /// The area that the machine writes.
-    const fn own(&self) -> Area {
+    pub(super) const fn own(&self) -> Area {
         match self.role {
             Role::Device => Area::Input,
             Role::Controller => Area::Output,
@@ -186,21 +186,12 @@ impl Reader<'_> {
         });
         let initial = self.assignments(set.as_ref());
         let steps = steps.and_then(|value| {
-            let tables = value.tables("steps");
-            if tables.is_empty() {
-                value.wrong(
-                    "a test without steps proves nothing",
-                    "write some, such as [{ run = \"1s\" }, { expect = \"Ready lamp\" }]",
-                );
-            }
-            let is_empty = tables.is_empty();
-            let steps: Vec<_> = tables.into_iter().map(|table| self.step(table)).collect();
-            let steps = steps.into_iter().collect::<Option<Vec<Step>>>()?;
-            let passes = |step: &Step| step.passage.is_some() || step.during > 0;
-            let timed = steps.iter().rposition(passes).map_or(0, |last| last + 1);
+            let steps = self.steps(&value)?;
+            let timed = steps.iter().rposition(Step::takes_time);
+            let timed = timed.map_or(0, |last| last + 1);
             let watches = |step: &Step| !step.always.is_empty() || !step.never.is_empty();
             let proves = timed > 0 || steps.iter().any(|step| !step.expect.is_empty());
-            if !is_empty && (!proves || steps[timed..].iter().any(watches)) {
+            if !steps.is_empty() && (!proves || steps[timed..].iter().any(watches)) {
                 value.wrong(
                     "no time passes in which its conditions are checked: this test proves nothing",
                     "let time pass with or after \"always\" and \"never\", such as { never = \"Jam lamp\", run = \"1s\" }",
@@ -214,6 +205,19 @@ impl Reader<'_> {
             initial: initial?,
             steps: steps?,
         })
+    }
+
+    /// The steps of a test or of a sweep's scenario.
+    pub(super) fn steps(&self, value: &Value<'_>) -> Option<Vec<Step>> {
+        let tables = value.tables("steps");
+        if tables.is_empty() {
+            value.wrong(
+                "a test without steps proves nothing",
+                "write some, such as [{ run = \"1s\" }, { expect = \"Ready lamp\" }]",
+            );
+        }
+        let steps: Vec<_> = tables.into_iter().map(|table| self.step(table)).collect();
+        steps.into_iter().collect()
     }
 
     fn step(&self, mut table: Table<'_>) -> Option<Step> {
@@ -318,7 +322,7 @@ impl Reader<'_> {
     }
 
     /// A span of simulation time in ticks: a number of ticks, or a duration, rounded up or down.
-    fn ticks(&self, value: &Value<'_>, up: bool) -> Option<u64> {
+    pub(super) fn ticks(&self, value: &Value<'_>, up: bool) -> Option<u64> {
         if value.as_text().is_none() {
             return u64::try_from(value.whole(1..=MOST_TICKS)?).ok();
         }
@@ -382,7 +386,7 @@ impl Reader<'_> {
     }
 
     /// One name or a list of them.
-    fn names(&self, value: &Value<'_>) -> Option<Vec<usize>> {
+    pub(super) fn names(&self, value: &Value<'_>) -> Option<Vec<usize>> {
         const RIGHT: &str = "write the name of a signal in quotes, or a list of names";
         let name = |value: &Value<'_>| self.settable(value, value.text(RIGHT)?);
         if value.as_text().is_some() {
@@ -438,7 +442,7 @@ impl Reader<'_> {
         read.into_iter().collect()
     }
 
-    fn condition(&self, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
+    pub(super) fn condition(&self, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let text = value.text("write a condition in quotes, such as \"Phase == 3\"")?;
         match Condition::parse(text, self.table) {
             Ok(condition) => Some((condition, value.place())),

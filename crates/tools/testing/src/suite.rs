@@ -14,6 +14,7 @@ use tickbus_plc as plc;
 use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
+use super::sweep::Sweep;
 use super::test::{Rule, Test};
 
 /// The default step of a test file.
@@ -24,8 +25,10 @@ const STEP: Nanos = Nanos::from_millis(1);
 pub struct Suite {
     /// The file's path, as messages name it.
     pub file: String,
-    /// The file's tests. Never empty.
+    /// The file's tests. Empty only in a file with a sweep.
     pub tests: Vec<Test>,
+    /// The file's sweep.
+    pub sweep: Option<Sweep>,
     pub(super) bench: Bench,
 }
 
@@ -71,10 +74,11 @@ impl Suite {
         match (collector.finish(), of_config) {
             (Some(mistakes), _) | (None, Some(mistakes)) => Err(mistakes),
             (None, None) => {
-                let (bench, tests) = read.expect("what is not read has a mistake");
+                let (bench, tests, sweep) = read.expect("what is not read has a mistake");
                 Ok(Self {
                     file: file.to_owned(),
                     tests,
+                    sweep,
                     bench,
                 })
             }
@@ -87,7 +91,7 @@ fn read(
     mut root: Table<'_>,
     (folder, kinds): (&Path, &'static Kinds),
     of_config: &mut Option<Mistakes>,
-) -> Option<(Bench, Vec<Test>)> {
+) -> Option<(Bench, Vec<Test>, Option<Sweep>)> {
     let right = "write the path of the driver.cfg, as seen from this file";
     let config = root.require("config", format!("add config = \"driver.cfg\": {right}"));
     let program = root.take("program");
@@ -95,7 +99,10 @@ fn read(
     let scan = root.take("scan");
     let step = root.take("step");
     let machine = root.take("machine");
-    let tests = root.require("test", "write a [[test]] with name and steps for each test");
+    let tests = root.take("test");
+    let sweep = root.take("sweep");
+    let either = "write a [[test]] with name and steps for each test";
+    root.require_one_of(&["test", "sweep"], either);
     if let (None, true) = (&program, root.is_whole()) {
         for (key, value) in [("program_options", &options), ("scan", &scan)] {
             if let Some(value) = value {
@@ -134,11 +141,21 @@ fn read(
     if let Some(mistakes) = machine.elsewhere.take() {
         *of_config = Some(mistakes);
     }
-    let tables = tests?.tables("[[test]]");
+    let tables = tests.map(|value| value.tables("[[test]]"));
+    let tables = tables.unwrap_or_default();
     check_twins(&tables);
     let tests: Vec<Option<Test>> = tables.into_iter().map(|table| reader.test(table)).collect();
+    let sweep = match sweep {
+        None => Some(None),
+        Some(value) => {
+            let table = value.table("[sweep]", "write one [sweep] table");
+            table
+                .and_then(|table| reader.sweep(table, &tests))
+                .map(Some)
+        }
+    };
     let tests: Option<Vec<Test>> = tests.into_iter().collect();
-    let tests = tests?;
+    let (tests, sweep) = (tests?, sweep?);
     if of_config.is_some() {
         return None;
     }
@@ -150,7 +167,7 @@ fn read(
         tape: machine.tape,
         fmu: machine.fmu,
     };
-    Some((bench, tests))
+    Some((bench, tests, sweep))
 }
 
 fn load_config(

@@ -38,6 +38,13 @@ pub(super) struct Step {
     pub(super) never: Vec<(Condition, TextPosition)>,
 }
 
+impl Step {
+    /// True if time passes in this step.
+    pub(super) const fn takes_time(&self) -> bool {
+        self.passage.is_some() || self.during > 0
+    }
+}
+
 /// How time passes in a step.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Passage {

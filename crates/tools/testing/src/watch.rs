@@ -55,7 +55,8 @@ pub(super) fn span(ticks: u64, step: Nanos) -> String {
     format!("{ticks} {plural} ({})", seconds(ticks, step))
 }
 
-fn seconds(ticks: u64, step: Nanos) -> String {
+/// The time of some ticks as readable text.
+pub(super) fn seconds(ticks: u64, step: Nanos) -> String {
     let nanos = i64::try_from(ticks)
         .unwrap_or(i64::MAX)
         .saturating_mul(step.0);

@@ -1,0 +1,81 @@
+//! A sweep: one scenario, run again with each fault of a list at each moment of a list.
+//!
+//! The run without a fault shows when each moment comes: a [`Plan`] is the list of runs. Up to its moment each of them is
+//! the run without a fault, bit for bit, then it is compared with that one. Each run stands alone, so any number of
+//! threads can share the list.
+
+mod accepted;
+mod disturbance;
+mod judgement;
+mod late;
+mod matrix;
+mod named;
+mod plan;
+mod progress;
+mod section;
+mod survey;
+mod trial;
+
+use std::path::PathBuf;
+
+pub use accepted::Accepted;
+use disturbance::Disturbance;
+pub use judgement::{Judgement, verdict_hash};
+pub use matrix::{Mark as CellMark, matrix};
+pub(super) use named::Named;
+pub use plan::{Cell, Plan};
+use progress::Mark;
+pub(super) use survey::{MOST_VALUES, Moment, Survey};
+use tickbus_image::signal::Slot;
+
+use super::test::{Step, TextPosition};
+
+/// The `[sweep]` of a test file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    /// The position at which the sweep begins.
+    pub place: TextPosition,
+    rows: Vec<Row>,
+    pub(super) moments: Vec<Moments>,
+    pub(super) initial: Vec<(usize, Slot)>,
+    pub(super) scenario: Vec<Step>,
+    /// Any of these is the program's word that something is wrong. Never empty.
+    told: Vec<Named>,
+    /// None of these may hold.
+    never: Vec<Named>,
+    /// The changes of these are the progress. Never empty.
+    goes_on: Vec<Mark>,
+    /// The ticks in which a fault is told, or the run continues.
+    within: u64,
+    /// How many ticks sooner than without a fault a change may come.
+    tolerance: u64,
+    accepted: PathBuf,
+}
+
+/// One fault of a sweep: a row of the matrix.
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    /// What is disturbed: a signal, a station, or nothing for the whole line.
+    subject: String,
+    /// The kind of fault, with its numbers if they are not the usual ones.
+    kind: String,
+    disturbance: Disturbance,
+}
+
+impl Row {
+    /// The name of the fault: `Level stuck-on`, `line-down`.
+    fn name(&self) -> String {
+        format!("{} {}", self.subject, self.kind)
+            .trim_start()
+            .to_owned()
+    }
+}
+
+/// Moments as the file states them.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Moments {
+    /// Each value that the signal with this index takes.
+    EachValue(usize, TextPosition),
+    /// The first time that a condition holds.
+    First(Named),
+}

@@ -349,6 +349,40 @@ fn a_scenario_can_be_a_test_of_the_file_and_moments_the_values_of_a_signal() {
     );
 }
 
+#[test]
+fn a_sweep_before_a_recording_sees_what_the_machine_would_not_answer() {
+    let folder = folder(SWEEP);
+    let one = [
+        "a.toml",
+        "--only",
+        "Start late 6ms @ moves",
+        "--keep",
+        "kept",
+    ];
+    test(folder.path(), &one);
+    let file = "config = \"line.cfg\"\nprogram = \"mirror\"\nscan = \"2ms\"\nstep = \"2ms\"\n\
+                [machine]\nrecording = \"kept/a - Start late 6ms @ moves.vcd\"\ncompare = [\"Run\"]\n\
+                [sweep]\nscenario = [{ tick = 35 }]\nmoments = { runs = \"Run\" }\nsignals = [\"Start\"]\n\
+                kinds = [\"stuck-on\", \"stuck-off\"]\ntold = \"Speed == 99\"\nwithin = \"20ms\"\n";
+    fs::write(folder.path().join("a.toml"), file).expect("the file");
+    let text = out(&test(folder.path(), &["a.toml"]));
+    assert!(text.contains("\nStart     ok\n"), "{text}");
+    assert!(text.contains("\nStart     DIFFERS\n"), "{text}");
+}
+
+#[test]
+fn the_sweep_of_the_docs_is_that_of_the_rig() {
+    let read = |path: &str| fs::read_to_string(repository().join(path)).expect("a text");
+    let docs = read("docs/testing.md");
+    let blocks = |first: &str| {
+        let (_, block) = docs.split_once(&format!("```toml\n{first}")).expect(first);
+        let (block, _) = block.split_once("```").expect("its end");
+        format!("{first}{block}")
+    };
+    assert!(read("examples/sweep/rig.toml").ends_with(&blocks("[sweep]")));
+    assert!(read("examples/sweep/accepted.toml").contains(&blocks("[[accept]]")));
+}
+
 /// The whole sweep takes some seconds, and `tools/test` makes it.
 #[test]
 fn the_sweep_of_the_rig_is_as_accepted() {

@@ -345,6 +345,36 @@ fn an_fmu_is_the_machine_of_a_test_file() {
 }
 
 #[test]
+fn a_sweep_before_an_fmu_is_the_same_in_one_process_and_in_several() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut sweeps = Vec::new();
+    for machine in [
+        "fmu = \"tank2.fmu\"\nmap = \"tank.toml\"",
+        "fmu = \"tank2.fmu\"\nmap = \"tank.toml\"\nisolated = true",
+    ] {
+        tests_in(
+            folder.path(),
+            machine,
+            "{ await = \"Level low\", within = \"30s\" }, { await = \"Valve\", within = 2 }, { run = \"10s\" }",
+        );
+        let file = folder.path().join("tank.toml.test.toml");
+        let sweep = "[sweep]\nscenario = \"the level stays\"\nmoments = { drains = \"not Valve\", fills = \"Valve\" }\n\
+                     kinds = [\"stuck-on\", \"stuck-off\", \"late\"]\nsignals = [\"Level low\"]\n\
+                     told = \"Level > 900\"\nnever = \"Level < 350\"\nwithin = \"20s\"\n";
+        let text = fs::read_to_string(&file).expect("the test");
+        fs::write(&file, text + sweep).expect("a file");
+        let output = tickbus(
+            folder.path(),
+            &["test", "tank.toml.test.toml", "--jobs", "3"],
+        );
+        assert_eq!(err(&output), "");
+        sweeps.push(out(&output));
+    }
+    assert!(sweeps[0].contains("\nLevel low NEVER "), "{}", sweeps[0]);
+    assert_eq!(sweeps[0], sweeps[1]);
+}
+
+#[test]
 fn a_test_file_names_an_fmu_that_is_not_right() {
     let folder = tempfile::tempdir().expect("a folder");
     for (machine, told) in [

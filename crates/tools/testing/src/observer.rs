@@ -1,4 +1,4 @@
-//! What watches a run beside its steps.
+//! The observer of a run, beside its steps.
 
 use tickbus_base::Mistake;
 use tickbus_driver::Driver;

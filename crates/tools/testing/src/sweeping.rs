@@ -95,7 +95,7 @@ impl Suite {
         Refused::Mistakes(Mistakes::of_list(&self.file, list))
     }
 
-    /// What is wrong with the sweep, as the run without a fault shows.
+    /// The mistakes in the sweep that the run without a fault shows.
     fn found(&self, sweep: &Sweep, survey: &Survey<'_>) -> Vec<(TextPosition, String, String)> {
         let step = self.bench.step;
         let scenario = seconds(survey.scenario.unwrap_or_default(), step);

@@ -14,7 +14,7 @@ const CHANCE: f64 = 0.1;
 /// How long the line or a station is gone, unless the file says it.
 const GONE: Nanos = Nanos::from_secs(1);
 
-/// What a run injects.
+/// The fault of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Disturbance {
     /// A fault that the driver injects.
@@ -78,7 +78,7 @@ impl Kind {
         }
     }
 
-    /// What this kind does to a signal; `None` if it has no such fault.
+    /// This kind of fault of a signal; `None` if the signal has no such fault.
     pub(super) fn of_signal(
         self,
         index: usize,
@@ -106,7 +106,7 @@ impl Kind {
         Some(self.fault(Effect::Signal(index, effect), Lasts::UntilEnded))
     }
 
-    /// What this kind does to the line; `None` if it has no such fault.
+    /// This kind of fault of the line; `None` if the line has no such fault.
     pub(super) fn of_line(self) -> Option<Disturbance> {
         match self {
             Self::LineDown(span) => {
@@ -116,7 +116,7 @@ impl Kind {
         }
     }
 
-    /// What this kind does to a station of several; `None` if it has no such fault.
+    /// This kind of fault of a station of several; `None` if stations have no such fault.
     pub(super) fn of_station(self, station: usize) -> Option<Disturbance> {
         match self {
             Self::StationDown(span) => {

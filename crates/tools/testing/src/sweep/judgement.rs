@@ -1,4 +1,4 @@
-//! What a program made of a fault.
+//! Verdicts: how a program copes with a fault.
 
 use std::fmt;
 use std::hash::Hasher as _;
@@ -6,7 +6,7 @@ use std::hash::Hasher as _;
 use siphasher::sip::SipHasher24;
 use tickbus_base::time::Nanos;
 
-/// What a program made of a fault.
+/// How a program copes with a fault.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Judgement {
     /// The program told it, this long after the fault.

@@ -55,7 +55,7 @@ pub struct Sweep {
 /// One fault of a sweep: a row of the matrix.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
-    /// What is disturbed: a signal, a station, or nothing for the whole line.
+    /// The name of the disturbed signal or station; empty for the whole line.
     subject: String,
     /// The kind of fault, with its numbers if they are not the usual ones.
     kind: String,

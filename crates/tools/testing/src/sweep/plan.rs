@@ -26,7 +26,7 @@ pub struct Plan<'a> {
 pub struct Cell {
     /// `Level stuck-on @ Step 3`.
     pub name: String,
-    /// Its place in the list.
+    /// The place of the run in the list.
     pub index: usize,
     pub(super) row: usize,
     pub(super) moment: usize,

@@ -11,7 +11,7 @@ use tickbus_image::signal::{Area, DataType, Signal, SignalTable, Slot};
 pub(crate) enum Mark {
     /// The value of the signal with this index.
     Value(usize),
-    /// Whether a condition holds; the text is the condition as written.
+    /// A condition, as 1 while it holds and else 0; the text is the condition as written.
     Holds(Condition, String),
 }
 

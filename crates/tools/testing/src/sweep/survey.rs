@@ -34,7 +34,7 @@ pub(crate) struct Survey<'a> {
     pub(crate) scenario: Option<u64>,
 }
 
-/// What is awaited for one entry of the file.
+/// The values or the condition that one entry of the file waits for.
 enum Seeker<'a> {
     Values(usize, Vec<Slot>),
     First(Watcher<'a>),

@@ -170,7 +170,10 @@ impl Observer for Trial<'_> {
         if told.is_some() && ticks <= end {
             self.told_at.get_or_insert(ticks);
         } else if told.is_some() && self.differs.is_none() {
-            self.differs = Some(format!("it is told, but only after {}", self.since(ticks)));
+            self.differs = Some(format!(
+                "the fault is told, but only after {}",
+                self.since(ticks)
+            ));
         }
         if changed && self.told_at.is_none() && self.differs.is_none() {
             self.follow(ticks);

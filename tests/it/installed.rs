@@ -320,12 +320,20 @@ struct Terminal {
 impl Terminal {
     /// Starts the command with stderr on a new terminal.
     fn with(command: &mut Command) -> (Self, std::process::Child) {
+        Self::showing(command, |command, screen| {
+            command.stdout(std::process::Stdio::null()).stderr(screen)
+        })
+    }
+
+    /// Starts the command on a new terminal, after `show` has connected it.
+    fn showing(
+        command: &mut Command,
+        show: impl FnOnce(&mut Command, fs::File) -> &mut Command,
+    ) -> (Self, std::process::Child) {
         let (end, name) = tickbus_base::os::PseudoTerminal::open().expect("a terminal");
         let screen = fs::File::options().write(true).open(name);
-        let child = command
+        let child = show(command, screen.expect("its other end"))
             .env("TERM", "xterm")
-            .stdout(std::process::Stdio::null())
-            .stderr(screen.expect("its other end"))
             .spawn()
             .expect("the tickbus program runs");
         let told = String::new();
@@ -360,6 +368,26 @@ fn a_terminal_has_colours_unless_the_user_wants_none() {
         terminal.await_words("For more information");
         assert_eq!(child.wait().expect("it ends").code(), Some(2));
         assert_eq!(terminal.told.contains('\x1b'), has_colours, "{no_colour}");
+    }
+}
+
+#[test]
+#[cfg(unix)]
+fn the_matrix_of_a_sweep_has_colours_on_a_terminal() {
+    for (no_colour, has_colours) in [("", true), ("1", false)] {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_tickbus"));
+        command.args([
+            "test",
+            "examples/sweep",
+            "--only",
+            "Not OK stuck-on @ Step 1",
+        ]);
+        command.current_dir(repository()).env("NO_COLOR", no_colour);
+        let (mut terminal, mut child) = Terminal::showing(&mut command, Command::stdout);
+        terminal.await_words(" hash=");
+        assert_eq!(child.wait().expect("it ends").code(), Some(0));
+        let is_green = terminal.told.contains("\x1b[32m 10ms   \x1b[0m");
+        assert_eq!(is_green, has_colours, "{}", terminal.told);
     }
 }
 

@@ -350,6 +350,43 @@ fn a_scenario_can_be_a_test_of_the_file_and_moments_the_values_of_a_signal() {
 }
 
 #[test]
+fn each_station_of_several_can_be_gone() {
+    let station = |name: &str, place: u32| {
+        let signal = |what: &str, address: &str| {
+            format!(
+                "[[signal]]\nname = \"{name} {what}\"\naddress = \"{address}{place}.0\"\nstation = \"{name}\"\n"
+            )
+        };
+        [signal("in", "%IX"), signal("out", "%QX")].concat()
+    };
+    let config = "[driver]\nid = 1\nname = \"Two\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+                  scan = \"2ms\"\n[[station]]\nname = \"A\"\n[[station]]\nname = \"B\"\n";
+    let folder = folder(
+        "config = \"two.cfg\"\nstep = \"2ms\"\n[sweep]\nsignals = [\"A in\"]\nkinds = [\"station-down\", \"stuck-off\"]\n\
+         moments = \"A out\"\ntold = [\"A out\", \"B out\"]\nwithin = \"100ms\"\n\
+         scenario = [{ tick = 5 }, { set = { \"A in\" = true }, tick = 5 }, { set = { \"B in\" = true }, tick = 5 }]\n",
+    );
+    let config = [config.to_owned(), station("A", 0), station("B", 2)].concat();
+    fs::write(folder.path().join("two.cfg"), config).expect("the driver.cfg");
+    let wrong = err(&test(folder.path(), &["a.toml"]));
+    assert!(
+        wrong.contains("\"A out\" holds without a fault, so it tells nothing"),
+        "{wrong}"
+    );
+    let file = folder.path().join("a.toml");
+    let text = fs::read_to_string(&file).expect("the file");
+    let text = text.replace("[\"A out\", \"B out\"]", "[[\"not A out\", \"B out\"]]");
+    fs::write(&file, text).expect("the file");
+    let text = out(&test(folder.path(), &["a.toml"]));
+    assert!(
+        text.contains("station-down A out\nA            ok\nB            STILL\n"),
+        "{text}"
+    );
+    assert!(text.contains("stuck-off    A out\nA in         "), "{text}");
+    assert!(text.contains("--only \"B station-down @ A out\""), "{text}");
+}
+
+#[test]
 fn a_sweep_before_a_recording_sees_what_the_machine_would_not_answer() {
     let folder = folder(SWEEP);
     let one = [

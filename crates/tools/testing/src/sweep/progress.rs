@@ -16,12 +16,13 @@ pub(crate) enum Mark {
 }
 
 impl Mark {
-    /// All that the PLC writes and that takes values one by one: a scaled or real value moves differently in each run.
-    pub(crate) fn usual(table: &SignalTable, written_by_plc: Area) -> Vec<Self> {
+    /// All signals of the PLC that take values one by one: a scaled or real value moves differently in each run.
+    /// `of_machine` is the area that the machine writes.
+    pub(crate) fn usual(table: &SignalTable, of_machine: Area) -> Vec<Self> {
         let signals = table.signals.iter().enumerate();
         let counts = |signal: &Signal| {
             let is_real = matches!(signal.data_type, DataType::Real | DataType::Lreal);
-            signal.area == written_by_plc && !is_real && signal.scale.is_none()
+            signal.area != of_machine && !is_real && signal.scale.is_none()
         };
         let counted = signals.filter(|(_, signal)| counts(signal));
         counted.map(|(index, _)| Self::Value(index)).collect()

@@ -3,7 +3,7 @@
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
 use tickbus_fieldbus::faults::unknown;
-use tickbus_image::signal::{Area, DataType, Slot};
+use tickbus_image::signal::{DataType, Slot};
 
 use super::disturbance::Kind;
 use super::named::Named;
@@ -40,6 +40,13 @@ impl Reader<'_> {
         let within = table.require("within", right);
         let tolerance = table.take("tolerance");
         let accepted = table.take("accepted");
+        let usual = Mark::usual(self.table, self.own());
+        if usual.is_empty() && goes_on.is_none() {
+            table.wrong(
+                "the PLC writes neither a BOOL nor an unscaled whole number that would show its progress",
+                "write conditions, such as goes_on = [\"Speed > 10\", \"Speed > 90\"]",
+            );
+        }
         table.finish();
 
         let scenario = scenario.and_then(|value| self.scenario(&value, tests));
@@ -61,7 +68,7 @@ impl Reader<'_> {
             None => Some(Vec::new()),
             Some(value) => self.named(&value, "write the conditions that never may hold"),
         };
-        let goes_on = self.goes_on(goes_on.as_ref());
+        let goes_on = goes_on.map_or(Some(usual), |value| self.goes_on(&value));
         let within = within.and_then(|value| self.ticks(&value, true));
         let tolerance = match tolerance {
             None => u64::try_from(TOLERANCE.0.div_euclid(self.step.0)).ok(),
@@ -265,15 +272,8 @@ impl Reader<'_> {
     }
 
     /// Signals and conditions whose changes are the progress.
-    fn goes_on(&self, value: Option<&Value<'_>>) -> Option<Vec<Mark>> {
+    fn goes_on(&self, value: &Value<'_>) -> Option<Vec<Mark>> {
         const RIGHT: &str = "write signals or conditions, such as [\"Step\", \"Cycles\"]";
-        let Some(value) = value else {
-            let by_plc = match self.own() {
-                Area::Input => Area::Output,
-                Area::Output => Area::Input,
-            };
-            return Some(Mark::usual(self.table, by_plc));
-        };
         let values = match value.as_text() {
             Some(_) => vec![value.clone()],
             None => value.list(RIGHT)?,

@@ -349,6 +349,27 @@ fn a_scenario_can_be_a_test_of_the_file_and_moments_the_values_of_a_signal() {
     );
 }
 
+/// The second fault hides the alarm of the first.
+#[test]
+fn pairs_of_faults_come_at_the_same_moment() {
+    let (head, sweep) = SWEEP.split_once("kinds    =").expect("the kinds");
+    let (_, rest) = sweep.split_once("moments").expect("the moments");
+    let folder = folder(&format!(
+        "{head}pairs = true\nkinds = [\"stuck-off\", \"frozen\", {{ kind = \"late\", by = \"20ms\" }}]\nmoments{rest}"
+    ));
+    let text = out(&test(folder.path(), &["a.toml"]));
+    for part in [
+        "\nstuck-off          at rest runs    moves\nStart              DIFFERS 8ms     8ms\n",
+        "\n+ Height frozen    at rest runs    moves\nStart stuck-off    STILL   DIFFERS DIFFERS\n",
+        "\nStart stuck-off    DIFFERS 28ms    28ms\nStart late 20ms    ok      ok      ok\n",
+    ] {
+        assert!(text.contains(part), "{part}\n{text}");
+    }
+    let again = "--only \"Start stuck-off + Height frozen @ runs\"\n";
+    assert!(text.contains(again), "{text}");
+    assert!(text.contains("sweep: runs=24 "), "{text}");
+}
+
 #[test]
 fn each_station_of_several_can_be_gone() {
     let station = |name: &str, place: u32| {

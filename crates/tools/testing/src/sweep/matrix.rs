@@ -13,7 +13,7 @@ const WIDTH: usize = 80;
 const COLUMN: usize = 7;
 
 /// The longest name of a row.
-const LONGEST: usize = 24;
+const LONGEST: usize = 32;
 
 /// The text of a cell.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -119,7 +119,8 @@ pub fn matrix(plan: &Plan<'_>, marks: &[Option<Mark>], colour: bool) -> String {
             }
             let heads = labels[block.clone()].iter().map(|label| column(label));
             let heads: String = heads.collect();
-            let head = format!("{:<name_width$}{heads}", of_kind[0].0);
+            let kind: String = of_kind[0].0.chars().take(LONGEST).collect();
+            let head = format!("{kind:<name_width$}{heads}");
             let _ = writeln!(text, "\n{}", head.trim_end());
             for (_, subject, marks) in of_kind {
                 let subject: String = subject.chars().take(LONGEST).collect();

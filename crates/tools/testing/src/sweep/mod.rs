@@ -52,14 +52,15 @@ pub struct Sweep {
     accepted: PathBuf,
 }
 
-/// One fault of a sweep: a row of the matrix.
+/// One fault of a sweep, or a pair of them: a row of the matrix.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     /// The name of the disturbed signal or station; empty for the whole line.
     subject: String,
-    /// The kind of fault, with its numbers if they are not the usual ones.
+    /// The kind of fault, with its numbers if they are not the usual ones; of a pair the second fault.
     kind: String,
-    disturbance: Disturbance,
+    /// The faults, which come at the same moment. Never empty.
+    disturbances: Vec<Disturbance>,
 }
 
 impl Row {
@@ -68,6 +69,15 @@ impl Row {
         format!("{} {}", self.subject, self.kind)
             .trim_start()
             .to_owned()
+    }
+
+    /// Both faults at once.
+    fn and(&self, other: &Self) -> Self {
+        Self {
+            subject: self.name(),
+            kind: format!("+ {}", other.name()),
+            disturbances: [&self.disturbances[..], &other.disturbances].concat(),
+        }
     }
 }
 

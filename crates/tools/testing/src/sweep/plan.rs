@@ -89,7 +89,7 @@ impl<'a> Plan<'a> {
         (signals, step): (&'t [Signal], Nanos),
     ) -> Trial<'t> {
         let fault = (
-            &self.sweep.rows[cell.row].disturbance,
+            &self.sweep.rows[cell.row].disturbances[..],
             self.moments[cell.moment].tick,
         );
         Trial::new(self.sweep, fault, &self.changes, (signals, step))

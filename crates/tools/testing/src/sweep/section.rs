@@ -32,6 +32,7 @@ impl Reader<'_> {
         let scenario = table.require("scenario", SCENARIO);
         let signals = table.take("signals");
         let kinds = table.take("kinds");
+        let pairs = table.take("pairs");
         let moments = table.require("moments", MOMENTS);
         let told = table.require("told", TOLD);
         let goes_on = table.take("goes_on");
@@ -62,6 +63,8 @@ impl Reader<'_> {
             Some(value) => read_kinds(&value).map(Some),
         };
         let rows = kinds.and_then(|kinds| self.rows(&signals?, kinds));
+        let pairs = pairs.map_or(Some(false), |value| value.boolean());
+        let rows = rows.and_then(|rows| Some(if pairs? { with_pairs(rows) } else { rows }));
         let moments = moments.and_then(|value| self.moments(&value));
         let told = told.and_then(|value| self.named(&value, TOLD));
         let never = match never {
@@ -170,7 +173,7 @@ impl Reader<'_> {
         let row = |subject: &str, disturbance| Row {
             subject: subject.to_owned(),
             kind: kind.label(),
-            disturbance,
+            disturbances: vec![disturbance],
         };
         let all = &self.table.signals;
         let of_signals = signals.iter().filter_map(|index| {
@@ -309,6 +312,18 @@ impl Reader<'_> {
 
 fn is_edge(text: &str) -> bool {
     text.ends_with(" rises") || text.ends_with(" falls")
+}
+
+/// These faults, and each two of them of different signals or stations.
+fn with_pairs(mut rows: Vec<Row>) -> Vec<Row> {
+    for second in 1..rows.len() {
+        for first in 0..second {
+            if rows[first].subject != rows[second].subject {
+                rows.push(rows[first].and(&rows[second]));
+            }
+        }
+    }
+    rows
 }
 
 /// Signals without those that are named twice, which are reported.

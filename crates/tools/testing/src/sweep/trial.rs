@@ -17,8 +17,8 @@ use super::progress::{Change, Progress};
 
 /// The observer of a run with a fault: injects it, and judges.
 pub(crate) struct Trial<'a> {
-    disturbance: &'a Disturbance,
-    held_back: Option<Late>,
+    disturbances: &'a [Disturbance],
+    held_back: Vec<Late>,
     /// The tick after which the fault is there.
     at: u64,
     within: u64,
@@ -42,15 +42,15 @@ pub(crate) struct Trial<'a> {
 impl<'a> Trial<'a> {
     pub(super) fn new(
         sweep: &'a Sweep,
-        (disturbance, at): (&'a Disturbance, u64),
+        (disturbances, at): (&'a [Disturbance], u64),
         changes: &'a [Change],
         (signals, step): (&'a [Signal], Nanos),
     ) -> Self {
         let after = changes.partition_point(|change| change.tick <= at);
         let reference = &changes[after..];
         Self {
-            disturbance,
-            held_back: None,
+            disturbances,
+            held_back: Vec::new(),
             at,
             within: sweep.within,
             tolerance: sweep.tolerance,
@@ -136,17 +136,21 @@ impl Observer for Trial<'_> {
         driver: &mut Driver,
         slots: &mut [Slot],
     ) -> Result<(), Mistake> {
-        if let (true, Disturbance::Fault(fault)) = (ticks == self.at, self.disturbance) {
-            driver.inject(fault)?;
+        if ticks == self.at {
+            for disturbance in self.disturbances {
+                if let Disturbance::Fault(fault) = disturbance {
+                    driver.inject(fault)?;
+                }
+            }
         }
-        if let Some(late) = &mut self.held_back {
+        for late in &mut self.held_back {
             late.apply_to(slots);
         }
         Ok(())
     }
 
     fn after(&mut self, slots: &mut [Slot]) {
-        if let Some(late) = &mut self.held_back {
+        for late in &mut self.held_back {
             late.restore(slots);
         }
     }
@@ -155,8 +159,12 @@ impl Observer for Trial<'_> {
         let told = holding(&mut self.told, watches, slots);
         let broken = holding(&mut self.never, watches, slots);
         let changed = self.progress.look(watches, slots);
-        if let (true, Disturbance::Late(signal, by)) = (ticks == self.at, self.disturbance) {
-            self.held_back = Some(Late::begin(*signal, *by, slots));
+        if ticks == self.at {
+            let late = self.disturbances.iter().filter_map(|one| match one {
+                Disturbance::Late(signal, by) => Some(Late::begin(*signal, *by, slots)),
+                Disturbance::Fault(_) => None,
+            });
+            self.held_back = late.collect();
         }
         if ticks <= self.at {
             return Ok(());

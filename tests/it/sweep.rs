@@ -108,6 +108,24 @@ fn each_fault_at_each_moment_has_its_verdict() {
 }
 
 #[test]
+fn a_fault_that_is_told_too_late_differs() {
+    let slow = SWEEP
+        .replace(
+            "\"Run falls\"\nafter = \"4ms\"",
+            "\"not Run\"\nafter = \"24ms\"",
+        )
+        .replace("100ms", "20ms")
+        .replace("told ", "goes_on = \"Run\"\ntold ");
+    let folder = folder(&slow);
+    let run = "Start stuck-off @ at rest";
+    let one = test(folder.path(), &["a.toml", "--only", run]);
+    let text = out(&one);
+    let told = "      continues differently: the fault is told, but only after 26ms\n";
+    assert!(text.contains(told), "{text}");
+    assert_eq!(one.status.code(), Some(1));
+}
+
+#[test]
 fn a_late_signal_is_right_and_late() {
     let folder = folder(SWEEP);
     let one = test(
@@ -439,6 +457,16 @@ fn the_sweep_of_the_docs_is_that_of_the_rig() {
     };
     assert!(read("examples/sweep/rig.toml").ends_with(&blocks("[sweep]")));
     assert!(read("examples/sweep/accepted.toml").contains(&blocks("[[accept]]")));
+    let machine = |file: &str| {
+        let text = read(file);
+        let (_, rest) = text.split_once("[machine.set]").expect("a machine");
+        let end = rest.find("[[test]]").or_else(|| rest.find("[sweep]"));
+        rest[..end.expect("its end")].trim_end().to_owned()
+    };
+    assert_eq!(
+        machine("examples/sweep/rig.toml"),
+        machine("examples/tests/rig.toml")
+    );
 }
 
 /// The whole sweep takes some seconds, and `tools/test` makes it.

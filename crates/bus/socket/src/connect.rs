@@ -25,7 +25,7 @@ pub(super) fn connect(
     let Some((mut call, peer)) = tcp::dial(address, patience, port, stop)? else {
         return Ok(());
     };
-    let mut lines = ConnectionStates::new([String::new()].into_iter());
+    let mut lines = ConnectionStates::new([(String::new(), frames.stations())].into_iter());
     let reason = format!("connected with {peer}; waiting for its first record");
     lines.opening(0, &reason, port);
     frames.begin();

@@ -1,6 +1,7 @@
 //! Several connections of one driver, combined into the driver's line.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use tickbus_fieldbus::{BusError, Port};
 
@@ -12,18 +13,21 @@ pub(super) struct ConnectionStates(Vec<ConnectionState>);
 struct ConnectionState {
     /// The name of the station; empty for a single connection.
     name: String,
+    stations: Range<usize>,
     running: bool,
     reason: String,
 }
 
 impl ConnectionStates {
-    pub(super) fn new(names: impl Iterator<Item = String>) -> Self {
-        let line = |name| ConnectionState {
+    /// The connections, each with its name and the stations that it carries.
+    pub(super) fn new(lines: impl Iterator<Item = (String, Range<usize>)>) -> Self {
+        let line = |(name, stations)| ConnectionState {
             name,
+            stations,
             running: false,
             reason: String::new(),
         };
-        Self(names.map(line).collect())
+        Self(lines.map(line).collect())
     }
 
     /// Prefixes a text about a line with its station's name.
@@ -49,20 +53,22 @@ impl ConnectionStates {
         text
     }
 
-    fn note(&mut self, line: usize, running: bool, reason: &str) {
+    /// Notes the state of a connection, and returns its stations.
+    fn note(&mut self, line: usize, running: bool, reason: &str) -> Range<usize> {
         let line = &mut self.0[line];
         line.running = running;
         reason.clone_into(&mut line.reason);
+        line.stations.clone()
     }
 
     pub(super) fn opening(&mut self, line: usize, reason: &str, port: &mut Port) {
-        self.note(line, false, reason);
-        port.opening(&self.reason());
+        let stations = self.note(line, false, reason);
+        port.opening_of(stations, &self.reason());
     }
 
     pub(super) fn lost(&mut self, line: usize, error: &BusError, next: &str, port: &mut Port) {
-        self.note(line, false, next);
-        port.lost(error, &self.reason());
+        let stations = self.note(line, false, next);
+        port.lost_of(stations, error, &self.reason());
     }
 
     pub(super) fn running(&mut self, line: usize, reason: &str, port: &mut Port) {
@@ -70,7 +76,8 @@ impl ConnectionStates {
         if self.0.iter().all(|line| line.running) {
             port.running(&self.reason());
         } else {
-            port.opening(&self.reason());
+            // No peer has left: those of other stations are missing still.
+            port.opening_of(0..0, &self.reason());
         }
     }
 }

@@ -35,7 +35,8 @@ pub(super) fn listen(
     port: &mut Port,
     stop: &Stop,
 ) -> Result<(), BusError> {
-    let mut lines = ConnectionStates::new(places.iter().map(|place| place.name.clone()));
+    let line = |place: &Endpoint<'_>| (place.name.clone(), place.frames.stations());
+    let mut lines = ConnectionStates::new(places.iter().map(line));
     let mut servers = Vec::new();
     // A client may connect as soon as the system listens, before this thread continues.
     let since = port.clock().now();

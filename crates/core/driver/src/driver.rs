@@ -142,6 +142,11 @@ impl Driver {
         }
     }
 
+    /// Returns the signals whose changes were swallowed between the simulation and the PLC.
+    pub fn swallowed(&self) -> &SwallowedSignals {
+        &self.swallowed
+    }
+
     /// Moves the oldest events into `into`, as many as fit, and returns their number.
     pub fn poll_events(&mut self, into: &mut [Event]) -> usize {
         let mut taken = 0;

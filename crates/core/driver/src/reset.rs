@@ -70,22 +70,25 @@ impl Driver {
 
     /// Opens the line and the other end again, in place of the present ones, whose tick ends with these `slots`.
     fn reopen_line(&mut self, slots: &[Slot]) -> Result<(), DriverError> {
-        let (bus, program) = bus::open(&self.config, &self.clock, None, &self.swallowed)?;
-        let (image, bus_end) = image_of(&self.config, &self.swallowed);
+        // The present line counts until it ends, which takes longer than the next one needs to begin.
+        let swallowed = self.swallowed.of_next_line();
+        let (bus, program) = bus::open(&self.config, &self.clock, None, &swallowed)?;
+        let (image, bus_end) = image_of(&self.config, &swallowed);
         let time = match &self.line {
             BusHandle::Stepped { time, .. } => Arc::clone(time),
             BusHandle::Free(_) => Arc::default(),
         };
         let (status, times) = (&self.status, (&self.clock, &time));
-        let line = (status, &self.board, &self.swallowed);
+        let line = (status, &self.board, &swallowed);
         let line = start(&self.config, bus, bus_end, times, line)?;
         // The present tick and line end only now, so that a failure leaves them as they are.
         self.end_tick(slots);
         self.line = line;
-        self.swallowed.counts().restart();
         self.image = image;
         self.program_counters.replace(counters_of(program.as_ref()));
         self.program = program;
+        swallowed.begin();
+        self.swallowed = swallowed;
         if self.is_stepped() {
             time.restart();
         }

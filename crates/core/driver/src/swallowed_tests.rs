@@ -68,6 +68,7 @@ fn every_pulse_of_the_machine_is_seen_by_the_plc_or_counted_as_swallowed() {
         assert_eq!(seen + found["swallowed.In"], pulses, "{mode}");
         assert_eq!(found["swallowed_inputs"], found["swallowed.In"]);
         assert_eq!(found["swallowed_outputs"], 0);
+        assert!(found["sent_age.count"] > 100, "{mode}");
     }
 }
 

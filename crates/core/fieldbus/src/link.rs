@@ -163,6 +163,8 @@ struct Shared {
     stale: AtomicUsize,
     /// The times from one bus cycle to the next.
     cycle: SharedHistogram,
+    /// How old the values of this end were when the bus took them.
+    sent_age: SharedHistogram,
     record: Mutex<Record>,
 }
 
@@ -227,6 +229,7 @@ impl LinkStatus {
             state: AtomicU8::new(0),
             stale: AtomicUsize::new(0),
             cycle: SharedHistogram::new(),
+            sent_age: SharedHistogram::new(),
             record: Mutex::new(Record {
                 link,
                 running: String::new(),
@@ -502,6 +505,12 @@ impl LinkStatus {
         self.0.cycle.record(span);
     }
 
+    /// Records that the bus took values of this `age`. Only the thread that runs the bus calls this.
+    #[inline]
+    pub(crate) fn sends(&self, age: Nanos) {
+        self.0.sent_age.record(age);
+    }
+
     /// Adds the state of the line.
     pub fn write(&self, now: Nanos, statistics: &mut Statistics) {
         let record = self.lock();
@@ -529,6 +538,7 @@ impl LinkStatus {
         }
         statistics.count("log.untold", record.log.untold());
         statistics.distribution("bus_cycle", &self.0.cycle.read());
+        statistics.distribution("sent_age", &self.0.sent_age.read());
     }
 
     fn lock(&self) -> MutexGuard<'_, Record> {

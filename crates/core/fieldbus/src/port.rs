@@ -68,6 +68,7 @@ impl Port {
                 fresh_until: Nanos::ZERO,
                 swallowed: None,
                 next_log: Nanos::ZERO,
+                next_age: Nanos::ZERO,
             },
             clock,
             role,
@@ -159,6 +160,7 @@ impl Port {
             return None;
         }
         self.image.attend(now);
+        self.image.note_age(now);
         if self.faults.loses_cycle() {
             self.lose(stations, now);
             return None;
@@ -396,19 +398,33 @@ impl Port {
 
     /// The bus connects, or waits for its peer.
     pub fn opening(&mut self, reason: &str) {
+        self.opening_of(0..self.stations(), reason);
+    }
+
+    /// As [`opening`](Self::opening), where only these stations have no peer: those of others may be there.
+    pub fn opening_of(&mut self, stations: Range<usize>, reason: &str) {
         self.image.last_cycle = None;
         // A bus that panicked may have left something half handed in.
         self.image.is_held = false;
-        self.image.image.peers_left();
+        self.peers_left(stations);
         self.enter(LinkState::Opening, Cause::Waiting, reason);
     }
 
     /// The peer was lost because of `error`, and the bus continues without a pause, as `next` describes.
     pub fn lost(&mut self, error: &BusError, next: &str) {
+        self.lost_of(0..self.stations(), error, next);
+    }
+
+    /// As [`lost`](Self::lost), where only these stations have lost their peer.
+    pub fn lost_of(&mut self, stations: Range<usize>, error: &BusError, next: &str) {
         self.image.last_cycle = None;
-        self.image.image.peers_left();
+        self.peers_left(stations);
         let reason = format!("{error}; {next}");
         self.enter(LinkState::Opening, error.into(), &reason);
+    }
+
+    fn peers_left(&mut self, stations: Range<usize>) {
+        stations.for_each(|station| self.image.image.peer_left(station));
     }
 
     /// The peer is present. The port checks that the peer sends: a line that is silent for too long becomes stale.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use tickbus_base::statistics::{Key, Statistics};
 use tickbus_base::time::Nanos;
@@ -38,12 +38,15 @@ impl fmt::Display for Steps {
 
 /// The signals of a driver whose values changed and changed back between two frames that the other side took.
 #[derive(Clone, Debug)]
-pub struct SwallowedSignals(Arc<Shared>);
+pub struct SwallowedSignals {
+    /// The counters of this line. The driver's next line, after a reset, has its own.
+    counts: Swallowed,
+    shared: Arc<Shared>,
+}
 
 #[derive(Debug)]
 struct Shared {
     driver: String,
-    counts: Swallowed,
     table: SignalTable,
     role: Role,
     /// The steps of the peer, and of this end.
@@ -52,41 +55,83 @@ struct Shared {
     scan: OnceLock<Nanos>,
     /// True once the log has the length of the ticks.
     has_told_ticks: AtomicBool,
+    /// The line that is reported.
+    current: Mutex<Current>,
+}
+
+#[derive(Debug)]
+struct Current {
+    counts: Swallowed,
     /// Which signals the log has.
-    logged: Mutex<Vec<bool>>,
+    logged: Vec<bool>,
+}
+
+impl Current {
+    fn new(counts: Swallowed, signals: usize) -> Self {
+        Self {
+            counts,
+            logged: vec![false; signals],
+        }
+    }
 }
 
 impl SwallowedSignals {
     /// Counts from zero the changes of these signals. `steps` are those in which the peer takes frames, and this
     /// end.
     pub fn new(driver: &str, table: &SignalTable, role: Role, steps: [Steps; 2]) -> Self {
-        Self(Arc::new(Shared {
-            driver: driver.to_owned(),
-            counts: Swallowed::new(table.signals.len()),
-            logged: Mutex::new(vec![false; table.signals.len()]),
-            table: table.clone(),
-            role,
-            steps,
-            scan: OnceLock::new(),
-            has_told_ticks: AtomicBool::new(false),
-        }))
+        let signals = table.signals.len();
+        let counts = Swallowed::new(signals);
+        Self {
+            shared: Arc::new(Shared {
+                driver: driver.to_owned(),
+                table: table.clone(),
+                role,
+                steps,
+                scan: OnceLock::new(),
+                has_told_ticks: AtomicBool::new(false),
+                current: Mutex::new(Current::new(counts.clone(), signals)),
+            }),
+            counts,
+        }
+    }
+
+    /// Counters from zero for the next line of the driver, which are reported once it [begins](Self::begin): until then
+    /// the present line counts on.
+    #[must_use]
+    pub fn of_next_line(&self) -> Self {
+        Self {
+            counts: Swallowed::new(self.shared.table.signals.len()),
+            shared: Arc::clone(&self.shared),
+        }
+    }
+
+    /// Reports this line from now on, and logs its signals again.
+    pub fn begin(&self) {
+        *self.current() = Current::new(self.counts.clone(), self.shared.table.signals.len());
+    }
+
+    fn current(&self) -> MutexGuard<'_, Current> {
+        let current = self.shared.current.lock();
+        current.unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The peer is a PLC program that this process scans so often: nothing shorter reaches it.
     pub fn scanned_every(&self, scan: Nanos) {
-        let _ = self.0.scan.set(scan);
+        let _ = self.shared.scan.set(scan);
     }
 
-    /// The counters, per signal of the table.
+    /// The counters of this line, per signal of the table.
     pub fn counts(&self) -> &Swallowed {
-        &self.0.counts
+        &self.counts
     }
 
-    /// Adds the numbers of both directions, of each station if there are several, and of each signal that has any.
+    /// Adds this end's role, the numbers of both directions, of each station if there are several, and of each signal
+    /// that has any.
     pub fn write(&self, statistics: &mut Statistics) {
-        let Shared { counts, table, .. } = &*self.0;
+        let table = &self.shared.table;
         let mut sums = vec![[0; 2]; table.stations.len()];
-        let found: Vec<(usize, u64)> = counts.iter().collect();
+        let found: Vec<(usize, u64)> = self.current().counts.iter().collect();
+        statistics.text("role", self.shared.role.name());
         for (signal, count) in &found {
             let signal = &table.signals[*signal];
             sums[signal.station][usize::from(signal.area == Area::Output)] += count;
@@ -111,22 +156,32 @@ impl SwallowedSignals {
     pub fn log(&self) {
         // Written after the lock is released, so that no thread waits for a slow reader of the log.
         for line in self.news() {
-            log::warn!("driver \"{}\": {line}", self.0.driver);
+            log::warn!("driver \"{}\": {line}", self.shared.driver);
         }
+    }
+
+    /// A sentence for each signal that has swallowed changes, with the signal's index: how often, between which steps,
+    /// and what to do. Allocates nothing if there are none.
+    pub fn sentences(&self) -> Vec<(usize, String)> {
+        let current = self.current();
+        let counts = current.counts.iter();
+        counts
+            .map(|(signal, count)| (signal, self.line(signal, count)))
+            .collect()
     }
 
     /// Logs once if a simulation's ticks are longer than the scans of its peer: `seen` are the number of ticks since the
     /// last call, and the shortest time between two of them. Only the scans of a program in this process are known.
     pub(crate) fn log_ticks(&self, seen: (u64, Nanos)) {
         if let Some(line) = self.long_ticks(seen)
-            && !self.0.has_told_ticks.swap(true, Ordering::Relaxed)
+            && !self.shared.has_told_ticks.swap(true, Ordering::Relaxed)
         {
-            log::warn!("driver \"{}\": {line}", self.0.driver);
+            log::warn!("driver \"{}\": {line}", self.shared.driver);
         }
     }
 
     fn long_ticks(&self, (ticks, shortest): (u64, Nanos)) -> Option<String> {
-        let scan = *self.0.scan.get()?;
+        let scan = *self.shared.scan.get()?;
         // A tenth is no more than the pace of a busy computer.
         let is_long = ticks >= TICKS && shortest > scan + Nanos(scan.0 / 10);
         let shortest = shortest.rounded();
@@ -141,20 +196,21 @@ impl SwallowedSignals {
 
     /// The steps in which the peer, or this end, takes frames.
     fn steps(&self, is_sent: bool) -> Steps {
-        match self.0.scan.get() {
+        match self.shared.scan.get() {
             Some(scan) if is_sent => Steps {
                 name: "scans",
                 span: Some(*scan),
             },
-            _ => self.0.steps[usize::from(!is_sent)],
+            _ => self.shared.steps[usize::from(!is_sent)],
         }
     }
 
     fn news(&self) -> Vec<String> {
-        let mut logged = self.0.logged.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut current = self.current();
+        let Current { counts, logged } = &mut *current;
         let before = logged.iter().filter(|is_logged| **is_logged).count();
         let mut news = Vec::new();
-        for (signal, count) in self.0.counts.iter() {
+        for (signal, count) in counts.iter() {
             if std::mem::replace(&mut logged[signal], true) {
                 continue;
             }
@@ -173,7 +229,7 @@ impl SwallowedSignals {
 
     /// The log's line about a signal: the fact and the cure.
     fn line(&self, signal: usize, count: u64) -> String {
-        let Shared { table, role, .. } = &*self.0;
+        let Shared { table, role, .. } = &*self.shared;
         let signal = &table.signals[signal];
         let (written, _) = role.areas();
         let is_sent = signal.area == written;
@@ -235,7 +291,7 @@ mod tests {
 
     /// All signals of a station and area go on and off this many times, and nobody sees it.
     fn pulse(of: &SwallowedSignals, station: usize, area: Area, times: usize) {
-        let counted = counted_signals(&of.0.table, station, area);
+        let counted = counted_signals(&of.shared.table, station, area);
         let stream = DirectStream::new(vec![0; 8].into(), Box::default());
         let mut stream = stream.with_counted(&counted, of.counts());
         stream.read(Nanos::ZERO);
@@ -272,7 +328,7 @@ mod tests {
         of.write(&mut statistics);
         assert_eq!(
             statistics.to_string(),
-            "swallowed_inputs=486\nswallowed_outputs=1\nstation.A.swallowed_inputs=486\n\
+            "role=device\nswallowed_inputs=486\nswallowed_outputs=1\nstation.A.swallowed_inputs=486\n\
              station.A.swallowed_outputs=0\nstation.B.swallowed_inputs=0\nstation.B.swallowed_outputs=1\n\
              swallowed.In 0=243\nswallowed.In 1=243\nswallowed.Out=1\n"
         );
@@ -282,6 +338,24 @@ mod tests {
             let line = of.long_ticks((ticks, Nanos::from_millis(millis)));
             assert_eq!(line.is_some(), is_long, "{line:?}");
         }
+        // A reset: the next line has counters of its own, and the log names its signals again.
+        let next = of.of_next_line();
+        pulse(&next, 0, Area::Input, 1);
+        assert_eq!(
+            of.sentences().len(),
+            3,
+            "the present line is still reported"
+        );
+        next.begin();
+        pulse(&of, 0, Area::Input, 5);
+        let sentence = |place: usize| {
+            format!(
+                "\"In {place}\" changed and changed back once between two scans of 20ms; the PLC saw none of it: set \
+                 latch = \"rising\" for it, or tick slower (count_swallowed = false turns this message off)"
+            )
+        };
+        assert_eq!(of.sentences(), [(0, sentence(0)), (1, sentence(1))]);
+        assert_eq!(of.news(), [sentence(0), sentence(1)]);
         let many = SwallowedSignals::new("x", &table(60), Role::Controller, steps);
         pulse(&many, 0, Area::Input, 1);
         let news = many.news();

@@ -220,12 +220,10 @@ impl BusEnd {
         }
     }
 
-    /// The peers are gone, or were never there: no change is swallowed until they take frames again.
-    pub fn peers_left(&mut self) {
-        for (index, station) in self.stations.iter_mut().enumerate() {
-            if std::mem::take(&mut station.takes) {
-                self.peers.note_takes(index, false);
-            }
+    /// The peer of a station is gone, or was never there: no change is swallowed until it takes frames again.
+    pub fn peer_left(&mut self, station: usize) {
+        if std::mem::take(&mut self.stations[station].takes) {
+            self.peers.note_takes(station, false);
         }
     }
 
@@ -233,6 +231,12 @@ impl BusEnd {
     #[inline]
     pub fn last_outgoing(&self, station: usize) -> &[u8] {
         &self.stations[station].outgoing
+    }
+
+    /// How old the values that were [taken over](Self::attend) are at `now`; [`Nanos::MAX`] before the first tick.
+    #[inline]
+    pub fn values_age(&self, now: Nanos) -> Nanos {
+        age(now, self.ticked)
     }
 
     /// Time since the last tick of the simulation; [`Nanos::MAX`] before the first one.

@@ -63,12 +63,6 @@ impl Swallowed {
         counts.enumerate().filter(|(_, count)| *count > 0)
     }
 
-    /// Counts from zero again.
-    pub fn restart(&self) {
-        let counts = self.0.iter();
-        counts.for_each(|count| count.store(0, Ordering::Relaxed));
-    }
-
     /// Counts the signals of these bits.
     #[inline(never)]
     fn add_all(&self, signals: &[usize; 64], mut bits: u64) {

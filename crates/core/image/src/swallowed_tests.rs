@@ -337,9 +337,12 @@ fn nothing_is_swallowed_before_the_other_side_is_there_or_while_it_is_gone() {
     bus.sent(0);
     pulse(&mut tick);
     assert_eq!(total(&tick), 1, "the other stations were never asked");
-    bus.peers_left();
+    bus.peer_left(1);
     pulse(&mut tick);
-    assert_eq!(total(&tick), 1);
+    assert_eq!(total(&tick), 2, "another station's peer is gone");
+    bus.peer_left(0);
+    pulse(&mut tick);
+    assert_eq!(total(&tick), 2);
     // Values of a PLC in STOP are no values.
     tick.update();
     tick.read(0, (now, Nanos::MAX), &mut Nobody);
@@ -347,10 +350,10 @@ fn nothing_is_swallowed_before_the_other_side_is_there_or_while_it_is_gone() {
         bus.received(0, now, &[level], false);
     }
     bus.hand_over();
-    assert_eq!(total(&tick), 1);
+    assert_eq!(total(&tick), 2);
     for level in [1, 0] {
         bus.received(0, now, &[level], true);
         bus.hand_over();
     }
-    assert_eq!(total(&tick), 2);
+    assert_eq!(total(&tick), 3);
 }

@@ -13,14 +13,15 @@ const LONGEST: i64 = 3_600_000_000_000;
 /// Significant decimal digits of the figures.
 const DIGITS: u8 = 2;
 
-/// A histogram of time spans from 100 ns to an hour, accurate to 1 %; mean, standard deviation and the
-/// shortest span are exact.
+/// A histogram of time spans from 100 ns to an hour, accurate to 1 %; mean, standard deviation, and the
+/// shortest and longest span are exact.
 ///
 /// The size is fixed, some 15 kB; recording allocates nothing.
 #[derive(Clone, Debug)]
 pub struct TimeHistogram {
     histogram: Histogram<u32>,
     shortest: Nanos,
+    longest: Nanos,
     /// The sum of all spans, and of their squares, in nanoseconds: 10^13 spans of an hour fit.
     sum: u128,
     squares: u128,
@@ -33,6 +34,7 @@ impl TimeHistogram {
         Self {
             histogram: histogram.expect("constant bounds that hdrhistogram takes"),
             shortest: Nanos::MAX,
+            longest: Nanos::ZERO,
             sum: 0,
             squares: 0,
         }
@@ -58,6 +60,7 @@ impl TimeHistogram {
             rest -= u64::from(some);
         }
         self.shortest = self.shortest.min(span);
+        self.longest = self.longest.max(span);
         self.sum += u128::from(nanos) * u128::from(times);
         self.squares += u128::from(nanos) * u128::from(nanos) * u128::from(times);
     }
@@ -67,12 +70,14 @@ impl TimeHistogram {
         let Self {
             histogram,
             shortest,
+            longest,
             sum,
             squares,
         } = self;
         let copied = histogram.set_to(&other.histogram);
         copied.expect("all have the same bounds");
-        (*shortest, *sum, *squares) = (other.shortest, other.sum, other.squares);
+        (*shortest, *longest) = (other.shortest, other.longest);
+        (*sum, *squares) = (other.sum, other.squares);
     }
 
     /// The number of spans.
@@ -83,7 +88,8 @@ impl TimeHistogram {
     /// The span that the fraction `share` of all spans does not exceed: 0.5 gives the median. Zero without
     /// spans.
     pub fn quantile(&self, share: f64) -> Nanos {
-        Nanos(i64::try_from(self.histogram.value_at_quantile(share)).unwrap_or(i64::MAX))
+        let span = i64::try_from(self.histogram.value_at_quantile(share)).unwrap_or(i64::MAX);
+        Nanos(span).min(self.longest)
     }
 
     /// The mean in nanoseconds; zero without spans.
@@ -118,9 +124,9 @@ impl TimeHistogram {
         self.shortest
     }
 
-    /// The longest span.
+    /// The longest span; zero without spans.
     pub fn longest(&self) -> Nanos {
-        Nanos(i64::try_from(self.histogram.max()).unwrap_or(i64::MAX))
+        self.longest
     }
 
     /// The non-empty bins of the histogram: the longest span of each, and its count.
@@ -195,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn mean_scatter_and_the_shortest_are_exact() {
+    fn mean_scatter_and_the_ends_are_exact() {
         let mut spans = TimeHistogram::new();
         assert_eq!(
             (spans.shortest(), spans.mean(), spans.deviation()),
@@ -205,6 +211,13 @@ mod tests {
             spans.record(Nanos::from_micros(micros));
         }
         assert_eq!(spans.shortest(), Nanos::from_micros(9_999));
+        assert_eq!(spans.longest(), Nanos::from_micros(10_004));
+        let mut none = TimeHistogram::new();
+        none.record(Nanos::ZERO);
+        assert_eq!(
+            (none.quantile(0.5), none.longest()),
+            (Nanos::ZERO, Nanos::ZERO)
+        );
         assert!((spans.mean() - 10_001_000.0).abs() < 1e-3);
         assert!(
             (spans.deviation() - 3.5_f64.sqrt() * 1e3).abs() < 1e-3,

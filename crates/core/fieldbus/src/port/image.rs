@@ -31,7 +31,12 @@ pub(super) struct ImagePort {
     /// Logs the signals whose changes were swallowed, at this time.
     pub(super) swallowed: Option<SwallowedSignals>,
     pub(super) next_log: Nanos,
+    /// The age of the values taken is not recorded before this time.
+    pub(super) next_age: Nanos,
 }
+
+/// The shortest time between two values of the distribution of ages: a busy server answers without a rest.
+const AGES: Nanos = Nanos::from_millis(1);
 
 impl ImagePort {
     #[inline]
@@ -119,6 +124,19 @@ impl ImagePort {
         self.image.attend(now, self.watchdog);
     }
 
+    /// Records how old the values are that the bus takes at `now`.
+    #[inline]
+    pub(super) fn note_age(&mut self, now: Nanos) {
+        if now < self.next_age {
+            return;
+        }
+        let age = self.image.values_age(now);
+        if age != Nanos::MAX {
+            self.next_age = now + AGES;
+            self.status.sends(age);
+        }
+    }
+
     /// Passes the data handed in to the tick, unless more data belong to them.
     #[inline]
     pub(super) fn hand_over(&mut self) {
@@ -140,6 +158,7 @@ impl ImagePort {
 
     /// The peer of a station is gone, for this reason.
     pub(super) fn station_left(&mut self, station: usize, now: Nanos, cause: Cause, why: &str) {
+        self.image.peer_left(station);
         self.validity.plc_state(station, PlcState::Stop);
         self.validity.station_left(station, cause, why);
         self.tell_facts();

@@ -2,9 +2,12 @@
 
 use std::collections::VecDeque;
 
+use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Manual;
 use tickbus_image::signal::{Area, Latch, SignalTable};
-use tickbus_image::{LatchedBit, StationStreams, TickEnd, image};
+use tickbus_image::{
+    Counted, LatchedBit, StationStreams, Swallowed, TickEnd, image, image_counting,
+};
 
 use super::*;
 use crate::faults::{Begin, Direction, Effect, Fault, Faults, Lasts, LineEffect, Slots, TickTime};
@@ -106,6 +109,70 @@ impl Rig {
             tick: self.ticks,
         };
         self.faults.begin_tick(moment, &mut []);
+    }
+}
+
+#[test]
+fn only_stations_whose_peer_is_gone_stop_counting_what_is_swallowed() {
+    let swallowed = Swallowed::new(STATIONS);
+    let streams = (0..STATIONS).map(|signal| StationStreams {
+        tx_fail_safe: Box::new([0]),
+        tx_latched: Box::default(),
+        tx_counted: Box::new([Counted { signal, bits: 0..1 }]),
+        rx_counted: Box::default(),
+        rx_fail_safe: Box::new([0]),
+        rx_latched: Box::default(),
+    });
+    let (mut tick, bus) = image_counting(streams.collect(), 0, &swallowed);
+    let status = LinkStatus::new("test", Nanos(MAX_AGE));
+    let mut port = Port::new(bus, Manual::new(), Role::Device, None, status);
+    let now = Nanos(1);
+    let mut counted = |port: &mut Port, takes: bool| {
+        for level in [1, 0] {
+            tick.write(now, |_, bytes| bytes[0] = level);
+        }
+        if takes {
+            let mut frames = port.take_all(now).expect("the line is up");
+            for station in 0..STATIONS {
+                assert_eq!(frames.frame(station), [0]);
+            }
+            let receipt = frames.receipt();
+            port.sent(&receipt);
+        }
+        [0, 1].map(|station| swallowed.of(station))
+    };
+    assert_eq!(counted(&mut port, true), [0, 0]);
+    assert_eq!(counted(&mut port, false), [1, 1]);
+    let gone = BusError::Link("gone".to_owned());
+    port.lost_of(1..2, &gone, "waiting");
+    assert_eq!(counted(&mut port, false), [2, 1]);
+    port.opening_of(0..0, "the other one is missing");
+    assert_eq!(counted(&mut port, true), [3, 1]);
+    assert_eq!(counted(&mut port, false), [4, 2]);
+    port.station_left(0, now, Cause::Left, "released");
+    assert_eq!(counted(&mut port, false), [4, 3]);
+    port.lost(&gone, "waiting");
+    assert_eq!(counted(&mut port, false), [4, 3]);
+}
+
+#[test]
+fn the_age_of_what_a_bus_takes_is_recorded_at_most_once_in_a_millisecond() {
+    let mut rig = Rig::new();
+    let mut take = |micros: i64| drop(rig.port.take_all(Nanos::from_micros(micros)));
+    take(100);
+    rig.tick.write(Nanos::from_micros(1_000), |_, _| {});
+    for micros in [4_000, 4_900, 5_000] {
+        take(micros);
+    }
+    let mut statistics = Statistics::default();
+    rig.port.image.status.write(Nanos::ZERO, &mut statistics);
+    let text = statistics.to_string();
+    for line in [
+        "sent_age.count=2",
+        "sent_age.min_us=3000.0",
+        "sent_age.mean_us=3500.0",
+    ] {
+        assert!(text.contains(line), "{text}");
     }
 }
 

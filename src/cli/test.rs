@@ -15,7 +15,7 @@ use super::progress::Progress;
 use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_driver::DriverError;
 use tickbus_driver_cfg::Kinds;
-use tickbus_report::page_beside;
+use tickbus_report::{RunStatistics, page_beside};
 use tickbus_testing::{Case, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
@@ -323,6 +323,10 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
         Ok(ran) => {
             count.ticks += ran.ticks;
             output = format!("ticks={} simulation_time={}s", ran.ticks, ran.seconds());
+            for line in RunStatistics::read(&ran.statistics).time() {
+                output.push('\n');
+                output.push_str(&line);
+            }
             match ran.failure {
                 None => {
                     count.passed += 1;
@@ -339,7 +343,8 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
                     }
                     if let Some(folder) = &job.arguments.keep {
                         let names = (suite.file.as_str(), test.name.as_str());
-                        let kept = record(names, folder, &full, |path| {
+                        let texts = (full.as_str(), Some(ran.statistics.as_str()));
+                        let kept = record(names, folder, texts, |path| {
                             suite.run(test, Some(path)).map(drop)
                         });
                         full.push_str(&kept);
@@ -359,12 +364,12 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
     }
 }
 
-/// Runs a failed test of a file again with a recorder. Tests are deterministic, so it fails in the same way. Returns the
-/// path of the recording.
+/// Runs a failed test of a file again with a recorder. Tests are deterministic, so it fails in the same way, and its
+/// statistics are those of the first run. Returns the path of the recording.
 fn record(
     (file, test): (&str, &str),
     folder: &Path,
-    failure: &str,
+    (failure, statistics): (&str, Option<&str>),
     run: impl FnOnce(&Path) -> Result<(), DriverError>,
 ) -> String {
     let stem = Path::new(file).file_stem().unwrap_or_default();
@@ -389,7 +394,7 @@ fn record(
         Err(error) => return format!("\n      it could not be recorded: {error}"),
     };
     let texts = [("What failed".to_owned(), failure.to_owned())];
-    let page = match page_beside(&file, test, None, &texts) {
+    let page = match page_beside(&file, test, statistics, &texts) {
         Ok(page) => page.display().to_string(),
         Err(error) => error,
     };

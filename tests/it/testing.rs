@@ -206,6 +206,58 @@ fn every_kind_of_step_can_fail() {
 }
 
 #[test]
+fn what_is_swallowed_is_named_with_its_first_tick_and_nothing_else_is() {
+    const PULSE: &str =
+        "{ tick = 3 }, { set = { Start = true }, tick = 1 }, { set = { Start = false }, tick = 2";
+    const SENTENCE: &str = "\"Start\" changed and changed back once between two scans of 10ms; the PLC saw none of it: set \
+        latch = \"rising\" for it, or tick slower (count_swallowed = false turns this message off); the first at tick 5 (10ms)";
+    for (steps, tick) in [
+        (
+            format!("{PULSE}, expect = \"nothing swallowed\" }}"),
+            "6 (12ms)",
+        ),
+        (
+            format!("{PULSE}, expect = [\"not Run\", \"nothing swallowed of Start\"] }}"),
+            "6 (12ms)",
+        ),
+        (
+            format!("{{ always = \"nothing swallowed\" }}, {PULSE} }}"),
+            "5 (10ms)",
+        ),
+        (
+            format!("{PULSE} }}, {{ tick = 9, always = \"nothing swallowed\" }}"),
+            "6 (12ms)",
+        ),
+    ] {
+        let folder = folder(&format!(
+            "{HEAD}[[test]]\nname = \"red\"\nsteps = [{steps}]\n"
+        ));
+        let output = out(&test(folder.path(), &["a.toml"]));
+        let told = format!("tick {tick}: expected nothing swallowed: {SENTENCE}");
+        let line = output.lines().nth(1).unwrap_or_default();
+        assert!(line.ends_with(&told), "{steps}\n{output}");
+        assert!(output.contains("last changes of \"Start\" (%IX0.0): off → on at tick 4"));
+    }
+    let folder = folder(&format!(
+        "{HEAD}[[test]]\nname = \"green\"\nsteps = [\n\
+         {{ always = \"nothing swallowed\", set = {{ Start = true }}, run = \"10ms\" }},\n\
+         {{ set = {{ Start = false }}, run = \"20ms\", expect = \"nothing swallowed\" }}]\n\
+         [[test]]\nname = \"of another signal\"\nsteps = [{PULSE}, expect = \"nothing swallowed of Run\" }}]\n"
+    ));
+    let output = test(folder.path(), &["a.toml", "--junit", "junit.xml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", out(&output));
+    let report = fs::read_to_string(folder.path().join("junit.xml")).expect("the report");
+    for line in [
+        "machine to PLC, from bus to scan: delay 0 ns to 0 ns, median 0 ns, jitter 0 ns",
+        "machine to PLC: 1 change swallowed",
+        "PLC to machine: 0 changes swallowed",
+        "Races: none",
+    ] {
+        assert!(report.contains(line), "{line}\n{report}");
+    }
+}
+
+#[test]
 fn rules_answer_the_program_as_a_machine_would() {
     let folder = folder(
         "config = \"line.cfg\"\nprogram = \"mirror\"\nscan = \"2ms\"\nstep = \"2ms\"\n\
@@ -392,6 +444,7 @@ fn a_failed_test_leaves_its_recording() {
     let page =
         fs::read_to_string(folder.path().join("kept/a - what is red_.html")).expect("a page");
     assert!(page.contains("what is red?"), "{page}");
+    assert!(page.contains("machine to PLC, from bus to scan"), "{page}");
     let kept = folder.path().join("kept/a - what is red_.vcd");
     let recording = tickbus::record::Recording::open(&kept, None).expect("a recording");
     let columns = recording.columns();

@@ -241,7 +241,7 @@ impl Work<'_> {
             let _ = write!(full, "\n      again: tickbus test {file} --only \"{name}\"");
         }
         if let (Some(folder), true) = (&self.job.arguments.keep, wants_record) {
-            full.push_str(&record((file, name), folder, &what, |path| {
+            full.push_str(&record((file, name), folder, (&what, None), |path| {
                 self.suite
                     .judge(&self.plan, made.cell, Some(path))
                     .map(drop)

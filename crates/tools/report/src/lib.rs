@@ -18,6 +18,7 @@ mod run;
 mod spans;
 mod statistics;
 mod tables;
+mod time;
 
 pub use file::{page_beside, write_file};
 pub use from::read;

@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use super::html::{Json, count, counted, digits, printable, span};
 use super::spans::{self, Span};
 use super::tables::{self, Scale};
-use super::{MarkKind, Run, RunStatistics, SignalKind, code, figures};
+use super::{MarkKind, Run, RunStatistics, SignalKind, code, figures, time};
 use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
@@ -247,8 +247,11 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
             @if let Some(statistics) = contents.statistics { (line(statistics)) }
             @if !states.is_empty() { (tables::states(&states, scale)) }
         }))
-        (section("timing", "Timing", &html! {
-            @if let Some(statistics) = contents.statistics { (swallowed(statistics)) }
+        (section("timing", "Time", &html! {
+            @if let Some(statistics) = contents.statistics {
+                (time::table(statistics))
+                (swallowed(statistics))
+            }
             @if let Some((intervals, shortest, longest)) = run.intervals() {
                 h3 { "From one tick to the next, in simulation time" }
                 (figures::histogram("interval", intervals, shortest, longest))

@@ -37,7 +37,7 @@ impl Scale {
 
 /// A table. Headings that begin with ">" head columns of numbers; the class "list" is for narrow rows, which
 /// are set in several columns if there is room.
-fn table(class: &str, caption: &str, headings: &[&str], rows: &Markup) -> Markup {
+pub(super) fn table(class: &str, caption: &str, headings: &[&str], rows: &Markup) -> Markup {
     html! {
         div class=(class) { table {
             caption { (caption) }

@@ -19,6 +19,7 @@ mod suite;
 mod sweep;
 mod sweeping;
 mod test;
+mod unswallowed;
 mod watch;
 
 pub use condition::{Condition, Demand};

@@ -14,7 +14,8 @@ use super::machine::Stub;
 use super::observer::Observer;
 use super::playback::{Difference, MachineRecording, Playback};
 use super::suite::Suite;
-use super::test::{Passage, Step, Test, TextPosition};
+use super::test::{Passage, Step, Test, TextPosition, Unswallowed};
+use super::unswallowed::First;
 use super::watch::{Watch, moment, real, span, text_of};
 
 /// The result of one test.
@@ -26,6 +27,8 @@ pub struct Ran {
     pub time: Nanos,
     /// The failure, if the test failed.
     pub failure: Option<Failure>,
+    /// The driver's statistics at the end; empty of a run in a sweep.
+    pub statistics: String,
 }
 
 impl Ran {
@@ -45,6 +48,9 @@ impl Suite {
     pub fn run(&self, test: &Test, record: Option<&Path>) -> Result<Ran, DriverError> {
         let begin = (&test.initial[..], test.place);
         self.play(begin, record, None, |stand| {
+            if test.steps.iter().any(Step::counts_swallowed) {
+                stand.swallowed = First::of(stand.signals.len());
+            }
             test.steps.iter().try_for_each(|step| stand.run(step))
         })
     }
@@ -92,6 +98,8 @@ impl Suite {
             forced: Vec::new(),
             faults: Vec::new(),
             standing: Vec::new(),
+            swallowed: First::default(),
+            standing_unswallowed: Vec::new(),
             observer,
         };
         let failure = match started {
@@ -115,6 +123,10 @@ impl Suite {
             ticks: stand.ticks,
             time: stand.time(),
             failure,
+            statistics: match stand.observer {
+                None => stand.driver.statistics(),
+                Some(_) => String::new(),
+            },
         };
         stand.driver.close();
         Ok(ran)
@@ -153,6 +165,9 @@ pub(super) struct Stand<'a> {
     /// Injected faults and their numbers.
     faults: Vec<(String, u32)>,
     standing: Vec<Standing>,
+    /// When changes were swallowed first, if the test asks for that.
+    swallowed: First,
+    standing_unswallowed: Vec<Unswallowed>,
     observer: Option<&'a mut dyn Observer>,
 }
 
@@ -181,6 +196,7 @@ impl Stand<'_> {
     /// on does not count any more.
     pub(super) fn idle(&mut self, place: TextPosition) -> Result<(), Halt> {
         self.standing.clear();
+        self.standing_unswallowed.clear();
         if let Some(observer) = &mut self.observer {
             observer.idle(self.ticks);
         }
@@ -227,6 +243,11 @@ impl Stand<'_> {
                 self.standing.push(standing);
             }
         }
+        if strict {
+            self.check_unswallowed(&step.always_unswallowed)?;
+            let always = step.always_unswallowed.iter().cloned();
+            self.standing_unswallowed.extend(always);
+        }
         match &step.passage {
             None => {}
             Some(Passage::Ticks(count)) => self.pass(*count, step.place)?,
@@ -241,12 +262,15 @@ impl Stand<'_> {
         let mut expected = self.watched(&step.expect);
         expected.retain(|_| strict);
         self.expect(&expected, "")?;
+        let unswallowed = if strict { &step.unswallowed[..] } else { &[] };
+        self.check_unswallowed(unswallowed)?;
         if step.during > 0 {
             let from = self.ticks;
             let when = format!(" for {} from tick {from}", span(step.during, self.step));
             for _ in 0..step.during {
                 self.tick(step.place)?;
                 self.expect(&expected, &when)?;
+                self.check_unswallowed(unswallowed)?;
             }
         }
         Ok(())
@@ -307,12 +331,14 @@ impl Stand<'_> {
         for (watch, (slot, signal)) in self.watches.iter_mut().zip(seen) {
             watch.look(*slot, signal, self.ticks);
         }
+        self.swallowed.look(&self.driver, self.ticks);
         if self.is_strict() {
             self.check_recorded()?;
         }
         for standing in &self.standing {
             self.check_standing(standing)?;
         }
+        self.check_unswallowed(&self.standing_unswallowed)?;
         self.look()
     }
 
@@ -413,6 +439,26 @@ impl Stand<'_> {
             format!("{demand} at every tick since tick {from}")
         };
         Err(self.failure(watched, &expected))
+    }
+
+    /// Fails with the first of these expectations that was disappointed, and with all its signals.
+    fn check_unswallowed(&self, expected: &[Unswallowed]) -> Result<(), Failure> {
+        for Unswallowed { signals, place } in expected {
+            let found = self.swallowed.lines(signals, &self.driver, self.step);
+            let mut lines = found.into_iter();
+            let Some((signal, line)) = lines.next() else {
+                continue;
+            };
+            let now = moment(self.ticks, self.step);
+            let mut more: Vec<String> = lines.map(|(_, line)| line).collect();
+            more.push(self.watches[signal].history(&self.signals[signal], self.step));
+            return Err(Failure {
+                place: *place,
+                what: format!("{now}: expected nothing swallowed: {line}"),
+                more,
+            });
+        }
+        Ok(())
     }
 
     fn failure(&self, one: &Watched, expected: &str) -> Failure {

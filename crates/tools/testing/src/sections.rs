@@ -13,7 +13,15 @@ use tickbus_image::signal::{Area, SignalTable, Slot};
 use super::condition::{Condition, Demand};
 use super::plant::{FmuKeys, Plant};
 use super::playback::MachineRecording;
-use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition};
+use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition, Unswallowed};
+use super::unswallowed;
+
+/// The advice where conditions are expected.
+const CONDITIONS: &str =
+    "write a condition such as \"Ready lamp\", a list of them, or { \"Phase\" = 3 }";
+
+/// Conditions on signals, and that nothing is swallowed.
+type Expectations = (Vec<(Condition, TextPosition)>, Vec<Unswallowed>);
 
 /// The longest time that may pass in one step: ten minutes on a fast machine.
 const MOST_TICKS: i128 = 1_000_000_000;
@@ -189,7 +197,10 @@ impl Reader<'_> {
             let steps = self.steps(&value)?;
             let timed = steps.iter().rposition(Step::takes_time);
             let timed = timed.map_or(0, |last| last + 1);
-            let watches = |step: &Step| !step.always.is_empty() || !step.never.is_empty();
+            let watches = |step: &Step| {
+                let always = &step.always_unswallowed;
+                !step.always.is_empty() || !step.never.is_empty() || !always.is_empty()
+            };
             let proves = timed > 0 || steps.iter().any(|step| !step.expect.is_empty());
             if !steps.is_empty() && (!proves || steps[timed..].iter().any(watches)) {
                 value.wrong(
@@ -268,16 +279,18 @@ impl Reader<'_> {
         let release = release.map_or(Some(Vec::new()), |value| self.names(&value));
         let inject = fault.map_or(Some(Vec::new()), |value| self.faults(&value));
         let end = end.map_or(Some(Vec::new()), |value| ended(&value));
-        let expect = self.conditions(expect.as_ref());
+        let expect = self.expectations(expect.as_ref());
         let during = during.map_or(Some(0), |value| self.ticks(&value, true));
         let (always, never) = (
-            self.conditions(always.as_ref()),
+            self.expectations(always.as_ref()),
             self.conditions(never.as_ref()),
         );
         let passage = match passage {
             None => None,
             Some(passage) => Some(passage?),
         };
+        let (expect, unswallowed) = expect?;
+        let (always, always_unswallowed) = always?;
         Some(Step {
             place,
             set: set?,
@@ -286,9 +299,11 @@ impl Reader<'_> {
             inject: inject?,
             end: end?,
             passage,
-            expect: expect?,
+            expect,
+            unswallowed,
             during: during?,
-            always: always?,
+            always,
+            always_unswallowed,
             never: never?,
         })
     }
@@ -417,35 +432,58 @@ impl Reader<'_> {
 
     /// A condition, a list of them, or a table of signals and values.
     fn conditions(&self, value: Option<&Value<'_>>) -> Option<Vec<(Condition, TextPosition)>> {
-        const RIGHT: &str = "write a condition such as \"Ready lamp\", a list of them, or \
-                             { \"Phase\" = 3 }";
         let Some(value) = value else {
             return Some(Vec::new());
         };
-        if value.as_text().is_some() {
-            return self.condition(value).map(|condition| vec![condition]);
-        }
         if value.is_table() {
             let read: Vec<_> = value
-                .table("signals", RIGHT)?
+                .table("signals", CONDITIONS)?
                 .all()
                 .map(|(name, value)| self.equality(name, &value))
                 .collect();
             return read.into_iter().collect();
         }
-        let list = value.list(RIGHT)?;
-        if list.is_empty() {
-            value.wrong("an empty list demands nothing", RIGHT);
-            return None;
-        }
-        let read: Vec<_> = list.iter().map(|value| self.condition(value)).collect();
+        let texts = texts(value)?;
+        let read: Vec<_> = texts.iter().map(|value| self.condition(value)).collect();
         read.into_iter().collect()
+    }
+
+    /// Conditions, among which may be that nothing is swallowed.
+    fn expectations(&self, value: Option<&Value<'_>>) -> Option<Expectations> {
+        let (mut plain, mut unswallowed) = (Vec::new(), Vec::new());
+        let values = match value {
+            Some(value) if !value.is_table() => texts(value)?,
+            other => return Some((self.conditions(other)?, unswallowed)),
+        };
+        let mut is_right = true;
+        for value in values {
+            let text = value.as_text();
+            match text.and_then(|text| unswallowed::signals_of(text, self.table)) {
+                None => match self.condition(&value) {
+                    Some(condition) => plain.push(condition),
+                    None => is_right = false,
+                },
+                Some(Ok(signals)) => unswallowed.push(Unswallowed {
+                    signals,
+                    place: value.place(),
+                }),
+                Some(Err(mistake)) => {
+                    value.refuse(mistake);
+                    is_right = false;
+                }
+            }
+        }
+        is_right.then_some((plain, unswallowed))
     }
 
     pub(super) fn condition(&self, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
         let text = value.text("write a condition in quotes, such as \"Phase == 3\"")?;
         match Condition::parse(text, self.table) {
             Ok(condition) => Some((condition, value.place())),
+            Err(_) if unswallowed::is_meant(text) => {
+                value.refuse(unswallowed::mistake(text, self.table));
+                None
+            }
             Err(mistake) => {
                 value.refuse(mistake);
                 None
@@ -463,6 +501,19 @@ impl Reader<'_> {
         let demand = Demand::equal(slot, &self.table.signals[signal]);
         Some((Condition { signal, demand }, value.place()))
     }
+}
+
+/// A text, or those of a list.
+fn texts<'v>(value: &Value<'v>) -> Option<Vec<Value<'v>>> {
+    if value.as_text().is_some() {
+        return Some(vec![value.clone()]);
+    }
+    let list = value.list(CONDITIONS)?;
+    if list.is_empty() {
+        value.wrong("an empty list demands nothing", CONDITIONS);
+        return None;
+    }
+    Some(list)
 }
 
 /// Names of faults: one, or a list of them.

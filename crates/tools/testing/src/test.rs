@@ -32,9 +32,11 @@ pub(super) struct Step {
     pub(super) end: Vec<(String, TextPosition)>,
     pub(super) passage: Option<Passage>,
     pub(super) expect: Vec<(Condition, TextPosition)>,
+    pub(super) unswallowed: Vec<Unswallowed>,
     /// The number of ticks for which the expectations must hold.
     pub(super) during: u64,
     pub(super) always: Vec<(Condition, TextPosition)>,
+    pub(super) always_unswallowed: Vec<Unswallowed>,
     pub(super) never: Vec<(Condition, TextPosition)>,
 }
 
@@ -43,6 +45,19 @@ impl Step {
     pub(super) const fn takes_time(&self) -> bool {
         self.passage.is_some() || self.during > 0
     }
+
+    /// True if the step expects that nothing is swallowed.
+    pub(super) const fn counts_swallowed(&self) -> bool {
+        !self.unswallowed.is_empty() || !self.always_unswallowed.is_empty()
+    }
+}
+
+/// The expectation that no change of these signals was swallowed since the test began.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Unswallowed {
+    /// Indexes in the table.
+    pub(super) signals: Vec<usize>,
+    pub(super) place: TextPosition,
 }
 
 /// How time passes in a step.

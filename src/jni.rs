@@ -191,6 +191,20 @@ extern "system" fn Java_tickbus_Tickbus_statisticsNative<'local>(
     .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native String linesNative(long handle)` of `SwallowedChanges`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_SwallowedChanges_linesNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+) -> JString<'local> {
+    env.with_env(|env| {
+        let swallowed = with(handle, |device| device.swallowed())?;
+        Ok(env.new_string(swallowed)?)
+    })
+    .resolve::<ThrowFieldbusException>()
+}
+
 /// `static native int eventsNative(long handle, long[] into)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_eventsNative<'local>(

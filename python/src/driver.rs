@@ -341,6 +341,10 @@ impl Driver {
         Ok(snapshot.to_string())
     }
 
+    fn _swallowed(&self, py: Python<'_>) -> PyResult<String> {
+        Self::done(py, self.handle.swallowed())
+    }
+
     fn _inject(&self, py: Python<'_>, fault: &str) -> PyResult<u32> {
         let read = || {
             let config = self.handle.config()?;

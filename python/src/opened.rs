@@ -264,6 +264,10 @@ impl Handle {
         self.visit(|opened| opened.driver.snapshot())
     }
 
+    pub(crate) fn swallowed(&self) -> Result<String, Refusal> {
+        self.visit(|opened| tickbus_binding::swallowed(&opened.driver))
+    }
+
     pub(crate) fn is_over(&self) -> Result<bool, Refusal> {
         self.visit(|opened| opened.driver.is_over())
     }

@@ -39,7 +39,7 @@ unit    = "mm/s"
 
 HEAD = """
 import pytest
-from tickbus.testing import above, below, falls, is_, minutes, ms, near, off, on, rises, s, ticks, when
+from tickbus.testing import above, below, falls, is_, minutes, ms, near, nothing_swallowed, off, on, rises, s, ticks, when
 
 pytestmark = pytest.mark.plc(config="line.cfg", step="2ms")
 """
@@ -134,6 +134,12 @@ def test_a_mark_adds_to_that_of_the_module(plc, machine):
     assert machine.height == 110
 
 
+@pytest.mark.plc(program="mirror", scan="10ms")
+def test_changes_that_the_program_sees_are_not_swallowed(plc):
+    plc.always(nothing_swallowed()).set("Start", True).run("10ms").set("Start", False).run("20ms")
+    plc.expect(nothing_swallowed("Start", "Run"))
+
+
 @pytest.mark.plc("socket.cfg", program="mirror", scan="2ms")
 class TestSocket:
     def test_the_plants_own_bus_does_not_matter(self, plc):
@@ -170,6 +176,7 @@ RED = [
         'tick 2 (4ms): "the cow is in the barn" is false, expected true within 2 ticks (4ms) of tick 0',
     ),
     ("plc.tick(12); raise AssertionError('of its own')", "of its own\n*the test stood at tick 12 (24ms); recording: *.vcd; report: *.html"),
+    ('plc.expect(nothing_swallowed("Strat"))', "driver 'Line' has no signal 'Strat'; did you mean 'Start'?"),
     ('plc.expect(on("Rnu"))', "driver 'Line' has no signal 'Rnu'; did you mean 'Run'?"),
     ('plc.set("Run", True)', "signal 'Run' at %QX0.0 is written by the other end"),
     ('plc.await_(on("Run")).within(0)', "a limit of 0 ticks; give it a whole number, at least 1, or use expect"),
@@ -209,7 +216,7 @@ def tests(pytester: pytest.Pytester) -> pytest.Pytester:
 
 def test_tests_with_all_words_of_the_kit_pass(tests):
     tests.makepyfile(HEAD + GREEN)
-    tests.runpytest_inprocess("--strict-markers").assert_outcomes(passed=14)
+    tests.runpytest_inprocess("--strict-markers").assert_outcomes(passed=15)
     assert not tests.path.joinpath("tickbus-reports").exists()
 
 
@@ -218,6 +225,25 @@ def test_failures_say_what_happened(tests):
     result = tests.runpytest_inprocess()
     result.assert_outcomes(failed=len(RED))
     result.stdout.fnmatch_lines([f"E *{line.lstrip('*')}*" for _, told in RED for line in told.split("\n")])
+
+
+SWALLOWED = (
+    'E *: tick {}: expected nothing swallowed: "Start" changed and changed back once between two scans of 10ms; the PLC saw none of'
+    ' it: set latch = "rising" for it, or tick slower (count_swallowed = false turns this message off); the first at tick 5 (10ms)'
+)
+
+
+def test_what_was_swallowed_is_named_with_the_steps_and_the_cure(tests):
+    mark = '\n\n@pytest.mark.plc(program="mirror", scan="10ms")\n'
+    pulse = 'plc.tick(3).set("Start", True).tick().set("Start", False)'
+    tests.makepyfile(
+        f"{HEAD}{mark}def test_expected(plc):\n    {pulse}.tick(2).expect(nothing_swallowed())\n"
+        f"{mark}def test_always(plc):\n    plc.always(nothing_swallowed())\n    {pulse}.tick(9)\n"
+    )
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(failed=2)
+    for tick in ("6 (12ms)", "5 (10ms)"):
+        result.stdout.fnmatch_lines([SWALLOWED.format(tick)])
 
 
 def test_wrong_marks_are_told(tests):

@@ -120,6 +120,13 @@ class Driver(_native.Driver):
         entries = filter(None, map(_ENTRY.fullmatch, self._statistics().splitlines()))
         return {re.sub(r"\\(.)", r"\1", entry[1]): entry[2] for entry in entries}
 
+    def swallowed(self) -> dict[str, str]:
+        """The signals whose changes came and went before the other side took a frame (docs/timing.md): by the signal's name, how
+        often, between which steps, and what to do.
+        """
+        lines = (line.split("\t", 1) for line in self._swallowed().splitlines())
+        return {self.signals[int(signal)].name: told for signal, told in lines}
+
     def inject(self, fault: str = "", /, **keys: Any) -> "Fault":
         """Inject a fault, such as a stuck signal or a broken line. It can begin with the next tick.
 

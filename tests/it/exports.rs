@@ -33,6 +33,7 @@ fn the_native_methods_of_tickbus_are_exported() {
         "Java_tickbus_Tickbus_sendNative",
         "Java_tickbus_Tickbus_finalizeNative",
         "Java_tickbus_Tickbus_statisticsNative",
+        "Java_tickbus_SwallowedChanges_linesNative",
         "Java_tickbus_Tickbus_eventsNative",
         "Java_tickbus_Tickbus_injectNative",
         "Java_tickbus_Tickbus_endFaultNative",

@@ -14,7 +14,7 @@ The plug-in for pytest comes with tickbus, and passes a ``Plc`` to tests as the 
 """
 
 from .._durations import minutes, ms, s, ticks
-from ._conditions import Condition, above, below, falls, is_, near, off, on, rises, when
+from ._conditions import Condition, above, below, falls, is_, near, nothing_swallowed, off, on, rises, when
 from ._plc import Await, Expectation, Machine, Plc
 
 __all__ = [
@@ -30,6 +30,7 @@ __all__ = [
     "minutes",
     "ms",
     "near",
+    "nothing_swallowed",
     "off",
     "on",
     "rises",

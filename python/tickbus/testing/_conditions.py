@@ -25,6 +25,10 @@ class Bound(ABC):
     @abstractmethod
     def seen(self) -> str: ...
 
+    def failure(self, span: str) -> str:
+        """The failure as a sentence; ``span`` is the time in which the condition should have held."""
+        return f"{self.subject} is {self.seen()}, expected {self.expected}" + (f" {span}" if span else "")
+
 
 class Condition(ABC):
     """A condition on signals; ``and_``, ``or_`` and ``negated`` join them, and so do ``&``, ``|`` and ``~``."""
@@ -95,6 +99,13 @@ def falls(signal: str) -> Condition:
     return _Edge(signal, rising=False)
 
 
+def nothing_swallowed(*signals: str) -> Condition:
+    """No change came and went before the other side took a frame, since the test began: of these signals, whose swallowed changes are
+    counted (docs/timing.md), or of all that are counted.
+    """
+    return _Unswallowed(signals)
+
+
 def when(what: str, holds: Callable[[], object]) -> Condition:
     """Any other condition, such as the state of the machine's model. A failure names it by ``what``."""
     return _When(what, holds)
@@ -141,6 +152,36 @@ class _Edge(Condition):
         bound.subject, bound.watches = watch.quoted(), (watch,)
         bound.expected = "a rising edge" if rising else "a falling edge"
         return bound
+
+
+class _Unswallowed(Condition):
+    def __init__(self, signals: tuple[str, ...]) -> None:
+        self._signals = signals
+
+    def bind(self, plc: Plc) -> Bound:
+        for signal in self._signals:
+            plc._watch(signal)
+        return _BoundUnswallowed(plc, self._signals)
+
+
+class _BoundUnswallowed(Bound):
+    subject, expected = "what was swallowed", "nothing swallowed"
+
+    def __init__(self, plc: Plc, signals: tuple[str, ...]) -> None:
+        self._plc, self._signals = plc, signals
+
+    @property
+    def watches(self) -> tuple[Watch, ...]:  # type: ignore[override]
+        return tuple(self._plc._watch(signal) for signal in [*self._plc._swallowed_of(self._signals)][:1])
+
+    def holds(self) -> bool:
+        return not self._plc._has_swallowed(self._signals)
+
+    def seen(self) -> str:
+        return "\n  ".join(self._plc._swallowed_of(self._signals).values())
+
+    def failure(self, span: str) -> str:
+        return f"expected nothing swallowed: {self.seen()}"
 
 
 class _When(Condition):

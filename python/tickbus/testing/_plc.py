@@ -48,6 +48,8 @@ class Plc:
         self._forced: dict[str, float] = {}
         self._standing: list[tuple[Bound, int]] = []
         self._open: list[Await] = []
+        self._swallowed: dict[str, int] = {}
+        """The tick at which changes of a signal were swallowed first."""
         self._ticks = 0
         self._in_step = False
 
@@ -174,6 +176,9 @@ class Plc:
             self._seen = seen
             for watch in self._watches.values():
                 watch.look(self._ticks)
+        if self._driver._swallowed():
+            for signal in self._driver.swallowed():
+                self._swallowed.setdefault(signal, self._ticks)
         for bound, since in self._standing:
             self._check(bound, f"at every tick since tick {since}")
 
@@ -209,8 +214,22 @@ class Plc:
         # For an unknown name, the driver's error has the nearest one.
         return watch if watch is not None else self._watches[self._driver.signal(name).name]
 
-    def _where(self) -> str:
-        return f"tick {self._ticks} ({_durations.text(self.time_ns)})"
+    def _where(self, tick: int | None = None) -> str:
+        tick = self._ticks if tick is None else tick
+        return f"tick {tick} ({_durations.text(tick * self.step_ns)})"
+
+    def _has_swallowed(self, signals: tuple[str, ...]) -> bool:
+        return any(signal in self._swallowed for signal in signals or self._swallowed)
+
+    def _swallowed_of(self, signals: tuple[str, ...]) -> dict[str, str]:
+        """The signals whose changes were swallowed, of these or of all if there are none, and what to do about each."""
+        found = self._driver.swallowed().items()
+        first = self._swallowed
+        return {
+            signal: f"{told}; the first at {self._where(first.get(signal))}"
+            for signal, told in found
+            if not signals or signal in signals
+        }
 
     def _span(self, count: int) -> str:
         return f"{count} {'tick' if count == 1 else 'ticks'} ({_durations.text(count * self.step_ns)})"
@@ -232,8 +251,7 @@ class Plc:
             raise self._failure(bound, span)
 
     def _failure(self, bound: Bound, span: str) -> AssertionError:
-        text = f"{self._where()}: {bound.subject} is {bound.seen()}, expected {bound.expected}"
-        text += f" {span}" if span else ""
+        text = f"{self._where()}: {bound.failure(span)}"
         return AssertionError("\n  ".join([text, *(watch.history(self.step_ns) for watch in bound.watches)]))
 
     def _unfinished(self) -> AssertionError | None:

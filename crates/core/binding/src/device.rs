@@ -16,6 +16,7 @@ use crate::description::SignalDescription;
 use crate::fault::inject;
 use crate::refusal::Refusal;
 use crate::shared::{NO_TIME, Shared, Word};
+use crate::swallowed::swallowed;
 
 /// The most events handed over in one call.
 pub const EVENTS: usize = 64;
@@ -115,6 +116,11 @@ impl<K> Device<K> {
     /// Calls `tell` with the description of the signal with this index.
     pub fn describe<R>(&self, signal: usize, tell: impl FnOnce(&SignalDescription<'_>) -> R) -> R {
         tell(&SignalDescription::of(&self.driver, signal))
+    }
+
+    /// A line for each signal whose changes were swallowed: its index, a tab, and how often, where, and what to do.
+    pub fn swallowed(&self) -> String {
+        swallowed(&self.driver)
     }
 
     /// The configuration that the driver was opened with.

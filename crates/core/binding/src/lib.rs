@@ -11,6 +11,7 @@ mod opening;
 mod panics;
 mod refusal;
 mod shared;
+mod swallowed;
 
 pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
@@ -20,3 +21,4 @@ pub use opening::{closing, load, open};
 pub use panics::panic_message;
 pub use refusal::Refusal;
 pub use shared::{NO_TIME, SPARE_SLOT, Shared, Word};
+pub use swallowed::swallowed;

@@ -59,6 +59,7 @@ class MisuseTest {
         for (long handle : new long[] {0, 1, -1, 64, 255, Long.MIN_VALUE, Long.MAX_VALUE}) {
             assertStatus(Status.NOT_OPEN, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.statisticsNative(handle));
+            assertStatus(Status.NOT_OPEN, () -> SwallowedChanges.linesNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.eventsNative(handle, new long[3]));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.endFaultNative(handle, 1));
@@ -79,6 +80,7 @@ class MisuseTest {
             assertEquals(Status.CLOSED.code(), Tickbus.sendNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.statisticsNative(handle));
+            assertStatus(Status.CLOSED, () -> SwallowedChanges.linesNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
             assertStatus(Status.CLOSED, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
             assertStatus(Status.CLOSED, () -> Tickbus.endFaultNative(handle, 1));

@@ -110,6 +110,23 @@ public abstract class Condition {
     }
 
     /**
+     * No change came and went before the other side took a frame, since the test began (docs/timing.md).
+     *
+     * @param signals names of driver.cfg, of signals whose swallowed changes are counted; none for all that are counted
+     * @return the condition
+     */
+    public static Condition nothingSwallowed(String... signals) {
+        List<String> names = List.of(signals);
+        return new Condition() {
+            @Override
+            Bound bind(Plc plc) {
+                names.forEach(plc::watch);
+                return new Unswallowed(plc, names);
+            }
+        };
+    }
+
+    /**
      * Any other condition, such as the state of the machine model.
      *
      * @param what the name in a failure, such as "bottle 1 is treated"
@@ -248,9 +265,54 @@ public abstract class Condition {
 
         abstract String seen();
 
+        /** The failure as a sentence; {@code when} is the span in which the condition should have held. */
+        String failure(String when) {
+            return subject() + " is " + seen() + ", expected " + expected() + (when.isEmpty() ? "" : " " + when);
+        }
+
         /** The signals that the condition depends on. */
         List<Watch> watches() {
             return List.of();
+        }
+    }
+
+    private static final class Unswallowed extends Bound {
+        private final Plc plc;
+        private final List<String> names;
+
+        Unswallowed(Plc plc, List<String> names) {
+            this.plc = plc;
+            this.names = names;
+        }
+
+        @Override
+        boolean holds() {
+            return !plc.hasSwallowed(names);
+        }
+
+        @Override
+        String subject() {
+            return "what was swallowed";
+        }
+
+        @Override
+        String expected() {
+            return "nothing swallowed";
+        }
+
+        @Override
+        String seen() {
+            return String.join("\n  ", plc.swallowed(names).values());
+        }
+
+        @Override
+        String failure(String when) {
+            return "expected nothing swallowed: " + seen();
+        }
+
+        @Override
+        List<Watch> watches() {
+            return plc.swallowed(names).keySet().stream().limit(1).map(plc::watch).toList();
         }
     }
 

@@ -1,6 +1,7 @@
 package tickbus.junit;
 
 import java.util.ArrayList;
+import java.util.HashMap;
 import java.util.LinkedHashMap;
 import java.util.LinkedHashSet;
 import java.util.List;
@@ -10,6 +11,7 @@ import java.util.Set;
 import org.opentest4j.AssertionFailedError;
 import tickbus.InjectedFault;
 import tickbus.Signal;
+import tickbus.SwallowedChanges;
 import tickbus.Tickbus;
 
 /**
@@ -44,6 +46,8 @@ public final class Plc {
     private final List<Forced> forced = new ArrayList<>();
     private final List<Standing> standing = new ArrayList<>();
     private final Set<Await> open = new LinkedHashSet<>();
+    /** The tick at which changes of a signal were swallowed first, by its name. */
+    private final Map<String, Long> swallowed = new HashMap<>();
     private long ticks;
     private boolean inStep;
 
@@ -340,6 +344,9 @@ public final class Plc {
         for (Watch watch : watches) {
             watch.look(ticks);
         }
+        for (String signal : SwallowedChanges.of(bus).keySet()) {
+            swallowed.putIfAbsent(signal, ticks);
+        }
         for (int i = 0; i < standing.size(); i++) {
             Standing one = standing.get(i);
             if (!one.condition().holds()) {
@@ -349,6 +356,19 @@ public final class Plc {
     }
 
     // Expectations
+
+    /** Returns whether changes of a signal were swallowed, or of any if there are no names. */
+    boolean hasSwallowed(List<String> names) {
+        return names.isEmpty() ? !swallowed.isEmpty() : names.stream().anyMatch(swallowed::containsKey);
+    }
+
+    /** Signals whose changes were swallowed, of these or of all if there are no names, and what to do about each. */
+    Map<String, String> swallowed(List<String> names) {
+        Map<String, String> found = new LinkedHashMap<>(SwallowedChanges.of(bus));
+        found.keySet().removeIf(name -> !names.isEmpty() && !names.contains(name));
+        found.replaceAll((name, told) -> told + "; the first at " + where(swallowed.getOrDefault(name, ticks)));
+        return found;
+    }
 
     /**
      * Fails unless the condition holds now.
@@ -410,11 +430,7 @@ public final class Plc {
     AssertionFailedError failure(Condition.Bound condition, String when) {
         String expected = condition.expected();
         String seen = condition.seen();
-        StringBuilder text = new StringBuilder(where()).append(": ").append(condition.subject()).append(" is ")
-            .append(seen).append(", expected ").append(expected);
-        if (!when.isEmpty()) {
-            text.append(" ").append(when);
-        }
+        StringBuilder text = new StringBuilder(where()).append(": ").append(condition.failure(when));
         condition.watches().forEach(watch -> text.append("\n  ").append(watch.history(stepNanos)));
         return new AssertionFailedError(text.toString(), expected, seen);
     }
@@ -429,7 +445,11 @@ public final class Plc {
 
     /** The current tick and time, for people. */
     String where() {
-        return "tick " + ticks + " (" + Durations.text(simulationNanos()) + ")";
+        return where(ticks);
+    }
+
+    private String where(long tick) {
+        return "tick " + tick + " (" + Durations.text(tick * stepNanos) + ")";
     }
 
     /** The duration of a number of ticks, for people. */

@@ -56,7 +56,7 @@ class PlcTestTest {
     void goodTestsPass() {
         Map<String, TestExecutionResult> results = run(Samples.Green.class);
         results.forEach((method, result) -> assertEquals(Optional.empty(), result.getThrowable(), method));
-        assertEquals(12, results.size(), () -> results.keySet().toString());
+        assertEquals(13, results.size(), () -> results.keySet().toString());
     }
 
     @Test
@@ -74,6 +74,7 @@ class PlcTestTest {
         "expect    | tick 0 (0s): 'Run' is off, expected on",
         "during    | tick 1 (2ms): 'Run' is on, expected off for 500 ticks (1s) from tick 0",
         "never     | tick 4 (8ms): 'Run' is on, expected not on at every tick since tick 0",
+        "swallowedOfNone   | driver 'Line' has no signal 'Strat'; did you mean 'Start'?",
         "edge      | tick 6 (12ms): 'Run' is on without one, expected a rising edge within 5 ticks (10ms) of tick 1",
         "both      | tick 1 (2ms): 'Speed' is 0 mm/s, expected 4 within 1 tick (2ms) of tick 0",
         "words     | tick 2 (4ms): \"the cow is in the barn\" is false, expected true within 2 ticks (4ms) of tick 0",
@@ -107,6 +108,15 @@ class PlcTestTest {
         assertTrue(message.contains(told), message);
     }
 
+    @ParameterizedTest
+    @CsvSource({"swallowed, 6 (12ms)", "alwaysUnswallowed, 5 (10ms)"})
+    void whatWasSwallowedIsNamedWithTheStepsAndTheCure(String method, String tick) {
+        assertEquals("tick " + tick + ": expected nothing swallowed: \"Start\" changed and changed back once between two"
+            + " scans of 10ms; the PLC saw none of it: set latch = \"rising\" for it, or tick slower (count_swallowed ="
+            + " false turns this message off); the first at tick 5 (10ms)\n  last changes of 'Start' (%IX0.0): off → on at"
+            + " tick 4 (8ms) → off at tick 5 (10ms)", failure(method).getMessage());
+    }
+
     @Test
     void everyFailureSaysWhereTheTestStood() {
         Throwable[] notes = failure("otherAssertion").getSuppressed();
@@ -131,7 +141,7 @@ class PlcTestTest {
 
     @Test
     void everySampleIsLookedAt() {
-        assertEquals(23, RED.size(), () -> RED.keySet().toString());
+        assertEquals(26, RED.size(), () -> RED.keySet().toString());
     }
 
     @Test

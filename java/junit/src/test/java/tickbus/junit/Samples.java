@@ -3,6 +3,7 @@ package tickbus.junit;
 import static tickbus.junit.Condition.above;
 import static tickbus.junit.Condition.is;
 import static tickbus.junit.Condition.near;
+import static tickbus.junit.Condition.nothingSwallowed;
 import static tickbus.junit.Condition.off;
 import static tickbus.junit.Condition.on;
 import static tickbus.junit.Condition.rises;
@@ -132,6 +133,12 @@ final class Samples {
             check(lift.height == 110);
         }
 
+        @PlcTest(program = "mirror", scan = "10ms")
+        void changesThatTheProgramSeesAreNotSwallowed(Plc plc) {
+            plc.always(nothingSwallowed()).set("Start", true).run("10ms").set("Start", false).run("20ms");
+            plc.expect(nothingSwallowed("Start", "Run"));
+        }
+
         @Nested
         class Inner {
             @Test
@@ -165,6 +172,26 @@ final class Samples {
         void never(Plc plc) {
             plc.never(on("Run"));
             plc.tick(3).press("Start");
+        }
+
+        @PlcTest(program = "mirror", scan = "10ms")
+        void swallowed(Plc plc) {
+            plc.tick(3);
+            plc.set("Start", true).tick().set("Start", false).tick(2);
+            plc.expect(nothingSwallowed("Run"));
+            plc.expect(nothingSwallowed());
+        }
+
+        @PlcTest(program = "mirror", scan = "10ms")
+        void alwaysUnswallowed(Plc plc) {
+            plc.always(nothingSwallowed("Start"));
+            plc.tick(3);
+            plc.set("Start", true).tick().set("Start", false).tick(9);
+        }
+
+        @Test
+        void swallowedOfNone(Plc plc) {
+            plc.expect(nothingSwallowed("Strat"));
         }
 
         @Test

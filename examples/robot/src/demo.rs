@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
 
-use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_net::Address;
 use tickbus_robot::experiment::{Experiment, Kind, verdict};
 use tickbus_robot::load::Load;
@@ -14,6 +14,7 @@ use tickbus_robot::metrics::Run;
 use tickbus_robot::page::{self, Picture};
 use tickbus_robot::participants::STEPS;
 use tickbus_robot::random::Random;
+use tickbus_robot::shear::{self, Link};
 use tickbus_robot::{free_wheeling, lock_step, wall_clock};
 use tickbus_virtual_time::{Meeting, Outcome};
 
@@ -21,6 +22,8 @@ use tickbus_virtual_time::{Meeting, Outcome};
 const MODEL_UPDATES: [i64; 3] = [10, 50, 100];
 /// The intervals of the link on the wall clock, in milliseconds.
 const WALL_UPDATES: [i64; 2] = [10, 50];
+/// The intervals at which the shear's PLC samples, in milliseconds.
+const SHEAR_UPDATES: [i64; 2] = [50, 100];
 /// The interval shown in the pictures, in milliseconds.
 const SHOWN: i64 = 50;
 
@@ -48,6 +51,7 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
     write_page(&experiments, file)
         .map_err(|error| format!("{} cannot be written: {error}", file.display()))?;
     verdict(&experiments)?;
+    let missed = cut_sheets()?;
     let errors = experiments.iter().filter_map(|of| {
         let name = match of.kind {
             Kind::LockStep => return None,
@@ -58,7 +62,7 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
     });
     let lock_step = &experiments[0];
     Ok(format!(
-        "lock_step_runs={} steps={STEPS} hash={} e_mm={:.7} d_mm={}{} page={}",
+        "lock_step_runs={} steps={STEPS} hash={} e_mm={:.7} d_mm={}{} shear_missed={missed} page={}",
         experiments.iter().map(|of| of.hashes.len()).sum::<usize>(),
         lock_step.hashes[0],
         lock_step.metrics.error,
@@ -66,6 +70,58 @@ pub(crate) fn run(file: &Path, runs: u32) -> Result<String, String> {
         errors.collect::<String>(),
         file.display()
     ))
+}
+
+/// Lets the shear cut in lock-step and free-wheeling, all at once since they mostly wait. Returns how many pulses of its
+/// sensors were missed.
+fn cut_sheets() -> Result<u64, String> {
+    let free = SHEAR_UPDATES.map(Link::FreeWheeling);
+    let links = [Link::LockStep].into_iter().chain(free);
+    let outcomes = thread::scope(|scope| {
+        let runs: Vec<_> = links
+            .map(|link| (link, scope.spawn(move || cut_sheet(link))))
+            .collect();
+        let runs = runs
+            .into_iter()
+            .map(|(link, run)| (link, run.join().expect("a run does not panic")));
+        runs.collect::<Vec<_>>()
+    });
+    let mut missed = 0;
+    for (link, outcome) in outcomes {
+        let outcome = outcome?;
+        let name = match link {
+            Link::LockStep => "lock-step".to_owned(),
+            Link::FreeWheeling(cycle) => format!("free-wheeling, sampled every {cycle} ms"),
+        };
+        println!(
+            "demo-robot: shear, {name}: {} marks, {} cuts, {} pulses of sensors missed",
+            outcome.marks,
+            outcome.cuts,
+            outcome.missed()
+        );
+        for sentence in &outcome.named {
+            println!("demo-robot:   {sentence}");
+        }
+        if (link == Link::LockStep) != (outcome.missed() == 0) {
+            return Err(format!(
+                "the shear, {name}, missed {} pulses",
+                outcome.missed()
+            ));
+        }
+        missed += outcome.missed();
+    }
+    Ok(missed)
+}
+
+fn cut_sheet(link: Link) -> Result<shear::Outcome, String> {
+    let (clock, stop) = (Monotonic::shared(), Stop::new());
+    let begun = clock.now();
+    let pause = |time: Nanos| {
+        if link != Link::LockStep {
+            clock.wait_until(begun + time, &stop);
+        }
+    };
+    shear::run(link, Monotonic::shared(), pause)
 }
 
 /// Prints the result of an experiment at once, as all of them together take a while.

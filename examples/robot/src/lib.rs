@@ -8,6 +8,8 @@
 //! * really free-wheeling, on threads that sleep ([`wall_clock`]).
 //!
 //! [`page`] shows the paths side by side. `docs/virtual-time.md` explains the experiment.
+//!
+//! [`shear`] is a second one: a shear whose sensors are on for too short a time for a slow link.
 
 #![cfg_attr(
     test,
@@ -25,6 +27,7 @@ pub mod participants;
 pub mod path;
 pub mod plant;
 pub mod random;
+pub mod shear;
 pub mod wall_clock;
 
 /// The programs in the guide are compiled with the tests.

@@ -116,6 +116,13 @@ typedef struct tb_event {
     int64_t time; /* on the driver's clock */
 } tb_event;
 
+/* A change of a fault of the simulation's model. */
+typedef struct tb_model_fault {
+    int32_t fault; /* the fault's index among the names of tb_declare_faults */
+    int32_t is_on; /* 1 from the tick in which the fault begins, 0 from the one in which it ends */
+    double value;  /* the fault's value; 0 if it is off */
+} tb_model_fault;
+
 #if defined(_WIN32)
 #define TB_IMPORT __declspec(dllimport)
 #else
@@ -171,6 +178,15 @@ TB_IMPORT int32_t tb_statistics(tb_driver driver, char *text, size_t room);
 
 /* Moves waiting events to `events`, at most 64 at once. Returns their number, or a status below 0. */
 TB_IMPORT int32_t tb_events(tb_driver driver, tb_event *events, size_t room);
+
+/* Names the faults that the simulation's model can have: those that a fault of kind "model" can name (docs/faults.md). Call it
+ * before the first tick. TB_BAD_ARGUMENT: a name is empty or there twice, or a fault of driver.cfg has another name; the message
+ * has the nearest one. */
+TB_IMPORT int32_t tb_declare_faults(tb_driver driver, const char *const *names, size_t count);
+
+/* Moves the changes of the model's faults since the last call to `faults`, at most `room`. Returns their number, or a status below
+ * 0. The thread that ticks asks after each tb_exchange, or between tb_receive and tb_send, until it gets less than `room`. */
+TB_IMPORT int32_t tb_model_faults(tb_driver driver, tb_model_fault *faults, size_t room);
 
 /* Injects a fault, written as in a [[fault]] table of driver.cfg: "kind = \"stuck\"\nsignal = \"Valve\"". Returns the fault's
  * number, or a status below 0. */

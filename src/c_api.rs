@@ -67,6 +67,14 @@ struct CSignal {
     fail_safe: u64,
 }
 
+/// `tb_model_fault` of the header.
+#[repr(C)]
+struct CModelFault {
+    fault: i32,
+    is_on: i32,
+    value: f64,
+}
+
 impl CSignal {
     /// A signal that does not exist: reads 0 and cannot be set.
     const NONE: Self = Self {
@@ -443,6 +451,56 @@ extern "C" fn tb_end_fault(driver: i64, fault: i32) -> i32 {
         Ok(DRIVERS
             .visit(driver, |opened| opened.device.end_fault(id))?
             .into())
+    })
+}
+
+/// # Safety
+///
+/// `names` must be null or have `count` C strings.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_declare_faults(
+    driver: i64,
+    names: *const *const c_char,
+    count: usize,
+) -> i32 {
+    answer(|| {
+        if names.is_null() && count > 0 {
+            return Err(Refusal::new(Code::BadArgument, "names is NULL"));
+        }
+        // SAFETY: promised by the caller.
+        let name = |at| unsafe { text(*names.add(at), "a name") }.map(str::to_owned);
+        let names = (0..count).map(name).collect::<Result<Vec<_>, _>>()?;
+        DRIVERS.visit(driver, |opened| opened.device.declare_model_faults(names))??;
+        Ok(Code::Fresh.code())
+    })
+}
+
+/// # Safety
+///
+/// `into` must be null or have room for `room` changes.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn tb_model_faults(driver: i64, into: *mut CModelFault, room: usize) -> i32 {
+    answer(|| {
+        if into.is_null() {
+            return Err(Refusal::new(Code::BadArgument, "faults is NULL"));
+        }
+        let count = DRIVERS.visit(driver, |opened| {
+            let mut count = 0;
+            while count < room
+                && let Some((place, value)) = opened.device.next_model_change()
+            {
+                let change = CModelFault {
+                    fault: i32::try_from(place).unwrap_or(i32::MAX),
+                    is_on: value.is_some().into(),
+                    value: value.unwrap_or_default(),
+                };
+                // SAFETY: there is room, promised by the caller.
+                unsafe { into.add(count).write(change) };
+                count += 1;
+            }
+            count
+        })?;
+        Ok(i32::try_from(count).unwrap_or(i32::MAX))
     })
 }
 

@@ -18,7 +18,7 @@ use std::panic::catch_unwind;
 use std::path::Path;
 use std::sync::Once;
 
-use jni::objects::{JClass, JLongArray, JObject, JString};
+use jni::objects::{JClass, JDoubleArray, JLongArray, JObject, JString};
 use jni::sys::{JNI_ERR, JNI_VERSION_1_8, jboolean, jclass, jint, jlong};
 use jni::vm::JavaVM;
 use jni::{Env, EnvUnowned};
@@ -32,6 +32,9 @@ use failure::{Failure, ThrowFieldbusException};
 
 /// The drivers that this process has open.
 static DRIVERS: Handles<Device<open::Keep>> = Handles::new();
+
+/// The most changes of the model's faults handed over in one call.
+const MODEL_FAULTS: usize = 32;
 
 /// Registers the exit handler, once, with the first driver.
 static AT_EXIT: Once = Once::new();
@@ -244,6 +247,34 @@ extern "system" fn Java_tickbus_Tickbus_endFaultNative<'local>(
     .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native void declareNative(long handle, String names)` of `ModelFaults`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_ModelFaults_declareNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+    names: JString<'local>,
+) {
+    env.with_env(|env| {
+        let names = names.try_to_string(env)?;
+        let names = names.lines().map(str::to_owned).collect();
+        Ok::<(), Failure>(with(handle, |device| device.declare_model_faults(names))??)
+    })
+    .resolve::<ThrowFieldbusException>();
+}
+
+/// `static native int takeNative(long handle, double[] into)` of `ModelFaults`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_ModelFaults_takeNative<'local>(
+    mut env: EnvUnowned<'local>,
+    _class: JClass<'local>,
+    handle: jlong,
+    into: JDoubleArray<'local>,
+) -> jint {
+    env.with_env(|env| model_faults(env, handle, &into))
+        .resolve::<ThrowFieldbusException>()
+}
+
 /// `static native String faultsNative(long handle)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_Tickbus_faultsNative<'local>(
@@ -320,6 +351,31 @@ fn events(env: &mut Env<'_>, handle: jlong, into: &JLongArray<'_>) -> Result<jin
     let room = into.len(env)?.min(words.len());
     let count = with(handle, |device| device.events(&mut words[..room]))?;
     into.set_region(env, 0, &words[..count * EVENT_WORDS])?;
+    Ok(jint::try_from(count).unwrap_or(jint::MAX))
+}
+
+/// Writes changes of the model's faults to an array: of each the place of the fault, and its value.
+fn model_faults(
+    env: &mut Env<'_>,
+    handle: jlong,
+    into: &JDoubleArray<'_>,
+) -> Result<jint, Failure> {
+    let mut changes = [0.0; 2 * MODEL_FAULTS];
+    let most = into.len(env)?.min(changes.len());
+    let count = with(handle, |device| {
+        let mut count = 0;
+        while let Some(room) = changes[..most].get_mut(2 * count..2 * count + 2)
+            && let Some((place, value)) = device.next_model_change()
+        {
+            #[expect(clippy::cast_precision_loss, reason = "a place is far below 2^53")]
+            room.copy_from_slice(&[place as f64, value.unwrap_or_default()]);
+            count += 1;
+        }
+        count
+    })?;
+    if count > 0 {
+        into.set_region(env, 0, &changes[..2 * count])?;
+    }
     Ok(jint::try_from(count).unwrap_or(jint::MAX))
 }
 

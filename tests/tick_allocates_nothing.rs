@@ -51,6 +51,7 @@ const FAULTS: &str = "
 [[fault]]\nkind = \"noise\"\nsignal = \"I LREAL\"\namplitude = 0.5\n
 [[fault]]\nkind = \"noise\"\nsignal = \"Q bit 1.0\"\nchance = 0.5\n
 [[fault]]\nkind = \"stuck\"\nsignal = \"Q INT\"\nwhen = \"I REAL > 0\"\nticks = 3\ntimes = 1000000\n
+[[fault]]\nkind = \"model\"\nname = \"leak\"\nwhen = \"I REAL > 0\"\nticks = 2\ntimes = 1000000\n
 [[fault]]\nkind = \"drop\"\nchance = 0.2\n
 [[fault]]\nkind = \"duplicate\"\nchance = 0.2\n
 [[fault]]\nkind = \"delay\"\nby = \"20ms\"\n
@@ -63,8 +64,10 @@ fn allocations(fieldbus: &str, faults: &str) -> u64 {
     let clock = Manual::new();
     let mut driver =
         Driver::open(config(fieldbus, faults), Arc::clone(&clock) as _).expect("opens");
+    let names = ["wear", "leak"].map(str::to_owned);
+    driver.declare_model_faults(names.into()).expect("names");
     let mut slots = driver.initial_slots();
-    let mut before = 0;
+    let (mut before, mut changes) = (0, 0);
     for tick in 0..11_000_i32 {
         if tick == 1_000 {
             before = allocations_of_thread();
@@ -84,7 +87,11 @@ fn allocations(fieldbus: &str, faults: &str) -> u64 {
             driver.receive(time, &mut slots);
             driver.send(&mut slots);
         }
+        while driver.next_model_change().is_some() {
+            changes += 1;
+        }
     }
+    assert_eq!(changes > 100, !faults.is_empty(), "the model has its fault");
     allocations_of_thread() - before
 }
 

@@ -3,7 +3,8 @@
  * A valve fills the tank, a drain empties it, a float switch is on while it is low. The file has the functions that a master needs
  * for such a model, and repeats the standards' types so that it compiles without their headers.
  *
- * Value references: 0 valve (input), 1 level in metres, 2 low (outputs), 3 area in square metres (parameter), 4 counter.
+ * Value references: 0 valve (input), 1 level in metres, 2 low (outputs), 3 area in square metres (parameter), 4 counter, 5 leak in
+ * cubic metres per second (tunable parameter: a fault can set it).
  */
 
 #include <stdbool.h>
@@ -18,7 +19,7 @@
 #endif
 
 enum { OK = 0, WARNING = 1, DISCARD = 2, FAILED = 3, FATAL = 4 };
-enum { VALVE = 0, LEVEL = 1, LOW = 2, AREA = 3, STEPS = 4 };
+enum { VALVE = 0, LEVEL = 1, LOW = 2, AREA = 3, STEPS = 4, LEAK = 5 };
 
 static const double INFLOW = 0.02;  /* cubic metres per second, with the valve open */
 static const double OUTFLOW = 0.01; /* at all times */
@@ -27,6 +28,7 @@ typedef struct {
     bool valve;
     double level;
     double area;
+    double leak;
     int32_t steps;
 } Tank;
 
@@ -40,7 +42,7 @@ static Tank *make(void) {
 }
 
 static void pass(Tank *tank, double seconds) {
-    tank->level += ((tank->valve ? INFLOW : 0.0) - OUTFLOW) / tank->area * seconds;
+    tank->level += ((tank->valve ? INFLOW : 0.0) - OUTFLOW - tank->leak) / tank->area * seconds;
     if (tank->level < 0.0) {
         tank->level = 0.0;
     }
@@ -51,11 +53,16 @@ static int get_real(const Tank *tank, uint32_t reference, double *value) {
     switch (reference) {
     case LEVEL: *value = tank->level; return OK;
     case AREA: *value = tank->area; return OK;
+    case LEAK: *value = tank->leak; return OK;
     default: return FAILED;
     }
 }
 
 static int set_real(Tank *tank, uint32_t reference, double value) {
+    if (reference == LEAK) {
+        tank->leak = value;
+        return OK;
+    }
     if (reference != AREA || value <= 0.0) {
         return FAILED;
     }

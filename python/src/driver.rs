@@ -354,6 +354,14 @@ impl Driver {
         Self::done(py, py.detach(|| Refusal::instead_of_panic(read)))
     }
 
+    fn _declare_faults(&self, py: Python<'_>, names: Vec<String>) -> PyResult<()> {
+        Self::done(py, py.detach(|| self.handle.declare_model_faults(names)))
+    }
+
+    fn _model_faults(&self, py: Python<'_>) -> PyResult<Vec<(usize, f64)>> {
+        Self::done(py, self.handle.model_changes())
+    }
+
     fn _end_fault(&self, py: Python<'_>, id: u32) -> PyResult<bool> {
         Self::done(py, py.detach(|| self.handle.end_fault(id)))
     }

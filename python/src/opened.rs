@@ -284,6 +284,20 @@ impl Handle {
         self.visit(|opened| tickbus_binding::inject(&mut opened.driver, fault))?
     }
 
+    pub(crate) fn declare_model_faults(&self, names: Vec<String>) -> Result<(), Refusal> {
+        self.visit(|opened| tickbus_binding::declare_model_faults(&mut opened.driver, names))?
+    }
+
+    /// The changes of the model's faults since the last call: the place of the fault, and its value.
+    pub(crate) fn model_changes(&self) -> Result<Vec<(usize, f64)>, Refusal> {
+        self.visit(|opened| {
+            let changes = std::iter::from_fn(|| opened.driver.next_model_change());
+            changes
+                .map(|(place, value)| (place, value.unwrap_or_default()))
+                .collect()
+        })
+    }
+
     pub(crate) fn end_fault(&self, id: u32) -> Result<bool, Refusal> {
         self.visit(|opened| opened.driver.end_fault(id))
     }

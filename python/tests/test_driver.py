@@ -235,6 +235,34 @@ def test_mistakes_of_a_fault_are_told(line):
         line.inject(3)
 
 
+def test_a_fault_of_the_model_is_told_in_the_tick_in_which_it_begins_and_ends(line):
+    line.declare_faults(["leak", "wear"])
+    line.inject(kind="model", name="wear", value=0.4, tick=2, ticks=2)
+    leak = line.inject(kind="model", name="leak")
+    seen = []
+    for tick in range(1, 6):
+        line.receive(ns=tick * 2_000_000)
+        seen.append(line.model_faults())
+        line.send()
+        if tick == 4:
+            leak.end()
+    assert seen == [[("leak", 1.0)], [("wear", 0.4)], [], [("wear", 0.0)], [("leak", 0.0)]]
+
+
+def test_a_fault_that_the_model_does_not_have_is_a_mistake_with_the_nearest_name(line):
+    with pytest.raises(tickbus.FieldbusError, match="let the simulation declare it before its first tick") as caught:
+        line.inject(kind="model", name="leak")
+    assert caught.value.status is Status.BAD_ARGUMENT
+    line.inject(kind="stuck", signal="Start", name="leak")
+    line.declare_faults(["leak"])
+    with pytest.raises(tickbus.FieldbusError, match='no fault "leek"; did you mean "leak"?'):
+        line.inject(kind="model", name="leek")
+    with pytest.raises(tickbus.FieldbusError, match="give each a name of its own"):
+        line.declare_faults(["leak", "leak"])
+    with pytest.raises(TypeError, match="a list of names, not one text"):
+        line.declare_faults("leak")
+
+
 def test_a_recording_makes_a_page(line_cfg, tmp_path):
     recording = tmp_path / "run.vcd"
     with tickbus.open(line_cfg, {"record": {"file": recording}}) as line:

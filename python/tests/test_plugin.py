@@ -112,6 +112,30 @@ def test_faults_are_injected_and_ended(plc):
     plc.await_(on("Run")).within(3)
 
 
+class LeakingLift(Lift):
+    faults = ["leak"]
+    leak = 0.0
+
+    def fault(self, name, value):
+        assert name == "leak"
+        self.leak = value
+
+    def step(self, plc, time):
+        super().step(plc, time)
+        plc.set("Height", self.height - 50 * self.leak)
+
+
+def test_a_machine_has_faults_by_name(plc):
+    plc.connect(LeakingLift()).tick()
+    leak = plc.inject(kind="model", name="leak", value=0.4)
+    plc.tick().expect(is_("Height", 100))
+    plc.tick().expect(is_("Height", 80))
+    leak.end()
+    plc.tick(2).expect(is_("Height", 100))
+    with pytest.raises(Exception, match='did you mean "leak"'):
+        plc.inject(kind="model", name="leck")
+
+
 def test_conditions_join(plc):
     plc.expect(on("Run").or_(off("Run")))
     plc.expect(~on("Run") & above("Speed", -1) & below("Speed", 1))

@@ -12,7 +12,7 @@ import threading
 import time
 import warnings
 import weakref
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -92,9 +92,10 @@ class Driver(_native.Driver):
     ``FieldbusError`` with ``Status.BUSY``.
     """
 
-    __slots__ = ("__weakref__",)
+    __slots__ = ("__weakref__", "_fault_names")
 
     def __init__(self, path: str, overlay: str = "", block: _native.Block | None = None, row: int = 0) -> None:
+        self._fault_names: list[str] = []
         _open.add(self)
         _close_when_terminated()
 
@@ -142,6 +143,26 @@ class Driver(_native.Driver):
             raise TypeError(f"a fault is a text in TOML, or keys such as kind='stuck', not {type(fault).__name__}")
         number = self._inject(fault + "\n" + _toml.section(keys))
         return next(fault for fault in self.faults() if fault.id == number)
+
+    def declare_faults(self, names: Iterable[str]) -> None:
+        """Name the faults that the simulation's model can have, before the first tick: those that a fault of kind
+        ``model`` can name. Raises ``FieldbusError`` with the nearest name if a fault in driver.cfg has another one."""
+        if isinstance(names, str):
+            raise TypeError("the faults of a model are a list of names, not one text")
+        declared = list(names)
+        self._declare_faults(declared)
+        self._fault_names = declared
+
+    def model_faults(self) -> list[tuple[str, float]]:
+        """The faults of the model that have begun or ended since the last call, as (name, value); 0.0 is off::
+
+            plc.declare_faults(["leak"])
+            ...
+            plc.receive(time)
+            for name, value in plc.model_faults():
+                tank.leak = value
+        """
+        return [(self._fault_names[at], value) for at, value in self._model_faults()]
 
     def faults(self) -> list["Fault"]:
         """The faults in driver.cfg and the injected ones; some that ended long ago may be missing."""

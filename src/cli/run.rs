@@ -9,6 +9,7 @@ use super::host::{ToldFaults, is_news, never_ran, recording, span};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_driver::{Code, Driver};
 use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
+use tickbus_fieldbus::faults::Effect;
 use tickbus_fieldbus::{Link, Role};
 use tickbus_fmi::RealTime;
 use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Stepped, Unpacked};
@@ -135,6 +136,13 @@ fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refu
     };
     let join = Join::of(&config, &fmu.model, &map)
         .map_err(|mistake| wrong(format!("{}: {mistake}", fmu.file)))?;
+    for fault in &config.faults {
+        if let Effect::Model(value) = fault.effect {
+            let checked = fmu.model.check_fault(&fault.name, value);
+            let told = |mistake| format!("{}: the fault \"{}\": {mistake}", fmu.file, fault.name);
+            checked.map_err(|mistake| wrong(told(mistake)))?;
+        }
+    }
     let stop = Stop::new();
     catch_interrupts(&stop, fmu.folder())?;
     let step = arguments.step.or(proposed(fmu.model.step)).unwrap_or(STEP);
@@ -148,7 +156,7 @@ fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refu
     say(&told(&fmu, &join, step, pace));
     let table = config.table.clone();
     let clock = Monotonic::shared();
-    let driver = Driver::open(config, Arc::clone(&clock) as _).map_err(|error| {
+    let mut driver = Driver::open(config, Arc::clone(&clock) as _).map_err(|error| {
         let outcome = if error.is_wrong_input() {
             Outcome::WrongInput
         } else {
@@ -156,6 +164,8 @@ fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refu
         };
         Refused(error.to_string(), outcome)
     })?;
+    let declared = driver.declare_model_faults(fmu.model.fault_names());
+    declared.map_err(|mistake| wrong(format!("{}: {mistake}", fmu.file)))?;
     let mut slots = driver.initial_slots();
     let options = MachineOptions {
         isolated: arguments.isolated,
@@ -366,6 +376,10 @@ fn tick(
         if done.code.code() < 0 {
             let reason = line.driver.link().reason;
             failure = Some(format!("the line failed: {reason}"));
+            break;
+        }
+        if let Err(why) = machine.take_faults(&mut line.driver) {
+            failure = Some(why.to_string());
             break;
         }
         let now = clock.now();

@@ -126,14 +126,38 @@ int main(int count, char **arguments) {
     EXPECT(tb_end_fault(driver, 4711), 0, NULL);
     EXPECT(tb_events(driver, NULL, 1), TB_BAD_ARGUMENT, "events is NULL");
 
+    /* Faults of the model: unknown before they are declared, told once in the tick in which they begin and in which they end. */
+    const char *names[] = {"leak", "wear"}, *twice[] = {"leak", "leak"}, *missing[] = {"leak", NULL};
+    tb_model_fault changes[4];
+    EXPECT(tb_inject(driver, "kind = \"model\"\nname = \"leak\""), TB_BAD_ARGUMENT, "declare it before its first tick");
+    EXPECT(tb_declare_faults(driver, twice, 2), TB_BAD_ARGUMENT, "a name of its own");
+    EXPECT(tb_declare_faults(driver, missing, 2), TB_BAD_ARGUMENT, "a name is NULL");
+    EXPECT(tb_declare_faults(driver, NULL, 1), TB_BAD_ARGUMENT, "names is NULL");
+    EXPECT(tb_declare_faults(driver, names, 2), TB_FRESH, NULL);
+    EXPECT(tb_inject(driver, "kind = \"model\"\nname = \"leek\""), TB_BAD_ARGUMENT, "did you mean \"leak\"?");
+    EXPECT((fault = tb_inject(driver, "kind = \"model\"\nname = \"wear\"\nvalue = 0.4")) > 0, 1, NULL);
+    EXPECT(tb_inject(driver, "kind = \"model\"\nname = \"leak\"\nvalue = 0") > 0, 1, NULL);
+    EXPECT(tb_model_faults(driver, changes, 4), 0, NULL);
+    EXPECT(tb_exchange(driver) >= 0, 1, NULL);
+    EXPECT(tb_model_faults(driver, NULL, 4), TB_BAD_ARGUMENT, "faults is NULL");
+    EXPECT(tb_model_faults(driver, changes, 1), 1, NULL);
+    EXPECT(changes[0].fault == 0 && changes[0].is_on && changes[0].value == 0, 1, NULL);
+    EXPECT(tb_model_faults(driver, changes, 4), 1, NULL);
+    EXPECT(changes[0].fault == 1 && changes[0].is_on && changes[0].value == 0.4, 1, NULL);
+    EXPECT(tb_end_fault(driver, fault), 1, NULL);
+    EXPECT(tb_exchange(driver) >= 0, 1, NULL);
+    EXPECT(tb_model_faults(driver, changes, 4), 1, NULL);
+    EXPECT(changes[0].fault == 1 && !changes[0].is_on && changes[0].value == 0, 1, NULL);
+
     /* Two threads: now and then, one of them gets TB_BUSY. */
     shared = driver;
+    uint64_t before = values->ticks;
     int counts[2][2] = {{0, 0}, {0, 0}};
     pthread_t thread;
     if (pthread_create(&thread, NULL, ticks, counts[0]) != 0) return 2;
     ticks(counts[1]);
     pthread_join(thread, NULL);
-    EXPECT(values->ticks, counts[0][0] + counts[1][0], NULL);
+    EXPECT(values->ticks - before, counts[0][0] + counts[1][0], NULL);
     EXPECT(values->ticks > 0, 1, NULL);
 
     /* Beside a thread that ticks without a pause, everything else gets in; and closing, too. */

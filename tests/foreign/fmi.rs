@@ -264,10 +264,12 @@ class Machine(Fmi2Slave):
         self.valve = False
         self.register_variable(Boolean('valve', causality=Fmi2Causality.input, variability=Fmi2Variability.discrete))
         self.register_variable(Real('level', causality=Fmi2Causality.output))
+        self.leak = 0.0
+        self.register_variable(Real('leak', causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
         self.register_variable(Boolean('low', causality=Fmi2Causality.output, variability=Fmi2Variability.discrete))
 
     def do_step(self, current_time, step_size):
-        self.level += (0.04 if self.valve else -0.04) * step_size
+        self.level += ((0.04 if self.valve else -0.04) - self.leak) * step_size
         self.low = self.level < 0.4
         return True
 ";
@@ -313,6 +315,10 @@ fn by_pythonfmu() -> Result<(), Absent> {
             .to_owned();
         std::fs::write(folder.path().join(file), text).expect("a file");
     }
+    // A tunable parameter of the FMU is its fault.
+    let faults =
+        "[[fault]]\nkind = \"model\"\nname = \"leak\"\nvalue = 0.08\nat = \"5s\"\nfor = \"3s\"\n";
+    std::fs::write(folder.path().join("faults.toml"), faults).expect("a file");
     let ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
         .args([
             "run",
@@ -327,6 +333,8 @@ fn by_pythonfmu() -> Result<(), Absent> {
             "20s",
             "--record",
             "run.csv",
+            "--faults",
+            "faults.toml",
         ])
         .args(["--isolated"])
         .env("LD_PRELOAD", &shared)
@@ -340,12 +348,13 @@ fn by_pythonfmu() -> Result<(), Absent> {
         "{told}"
     );
     let record = std::fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
-    let level: f64 = record
-        .lines()
-        .last()
-        .and_then(|line| line.rsplit(',').next())
-        .and_then(|value| value.parse().ok())
-        .expect("a level");
-    assert!((395.0..=405.0).contains(&level), "{level}");
+    let lines: Vec<&str> = record.lines().collect();
+    let level = |tick: usize| -> f64 {
+        let value = lines[tick].rsplit(',').next().expect("a column");
+        value.parse().expect("a level")
+    };
+    assert!((395.0..=405.0).contains(&level(2000)), "{}", level(2000));
+    assert!((395.0..=405.0).contains(&level(500)), "{}", level(500));
+    assert!((270.0..=290.0).contains(&level(800)), "{}", level(800));
     Ok(())
 }

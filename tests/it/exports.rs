@@ -38,6 +38,8 @@ fn the_native_methods_of_tickbus_are_exported() {
         "Java_tickbus_Tickbus_injectNative",
         "Java_tickbus_Tickbus_endFaultNative",
         "Java_tickbus_Tickbus_faultsNative",
+        "Java_tickbus_ModelFaults_declareNative",
+        "Java_tickbus_ModelFaults_takeNative",
         "Java_tickbus_Tickbus_reportNative",
     ] {
         // SAFETY: the symbol is looked up, and never called.

@@ -178,7 +178,7 @@ fn a_document_of_check_describes_a_right_file() {
     assert_eq!(named("Valve open")["fail_safe"], true);
     assert_eq!(named("Serial number")["fail_safe"], u64::MAX);
     assert_eq!(named("Drift")["fail_safe"], i64::MIN);
-    assert_eq!(all["faults"].as_array().map(Vec::len), Some(4));
+    assert_eq!(all["faults"].as_array().map(Vec::len), Some(5));
     let (_, axes) = document(&["check", "tests/right/axes.cfg"]);
     assert!(axes["axes"][0]["name"].is_string());
 }

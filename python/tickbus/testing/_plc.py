@@ -22,7 +22,9 @@ Duration: TypeAlias = Union[float, str]
 
 
 class Machine(Protocol):
-    """A model of the machine, as detailed as the tests need. ``connect(plc)`` is optional, and is called once before the first tick."""
+    """A model of the machine, as detailed as the tests need. Two methods are optional: ``connect(plc)`` is called once before the
+    first tick. ``fault(name, value)`` is called when a fault of kind ``model`` begins, and with 0.0 when it ends; ``faults`` has
+    the names of these faults."""
 
     def step(self, plc: Plc, time: float) -> object:
         """One tick: reads the PLC's commands, moves on, sets the sensors. ``time`` is the time at its end, in seconds."""
@@ -45,6 +47,7 @@ class Plc:
         self._seen = self._slots.tobytes()
         self._watches = {signal.name: Watch(signal) for signal in driver.signals}
         self._machines: list[Callable[[Plc, float], object]] = []
+        self._model_faults: dict[str, Callable[[str, float], object]] = {}
         self._forced: dict[str, float] = {}
         self._standing: list[tuple[Bound, int]] = []
         self._open: list[Await] = []
@@ -61,6 +64,10 @@ class Plc:
         connect = getattr(machine, "connect", None)
         if connect is not None:
             connect(self)
+        for name in getattr(machine, "faults", ()):
+            self._model_faults[name] = machine.fault  # type: ignore[union-attr]
+        if self._model_faults:
+            self._driver.declare_faults(self._model_faults)
         self._machines.append(step)
         return self
 
@@ -168,6 +175,9 @@ class Plc:
             for signal, value in self._forced.items():
                 self._watches[signal].signal.value = value
             self._driver.exchange(ns=nanos)
+            if self._model_faults:
+                for name, value in self._driver.model_faults():
+                    self._model_faults[name](name, value)
         finally:
             self._in_step = False
         self._ticks += 1

@@ -13,7 +13,7 @@ use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 
 use crate::description::SignalDescription;
-use crate::fault::inject;
+use crate::fault::{declare_model_faults, inject};
 use crate::refusal::Refusal;
 use crate::shared::{NO_TIME, Shared, Word};
 use crate::swallowed::swallowed;
@@ -132,7 +132,7 @@ impl<K> Device<K> {
     ///
     /// # Errors
     ///
-    /// `BAD_ARGUMENT` if too many faults wait or are active.
+    /// `BAD_ARGUMENT` if too many faults wait or are active, or the simulation's model has no fault of this name.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Refusal> {
         inject(&mut self.driver, fault)
     }
@@ -140,6 +140,21 @@ impl<K> Device<K> {
     /// Ends a fault; false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
         self.driver.end_fault(id)
+    }
+
+    /// Takes the names of the faults that the simulation's model can have: see [`Driver::declare_model_faults`].
+    ///
+    /// # Errors
+    ///
+    /// `BAD_ARGUMENT` if a name is not usable, or a fault of the model has none of the names.
+    pub fn declare_model_faults(&mut self, names: Vec<String>) -> Result<(), Refusal> {
+        declare_model_faults(&mut self.driver, names)
+    }
+
+    /// The next change of a fault of the model: see [`Driver::next_model_change`].
+    #[inline]
+    pub fn next_model_change(&mut self) -> Option<(usize, Option<f64>)> {
+        self.driver.next_model_change()
     }
 
     /// The board on which the injected faults publish their state.

@@ -21,9 +21,19 @@ pub fn read_fault(text: &str, config: &Config) -> Result<Fault, Refusal> {
 ///
 /// # Errors
 ///
-/// `BAD_ARGUMENT` if too many faults wait or are active.
+/// `BAD_ARGUMENT` if too many faults wait or are active, or the simulation's model has no fault of this name.
 pub fn inject(driver: &mut Driver, fault: &Fault) -> Result<u32, Refusal> {
     driver.inject_read(fault).map_err(not_injected)
+}
+
+/// Takes the names of the faults that the simulation's model can have.
+///
+/// # Errors
+///
+/// `BAD_ARGUMENT` if a name is not usable, or a fault of the model has none of the names.
+pub fn declare_model_faults(driver: &mut Driver, names: Vec<String>) -> Result<(), Refusal> {
+    let refused = |why| Refusal::new(Code::BadArgument, format!("the model's faults: {why}"));
+    driver.declare_model_faults(names).map_err(refused)
 }
 
 fn not_injected(why: impl std::fmt::Display) -> Refusal {

@@ -15,7 +15,7 @@ mod swallowed;
 
 pub use description::{SignalDescription, SlotKind};
 pub use device::{Device, EVENT_WORDS, EVENTS};
-pub use fault::{faults, inject, read_fault};
+pub use fault::{declare_model_faults, faults, inject, read_fault};
 pub use handles::{Handles, MAX_DRIVERS, Reservation};
 pub use opening::{closing, load, open};
 pub use panics::panic_message;

@@ -97,6 +97,12 @@ impl Extras {
         self.faults.as_mut().is_some_and(|faults| faults.end(id))
     }
 
+    /// Returns the next change of a fault of the simulation's model that the model has not been told.
+    #[inline]
+    pub(super) fn next_model_change(&mut self) -> Option<(usize, Option<f64>)> {
+        self.faults.as_mut()?.next_model_change()
+    }
+
     /// Takes over the faults that another thread has ordered; needs [room](Self::make_room).
     pub(super) fn obey(&mut self, tap: &mut Tap) {
         if let Some(faults) = &mut self.faults {

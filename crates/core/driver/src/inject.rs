@@ -6,15 +6,24 @@ use super::Driver;
 use super::bus_handle::BusHandle;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_fieldbus::faults::{self, Fault, FaultBoard, FaultStatus, Slots};
+use tickbus_fieldbus::faults::{self, Effect, Fault, FaultBoard, FaultStatus, Slots};
 
 impl Driver {
     /// Injects a fault, which can begin at the next exchange. Returns the fault's number.
     ///
     /// # Errors
     ///
-    /// Too many faults are waiting or active.
+    /// Too many faults are waiting or active, or the simulation's model has [declared](Self::declare_model_faults) no
+    /// fault of this name.
     pub fn inject(&mut self, fault: &Fault) -> Result<u32, Mistake> {
+        if let Effect::Model(_) = fault.effect {
+            self.board.check_model_fault(&fault.name)?;
+        }
+        self.inject_unchecked(fault)
+    }
+
+    /// As [`inject`](Self::inject), while the model may still declare its faults.
+    pub(super) fn inject_unchecked(&mut self, fault: &Fault) -> Result<u32, Mistake> {
         let slots = Slots {
             table: &self.config.table,
             writes: self.config.role.areas().0,
@@ -34,7 +43,7 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// Returns every mistake in the text, or an error when too many faults are waiting or active.
+    /// Returns every mistake in the text, or an error of [`inject`](Self::inject).
     pub fn inject_text(&mut self, text: &str) -> Result<u32, Mistakes> {
         let fault = faults::read_one(text, self.config.fault_scope())?;
         self.inject_read(&fault)
@@ -44,7 +53,7 @@ impl Driver {
     ///
     /// # Errors
     ///
-    /// Too many faults are waiting or active.
+    /// As [`inject`](Self::inject).
     pub fn inject_read(&mut self, fault: &Fault) -> Result<u32, Mistakes> {
         self.inject(fault)
             .map_err(|mistake| Mistakes::of("fault", mistake))
@@ -53,6 +62,25 @@ impl Driver {
     /// Ends a fault at the next exchange. Returns false if no fault has this number.
     pub fn end_fault(&mut self, id: u32) -> bool {
         self.extras.end_fault(id)
+    }
+
+    /// Takes the names of the faults that the simulation's model can have: those that a fault of the kind "model" can
+    /// name from now on, in place of earlier ones. A simulation with such faults calls this once, before its first tick.
+    ///
+    /// # Errors
+    ///
+    /// A name is empty, has a control character or is there twice, or a fault that is not over, such as one of the
+    /// configuration, has none of the names. Then no name is taken.
+    pub fn declare_model_faults(&mut self, names: Vec<String>) -> Result<(), Mistake> {
+        self.extras.make_room(&self.board).declare(names)
+    }
+
+    /// Returns the next fault of the model that began, ended or changed its value in the ticks since the model was last
+    /// told: its place among the declared names, and its value; `None` for a fault that is off. The simulation asks
+    /// after each exchange, or between [`receive`](Self::receive) and [`send`](Self::send), until there is no more.
+    #[inline]
+    pub fn next_model_change(&mut self) -> Option<(usize, Option<f64>)> {
+        self.extras.next_model_change()
     }
 
     /// Returns the board where the faults publish their state, readable from any thread.

@@ -11,6 +11,8 @@ mod frames;
 mod heartbeat;
 mod host;
 mod inject;
+#[cfg(test)]
+mod model_faults_tests;
 mod open;
 mod recording;
 mod replay;

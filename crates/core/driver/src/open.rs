@@ -103,7 +103,10 @@ impl Driver {
     pub(super) fn inject_configured(&mut self) -> Result<(), DriverError> {
         let config = Arc::clone(&self.config);
         let mut faults = config.faults.iter();
-        faults.try_for_each(|fault| self.inject(fault).map(drop).map_err(DriverError::Fault))
+        faults.try_for_each(|fault| {
+            let injected = self.inject_unchecked(fault);
+            injected.map(drop).map_err(DriverError::Fault)
+        })
     }
 
     /// Closes the driver: leaves the peer with the fail-safe values if `at_close` asks for that, stops the threads and

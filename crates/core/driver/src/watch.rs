@@ -173,17 +173,38 @@ impl Watch {
     ///
     /// When there is no such signal.
     pub fn force(&mut self, signal: usize, value: Slot) -> Result<u32, Mistake> {
-        let table = &self.config.table;
+        let name = format!("forced: {}", self.config.table.signals[signal].name);
+        let effect = Effect::Signal(signal, SignalEffect::Stuck(Some(value)));
+        self.inject(name, effect)
+    }
+
+    /// Returns the faults that the simulation's model has declared, in its order.
+    pub fn model_faults(&self) -> Arc<[String]> {
+        self.figures.board.model_faults()
+    }
+
+    /// Gives the simulation's model a fault, as by a fault of the kind "model", in the tick after the next one. Returns
+    /// the fault's number.
+    ///
+    /// # Errors
+    ///
+    /// The model has not declared the fault, or as for [`force`](Self::force).
+    pub fn inject_model_fault(&mut self, name: &str, value: f64) -> Result<u32, Mistake> {
+        self.figures.board.check_model_fault(name)?;
+        self.inject(name.to_owned(), Effect::Model(value))
+    }
+
+    fn inject(&mut self, name: String, effect: Effect) -> Result<u32, Mistake> {
         let fault = Fault {
-            name: format!("forced: {}", table.signals[signal].name),
-            effect: Effect::Signal(signal, SignalEffect::Stuck(Some(value))),
+            name,
+            effect,
             begin: Begin::AtOnce,
             lasts: Lasts::UntilEnded,
             times: 1,
             seed: 1,
         };
         let slots = Slots {
-            table,
+            table: &self.config.table,
             writes: self.writes(),
             edges: &self.slots.edges,
         };

@@ -4,6 +4,7 @@ use std::fmt;
 
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::shown;
 use tickbus_fieldbus::LinkState;
 use tickbus_image::signal::Signal;
 use tickbus_web::Refused;
@@ -77,7 +78,15 @@ pub(crate) trait Exhibit: fmt::Debug + Send {
     /// Ends the force of a signal.
     fn release(&mut self, signal: &str) -> Result<(), Refused>;
 
-    /// Ends all forces; those whose end is not accepted remain.
+    /// Gives the simulation's model a fault of this value, or ends it.
+    fn fault(&mut self, name: &str, _value: Option<&str>) -> Result<(), Refused> {
+        Err(Refused {
+            status: 404,
+            text: format!("\"{}\" has no fault \"{}\"", self.name(), shown(name)),
+        })
+    }
+
+    /// Ends all forces and faults of the model; those whose end is not accepted remain.
     fn release_all(&mut self) -> Result<(), Refused> {
         Ok(())
     }

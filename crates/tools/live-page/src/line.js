@@ -5,6 +5,8 @@
 const line = (() => {
   const box = document.getElementById("drivers");
   let cards = new Map();
+  /** Requests a change: `(method, path, body, done)`. */
+  let change = () => {};
 
   function make(tag, className, parent, content) {
     const it = document.createElement(tag);
@@ -31,6 +33,7 @@ const line = (() => {
     reason.setAttribute("role", "status");
     const since = make("p", "note since", it);
     const faults = make("ul", "faults", it);
+    const model = modelFaults(driver, it);
     const facts = make("dl", "facts", it);
     const stations = make("table", "stations", make("div", "wide", it));
     const more = make("details", "", it);
@@ -38,7 +41,38 @@ const line = (() => {
     const times = make("table", "times", make("div", "wide", more));
     const texts = make("table", "texts", make("div", "wide", more));
     const counters = make("table", "counters", make("div", "wide", more));
-    return { it, state, name, reason, since, faults, facts, stations, more, times, texts, counters };
+    return { it, state, name, reason, since, faults, model, facts, stations, more, times, texts, counters };
+  }
+
+  /** The tools that give the simulation's model one of its faults. */
+  function modelFaults(driver, parent) {
+    const form = make("form", "model", parent);
+    const label = make("label", "", form, "Fault of the model ");
+    const name = make("select", "", label);
+    const value = make("input", "", make("label", "", form, "value "));
+    value.inputMode = "decimal";
+    value.size = 6;
+    value.value = "1";
+    make("button", "", form, "Inject");
+    const end = make("button", "", form, "End");
+    end.type = "button";
+    const path = () => `/fault/${driver.id}/${encodeURIComponent(name.value)}`;
+    form.addEventListener("submit", (event) => {
+      event.preventDefault();
+      const number = value.value.trim().replace(",", ".");
+      change("PUT", path(), number, `${name.value} is ${number}.`);
+    });
+    end.addEventListener("click", () => change("DELETE", path(), undefined, `${name.value} is over.`));
+    form.hidden = true;
+    return { form, name, key: "" };
+  }
+
+  function showModelFaults({ model }, names) {
+    model.form.hidden = !names.length;
+    const key = names.join("\n");
+    if (model.key === key) return;
+    model.key = key;
+    model.name.replaceChildren(...names.map((name) => new Option(name)));
   }
 
   /** Fills a table with rows of cells, and touches only cells that differ. */
@@ -131,6 +165,7 @@ const line = (() => {
       say(own.since, `for ${words.span(since(line))}, cause ${line.cause}, data ${line.status}${isSilent(line) ? `; the simulation has not ticked for ${words.span(line.silence_ms)}` : ""}`);
       // A forced value that was released is no longer worth a row.
       faults(own, (line.faults ?? []).filter(({ name, phase }) => phase !== "over" || !name.startsWith("forced: ")));
+      showModelFaults(own, line.model_faults ?? []);
       facts(own, line);
       const isRun = driver.kind === "sync";
       const several = line.stations.length > 1 || isRun ? line.stations : [];
@@ -144,6 +179,11 @@ const line = (() => {
     }
   }
 
+  /** Sets the way to change something. */
+  function begin(way) {
+    change = way;
+  }
+
   box.addEventListener("toggle", show, true);
-  return { show };
+  return { begin, show };
 })();

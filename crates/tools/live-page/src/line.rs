@@ -51,6 +51,9 @@ pub(crate) struct Line<'a> {
     pub(crate) facts: Vec<(&'static str, String)>,
     pub(crate) stations: Vec<Station<'a>>,
     pub(crate) faults: Vec<Fault<'a>>,
+    /// The faults that the simulation's model has declared.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(crate) model_faults: Vec<&'a str>,
     pub(crate) counters: BTreeMap<&'a str, Number>,
     pub(crate) times: BTreeMap<&'a str, BTreeMap<&'a str, Number>>,
     pub(crate) texts: BTreeMap<&'a str, String>,
@@ -78,6 +81,7 @@ impl<'a> Line<'a> {
             facts: Vec::new(),
             stations: Vec::new(),
             faults: Vec::new(),
+            model_faults: Vec::new(),
             counters: BTreeMap::new(),
             times: BTreeMap::new(),
             texts: BTreeMap::new(),
@@ -149,7 +153,7 @@ pub(crate) fn millis(span: Nanos) -> Option<f64> {
 pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics) -> String {
     let config = watch.config();
     let (now, silence) = (watch.clock().now(), watch.silence());
-    let faults = watch.faults();
+    let (faults, model_faults) = (watch.faults(), watch.model_faults());
     let (stations, status, tick) = watch.view(|view| {
         let sections = config.table.stations.iter().zip(&view.stations);
         let stations = sections.map(|(section, station)| {
@@ -193,6 +197,7 @@ pub(crate) fn json(id: i32, watch: &Watch, link: &Link, statistics: &Statistics)
                 begun: fault.begun,
             })
             .collect(),
+        model_faults: model_faults.iter().map(String::as_str).collect(),
         ..Line::new(id, &config.name, link.state, link.cause, status)
     };
     sort(statistics, &mut line);

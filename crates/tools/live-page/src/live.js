@@ -85,6 +85,7 @@
     if (isLost) get("list").focus({ preventScroll: true });
   }
 
+  line.begin(change);
   list.begin({
     chosen: showChosen,
     force: edit,

@@ -93,6 +93,11 @@ impl Model {
                 signal,
                 value,
             } => self.named(*driver)?.force(signal, value),
+            Order::Fault {
+                driver,
+                name,
+                value,
+            } => self.named(*driver)?.fault(name, value.as_deref()),
             Order::Release { driver, signal } => self.named(*driver)?.release(signal),
         }
     }

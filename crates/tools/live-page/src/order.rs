@@ -22,18 +22,27 @@ pub enum Order {
         /// The signal's name.
         signal: String,
     },
-    /// End the forces of all signals of all drivers.
+    /// Give the simulation's model a fault, or end it.
+    Fault {
+        /// The driver's id.
+        driver: i32,
+        /// The fault's name.
+        name: String,
+        /// The value, as it was written; `None` ends the fault.
+        value: Option<String>,
+    },
+    /// End the forces of all signals of all drivers, and the faults of their models.
     ReleaseAll,
 }
 
-/// The order in a request: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, or
-/// `DELETE /force`.
+/// The order in a request: `PUT /force/4711/LA1%20run` with the value as its body, `DELETE` of the same path, `DELETE
+/// /force`, or `PUT` and `DELETE /fault/4711/hose` for a fault of the simulation's model.
 ///
 /// # Errors
 ///
 /// Not a valid order; carries what would be.
 pub fn order(change: &Change) -> Result<Order, Refused> {
-    const RIGHT: &str = "PUT or DELETE /force/ID/SIGNAL, with the driver's id and the signal's name in percent-encoding";
+    const RIGHT: &str = "PUT or DELETE /force/ID/SIGNAL or /fault/ID/NAME, with the driver's id and the name in percent-encoding";
     let refused = |status, text: String| Err(Refused { status, text });
     let path = change.path.strip_prefix("/force");
     let rest = path.map(|rest| rest.trim_end_matches('/'));
@@ -44,7 +53,8 @@ pub fn order(change: &Change) -> Result<Order, Refused> {
         }
         _ => {}
     }
-    let path = path.and_then(|rest| rest.strip_prefix('/'));
+    let fault = change.path.strip_prefix("/fault");
+    let path = path.or(fault).and_then(|rest| rest.strip_prefix('/'));
     let Some((id, name)) = path.and_then(|rest| rest.split_once('/')) else {
         return refused(404, format!("there is nothing to change here; {RIGHT}"));
     };
@@ -52,8 +62,15 @@ pub fn order(change: &Change) -> Result<Order, Refused> {
         return refused(400, format!("the path has no id of a driver; {RIGHT}"));
     };
     let Ok(signal) = String::from_utf8(percent_decoded(name)) else {
-        return refused(400, "the signal's name in the path is not UTF-8".to_owned());
+        return refused(400, "the name in the path is not UTF-8".to_owned());
     };
+    if fault.is_some() {
+        return Ok(Order::Fault {
+            driver,
+            name: signal,
+            value: (change.verb == Verb::Put).then(|| change.body.clone()),
+        });
+    }
     Ok(match change.verb {
         Verb::Put => Order::Force {
             driver,
@@ -97,6 +114,14 @@ mod tests {
         ] {
             assert_eq!(read(Verb::Delete, path, ""), Ok(release.clone()), "{path}");
         }
+        for (verb, value) in [(Verb::Put, Some("0.4".to_owned())), (Verb::Delete, None)] {
+            let fault = Order::Fault {
+                driver: 7,
+                name: "a hose".to_owned(),
+                value,
+            };
+            assert_eq!(read(verb, "/fault/7/a%20hose", "0.4"), Ok(fault));
+        }
         for path in ["/force", "/force/"] {
             assert_eq!(read(Verb::Delete, path, ""), Ok(Order::ReleaseAll));
             assert_eq!(read(Verb::Put, path, "1"), Err(405));
@@ -106,6 +131,8 @@ mod tests {
             ("/forced", 404),
             ("/signals", 404),
             ("/force/4711", 404),
+            ("/fault", 404),
+            ("/fault/x/hose", 400),
             ("/force/x/LA1", 400),
             ("/force/99999999999/LA1", 400),
             ("/force/1/%FF", 400),

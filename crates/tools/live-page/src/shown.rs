@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
-use tickbus_base::toml_text::did_you_mean;
+use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver::Watch;
 use tickbus_fieldbus::{Link, LinkState};
 use tickbus_image::signal::{Area, Latch, Plan, RawValues, Signal, Slot};
@@ -28,6 +29,8 @@ pub(crate) struct Shown {
     codec: Codec,
     /// By the index of the signal.
     forced: BTreeMap<usize, Force>,
+    /// The faults that the page has given the simulation's model: their numbers, by name.
+    faults: BTreeMap<String, u32>,
     /// Replaced faults whose end the simulation has not taken over yet.
     ending: Vec<u32>,
     link: Link,
@@ -93,6 +96,7 @@ impl Shown {
             sheet: Sheet::new(now, &values),
             codec: Codec::new(&watch),
             forced: BTreeMap::new(),
+            faults: BTreeMap::new(),
             ending: Vec::new(),
             link: watch.link(),
             statistics: Statistics::default(),
@@ -337,7 +341,7 @@ impl Exhibit for Shown {
         if before.is_some_and(|force| force.value == value) {
             return Ok(());
         }
-        let refused = |mistake: tickbus_base::Mistake| Refused {
+        let refused = |mistake: Mistake| Refused {
             status: 409,
             text: mistake.to_string(),
         };
@@ -368,15 +372,44 @@ impl Exhibit for Shown {
         Ok(())
     }
 
+    fn fault(&mut self, name: &str, value: Option<&str>) -> Result<(), Refused> {
+        let unknown = |mistake: Mistake| Refused {
+            status: 404,
+            text: mistake.to_string(),
+        };
+        let value = value.map(|text| fault_value(name, text)).transpose()?;
+        self.look_at_forced();
+        let before = self.faults.get(name).copied();
+        if let Some(value) = value {
+            let fault = self
+                .watch
+                .inject_model_fault(name, value)
+                .map_err(unknown)?;
+            self.faults.insert(name.to_owned(), fault);
+        }
+        // End the old fault together with the new one, so that the model has one of them throughout.
+        if let Some(before) = before
+            && self.watch.end_fault(before).is_err()
+        {
+            self.ending.push(before);
+        }
+        if value.is_none() {
+            self.faults.remove(name);
+        }
+        Ok(())
+    }
+
     fn release_all(&mut self) -> Result<(), Refused> {
         let mut refused = None;
         let watch = &mut self.watch;
-        self.forced.retain(|_, force| {
-            let ended = watch.end_fault(force.fault);
+        let mut remains = |fault: u32| {
+            let ended = watch.end_fault(fault);
             let remains = ended.is_err();
             refused = refused.take().or(ended.err());
             remains
-        });
+        };
+        self.forced.retain(|_, force| remains(force.fault));
+        self.faults.retain(|_, fault| remains(*fault));
         refused.map_or(Ok(()), |mistake| {
             Err(Refused {
                 status: 409,
@@ -390,9 +423,28 @@ impl Exhibit for Shown {
         self.ending.retain(|fault| watch.end_fault(*fault).is_err());
         self.forced
             .retain(|_, force| watch.is_fault_on(force.fault));
+        self.faults.retain(|_, fault| watch.is_fault_on(*fault));
     }
 
     fn grace(&self) -> Option<Nanos> {
-        self.options.grace.filter(|_| !self.forced.is_empty())
+        let is_free = self.forced.is_empty() && self.faults.is_empty();
+        self.options.grace.filter(|_| !is_free)
     }
+}
+
+/// The value of a fault of the model, as a request has it.
+fn fault_value(name: &str, text: &str) -> Result<f64, Refused> {
+    let number = match text.trim() {
+        "TRUE" => Some(1.0),
+        "FALSE" => Some(0.0),
+        text => text.parse::<f64>().ok(),
+    };
+    let finite = number.filter(|number| number.is_finite());
+    finite.ok_or_else(|| Refused {
+        status: 400,
+        text: format!(
+            "\"{}\" is no value for \"{name}\"; write a number, TRUE or FALSE",
+            shown(text)
+        ),
+    })
 }

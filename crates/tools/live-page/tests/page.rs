@@ -31,6 +31,8 @@ struct Simulation {
     /// The values to write, by index, from the next tick on; and the values read.
     writes: Sender<(usize, f64)>,
     reads: Receiver<Vec<f64>>,
+    /// The changes of the model's faults.
+    faults: Receiver<(usize, Option<f64>)>,
     thread: Option<JoinHandle<()>>,
     member: Option<Member>,
 }
@@ -79,6 +81,11 @@ impl Simulation {
         let ticks = Arc::<AtomicU64>::default();
         let (writes, written) = channel();
         let (send, reads) = channel();
+        let names = ["leak", "a hose"].map(str::to_owned);
+        driver
+            .declare_model_faults(names.into())
+            .expect("two names");
+        let (tell, faults) = channel();
         let thread = thread::spawn({
             let (is_over, ticks) = (Arc::clone(&is_over), Arc::clone(&ticks));
             move || {
@@ -91,6 +98,10 @@ impl Simulation {
                         is_asked = true;
                     }
                     driver.exchange(time, &mut slots);
+                    while let Some(change) = driver.next_model_change() {
+                        // As below.
+                        let _ = tell.send(change);
+                    }
                     time += Nanos::from_millis(1);
                     ticks.fetch_add(1, Ordering::Relaxed);
                     if is_asked {
@@ -108,6 +119,7 @@ impl Simulation {
             ticks,
             writes,
             reads,
+            faults,
             thread: Some(thread),
             member: Some(member),
         }
@@ -357,6 +369,52 @@ fn what_is_forced_holds_until_it_is_released() {
     eventually("the last one holds", || {
         simulation.slots(0, 9.0)[1] == 199.0
     });
+}
+
+#[test]
+fn a_fault_of_the_model_is_given_to_it_and_taken_back() {
+    let page = Page::open();
+    let simulation = Simulation::start(&page, 1, "Cell", EVER);
+    let told = || simulation.faults.recv().expect("it runs");
+    eventually("the page has their names", || {
+        page.get("/line")["drivers"][0]["model_faults"] == serde_json::json!(["leak", "a hose"])
+    });
+    assert_eq!(page.change("PUT /fault/1/a%20hose", "0.4").0, 200);
+    assert_eq!(told(), (1, Some(0.4)));
+    // The other value takes its place, without a tick between them.
+    assert_eq!(page.change("PUT /fault/1/a%20hose", "0.6").0, 200);
+    assert_eq!(told(), (1, Some(0.6)));
+    assert_eq!(page.change("DELETE /fault/1/a%20hose", "").0, 200);
+    assert_eq!(told(), (1, None));
+    assert_eq!(
+        page.change("DELETE /fault/1/a%20hose", "").0,
+        200,
+        "it is over already"
+    );
+    assert_eq!(page.change("PUT /fault/1/leak", "TRUE").0, 200);
+    assert_eq!(told(), (0, Some(1.0)));
+    assert_eq!(page.change("DELETE /force", "").0, 200);
+    assert_eq!(told(), (0, None));
+    for (line, body, status, words) in [
+        ("PUT /fault/1/leek", "1", 404, "did you mean \\\"leak\\\"?"),
+        (
+            "PUT /fault/1/leak",
+            "much",
+            400,
+            "write a number, TRUE or FALSE",
+        ),
+        ("PUT /fault/2/leak", "1", 404, "ids are 1"),
+    ] {
+        let (is, text) = page.change(line, body);
+        assert_eq!(is, status, "{line}: {text}");
+        assert!(text.contains(words), "{line}: {text}");
+    }
+    assert_eq!(page.ask("PUT /fault/1/leak", "", "1").0, 401);
+    simulation.pass(3);
+    assert!(
+        simulation.faults.try_recv().is_err(),
+        "nothing of it was done"
+    );
 }
 
 #[test]

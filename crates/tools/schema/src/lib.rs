@@ -178,7 +178,9 @@ fn fault_rule(kind: &FaultKind) -> Value {
     for key in kind.required {
         properties.insert(key.name.to_owned(), shape::of(&key.shape));
     }
-    let required: Vec<&str> = kind.required.iter().map(|key| key.name).collect();
+    let name = kind.needs_name.then_some("name");
+    let required = kind.required.iter().map(|key| key.name);
+    let required: Vec<&str> = required.chain(name).collect();
     json!({
         "if": { "properties": { "kind": { "const": kind.name } }, "required": ["kind"] },
         "then": { "properties": properties, "required": required },

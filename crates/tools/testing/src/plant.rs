@@ -3,7 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Mistakes, Table, Value};
+use tickbus_driver::Driver;
 use tickbus_driver_cfg::Config;
 use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Unpacked};
 use tickbus_image::signal::{SignalTable, Slot};
@@ -27,10 +29,46 @@ impl Plant {
         self.options.isolated
     }
 
-    /// Starts a run of the FMU; sets `slots` to the initial sensor values.
-    pub(super) fn start(&self, table: &SignalTable, slots: &mut [Slot]) -> Result<Machine, String> {
+    /// The names of the FMU's faults.
+    pub(super) fn fault_names(&self) -> Vec<String> {
+        self.fmu.model.fault_names()
+    }
+
+    /// The faults of the FMU that are on or off, and that no signal sets.
+    pub(super) fn switches(&self) -> Vec<String> {
+        self.fmu.model.fault_switches(&self.join)
+    }
+
+    /// Starts a run of the FMU, with its faults in the driver; sets `slots` to the initial sensor values.
+    pub(super) fn start(
+        &self,
+        table: &SignalTable,
+        driver: &mut Driver,
+        slots: &mut [Slot],
+    ) -> Result<Machine, String> {
+        let declared = driver.declare_model_faults(self.fmu.model.fault_names());
+        declared.map_err(|mistake| mistake.to_string())?;
         let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
         machine.map_err(|failure| failure.to_string())
+    }
+}
+
+/// Checks a fault of the kind "model" of a machine.
+///
+/// # Errors
+///
+/// The machine has no such fault.
+pub(super) fn check_model_fault(
+    plant: Option<&Plant>,
+    name: &str,
+    value: f64,
+) -> Result<(), Mistake> {
+    match plant {
+        Some(plant) => plant.fmu.model.check_fault(name, value),
+        None => Err(Mistake::new(
+            "this machine has no faults of its own",
+            "name an FMU that has them, or let a rule of the machine do what the fault does",
+        )),
     }
 }
 

@@ -74,14 +74,15 @@ impl Suite {
         let playback = bench.tape.as_ref().map(|tape| Playback::start(tape, table));
         let playback = playback.transpose()?;
         // A stepped bus uses only simulation time.
-        let driver = Driver::open(config, Manual::new())?;
+        let mut driver = Driver::open(config, Manual::new())?;
         let mut slots = driver.initial_slots();
         for (signal, value) in bench.initial.iter().chain(initial) {
             slots[*signal] = *value;
         }
         let signals = &bench.config.table.signals;
         let fmu = bench.fmu.as_ref();
-        let started = fmu.map(|fmu| fmu.start(table, &mut slots)).transpose();
+        let started = fmu.map(|fmu| fmu.start(table, &mut driver, &mut slots));
+        let started = started.transpose();
         let watch = |(signal, slot): (&Signal, &Slot)| Watch::new(*slot, signal);
         let watches: Vec<Watch> = signals.iter().zip(&slots).map(watch).collect();
         let mut stand = Stand {
@@ -319,6 +320,11 @@ impl Stand<'_> {
         let done = self.driver.exchange(now, &mut self.slots);
         if let Some(observer) = &mut self.observer {
             observer.after(&mut self.slots);
+        }
+        if let Some(fmu) = &mut self.fmu
+            && let Err(why) = fmu.take_faults(&mut self.driver)
+        {
+            return Err(self.broken(place, &why.to_string()).into());
         }
         self.ticks += 1;
         if done.code == Code::BusFailed {

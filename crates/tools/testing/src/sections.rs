@@ -6,12 +6,12 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Mistakes, Table, Value, shown};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
-use tickbus_fieldbus::faults::{self, Fault, unknown};
+use tickbus_fieldbus::faults::{self, Effect, Fault, unknown};
 use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::condition::{Condition, Demand};
-use super::plant::{FmuKeys, Plant};
+use super::plant::{FmuKeys, Plant, check_model_fault};
 use super::playback::MachineRecording;
 use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition, Unswallowed};
 use super::unswallowed;
@@ -39,6 +39,8 @@ pub(super) struct Reader<'a> {
     pub(super) step: Nanos,
     pub(super) folder: &'a Path,
     pub(super) config: &'a Config,
+    /// The FMU that is the machine, once it is read.
+    pub(super) plant: Option<&'a Plant>,
 }
 
 /// The machine in a test file.
@@ -424,6 +426,10 @@ impl Reader<'_> {
             let section = value.table("fault", RIGHT)?;
             // The mistakes of an unreadable section were reported.
             let fault = faults::read_sections(vec![section], Some(self.table.into())).pop()?;
+            if let Effect::Model(number) = fault.effect {
+                let checked = check_model_fault(self.plant, &fault.name, number);
+                checked.map_err(|mistake| value.refuse(mistake)).ok()?;
+            }
             Some((fault, value.place()))
         };
         let read: Vec<_> = values.into_iter().map(fault).collect();

@@ -133,6 +133,7 @@ fn read(
         step,
         folder,
         config: &config,
+        plant: None,
     };
     let mut machine = match machine {
         None => Machine::default(),
@@ -141,6 +142,10 @@ fn read(
     if let Some(mistakes) = machine.elsewhere.take() {
         *of_config = Some(mistakes);
     }
+    let reader = Reader {
+        plant: machine.fmu.as_ref(),
+        ..reader
+    };
     let tables = tests.map(|value| value.tables("[[test]]"));
     let tables = tables.unwrap_or_default();
     check_twins(&tables);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::faults::{FaultBoard, Slots, TickTime};
+use tickbus_fieldbus::faults::{Effect, FaultBoard, Slots, TickTime};
 use tickbus_fieldbus::is_stale;
 use tickbus_image::TickEnd;
 use tickbus_image::signal::{Plan, Slot};
@@ -54,7 +54,7 @@ impl OwnEnd {
     ///
     /// # Errors
     ///
-    /// There are more faults than an end can have.
+    /// There are more faults than an end can have, or one of a machine's model.
     pub(super) fn new(
         config: Arc<Config>,
         board: &Arc<FaultBoard>,
@@ -67,6 +67,12 @@ impl OwnEnd {
         extras.make_room(board);
         let map = SlotMap::new(table, config.role);
         for fault in &config.faults {
+            if let Effect::Model(_) = fault.effect {
+                return Err(Mistake::new(
+                    format!("the fault \"{}\" is one of the machine's model", fault.name),
+                    "inject it at the machine's end: a PLC program has no such faults",
+                ));
+            }
             let slots = Slots {
                 table,
                 writes,

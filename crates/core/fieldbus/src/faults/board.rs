@@ -1,12 +1,15 @@
 //! The board by which the tick, the bus and other threads share the state of faults.
 
+use std::collections::HashSet;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::cell::Cell;
+use super::models::undeclared;
 use super::{FaultStatus, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
+use tickbus_base::toml_text::shown;
 
 /// The state of a driver's faults, shared by the tick, the bus and other threads.
 #[derive(Debug, Default)]
@@ -20,6 +23,8 @@ pub struct FaultBoard {
     base: AtomicU32,
     /// Line faults on their way to the bus.
     mailbox: Mutex<Vec<LineFault>>,
+    /// The faults that the simulation's model has declared.
+    declared: Mutex<Arc<[String]>>,
     /// The number of beginnings of faults that are no longer on the list.
     forgotten: AtomicU64,
     pub(super) dropped: AtomicU64,
@@ -94,14 +99,69 @@ impl FaultBoard {
     /// Logs the faults that have begun or ended since the last call.
     pub fn tell(&self, driver: &str) {
         // The messages are logged after the lock is released, so that no thread waits for a slow reader of the log.
-        let news: Vec<String> = self
-            .cells()
-            .iter()
-            .filter_map(|cell| cell.news(driver))
-            .collect();
+        let cells = self.cells();
+        let news = cells.iter().filter_map(|cell| {
+            let news = cell.news(driver)?;
+            let unknown = cell
+                .is_of_model()
+                .then(|| self.check_model_fault(cell.name()));
+            Some(match unknown {
+                Some(Err(unknown)) => format!("{news}, which changes nothing: {unknown}"),
+                _ => news,
+            })
+        });
+        let news: Vec<String> = news.collect();
+        drop(cells);
         for line in news {
             log::warn!("{line}");
         }
+    }
+
+    /// The faults that the simulation's model has declared, in its order.
+    pub fn model_faults(&self) -> Arc<[String]> {
+        Arc::clone(&self.declared())
+    }
+
+    /// Checks the name of a fault of the simulation's model.
+    ///
+    /// # Errors
+    ///
+    /// The model has not declared it; with the nearest name.
+    pub fn check_model_fault(&self, name: &str) -> Result<(), Mistake> {
+        let declared = self.model_faults();
+        if declared.iter().any(|known| known == name) {
+            return Ok(());
+        }
+        Err(undeclared(name, &declared))
+    }
+
+    /// Takes the names of the faults that the simulation's model can have.
+    ///
+    /// # Errors
+    ///
+    /// A name is not usable or there twice, or a fault that is not over has another name. Then the names are not taken.
+    pub(super) fn declare(&self, names: Vec<String>) -> Result<Arc<[String]>, Mistake> {
+        let mut seen = HashSet::new();
+        for name in &names {
+            let is_usable = !name.is_empty() && !name.chars().any(char::is_control);
+            if !is_usable || !seen.insert(name) {
+                return Err(Mistake::new(
+                    format!("a fault of the model cannot be called \"{}\"", shown(name)),
+                    "give each a name of its own, without control characters",
+                ));
+            }
+        }
+        let is_unknown = |cell: &&Arc<Cell>| {
+            cell.is_of_model()
+                && cell.phase() != Phase::Over
+                && !names.iter().any(|name| name == cell.name())
+        };
+        if let Some(unknown) = self.cells().iter().find(is_unknown) {
+            return Err(undeclared(unknown.name(), &names));
+        }
+        let names: Arc<[String]> = names.into();
+        *self.declared() = Arc::clone(&names);
+        Ok(names)
     }
 
     /// All faults in order of injection; faults that ended long ago may be missing.
@@ -143,6 +203,10 @@ impl FaultBoard {
         self.cells.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    fn declared(&self) -> MutexGuard<'_, Arc<[String]>> {
+        self.declared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn mailbox(&self) -> MutexGuard<'_, Vec<LineFault>> {
         self.mailbox.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -177,5 +241,33 @@ mod tests {
         }
         let told = logged::times("injected fault \"again\"");
         assert_eq!(told, 20 + 9, "twenty, and the powers of two up to 8192");
+    }
+
+    #[test]
+    fn a_fault_that_no_model_has_declared_is_logged_as_one_that_changes_nothing() {
+        let _logged = logged::Watch::over("tickbus_fieldbus");
+        let told = "it leaks, which changes nothing: the model has no fault \"unknown leak\"; let the simulation declare";
+        let ends = "injected fault \"unknown leak\" (model) ends";
+        logged::expect(told);
+        logged::expect(ends);
+        let board = FaultBoard::default();
+        let make = |id, _| {
+            let (name, what) = ("unknown leak".to_owned(), "it leaks".to_owned());
+            (Arc::new(Cell::new(id, name, "model", what)), None)
+        };
+        let (cell, _) = board.enlist(make).expect("room");
+        board.enter(&cell, Phase::Active, TickTime::default());
+        board.tell("d");
+        assert_eq!(logged::times(told), 1);
+        let refused = board.declare(vec!["known leak".to_owned()]);
+        assert_eq!(
+            refused.expect_err("another one waits").to_string(),
+            "the model has no fault \"unknown leak\"; did you mean \"known leak\"?"
+        );
+        let declared = board.declare(vec!["unknown leak".to_owned()]);
+        declared.expect("the name that waits");
+        board.enter(&cell, Phase::Over, TickTime::default());
+        board.tell("d");
+        assert_eq!((logged::times(told), logged::times(ends)), (1, 1));
     }
 }

@@ -4,6 +4,7 @@ use std::fmt::{self, Write as _};
 use std::sync::atomic::{AtomicI64, AtomicU8, AtomicU64, Ordering};
 
 use super::TickTime;
+use super::fault::MODEL;
 use tickbus_base::os::{is_rarely_logged, is_told};
 use tickbus_base::time::Nanos;
 
@@ -100,6 +101,16 @@ impl Cell {
 
     pub(super) fn phase(&self) -> Phase {
         Phase::ALL[usize::from(self.phase.load(Ordering::Acquire)) % Phase::ALL.len()]
+    }
+
+    /// The fault's name.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Returns true if the simulation's model has the fault.
+    pub(super) fn is_of_model(&self) -> bool {
+        self.kind == MODEL
     }
 
     /// The fault's number.

@@ -7,10 +7,13 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
+/// The kind of a fault that the simulation's model has, as a driver.cfg names it.
+pub(super) const MODEL: &str = "model";
+
 /// One fault, as a `[[fault]]` section describes it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
-    /// The fault's name, for messages.
+    /// The fault's name, for messages; of a fault of the model, the name by which the model knows it.
     pub name: String,
     /// The fault's effect.
     pub effect: Effect,
@@ -31,6 +34,8 @@ pub enum Effect {
     Signal(usize, SignalEffect),
     /// The fault disturbs the line.
     Line(LineEffect),
+    /// The simulation's model has the fault of this name, with this value.
+    Model(f64),
 }
 
 /// How the value of a signal is changed.
@@ -132,6 +137,7 @@ impl Fault {
             Effect::Line(LineEffect::LinkDown) => "link-down",
             Effect::Line(LineEffect::StationDown(_)) => "station-down",
             Effect::Line(LineEffect::Diagnosis(_)) => "diagnosis",
+            Effect::Model(_) => MODEL,
         }
     }
 
@@ -143,6 +149,9 @@ impl Fault {
                 format!("\"{}\" {}", signal.name, changed(change, signal))
             }
             Effect::Line(trouble) => troubled(trouble, table),
+            Effect::Model(value) => {
+                format!("\"{}\" of the model is {}", self.name, short_number(value))
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::cell::Cell;
+use super::models::Models;
 use super::random::Random;
 use super::schedule::{Schedule, Step};
 use super::signal_fault::SignalFault;
@@ -30,6 +31,8 @@ pub struct Faults {
     entries: Vec<Entry>,
     /// True if at least one fault of a value is active since the tick began.
     change_values: bool,
+    /// The declared faults of the simulation's model.
+    models: Models,
     board: Arc<FaultBoard>,
     /// How long the simulation has run, and its time at the last tick.
     time: Nanos,
@@ -75,6 +78,10 @@ impl Prepared {
                     None
                 }
                 Effect::Line(trouble) => Some(LineFault::new(trouble, Arc::clone(&cell), random)),
+                Effect::Model(value) => {
+                    kind = Kind::Model(None, value);
+                    None
+                }
             };
             (cell, line)
         })?;
@@ -118,11 +125,20 @@ enum Kind {
     Read(SignalFault),
     /// Takes effect in the bus, which reads the board.
     Line,
+    /// Takes effect in the simulation's model: the place among the declared faults, if it is one of them, and the value.
+    Model(Option<usize>, f64),
 }
 
 impl Entry {
     fn changes_values(&self) -> bool {
-        self.schedule.is_active() && !matches!(self.kind, Kind::Line)
+        self.schedule.is_active() && matches!(self.kind, Kind::Written(_) | Kind::Read(_))
+    }
+
+    /// Finds the fault among those that the model has declared.
+    fn join(&mut self, models: &Models) {
+        if let Kind::Model(place, _) = &mut self.kind {
+            *place = models.position(self.cell.name());
+        }
     }
 }
 
@@ -133,6 +149,7 @@ impl Faults {
             // Forgotten faults may leave the list a little later than new ones join it.
             entries: Vec::with_capacity(2 * LIMIT),
             change_values: false,
+            models: Models::default(),
             board,
             given: Nanos::ZERO,
             time: Nanos::ZERO,
@@ -153,8 +170,9 @@ impl Faults {
 
     /// Adds a prepared fault, which can begin at the next tick. Returns the fault that this one replaces, if any.
     /// Neither allocates nor frees memory.
-    pub fn adopt(&mut self, prepared: Prepared) -> Option<Retired> {
+    pub fn adopt(&mut self, mut prepared: Prepared) -> Option<Retired> {
         let forgotten = prepared.forgotten;
+        prepared.entry.join(&self.models);
         let place = self
             .entries
             .iter()
@@ -162,6 +180,37 @@ impl Faults {
         let retired = place.map(|place| Retired(self.entries.remove(place)));
         self.entries.push(prepared.entry);
         retired
+    }
+
+    /// Takes the names of the faults that the simulation's model can have, in place of earlier ones. The model is told
+    /// by [`next_model_change`](Self::next_model_change) which of them are on.
+    ///
+    /// # Errors
+    ///
+    /// A name is not usable or there twice, or a fault that is not over has another name. Then the names are not taken.
+    pub fn declare(&mut self, names: Vec<String>) -> Result<(), Mistake> {
+        self.models = Models::new(self.board.declare(names)?);
+        for entry in &mut self.entries {
+            entry.join(&self.models);
+        }
+        self.note_models();
+        Ok(())
+    }
+
+    /// The next fault of the model that has begun, ended or changed its value since the model was last told: its place
+    /// among the declared names, and its value; `None` for a fault that is off.
+    #[inline]
+    pub fn next_model_change(&mut self) -> Option<(usize, Option<f64>)> {
+        self.models.next_change()
+    }
+
+    /// Notes which faults of the model are on.
+    fn note_models(&mut self) {
+        let active = self.entries.iter().filter_map(|entry| match entry.kind {
+            Kind::Model(Some(place), value) if entry.schedule.is_active() => Some((place, value)),
+            _ => None,
+        });
+        self.models.set(active);
     }
 
     /// Returns true if all faults are over.
@@ -196,6 +245,7 @@ impl Faults {
             }
         }
         self.change_values = false;
+        self.note_models();
         self.board.restart();
         (self.time, self.given) = (Nanos::ZERO, Nanos::ZERO);
     }
@@ -220,6 +270,7 @@ impl Faults {
                 }
             }
         }
+        let mut is_model_news = false;
         for entry in &mut self.entries {
             let step = entry.schedule.step(moment, slots);
             self.change_values |= entry.changes_values();
@@ -234,7 +285,11 @@ impl Faults {
             {
                 fault.begin(slots);
             }
+            is_model_news |= matches!(entry.kind, Kind::Model(..));
             self.board.enter(&entry.cell, phase, moment);
+        }
+        if is_model_news {
+            self.note_models();
         }
     }
 

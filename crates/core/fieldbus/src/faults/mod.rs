@@ -14,6 +14,7 @@ mod line_fault;
 mod line_faults;
 mod list;
 mod measure;
+mod models;
 mod random;
 mod ring;
 mod schedule;
@@ -30,8 +31,8 @@ pub use line_fault::LineFault;
 pub use line_faults::{Fate, LineFaults, Shape, Taken};
 pub use list::{Faults, Prepared, Retired, Slots};
 pub use section::{
-    FAULT_KEYS, FAULT_KINDS, FaultKind, LIMIT, RequiredKey, Scope, read_file, read_one,
-    read_sections,
+    FAULT_KEYS, FAULT_KINDS, FaultKind, LIMIT, RequiredKey, Scope, model_value, read_file,
+    read_one, read_sections,
 };
 pub use tick_time::TickTime;
 

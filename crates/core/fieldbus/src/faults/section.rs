@@ -3,6 +3,7 @@
 mod effect;
 mod keys;
 
+pub use self::effect::model_value;
 use self::effect::read_effect;
 pub use self::keys::{FAULT_KEYS, FAULT_KINDS, FaultKind, RequiredKey};
 use super::{Begin, Condition, Effect, Fault, Lasts};
@@ -31,6 +32,10 @@ impl<'a> From<&'a SignalTable> for Scope<'a> {
         }
     }
 }
+
+/// The remedy for a fault of the model without a name.
+const NAME_OF_MODEL: &str =
+    "name the fault as the model calls it, such as name = \"hose of clamp left\"";
 
 const KIND: &str = "write the kind of fault, such as kind = \"stuck\"";
 
@@ -104,6 +109,8 @@ pub fn read_sections(sections: Vec<Table<'_>>, scope: Option<Scope<'_>>) -> Vec<
         };
         let twin = faults.iter().any(|other| other.name == fault.name);
         match (twin, name) {
+            // The model knows one fault by that name, which may come twice.
+            (true, Some(_)) if matches!(fault.effect, Effect::Model(_)) => faults.push(fault),
             (true, Some(name)) => name.wrong(
                 format!("there is a fault \"{}\" already", shown(&fault.name)),
                 "give each a name of its own",
@@ -203,6 +210,9 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
         for key in kind.required {
             section.require(key.name, key.right);
         }
+        if kind.needs_name {
+            section.require("name", NAME_OF_MODEL);
+        }
     }
     let whole = section.is_whole();
     section.finish();
@@ -248,7 +258,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
         (None, Effect::Signal(index, _)) => {
             format!("{} {}", fault.kind(), table?.signals[index].name)
         }
-        (None, Effect::Line(_)) => fault.kind().to_owned(),
+        (None, Effect::Line(_) | Effect::Model(_)) => fault.kind().to_owned(),
     };
     Some(fault)
 }

@@ -59,6 +59,8 @@ pub struct ForeignVariable {
     pub type_name: String,
     /// The variable's role for the importing tool.
     pub causality: Causality,
+    /// True if the tool can set the variable while the FMU runs: an input, or a tunable parameter.
+    pub is_changeable: bool,
     /// The unit, if the variable names one.
     pub unit: Option<String>,
     /// The variable's other names.
@@ -261,6 +263,11 @@ fn common(
             Some("output") => Causality::Output,
             Some("parameter" | "structuralParameter") => Causality::Parameter,
             _ => Causality::Local,
+        },
+        is_changeable: match node.attribute("causality") {
+            Some("input") => true,
+            Some("parameter") => node.attribute("variability") == Some("tunable"),
+            _ => false,
         },
         unit: unit.map(str::to_owned),
         aliases: node

@@ -59,6 +59,13 @@ pub fn serve() -> io::Result<()> {
                 },
                 Err(failure) => Answer::Failed(failure),
             },
+            Some(Request::Change { variable, value }) => match slave.change(variable, value) {
+                Ok(before) => Answer::Outputs {
+                    outputs: vec![before],
+                    stepped: Stepped::Done,
+                },
+                Err(failure) => Answer::Failed(failure),
+            },
             Some(Request::End) => match slave.end() {
                 Ok(()) => Answer::Ended,
                 Err(failure) => Answer::Failed(failure),

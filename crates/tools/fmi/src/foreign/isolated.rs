@@ -10,7 +10,7 @@ use tickbus_net::{Inbox, Message as _};
 use super::helper::next;
 use super::slave::{Failure, Setup, Slave, Stepped};
 use super::talk::{Answer, Request};
-use crate::value::Value;
+use crate::value::{Value, ValueType};
 
 /// The longest time that an FMU can take to begin, or for a step.
 const PATIENCE: Nanos = Nanos::from_secs(60);
@@ -157,6 +157,13 @@ impl Slave for Isolated {
             &format!("the step of {length} s at {from} s"),
             outputs,
         )
+    }
+
+    fn change(&mut self, variable: (ValueType, u32), value: Value) -> Result<Value, Failure> {
+        let mut before = [value];
+        let request = Request::Change { variable, value };
+        self.ask(&request, "setting a variable", &mut before)?;
+        Ok(before[0])
     }
 
     fn end(&mut self) -> Result<(), Failure> {

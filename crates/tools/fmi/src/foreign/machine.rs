@@ -2,9 +2,11 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_binding::SlotKind;
+use tickbus_driver::Driver;
 use tickbus_image::signal::{DataType, SignalTable, Slot};
 
 use super::archive::Unpacked;
+use super::faults::Changeable;
 use super::join::Join;
 use super::map::Joined;
 use super::slave::{Direct, Failure, Setup, Slave, Stepped};
@@ -78,6 +80,8 @@ pub struct Machine {
     outputs: Vec<Way>,
     sent: Vec<Value>,
     got: Vec<Value>,
+    /// The variables that a fault can change, in the order of [`Model::fault_names`](super::Model::fault_names).
+    changeable: Vec<Changeable>,
 }
 
 impl Machine {
@@ -133,6 +137,7 @@ impl Machine {
             outputs,
             sent,
             got,
+            changeable: Changeable::all(model, join),
         };
         machine.show(slots);
         Ok(machine)
@@ -153,12 +158,31 @@ impl Machine {
         for (value, way) in self.sent.iter_mut().zip(&self.inputs) {
             *value = way.variable(slots);
         }
+        for fault in &self.changeable {
+            fault.apply_to(&mut self.sent);
+        }
         let from = self.start + seconds(from);
         let stepped = self
             .slave
             .step(&self.sent, from, seconds(length), &mut self.got)?;
         self.show(slots);
         Ok(stepped)
+    }
+
+    /// Takes the faults of the model that have begun or ended in a driver which has declared the names of
+    /// [`Model::fault_names`](super::Model::fault_names). From the next step on a variable has the value of its fault,
+    /// and after the fault the value that it had before.
+    ///
+    /// # Errors
+    ///
+    /// Returns why the FMU does not continue.
+    pub fn take_faults(&mut self, driver: &mut Driver) -> Result<(), Failure> {
+        while let Some((place, value)) = driver.next_model_change() {
+            if let Some(variable) = self.changeable.get_mut(place) {
+                variable.set(value, &mut *self.slave)?;
+            }
+        }
+        Ok(())
     }
 
     fn show(&mut self, slots: &mut [Slot]) {

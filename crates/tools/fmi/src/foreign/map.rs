@@ -171,7 +171,7 @@ fn refused_element(name: &str, value: &TomlValue<'_>, model: &Model) -> bool {
 
 /// Returns true if a type can represent this number; a floating point type takes its nearest value.
 #[expect(clippy::float_cmp, reason = "exactly as written")]
-fn holds(kind: ValueType, number: f64) -> bool {
+pub(super) fn holds(kind: ValueType, number: f64) -> bool {
     fn nearest<T: Number>(number: f64) -> f64 {
         T::from_real(number).value().real()
     }

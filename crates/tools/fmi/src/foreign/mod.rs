@@ -2,6 +2,7 @@
 
 mod archive;
 mod description;
+mod faults;
 mod helper;
 mod isolated;
 mod join;

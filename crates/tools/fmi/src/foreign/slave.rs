@@ -67,6 +67,13 @@ pub(super) trait Slave: std::fmt::Debug {
         outputs: &mut [Value],
     ) -> Result<Stepped, Failure>;
 
+    /// Sets a variable between two steps, and returns the value that it had.
+    ///
+    /// # Errors
+    ///
+    /// The FMU does not continue.
+    fn change(&mut self, variable: (ValueType, u32), value: Value) -> Result<Value, Failure>;
+
     /// Ends the run properly.
     ///
     /// # Errors
@@ -234,6 +241,19 @@ impl Slave for Direct {
         } else {
             Stepped::Done
         })
+    }
+
+    fn change(
+        &mut self,
+        (kind, reference): (ValueType, u32),
+        value: Value,
+    ) -> Result<Value, Failure> {
+        let mut before = [value];
+        let status = self.instance.get(kind, &[reference], &mut before);
+        self.check(status, "reading a variable before its fault")?;
+        let status = self.instance.set(kind, &[reference], &[value]);
+        self.check(status, "setting a variable for its fault")?;
+        Ok(before[0])
     }
 
     fn end(&mut self) -> Result<(), Failure> {

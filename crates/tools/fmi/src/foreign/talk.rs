@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use tickbus_net::Message;
 
 use super::slave::{Failure, Setup, Stepped};
-use crate::value::Value;
+use crate::value::{Value, ValueType};
 
 /// The most bytes of a message: enough for a hundred thousand variables and their names.
 const MOST: usize = 64 << 20;
@@ -23,6 +23,11 @@ pub(super) enum Request {
         from: f64,
         length: f64,
     },
+    /// Set a variable, and answer with the value that it had.
+    Change {
+        variable: (ValueType, u32),
+        value: Value,
+    },
     /// End the run.
     End,
 }
@@ -30,7 +35,7 @@ pub(super) enum Request {
 /// A message from the helper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Answer {
-    /// The run has begun, or the step is done; carries the outputs.
+    /// The run has begun, or the step is done; carries the outputs. Or a variable is set; carries its former value.
     Outputs {
         outputs: Vec<Value>,
         stepped: Stepped,

@@ -35,11 +35,14 @@ pub(super) enum Kind {
     Frozen,
     LineDown(Nanos),
     StationDown(Nanos),
+    /// A fault of the machine's model with this value: the one with this place among those in the file, or each that is
+    /// on or off.
+    Model(Option<usize>, f64),
 }
 
 impl Kind {
     /// All kinds with their usual numbers, in the order of the matrices.
-    pub(super) const USUAL: [(&'static str, Self); 8] = [
+    pub(super) const USUAL: [(&'static str, Self); 9] = [
         ("stuck-on", Self::StuckOn),
         ("stuck-off", Self::StuckOff),
         ("inverted", Self::Inverted),
@@ -48,6 +51,7 @@ impl Kind {
         ("frozen", Self::Frozen),
         ("line-down", Self::LineDown(GONE)),
         ("station-down", Self::StationDown(GONE)),
+        ("model", Self::Model(None, 1.0)),
     ];
 
     /// The kind's name in the file.
@@ -74,7 +78,12 @@ impl Kind {
                     short_number(amplitude)
                 )
             }
-            Self::StuckOn | Self::StuckOff | Self::Inverted | Self::Frozen => name.to_owned(),
+            Self::StuckOn
+            | Self::StuckOff
+            | Self::Inverted
+            | Self::Frozen
+            | Self::Model(Some(_), 1.0) => name.to_owned(),
+            Self::Model(_, value) => format!("{name} {}", short_number(value)),
         }
     }
 
@@ -127,16 +136,32 @@ impl Kind {
         }
     }
 
-    fn fault(self, effect: Effect, lasts: Lasts) -> Disturbance {
-        Disturbance::Fault(Box::new(Fault {
-            name: self.label(),
-            effect,
-            begin: Begin::AtOnce,
-            lasts,
-            times: 1,
-            seed: 1,
-        }))
+    /// This kind of fault of the machine's model, by its name; `None` if models have no such fault.
+    pub(super) fn of_model(self, name: &str) -> Option<Disturbance> {
+        match self {
+            Self::Model(_, value) => Some(fault(
+                name.to_owned(),
+                Effect::Model(value),
+                Lasts::UntilEnded,
+            )),
+            _ => None,
+        }
     }
+
+    fn fault(self, effect: Effect, lasts: Lasts) -> Disturbance {
+        fault(self.label(), effect, lasts)
+    }
+}
+
+fn fault(name: String, effect: Effect, lasts: Lasts) -> Disturbance {
+    Disturbance::Fault(Box::new(Fault {
+        name,
+        effect,
+        begin: Begin::AtOnce,
+        lasts,
+        times: 1,
+        seed: 1,
+    }))
 }
 
 #[cfg(test)]
@@ -153,6 +178,9 @@ mod tests {
             (Kind::Noise(CHANCE, Some(2.5)), "noise 2.5"),
             (Kind::Noise(0.2, Some(2.5)), "noise 0.2 2.5"),
             (Kind::LineDown(Nanos::from_secs(2)), "line-down 2s"),
+            (Kind::Model(None, 1.0), "model"),
+            (Kind::Model(Some(0), 1.0), "model"),
+            (Kind::Model(Some(0), 0.4), "model 0.4"),
         ] {
             assert_eq!(kind.label(), label);
         }

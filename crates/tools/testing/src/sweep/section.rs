@@ -2,13 +2,14 @@
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::faults::unknown;
+use tickbus_fieldbus::faults::{model_value, unknown};
 use tickbus_image::signal::{DataType, Slot};
 
 use super::disturbance::Kind;
 use super::named::Named;
 use super::progress::Mark;
 use super::{Moments, Row, Sweep};
+use crate::plant::{Plant, check_model_fault};
 use crate::sections::Reader;
 use crate::test::{Step, Test, TextPosition};
 
@@ -60,7 +61,7 @@ impl Reader<'_> {
         };
         let kinds = match kinds {
             None => Some(None),
-            Some(value) => read_kinds(&value).map(Some),
+            Some(value) => self.kinds(&value).map(Some),
         };
         let rows = kinds.and_then(|kinds| self.rows(&signals?, kinds));
         let pairs = pairs.map_or(Some(false), |value| value.boolean());
@@ -134,6 +135,20 @@ impl Reader<'_> {
         Some((Vec::new(), steps))
     }
 
+    /// The kinds of faults, each with its place.
+    fn kinds<'v>(&self, value: &Value<'v>) -> Option<Vec<(Value<'v>, Kind)>> {
+        const RIGHT: &str = "write a list of kinds, such as [\"stuck-on\", \"stuck-off\"]";
+        let values = value.list(RIGHT)?;
+        if values.is_empty() {
+            value.wrong("without a kind there is no fault", RIGHT);
+        }
+        let read: Vec<Option<_>> = values
+            .into_iter()
+            .map(|value| kind(&value, self.plant).map(|kind| (value, kind)))
+            .collect();
+        read.into_iter().collect()
+    }
+
     /// The faults of all kinds: of those in the file, or of all that fit.
     fn rows(&self, signals: &[usize], kinds: Option<Vec<(Value<'_>, Kind)>>) -> Option<Vec<Row>> {
         let Some(kinds) = kinds else {
@@ -144,7 +159,8 @@ impl Reader<'_> {
         for (value, kind) in kinds {
             let of_kind = self.rows_of(kind, signals);
             let label = kind.label();
-            if rows.iter().any(|row| row.kind == label) {
+            let is_there = |new: &Row| rows.iter().any(|row| row.name() == new.name());
+            if of_kind.iter().any(is_there) {
                 value.wrong(
                     format!("the kind \"{label}\" is there already"),
                     "remove it",
@@ -155,6 +171,12 @@ impl Reader<'_> {
                 let right = match kind {
                     Kind::StationDown(_) => "this driver has one station: write \"line-down\"",
                     Kind::Noise(_, None) => "numbers need a strength: add amplitude = 2.5",
+                    Kind::Model(..) if self.plant.is_none() => {
+                        "the machine has no faults of its own: remove it, or name an FMU that has some"
+                    }
+                    Kind::Model(..) => {
+                        "name each: { kind = \"model\", name = \"leak\", value = 0.4 }"
+                    }
                     _ => "remove it, or name other signals",
                 };
                 value.wrong(
@@ -182,6 +204,8 @@ impl Reader<'_> {
         });
         let mut rows: Vec<Row> = of_signals.collect();
         rows.extend(kind.of_line().map(|disturbance| row("", disturbance)));
+        let of_model = |name: &String| Some(row(name, kind.of_model(name)?));
+        rows.extend(self.model_faults(kind).iter().filter_map(of_model));
         if self.table.stations.len() > 1 {
             for (index, station) in self.table.stations.iter().enumerate() {
                 rows.extend(
@@ -191,6 +215,17 @@ impl Reader<'_> {
             }
         }
         rows
+    }
+
+    /// The faults of the machine's model that a kind means: one of them, or each that is on or off.
+    fn model_faults(&self, kind: Kind) -> Vec<String> {
+        match (self.plant, kind) {
+            (Some(plant), Kind::Model(None, _)) => plant.switches(),
+            (Some(plant), Kind::Model(Some(place), _)) => {
+                vec![plant.fault_names().swap_remove(place)]
+            }
+            _ => Vec::new(),
+        }
     }
 
     fn moments(&self, value: &Value<'_>) -> Option<Vec<Moments>> {
@@ -339,22 +374,8 @@ fn once(value: &Value<'_>, names: Vec<usize>) -> Vec<usize> {
     signals
 }
 
-/// The kinds of faults, each with its place.
-fn read_kinds<'a>(value: &Value<'a>) -> Option<Vec<(Value<'a>, Kind)>> {
-    const RIGHT: &str = "write a list of kinds, such as [\"stuck-on\", \"stuck-off\"]";
-    let values = value.list(RIGHT)?;
-    if values.is_empty() {
-        value.wrong("without a kind there is no fault", RIGHT);
-    }
-    let read: Vec<Option<_>> = values
-        .into_iter()
-        .map(|value| kind(&value).map(|kind| (value, kind)))
-        .collect();
-    read.into_iter().collect()
-}
-
 /// A kind of fault: its name, or a table with its numbers.
-fn kind(value: &Value<'_>) -> Option<Kind> {
+fn kind(value: &Value<'_>, plant: Option<&Plant>) -> Option<Kind> {
     if !value.is_table() {
         value.text(KIND)?;
         return value.choice("kinds", &Kind::USUAL);
@@ -388,10 +409,32 @@ fn kind(value: &Value<'_>) -> Option<Kind> {
             let (given, amplitude) = (table.take("chance"), table.take("amplitude"));
             noise(chance, given, amplitude)
         }
+        Kind::Model(..) => {
+            let (name, value) = (table.take("name"), table.take("value"));
+            model(name, value, plant)
+        }
         plain => Some(plain),
     };
     table.finish();
     read
+}
+
+/// A fault of the machine's model, by its name; without a name each that is on or off.
+fn model(name: Option<Value<'_>>, value: Option<Value<'_>>, plant: Option<&Plant>) -> Option<Kind> {
+    let number = model_value(value.as_ref())?;
+    let Some(place) = name else {
+        if let Some(value) = value {
+            let right = "add its name, or remove the value: without a name all are on or off";
+            value.wrong("it is not said which fault has this value", right);
+        }
+        return Some(Kind::Model(None, 1.0));
+    };
+    let name = place.text("write the name of a fault of the machine")?;
+    let checked = check_model_fault(plant, name, number);
+    checked.map_err(|mistake| place.refuse(mistake)).ok()?;
+    let names = plant?.fault_names();
+    let found = names.iter().position(|known| known == name)?;
+    Some(Kind::Model(Some(found), number))
 }
 
 fn noise(usual: f64, chance: Option<Value<'_>>, amplitude: Option<Value<'_>>) -> Option<Kind> {

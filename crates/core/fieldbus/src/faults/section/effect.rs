@@ -4,6 +4,7 @@ use super::Keys;
 use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
+use crate::faults::fault::MODEL;
 use crate::faults::{
     ChannelError, Diagnosis, Direction, Effect, Finding, LineEffect, Octets, SignalEffect, measure,
 };
@@ -43,8 +44,18 @@ pub(super) fn read_effect(
                 station, table?, right,
             )?))
         }
+        MODEL => model_value(keys.value.as_ref()).map(Effect::Model),
         "diagnosis" => line(LineEffect::Diagnosis(read_diagnosis(keys, table?, whole)?)),
         _ => read_change(kind, keys, table, whole),
+    }
+}
+
+/// Reads the value of a fault of the model; 1 if none is stated. Reports a mistake.
+pub fn model_value(value: Option<&Value<'_>>) -> Option<f64> {
+    match value {
+        None => Some(1.0),
+        Some(value) if value.is_boolean() => value.boolean().map(|on| f64::from(u8::from(on))),
+        Some(value) => value.number("write a number, such as 0.4, or true"),
     }
 }
 

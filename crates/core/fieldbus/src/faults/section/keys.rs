@@ -5,6 +5,7 @@ use tickbus_image::signal::section::NAME_LIMIT;
 
 use super::super::Direction;
 use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
+use super::super::fault::MODEL;
 
 /// The keys of one kind of faults, beside those that all kinds have.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +16,8 @@ pub struct FaultKind {
     pub required: &'static [RequiredKey],
     /// The keys that it can have.
     pub optional: &'static [&'static str],
+    /// True if a fault of this kind needs a name: elsewhere a name is for messages only.
+    pub needs_name: bool,
 }
 
 /// A key that one kind of faults needs.
@@ -45,6 +48,7 @@ const fn kind(
         name,
         required,
         optional,
+        needs_name: false,
     }
 }
 
@@ -63,7 +67,7 @@ const BY_TIME: RequiredKey = key(
 );
 
 /// The kinds of faults.
-pub const FAULT_KINDS: [FaultKind; 11] = [
+pub const FAULT_KINDS: [FaultKind; 12] = [
     kind("stuck", &[OF_SIGNAL], &["value"]),
     kind("invert", &[OF_SIGNAL], &[]),
     kind(
@@ -98,6 +102,10 @@ pub const FAULT_KINDS: [FaultKind; 11] = [
         &[],
         &["station", "slot", "channel", "error", "octets", "static"],
     ),
+    FaultKind {
+        needs_name: true,
+        ..kind(MODEL, &[], &["value"])
+    },
 ];
 
 const KIND_NAMES: [&str; FAULT_KINDS.len()] = {
@@ -132,7 +140,7 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "name",
         Shape::Label(NAME_LIMIT),
-        "A name of its own; kind and signal by default",
+        "A name of its own; kind and signal by default; model: the name by which the model knows the fault",
     ),
     Key::new(
         "signal",
@@ -142,7 +150,8 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "value",
         Shape::Any(&[Shape::Number, Shape::Boolean, Shape::Text]),
-        "stuck: the value; where the signal is when the fault begins, without this key",
+        "stuck: the value; where the signal is when the fault begins, without this key; model: the fault's value, 1 without \
+         this key",
     ),
     Key::new(
         "by",

@@ -3,10 +3,12 @@ package DeviceDrivers;
 import controlinterface.ControlInterfaceDeviceDriver;
 import controlinterface.Direction;
 import controlinterface.HardwareComponent;
+import controlinterface.MachineFaultListener;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
+import tickbus.FaultHandler;
 import tickbus.FieldbusException;
 import tickbus.Signal;
 import tickbus.Tickbus;
@@ -27,6 +29,8 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
     private final List<HardwareComponent> components;
     private final Signal[] latched;
     private final double[] inputs;
+    /** Gets the faults of the machine; null for a machine without faults. */
+    private FaultHandler faults;
     private boolean timed;
     private long simulationNanos;
     /** True if this tick's inputs were delivered before the simulation's step. */
@@ -111,7 +115,21 @@ public final class FieldbusDriver extends ControlInterfaceDeviceDriver {
         deliver(status);
     }
 
+    /**
+     * {@inheritDoc}
+     *
+     * @throws FieldbusException if driver.cfg has a fault of the kind {@code model} with another name
+     */
+    @Override
+    public void connectFaults(List<String> names, MachineFaultListener listener) {
+        bus.declareFaults(names);
+        faults = listener::machineFault;
+    }
+
     private void deliver(int status) {
+        if (faults != null) {
+            bus.pollFaults(faults);
+        }
         int at = bus.getAll(inputs);
         for (Signal signal : latched) {
             inputs[at++] = signal.edges();

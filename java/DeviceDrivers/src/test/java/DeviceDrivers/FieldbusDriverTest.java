@@ -63,6 +63,31 @@ class FieldbusDriverTest {
     }
 
     @Test
+    void theMachineGetsItsFaultsBeforeTheValuesOfTheTick() throws IOException {
+        FieldbusDriver driver = new FieldbusDriver(file("""
+            [[fault]]
+            kind  = "model"
+            name  = "leak"
+            value = 0.4
+            tick  = 2
+            ticks = 1
+            """));
+        List<String> told = new ArrayList<>();
+        driver.connectFaults(List.of("wear", "leak"), (name, value) -> told.add(name + "=" + value));
+        driver.connect(inputs -> told.add("tick"));
+        for (int i = 1; i <= 3; i++) {
+            driver.simulationTime(i * TICK);
+            driver.updateHardwareInputs();
+            driver.updateComponentValues(new double[2]);
+        }
+        assertEquals(List.of("tick", "leak=0.4", "tick", "leak=0.0", "tick"), told);
+        FieldbusException wrong = assertThrows(FieldbusException.class,
+            () -> driver.connectFaults(List.of("wear", "wear"), (name, value) -> { }));
+        assertEquals(Status.BAD_ARGUMENT, wrong.status());
+        driver.exit();
+    }
+
+    @Test
     void aDriverThatIsOnlyLookedAtOpensNothing() throws IOException {
         Path record = Files.writeString(directory.resolve("run.vcd"), "the recording of yesterday");
         Path cfg = file("[record]\nfile = \"run.vcd\"\n");

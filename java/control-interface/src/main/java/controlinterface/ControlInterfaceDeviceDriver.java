@@ -70,6 +70,18 @@ public abstract class ControlInterfaceDeviceDriver {
     }
 
     /**
+     * Passes the faults that the machine model can have, before the first tick. A driver that injects faults calls the listener
+     * when one of these begins or ends: in {@link #updateHardwareInputs}, before it delivers, or else in {@link
+     * #updateComponentValues}. A driver without faults need not override this method.
+     *
+     * @param names the faults' names
+     * @param listener gets the faults
+     * @throws RuntimeException if the driver is to inject a fault that has none of these names
+     */
+    public void connectFaults(List<String> names, MachineFaultListener listener) {
+    }
+
+    /**
      * The components, fixed for the driver's life. The order within each direction is the order of the
      * values in {@link #updateComponentValues} and {@link #deliverHardwareInputs}.
      *

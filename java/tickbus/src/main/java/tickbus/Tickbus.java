@@ -66,12 +66,6 @@ public final class Tickbus implements AutoCloseable {
     private static final Cleaner CLEANER = Cleaner.create();
     /** No driver's handle. */
     private static final long NO_HANDLE = 0;
-    /** The most events fetched by one native call. */
-    private static final int EVENTS = 64;
-    /** The most events handed over by one call: as many as the driver's ring holds. */
-    private static final int MOST_EVENTS = 4096;
-    /** Longs per event: signal, slot, time. */
-    private static final int EVENT_WORDS = 3;
 
     static {
         try {
@@ -91,10 +85,9 @@ public final class Tickbus implements AutoCloseable {
     private final Conversions conversions;
     private final SignalGroup written;
     private final SignalGroup read;
-    /** Fetched events; those from {@code nextEvent} to {@code endOfEvents} have not been handed over yet. */
-    private long[] events;
-    private int nextEvent;
-    private int endOfEvents;
+    private final Events events = new Events(this);
+    /** The faults that the model has declared; null if it has declared none. */
+    private ModelFaults modelFaults;
     /**
      * The thread that the slots belong to; null before the first tick and after a release. A thread that reads its own name
      * here has written it itself, so a plain comparison suffices on every tick except a thread's first.
@@ -297,8 +290,7 @@ public final class Tickbus implements AutoCloseable {
         mustBeTicker();
         mustBeOpen();
         resetNative(handle);
-        nextEvent = 0;
-        endOfEvents = 0;
+        events.drop();
     }
 
     /**
@@ -481,6 +473,34 @@ public final class Tickbus implements AutoCloseable {
     }
 
     /**
+     * Names the faults of the simulation's model, which a fault of the kind {@code model} can name. Called before the first
+     * tick; a later call replaces the names.
+     *
+     * @param names names without control characters, each once
+     * @throws FieldbusException {@link Status#BAD_ARGUMENT} if a fault of driver.cfg has another name, with the nearest one, or
+     *     if a name cannot be used; {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public void declareFaults(List<String> names) {
+        modelFaults = ModelFaults.declare(handle, List.copyOf(names));
+    }
+
+    /**
+     * Hands over the faults of the model that have begun, changed their value or ended since the last call. The model asks
+     * after each {@link #exchange()}, or between {@link #receive()} and {@link #send()}, and has a fault in the tick in which it
+     * begins. Allocates nothing.
+     *
+     * @param handler called on this thread, for each change
+     * @return how many changes there were
+     * @throws FieldbusException {@link Status#BUSY}, {@link Status#CLOSED} or {@link Status#INTERNAL}
+     */
+    public int pollFaults(FaultHandler handler) {
+        Objects.requireNonNull(handler, "handler");
+        mustBeTicker();
+        mustBeOpen();
+        return modelFaults == null ? 0 : modelFaults.poll(handler);
+    }
+
+    /**
      * The faults that were injected by driver.cfg or by {@link #inject}.
      *
      * @return in order of injection; if there were more than 64, those that ended long ago may be missing
@@ -516,33 +536,7 @@ public final class Tickbus implements AutoCloseable {
         Objects.requireNonNull(handler, "handler");
         mustBeTicker();
         mustBeOpen();
-        int total = 0;
-        // The handler may close the driver.
-        while (total < MOST_EVENTS && !closed && (nextEvent < endOfEvents || takeEvents())) {
-            int at = nextEvent;
-            nextEvent += EVENT_WORDS;
-            total++;
-            Signal signal = signals.get((int) events[at]);
-            handler.event(signal, signal.value(events[at + 1]), events[at + 2]);
-        }
-        return total;
-    }
-
-    /** Fetches events; false if nothing has happened. */
-    private boolean takeEvents() {
-        if (events == null) {
-            events = new long[EVENTS * EVENT_WORDS];
-        }
-        // Like Patience.untilIdle, which would allocate.
-        while (true) {
-            try {
-                endOfEvents = eventsNative(handle, events) * EVENT_WORDS;
-                nextEvent = 0;
-                return endOfEvents > 0;
-            } catch (FieldbusException e) {
-                Patience.waitAfter(e);
-            }
-        }
+        return events.poll(handler);
     }
 
     /**

@@ -1,11 +1,13 @@
 package tickbus;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertTrue;
 import static org.junit.jupiter.api.Assumptions.assumeTrue;
 
 import com.sun.management.ThreadMXBean;
 import java.lang.management.ManagementFactory;
 import java.nio.file.Path;
+import java.util.List;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
@@ -34,6 +36,10 @@ class AllocationTest {
             double[] written = new double[3];
             double[] read = new double[3];
             EventHandler handler = (signal, value, time) -> { };
+            double[] leak = new double[1];
+            FaultHandler faults = (name, value) -> leak[0] += value;
+            bus.declareFaults(List.of("leak"));
+            bus.inject("kind = \"model\"\nname = \"leak\"\nwhen = \"height > 500\"\nticks = 5\ntimes = 1000000");
             double sum = 0;
             long allocated = Long.MAX_VALUE;
             long now = 0;
@@ -56,10 +62,12 @@ class AllocationTest {
                     bus.send();
                     sum += bus.receive();
                     bus.send();
-                    sum += bus.ageNanos() + bus.sequence() + bus.grantedNanos() + bus.pollEvents(handler);
+                    sum += bus.ageNanos() + bus.sequence() + bus.grantedNanos() + bus.pollEvents(handler)
+                        + bus.pollFaults(faults);
                 }
                 allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);
             }
+            assertTrue(leak[0] > 0, "the fault of the model has begun");
             assertEquals(0, allocated, "bytes in " + TICKS + " rounds; sum " + sum);
         }
     }

@@ -7,7 +7,9 @@ import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.nio.file.Path;
+import java.util.ArrayList;
 import java.util.List;
+import java.util.stream.IntStream;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
@@ -103,6 +105,41 @@ class InjectedFaultTest {
             told = "fault:3:10: \"level\" is in mm, not in cm; write the number in mm";
             assertTrue(wrong.getMessage().contains(told), wrong::getMessage);
             assertEquals(List.of(), bus.faults());
+        }
+    }
+
+    @Test
+    void faultsOfTheModelAreHandedOverInTheTickInWhichTheyBeginAndEnd() {
+        try (Tickbus bus = mirror("type = \"INT\"")) {
+            List<String> told = new ArrayList<>();
+            FaultHandler handler = (name, value) -> told.add(name + "=" + value);
+            assertEquals(0, bus.pollFaults(handler), "nothing is declared");
+            FieldbusException wrong = assertThrows(FieldbusException.class,
+                () -> bus.inject("kind = \"model\"\nname = \"leak\""));
+            assertEquals(Status.BAD_ARGUMENT, wrong.status());
+            assertTrue(wrong.getMessage().contains("let the simulation declare it"), wrong::getMessage);
+            List<String> names = IntStream.range(0, 40).mapToObj(i -> "leak " + i).toList();
+            bus.declareFaults(names);
+            wrong = assertThrows(FieldbusException.class, () -> bus.declareFaults(List.of("a", "a")));
+            assertEquals(Status.BAD_ARGUMENT, wrong.status());
+            wrong = assertThrows(FieldbusException.class,
+                () -> bus.inject("kind = \"model\"\nname = \"leek 7\""));
+            assertTrue(wrong.getMessage().contains("did you mean \"leak 7\"?"), wrong::getMessage);
+            bus.receive(++now);
+            InjectedFault fault = bus.inject("kind = \"model\"\nname = \"leak 7\"\nvalue = 0.4");
+            assertEquals(0, bus.pollFaults(handler), "it begins with the next tick");
+            bus.receive(++now);
+            assertEquals(1, bus.pollFaults(handler));
+            assertEquals(0, bus.pollFaults(handler));
+            fault.end();
+            bus.exchange(++now);
+            assertEquals(1, bus.pollFaults(handler));
+            assertEquals(List.of("leak 7=0.4", "leak 7=0.0"), told);
+            told.clear();
+            names.forEach(name -> bus.inject("kind = \"model\"\nname = \"" + name + "\""));
+            bus.exchange(++now);
+            assertEquals(40, bus.pollFaults(handler), "more than one native call fetches");
+            assertEquals(names.stream().map(name -> name + "=1.0").toList(), told);
         }
     }
 

@@ -1,5 +1,7 @@
 package tickbus.junit;
 
+import java.util.List;
+
 /**
  * A model of the machine that the PLC controls, as detailed as the tests need.
  *
@@ -25,6 +27,24 @@ public interface Machine {
      * @param plc the PLC that this machine is connected to
      */
     default void connect(Plc plc) {
+    }
+
+    /**
+     * The faults that this machine can have, which a fault of the kind {@code model} names. Asked once, after {@link #connect}.
+     *
+     * @return their names; empty for a machine without faults
+     */
+    default List<String> faults() {
+        return List.of();
+    }
+
+    /**
+     * A fault of this machine begins, changes its value, or ends; takes effect in the next {@link #step}.
+     *
+     * @param name one of the names in {@link #faults}
+     * @param value the fault's value; 0 when it has ended
+     */
+    default void fault(String name, double value) {
     }
 
     /**

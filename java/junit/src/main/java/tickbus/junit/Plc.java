@@ -9,6 +9,7 @@ import java.util.Map;
 import java.util.Objects;
 import java.util.Set;
 import org.opentest4j.AssertionFailedError;
+import tickbus.FaultHandler;
 import tickbus.InjectedFault;
 import tickbus.Signal;
 import tickbus.SwallowedChanges;
@@ -43,6 +44,9 @@ public final class Plc {
     private final Watch[] watches;
     private final Map<String, Watch> byName = new LinkedHashMap<>();
     private final List<Machine> machines = new ArrayList<>();
+    /** Each fault that a machine can have, with that machine. */
+    private final Map<String, Machine> faulty = new LinkedHashMap<>();
+    private final FaultHandler faults = (name, value) -> faulty.get(name).fault(name, value);
     private final List<Forced> forced = new ArrayList<>();
     private final List<Standing> standing = new ArrayList<>();
     private final Set<Await> open = new LinkedHashSet<>();
@@ -69,6 +73,12 @@ public final class Plc {
     public Plc connect(Machine machine) {
         Objects.requireNonNull(machine, "machine");
         machine.connect(this);
+        for (String name : machine.faults()) {
+            faulty.put(name, machine);
+        }
+        if (!faulty.isEmpty()) {
+            bus.declareFaults(List.copyOf(faulty.keySet()));
+        }
         machines.add(machine);
         return this;
     }
@@ -337,6 +347,7 @@ public final class Plc {
                 one.signal().set(one.value());
             }
             bus.exchange(time);
+            bus.pollFaults(faults);
         } finally {
             inStep = false;
         }

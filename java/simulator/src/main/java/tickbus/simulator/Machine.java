@@ -49,6 +49,26 @@ public interface Machine {
     double output(int index);
 
     /**
+     * The faults that the machine can have, by name.
+     *
+     * @return always the same; empty for a machine without faults
+     */
+    default List<ModelFault> modelFaults() {
+        return List.of();
+    }
+
+    /**
+     * A fault begins, changes its value, or ends. Called before a {@link #step(long)}, on the same thread.
+     *
+     * @param name one of the names in {@link #modelFaults()}
+     * @param value the fault's value; 0 ends it
+     * @throws IllegalArgumentException if the machine has no such fault
+     */
+    default void fault(String name, double value) {
+        throw new IllegalArgumentException("the machine " + name() + " has no fault \"" + name + "\"");
+    }
+
+    /**
      * Advances the machine. The same inputs at the same steps give the same motion, bit for bit.
      *
      * @param nanos the time step, in nanoseconds of simulation time; not negative

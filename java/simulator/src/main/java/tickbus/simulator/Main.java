@@ -10,6 +10,7 @@ import java.util.Set;
 import java.util.function.Supplier;
 import tickbus.simulator.control.ControlTableException;
 import tickbus.simulator.control.TransferFunctions;
+import tickbus.simulator.text.Columns;
 import tickbus.simulator.text.Durations;
 
 /**
@@ -31,7 +32,7 @@ public final class Main {
               --step TIME      simulation step size (default 2ms)
               --mode MODE      real-time (default), or best-effort: as fast as possible
               --duration TIME  how much simulation time to run (default: until Ctrl-C)
-              --list           list the drivers and their hardware components, and end
+              --list           list the drivers, their hardware components and the machine's faults, and end
               --help           this text, and end
 
             Times are numbers with a unit: 500us, 2ms, 10s, 1min.
@@ -86,6 +87,7 @@ public final class Main {
             if (arguments.has("--list")) {
                 try (DriverSet drivers = DeviceDriverFolder.scan(arguments.path("--drivers")).look()) {
                     out.print(drivers.list());
+                    out.print(faults(machine(arguments, all)));
                 }
                 return 0;
             }
@@ -119,8 +121,22 @@ public final class Main {
         }
     }
 
+    private static Machine machine(Arguments arguments, Map<String, Supplier<Machine>> machines) {
+        return arguments.choice("--machine", machines, machines.keySet().iterator().next()).get();
+    }
+
+    /** Lists the machine's faults; nothing for a machine without faults. */
+    private static String faults(Machine machine) {
+        if (machine.modelFaults().isEmpty()) {
+            return "";
+        }
+        Columns table = new Columns("fault", "values", "effect");
+        machine.modelFaults().forEach(fault -> table.row(fault.name(), fault.values(), fault.effect()));
+        return "\nmachine " + machine.name() + "\n" + table.text("  ");
+    }
+
     private static void simulate(Arguments arguments, Map<String, Supplier<Machine>> machines, PrintStream out) {
-        Machine machine = arguments.choice("--machine", machines, machines.keySet().iterator().next()).get();
+        Machine machine = machine(arguments, machines);
         long step = arguments.duration("--step", "2ms");
         TickMode mode = arguments.choice("--mode", Arguments.MODES, "real-time");
         long duration = arguments.has("--duration") ? arguments.duration("--duration", "") : Long.MAX_VALUE;

@@ -57,6 +57,7 @@ public final class Simulator implements AutoCloseable {
      * @param stepNanos step size in nanoseconds, above 0
      * @param time the clock for real-time mode
      * @throws ControlTableException if the control table has mistakes
+     * @throws WrongInput if a driver is to inject a fault that the machine does not have
      * @throws IllegalArgumentException if the step size is not above 0
      */
     public Simulator(DriverSet drivers, Machine machine, Path controlTable, long stepNanos, TimeSource time) {
@@ -96,6 +97,7 @@ public final class Simulator implements AutoCloseable {
             written += component.direction() == Direction.WRITTEN_BY_SIMULATION ? 1 : 0;
         }
         int read = driver.components().size() - written;
+        connectFaults(driver);
         driver.connect(inputs -> {
             if (inputs.length != read) {
                 throw new IllegalStateException("driver " + driver.id() + " delivered " + inputs.length
@@ -104,6 +106,19 @@ public final class Simulator implements AutoCloseable {
             table.setSources(firstSource, inputs);
         });
         return new Seat(driver, firstDestination, written);
+    }
+
+    /** Passes the machine's faults to a driver, whose configuration may name one that the machine does not have. */
+    private void connectFaults(ControlInterfaceDeviceDriver driver) {
+        List<String> names = machine.modelFaults().stream().map(ModelFault::name).toList();
+        if (names.isEmpty()) {
+            return;
+        }
+        try {
+            driver.connectFaults(names, machine::fault);
+        } catch (RuntimeException e) {
+            throw new WrongInput("driver " + driver.id() + ", machine " + machine.name() + ": " + e.getMessage(), e);
+        }
     }
 
     /**

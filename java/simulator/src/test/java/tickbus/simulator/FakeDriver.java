@@ -3,6 +3,7 @@ package tickbus.simulator;
 import controlinterface.ControlInterfaceDeviceDriver;
 import controlinterface.Direction;
 import controlinterface.HardwareComponent;
+import controlinterface.MachineFaultListener;
 import java.util.ArrayList;
 import java.util.List;
 
@@ -22,6 +23,11 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
     public boolean deliversFirst;
     /** Thrown by the next tick, if any. */
     public RuntimeException failTick;
+    /** The names of the machine's faults, and the listener for them. */
+    public List<String> faults = List.of();
+    public MachineFaultListener faultListener;
+    /** Thrown when the machine passes its faults, if any. */
+    public RuntimeException failFaults;
     /** Thrown by {@link #exit}, if any. */
     public RuntimeException failExit;
 
@@ -38,6 +44,15 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
     @Override
     public void simulationTime(long nanos) {
         time = nanos;
+    }
+
+    @Override
+    public void connectFaults(List<String> names, MachineFaultListener listener) {
+        if (failFaults != null) {
+            throw failFaults;
+        }
+        faults = names;
+        faultListener = listener;
     }
 
     @Override

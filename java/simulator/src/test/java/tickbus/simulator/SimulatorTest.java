@@ -20,8 +20,25 @@ class SimulatorTest {
 
     /** Adds its input to its output at each step. */
     private static final class Integrator implements Machine {
+        private final ModelFaults faults = new ModelFaults();
         private double input;
         private double sum;
+        private double slip;
+
+        Integrator() {
+            faults.add("slip", 1, "", "this part of the rate is lost", value -> slip = value);
+            faults.add("reset", "the sum is 0", on -> sum = on ? 0 : sum);
+        }
+
+        @Override
+        public List<ModelFault> modelFaults() {
+            return faults.list();
+        }
+
+        @Override
+        public void fault(String name, double value) {
+            faults.set(name, value);
+        }
 
         @Override
         public String name() {
@@ -50,7 +67,7 @@ class SimulatorTest {
 
         @Override
         public void step(long nanos) {
-            sum += input * nanos / STEP;
+            sum += (1 - slip) * input * nanos / STEP;
         }
     }
 
@@ -92,6 +109,39 @@ class SimulatorTest {
             assertEquals(1, simulator.probe("high").getAsDouble());
             assertEquals(List.of("1:spare"), simulator.unconnected());
         }
+        assertEquals(1, first.exits);
+        assertEquals(1, second.exits);
+    }
+
+    @Test
+    void theMachineHasItsFaultsFromEachDriver() throws IOException {
+        try (Simulator simulator = simulator(TABLE, STEP, TimeSource.system())) {
+            assertEquals(List.of("slip", "reset"), first.faults);
+            assertEquals(first.faults, second.faults);
+            first.deliversFirst = true;
+            first.answer[0] = 10;
+            simulator.tick();
+            assertEquals(20, first.got[0]);
+            second.faultListener.machineFault("slip", 0.5);
+            simulator.tick();
+            assertEquals(30, first.got[0]);
+            first.faultListener.machineFault("slip", 7);
+            simulator.tick();
+            assertEquals(30, first.got[0], "1 is the most");
+            first.faultListener.machineFault("slip", 0);
+            simulator.tick();
+            assertEquals(50, first.got[0]);
+            IllegalArgumentException wrong = assertThrows(IllegalArgumentException.class,
+                    () -> first.faultListener.machineFault("slop", 1));
+            assertEquals("the machine has no fault \"slop\"; did you mean \"slip\"?", wrong.getMessage());
+        }
+    }
+
+    @Test
+    void aDriverThatIsToInjectAnUnknownFaultEndsTheRunBeforeItBegins() {
+        second.failFaults = new IllegalStateException("the model has no fault \"slop\"");
+        WrongInput wrong = assertThrows(WrongInput.class, () -> simulator(TABLE, STEP, TimeSource.system()));
+        assertEquals("driver 2, machine integrator: the model has no fault \"slop\"", wrong.getMessage());
         assertEquals(1, first.exits);
         assertEquals(1, second.exits);
     }

@@ -6,6 +6,8 @@ import java.util.function.BooleanSupplier;
 import java.util.function.DoubleConsumer;
 import java.util.function.DoubleSupplier;
 import tickbus.simulator.Machine;
+import tickbus.simulator.ModelFault;
+import tickbus.simulator.ModelFaults;
 
 /**
  * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg and plc/cell/reader.cfg. The
@@ -18,12 +20,16 @@ public final class ManufacturingCell implements Machine {
     /** The time from the button Rearm until air and motors are back; the control's outputs are back earlier. */
     private static final long CONTACTOR_NANOS = 50_000_000;
 
+    /** The most that wear can take of a cylinder's speed. */
+    private static final double MOST_WEAR = 0.9;
+
     /** Takes a Boolean variable. */
     private interface Switch {
         void set(boolean on);
     }
 
     private final Counters counters = new Counters();
+    private final ModelFaults modelFaults = new ModelFaults();
     private final StationOne one = new StationOne(counters);
     private final StationThree three = new StationThree(counters);
     private final StationFour four = new StationFour(counters);
@@ -56,6 +62,7 @@ public final class ManufacturingCell implements Machine {
         in("Belt", on -> transport.forward = on);
         in("Belt back", on -> transport.backward = on);
         in("Running lamp", on -> runningLamp = on);
+        declareFaults();
         head(1, one.head);
         head(3, three.head);
         head(4, four.head);
@@ -126,6 +133,35 @@ public final class ManufacturingCell implements Machine {
         in("S4 empty lamp", on -> capsLamp = on);
     }
 
+    private void declareFaults() {
+        once("jam of the loader", "its next stroke stops half-way", one.loader::jam, one.loader::jamsNoMore);
+        once("jam of a pallet", "the next pallet that passes the middle between two stops sticks", transport::jam,
+                transport::jamsNoMore);
+        once("carrier missed", "head 1 misses the carrier the next time that it comes forward", one::missCarrier,
+                one::missesNoCarrier);
+        once("vacuum lost", "the next piece that station 4 lifts falls", four::loseVacuum, four::keepsVacuum);
+        worn("S1 loader", one.loader);
+        worn("S1 arm", one.arm);
+        worn("S1 lift", one.lift);
+        worn("S1 reader", one.reader);
+        worn("S1 gripper", one.fingers);
+        worn("S3 parts feeder", three.parts.cylinder);
+        worn("S3 head feeder", three.heads.cylinder);
+        worn("S3 press", three.press);
+        worn("S4 cap feeder", four.caps.cylinder);
+        worn("S4 press", four.press);
+        worn("S4 arm", four.arm);
+        worn("S4 lift", four.lift);
+    }
+
+    private void once(String name, String effect, Runnable begin, Runnable end) {
+        modelFaults.add(name, effect, on -> (on ? begin : end).run());
+    }
+
+    private void worn(String name, PneumaticCylinder cylinder) {
+        modelFaults.add("wear of " + name, MOST_WEAR, "", "the cylinder has this part less of its speed", cylinder::wear);
+    }
+
     private void head(int number, ReadWriteHead head) {
         String name = "Head " + number;
         out(name + " carrier", head::showsCarrier);
@@ -162,6 +198,16 @@ public final class ManufacturingCell implements Machine {
     @Override
     public List<String> outputs() {
         return List.copyOf(outputs);
+    }
+
+    @Override
+    public List<ModelFault> modelFaults() {
+        return modelFaults.list();
+    }
+
+    @Override
+    public void fault(String name, double value) {
+        modelFaults.set(name, value);
     }
 
     @Override

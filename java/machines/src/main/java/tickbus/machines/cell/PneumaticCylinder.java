@@ -6,6 +6,7 @@ final class PneumaticCylinder {
     private long at;
     private boolean willJam;
     private boolean jammed;
+    private double wear;
 
     /** A retracted cylinder that takes {@code strokeNanos} from one end to the other. */
     PneumaticCylinder(long strokeNanos) {
@@ -18,7 +19,8 @@ final class PneumaticCylinder {
     }
 
     /** With a valve for each direction: with neither or both on, the cylinder stays. */
-    void step(boolean forward, boolean backward, long nanos) {
+    void step(boolean forward, boolean backward, long time) {
+        long nanos = wear == 0 ? time : Math.round(time * (1 - wear));
         if (forward && !backward) {
             boolean halts = willJam && at <= strokeNanos / 2;
             long most = halts ? strokeNanos / 2 : strokeNanos;
@@ -47,6 +49,17 @@ final class PneumaticCylinder {
      */
     void jam() {
         willJam = true;
+    }
+
+    /** Frees the cylinder, and lets its next strokes pass. */
+    void jamsNoMore() {
+        willJam = false;
+        jammed = false;
+    }
+
+    /** A worn cylinder has this part less of its speed; 0 is a new one. */
+    void wear(double part) {
+        wear = part;
     }
 
     boolean isJammed() {

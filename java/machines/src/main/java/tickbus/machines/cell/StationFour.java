@@ -36,6 +36,10 @@ final class StationFour {
         willLose = true;
     }
 
+    void keepsVacuum() {
+        willLose = false;
+    }
+
     List<Workpiece> delivered() {
         return delivered;
     }

@@ -104,6 +104,12 @@ final class StationOne {
         willMiss = true;
     }
 
+    /** Lets the head meet the carriers again. */
+    void missesNoCarrier() {
+        willMiss = false;
+        askew = false;
+    }
+
     boolean seesPallet() {
         return optical;
     }

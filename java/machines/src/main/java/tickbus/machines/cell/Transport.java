@@ -59,6 +59,12 @@ public final class Transport {
         willJam = true;
     }
 
+    /** Frees the pallet, and lets the next ones pass. */
+    void jamsNoMore() {
+        willJam = false;
+        jammed = null;
+    }
+
     boolean isJammed() {
         return jammed != null;
     }

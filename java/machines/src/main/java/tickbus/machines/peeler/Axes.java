@@ -3,6 +3,7 @@ package tickbus.machines.peeler;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Map;
+import tickbus.simulator.ModelFaults;
 
 /** All axes of the line, and the variables by which their PLCs command and observe them. */
 final class Axes {
@@ -10,11 +11,28 @@ final class Axes {
     private static final List<String> SHOWN =
             List.of("Healthy", "InPosition", "ActualPosition", "ActualSpeed", "Status", "Error");
 
+    /** The most that wear can take of a drive's speed and acceleration. */
+    private static final double MOST_WEAR = 0.9;
+
     private final Axis[] axes = new Axis[AxisName.values().length];
 
     Axes() {
         for (AxisName name : AxisName.values()) {
             axes[name.ordinal()] = new Axis(name);
+        }
+    }
+
+    /** The faults that the axes can have, by name. */
+    void declare(ModelFaults list) {
+        for (AxisName name : AxisName.values()) {
+            Axis axis = get(name);
+            list.add("failure of " + name.label(), "the axis is not healthy, and does not move", axis::fail);
+            if (name.kind() == AxisKind.TORQUE) {
+                list.add("leak of " + name.label(), 1, "", "this part of its pressure and of its speed is lost", axis::leak);
+            } else if (name.kind() == AxisKind.POSITION) {
+                list.add("wear of " + name.label(), MOST_WEAR, "",
+                        "its next commands have this part less of their speed and acceleration", axis::wear);
+            }
         }
     }
 

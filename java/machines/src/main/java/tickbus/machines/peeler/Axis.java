@@ -40,6 +40,8 @@ final class Axis {
     private boolean executed;
     private boolean inPosition;
     private boolean healthy = true;
+    private double leak;
+    private double wear;
     private AxisError error = AxisError.NONE;
     private int commands;
     /** Values of the active command that are needed later. */
@@ -92,7 +94,7 @@ final class Axis {
     }
 
     private boolean pressed() {
-        return mode == Mode.TORQUE && direction != 0 && torque > 0;
+        return mode == Mode.TORQUE && direction != 0 && pressing() > 0;
     }
 
     /** The error word: the error of the axis or of its last command. */
@@ -112,12 +114,17 @@ final class Axis {
 
     /** True if the axis presses against an obstacle. */
     boolean presses() {
-        return met && (name.kind() != AxisKind.TORQUE || mode == Mode.TORQUE && direction < 0 && torque > 0);
+        return met && (name.kind() != AxisKind.TORQUE || mode == Mode.TORQUE && direction < 0 && pressing() > 0);
     }
 
     /** The pressure in percent, while the axis presses. */
     double pressure() {
-        return presses() ? torque : 0;
+        return presses() ? pressing() : 0;
+    }
+
+    /** The torque of the last command that is left behind a leaking hose. */
+    private double pressing() {
+        return torque * (1 - leak);
     }
 
     boolean tracks() {
@@ -141,6 +148,16 @@ final class Axis {
     /** Sets or clears a fault of the axis; with a fault it does not move. */
     void fail(boolean failed) {
         healthy = !failed;
+    }
+
+    /** A leaking hose takes this part of the pressure and of the speed of an axis that opens and closes; 0 for no leak. */
+    void leak(double part) {
+        leak = part;
+    }
+
+    /** A worn drive has this part less of the speed and the acceleration of its next command; 0 is a new one. */
+    void wear(double part) {
+        wear = part;
     }
 
     /** Sets the position below which the axis cannot go, until the next call; the lower end for none. */
@@ -198,7 +215,8 @@ final class Axis {
         } else {
             double target = Math.max(name.low(), Math.min(name.high(), command.target()));
             error = target == command.target() ? AxisError.NONE : AxisError.BEYOND_END;
-            drive.moveTo(target, command.speed(), command.acceleration(), command.deceleration());
+            drive.moveTo(target, command.speed() * (1 - wear), command.acceleration() * (1 - wear),
+                    command.deceleration());
             mode = Mode.POSITION;
         }
     }
@@ -262,9 +280,9 @@ final class Axis {
     }
 
     private void push(long nanos) {
-        double speed = name.high() > LONGEST_GATE ? CLAMP_SPEED : GATE_SPEED;
+        double speed = (name.high() > LONGEST_GATE ? CLAMP_SPEED : GATE_SPEED) * (1 - leak);
         double before = position();
-        double way = torque > 0 ? direction * speed * nanos * 1e-9 : 0;
+        double way = pressing() > 0 ? direction * speed * nanos * 1e-9 : 0;
         double place = Math.max(obstacle, Math.min(name.high(), before + way));
         if (way == 0) {
             place = before;

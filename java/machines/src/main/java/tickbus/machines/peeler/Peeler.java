@@ -3,6 +3,8 @@ package tickbus.machines.peeler;
 import java.util.ArrayList;
 import java.util.List;
 import tickbus.simulator.Machine;
+import tickbus.simulator.ModelFault;
+import tickbus.simulator.ModelFaults;
 
 /**
  * The peeling line as a machine: charger and lathe, with 25 axes.
@@ -21,6 +23,7 @@ public final class Peeler implements Machine {
 
     private final Axes axes;
     private final Mishaps mishaps = new Mishaps();
+    private final ModelFaults modelFaults = new ModelFaults();
     private final Charger charger;
     private final Lathe lathe;
     private long now;
@@ -38,6 +41,7 @@ public final class Peeler implements Machine {
      */
     public Peeler(int blocks, int onSteps) {
         axes = new Axes();
+        axes.declare(modelFaults);
         charger = new Charger(axes, new BlockSupply(blocks), mishaps, onSteps);
         lathe = new Lathe(axes, mishaps);
     }
@@ -62,6 +66,16 @@ public final class Peeler implements Machine {
         names.add("pre-centring distance 2");
         names.add("simulation time");
         return names;
+    }
+
+    @Override
+    public List<ModelFault> modelFaults() {
+        return modelFaults.list();
+    }
+
+    @Override
+    public void fault(String name, double value) {
+        modelFaults.set(name, value);
     }
 
     @Override

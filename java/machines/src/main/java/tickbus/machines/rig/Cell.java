@@ -1,5 +1,7 @@
 package tickbus.machines.rig;
 
+import tickbus.simulator.ModelFaults;
+
 /**
  * The rig's mechanics: two wheels, two lifts and the bottles between them, moved by the control's commands.
  *
@@ -8,6 +10,12 @@ package tickbus.machines.rig;
 final class Cell {
     /** The longest motion between two collision checks. */
     private static final long SLICE_NANOS = 10_000_000L;
+
+    /** The most play that the spindle of a lift can have, in millimetres. */
+    private static final double MOST_BACKLASH = 20;
+
+    /** The most that wear can take of a drive's speed and acceleration. */
+    private static final double MOST_WEAR = 0.9;
 
     private final Faults faults = new Faults();
     private final Wheel wheel1;
@@ -19,6 +27,9 @@ final class Cell {
     private final LiftPath path2;
     private boolean run1;
     private boolean run2;
+    private boolean leak1;
+    private boolean leak2;
+    private boolean dark;
     private long treated;
     private long removed;
     private long fallen;
@@ -52,8 +63,8 @@ final class Cell {
         if (in.rising(Inputs.ACKNOWLEDGE)) {
             acknowledge();
         }
-        suction(path1, in, Inputs.SC1);
-        suction(path2, in, Inputs.SC2);
+        suction(path1, in.high(Inputs.SC1) && !leak1);
+        suction(path2, in.high(Inputs.SC2) && !leak2);
         if (!faults.latched()) {
             command(in);
         }
@@ -126,12 +137,44 @@ final class Cell {
         }
     }
 
-    private void suction(LiftPath path, Inputs in, int input) {
-        if (!in.changed(input)) {
+    /** The faults that the cell can have, by name. */
+    void declare(ModelFaults list) {
+        declare(list, path1, leak -> leak1 = leak);
+        declare(list, path2, leak -> leak2 = leak);
+        declare(list, "index wheel 1", wheel1);
+        declare(list, "chamber wheel", wheel2);
+        list.add("infeed empty", "no new bottle comes to index wheel 1", conveyor::dry);
+        list.add("lamp burnt out", "bottles at the lamp are not treated", on -> dark = on);
+    }
+
+    private void declare(ModelFaults list, LiftPath path, ModelFaults.Switch leak) {
+        LiftDrive drive = path.drive();
+        list.add("jam at " + drive.name(), "the next bottle that the lift carries through its beam sticks there",
+                on -> {
+                    if (on) {
+                        path.jamNext();
+                    } else {
+                        remove(path.jamsNoMore());
+                    }
+                });
+        list.add("leak at " + drive.name(), "the suction cup has no vacuum, and its bottle falls", leak);
+        list.add("backlash of " + drive.name(), MOST_BACKLASH, "mm",
+                "play between motor and lift, which follows half of it late in either direction", drive::backlash);
+        list.add("wear of " + drive.name(), MOST_WEAR, "",
+                "the next moves have this part less of their speed and acceleration", drive::wear);
+    }
+
+    private static void declare(ModelFaults list, String name, Wheel wheel) {
+        list.add("wear of " + name, MOST_WEAR, "",
+                "the next turns have this part less of their speed and acceleration", wheel::wear);
+    }
+
+    private void suction(LiftPath path, boolean on) {
+        if (on == path.cup().vacuum()) {
             return;
         }
         Bottle onCup = path.cup().held();
-        Bottle fell = path.suction(in.high(input));
+        Bottle fell = path.suction(on);
         if (fell != null) {
             fallen++;
             conveyor.away(fell);
@@ -191,7 +234,7 @@ final class Cell {
         }
         path1.watch(in.high(Inputs.LA1_RUN), nanos);
         path2.watch(in.high(Inputs.LA2_RUN), nanos);
-        treat(in.high(Inputs.LAMP));
+        treat(in.high(Inputs.LAMP) && !dark);
         conveyor.work();
     }
 

@@ -20,12 +20,18 @@ final class Conveyor {
     private final Bottle[] bottles = new Bottle[MOST];
     private int fed;
     private long delivered;
+    private boolean dry;
 
     Conveyor(Slots pockets) {
         this.pockets = pockets;
         for (int i = 0; i < MOST; i++) {
             bottles[i] = new Bottle();
         }
+    }
+
+    /** Sets whether the infeed has no bottles. */
+    void dry(boolean on) {
+        dry = on;
     }
 
     void work() {
@@ -39,7 +45,7 @@ final class Conveyor {
                 }
             }
         }
-        if (!pockets.wheel().moving()) {
+        if (!dry && !pockets.wheel().moving()) {
             int slot = pockets.at(Geometry.INFEED);
             if (slot >= 0 && pockets.bottle(slot) == null) {
                 Bottle bottle = spare();

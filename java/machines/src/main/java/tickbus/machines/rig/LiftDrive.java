@@ -7,6 +7,9 @@ import java.util.Locale;
  *
  * <p>At power-up and after a fault its position is only valid if it is at the bottom. Otherwise the only permitted
  * move is downwards, which becomes a reference run: slowly down to the mechanical stop, which is position 0.
+ *
+ * <p>The motor carries the lift by a spindle, and measures its own position. With backlash the lift follows at up to half the
+ * backlash on either side: after a reversal it stays where it is until the motor has gone the whole backlash.
  */
 final class LiftDrive {
     /** Speed in millimetres per second and acceleration in millimetres per second squared of a move. */
@@ -32,12 +35,17 @@ final class LiftDrive {
     private boolean referencing;
     private double target;
     private Pace pace = Pace.BIG;
+    /** Millimetres of the lift, not of the motor. */
+    private double lift;
+    private double backlash;
+    private double wear;
     private boolean wedged;
     private boolean underWay;
 
     LiftDrive(String name, double position) {
         this.name = name;
         this.ramp = new Ramp(position);
+        this.lift = position;
         this.referenced = atBottom();
     }
 
@@ -47,7 +55,22 @@ final class LiftDrive {
 
     /** Millimetres above the bottom. */
     double position() {
+        return lift;
+    }
+
+    /** The position that the motor measures, in millimetres: that of the lift, but for the backlash. */
+    double measured() {
         return ramp.position();
+    }
+
+    /** The play between motor and lift, in millimetres; 0 for none. */
+    void backlash(double millimetres) {
+        backlash = millimetres;
+    }
+
+    /** A worn drive has this part less of the speed and the acceleration of the moves that begin from now on; 0 is a new one. */
+    void wear(double part) {
+        wear = part;
     }
 
     boolean atBottom() {
@@ -71,14 +94,14 @@ final class LiftDrive {
 
     /** A move by a distance, which requires a reference and enough room. */
     void by(double distance, Pace newPace, Faults faults) {
-        double end = position() + distance;
+        double end = measured() + distance;
         if (!referenced) {
             faults.raise(Faults.Kind.UNREFERENCED, String.format(Locale.ROOT,
                     "%s was told to move %+.0f mm without a reference: move it down to its stop first", name, distance));
         } else if (end < -Geometry.BOTTOM_WINDOW || end > Geometry.STROKE) {
             faults.raise(Faults.Kind.END_STOP, String.format(Locale.ROOT,
                     "%s was told to move %+.0f mm from %.1f mm, past its end stop at %.0f mm",
-                    name, distance, position(), distance < 0 ? 0 : Geometry.STROKE));
+                    name, distance, measured(), distance < 0 ? 0 : Geometry.STROKE));
         } else {
             go(Math.max(0, end), newPace);
         }
@@ -116,6 +139,7 @@ final class LiftDrive {
     /** A bottle is stuck: the motor runs against it. */
     void wedge(double place) {
         ramp.haltAt(place);
+        lift = place;
         wedged = true;
     }
 
@@ -132,6 +156,7 @@ final class LiftDrive {
             return;
         }
         ramp.advance(nanos);
+        lift = Math.max(measured() - backlash / 2, Math.min(measured() + backlash / 2, lift));
         if (!ramp.moving()) {
             underWay = false;
             referenced |= referencing;
@@ -146,7 +171,7 @@ final class LiftDrive {
             underWay = true;
             return;
         }
-        ramp.moveTo(target, pace.speed, pace.steepness, BRAKE);
+        ramp.moveTo(target, pace.speed * (1 - wear), pace.steepness * (1 - wear), BRAKE);
         underWay = ramp.moving();
         if (!underWay) {
             referenced |= referencing;

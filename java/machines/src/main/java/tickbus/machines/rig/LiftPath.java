@@ -67,6 +67,12 @@ final class LiftPath {
         jamArmed = true;
     }
 
+    /** Lets bottles pass the beam again; returns the bottle that stuck in it, or null. */
+    Bottle jamsNoMore() {
+        jamArmed = false;
+        return stuck == null ? null : takeAway();
+    }
+
     /** The operator takes the bottle off the cup or out of the guide; null if both are empty. */
     Bottle takeAway() {
         if (stuck != null) {

@@ -2,6 +2,8 @@ package tickbus.machines.rig;
 
 import java.util.List;
 import tickbus.simulator.Machine;
+import tickbus.simulator.ModelFault;
+import tickbus.simulator.ModelFaults;
 
 /**
  * The bottle treatment cell of the test rig.
@@ -19,6 +21,7 @@ public final class Rig implements Machine {
     private final Outputs out = new Outputs();
     private final Panel panel = new Panel();
     private final StepMonitor monitor = new StepMonitor();
+    private final ModelFaults modelFaults = new ModelFaults();
     private final Cell cell;
     private long time;
 
@@ -40,6 +43,7 @@ public final class Rig implements Machine {
      */
     public Rig(double wheel1Degrees, double wheel2Degrees, double lift1Millimetres, double lift2Millimetres) {
         cell = new Cell(wheel1Degrees, wheel2Degrees, lift1Millimetres, lift2Millimetres);
+        cell.declare(modelFaults);
         show();
     }
 
@@ -56,6 +60,16 @@ public final class Rig implements Machine {
     @Override
     public List<String> outputs() {
         return Outputs.NAMES;
+    }
+
+    @Override
+    public List<ModelFault> modelFaults() {
+        return modelFaults.list();
+    }
+
+    @Override
+    public void fault(String name, double value) {
+        modelFaults.set(name, value);
     }
 
     @Override
@@ -333,7 +347,7 @@ public final class Rig implements Machine {
         out.set(Outputs.RESET, panel.down(Button.RESET));
         out.set(Outputs.LA1_BOTTOM, path1.drive().atBottom());
         out.set(Outputs.LA2_BOTTOM, path2.drive().atBottom());
-        out.set(Outputs.LA1_POSITION, path1.drive().position());
-        out.set(Outputs.LA2_POSITION, path2.drive().position());
+        out.set(Outputs.LA1_POSITION, path1.drive().measured());
+        out.set(Outputs.LA2_POSITION, path2.drive().measured());
     }
 }

@@ -26,6 +26,7 @@ final class Wheel {
     private final double steepness;
     private final Ramp ramp;
     private State state = State.REST;
+    private double wear;
     private boolean pending;
     private boolean jogArmed;
     private long retriggers;
@@ -44,6 +45,11 @@ final class Wheel {
         this.steepness = steepness;
         this.ramp = new Ramp(angle);
         wrap();
+    }
+
+    /** A worn drive has this part less of the speed and the acceleration of the turns that begin from now on; 0 is a new one. */
+    void wear(double part) {
+        wear = part;
     }
 
     double angle() {
@@ -131,7 +137,7 @@ final class Wheel {
         pending = false;
         state = State.INDEXING;
         double target = (Math.floor(angle() / pitch) + 1) * pitch;
-        ramp.moveTo(target, speed, steepness, steepness);
+        ramp.moveTo(target, speed * (1 - wear), steepness * (1 - wear), steepness);
     }
 
     private boolean nearPulse() {

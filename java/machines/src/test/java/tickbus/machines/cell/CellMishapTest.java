@@ -41,6 +41,38 @@ class CellMishapTest {
     }
 
     @Test
+    void aFaultByNameIsAMishapAndEndsWithTheFault() {
+        ManufacturingCell cell = new ManufacturingCell();
+        int loader = cell.inputs().indexOf("S1 loader");
+        int forward = cell.outputs().indexOf("S1 loader forward");
+        cell.fault("jam of the loader", 1);
+        cell.input(loader, 1);
+        for (int i = 0; i < 50; i++) {
+            cell.step(STEP);
+        }
+        assertTrue(cell.isJammed());
+        assertEquals(0, cell.output(forward));
+        cell.fault("jam of the loader", 0);
+        for (int i = 0; i < 50; i++) {
+            cell.step(STEP);
+        }
+        assertFalse(cell.isJammed());
+        assertEquals(1, cell.output(forward));
+        cell.modelFaults().forEach(fault -> cell.fault(fault.name(), 0));
+    }
+
+    @Test
+    void aWornCylinderHasSoMuchLessOfItsSpeed() {
+        PneumaticCylinder cylinder = new PneumaticCylinder(20 * STEP);
+        cylinder.wear(0.75);
+        for (int strokes = 0; strokes < 4; strokes++) {
+            assertFalse(cylinder.isForward(), "after the time of " + strokes + " strokes");
+            move(cylinder, true);
+        }
+        assertTrue(cylinder.isForward());
+    }
+
+    @Test
     void aVacuumThatIsToBeLostOverTheExitIsLostWithTheNextPiece() {
         Counters counters = new Counters();
         StationFour station = new StationFour(counters);

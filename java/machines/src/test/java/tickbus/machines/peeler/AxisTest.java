@@ -4,9 +4,11 @@ import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertFalse;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.util.List;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
+import tickbus.simulator.ModelFault;
 
 /** The reactions of an axis to commands. */
 class AxisTest {
@@ -34,6 +36,49 @@ class AxisTest {
         feeder.position(650 - distance / 100, 80, 150);
         long ticks = feeder.until(() -> feeder.axis().inPosition());
         assertEquals(seconds, (ticks + 1) * TICK / 1e9, 0.004);
+    }
+
+    @Test
+    void aWornAxisHasHalfItsSpeedAndAcceleration() {
+        feeder.axis().wear(0.5);
+        feeder.position(250, 400, 1500);
+        long ticks = feeder.until(() -> feeder.axis().inPosition());
+        // The deceleration is that of the command.
+        double v = 200;
+        double seconds = v / 750 + (400 - v * v / 1500 - v * v / 3000) / v + v / 1500;
+        assertEquals(seconds, (ticks + 1) * TICK / 1e9, 0.004);
+        assertEquals(250, feeder.axis().position());
+    }
+
+    @Test
+    void aClampWithALeakIsSlowerAndPressesLess() {
+        clamp.axis().leak(0.25);
+        clamp.axis().meets(Block.HALF);
+        clamp.set("Torque", 60);
+        clamp.set("Tracking", 1);
+        clamp.execute();
+        clamp.ticks(20);
+        assertEquals(-300, clamp.axis().velocity());
+        clamp.until(() -> clamp.axis().velocity() == 0);
+        assertEquals(45, clamp.axis().pressure());
+        clamp.axis().leak(1);
+        clamp.tick();
+        assertFalse(clamp.axis().presses());
+    }
+
+    @Test
+    void everyAxisHasItsFaultsByName() {
+        Peeler peeler = new Peeler();
+        peeler.fault("failure of step feeder", 1);
+        peeler.step(TICK);
+        int healthy = peeler.outputs().indexOf("step feeder.Healthy");
+        assertEquals(0, peeler.output(healthy));
+        peeler.fault("failure of step feeder", 0);
+        assertEquals(1, peeler.output(healthy));
+        List<String> names = peeler.modelFaults().stream().map(ModelFault::name).toList();
+        assertTrue(names.containsAll(List.of("leak of transfer clamp left", "wear of transfer arm",
+                "failure of spindle rotation")), names::toString);
+        names.forEach(name -> peeler.fault(name, 0));
     }
 
     @Test

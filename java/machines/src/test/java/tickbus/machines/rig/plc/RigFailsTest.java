@@ -65,6 +65,29 @@ class RigFailsTest {
     }
 
     @Test
+    void stopsAtAJamThatIsInjectedByItsName(Plc plc, SimulatedRig machine) {
+        start(plc);
+        plc.await(is("Step", 5)).within("10s");
+        InjectedFault jam = plc.inject("kind = \"model\"\nname = \"jam at lift 2\"");
+        plc.await(on("Not OK")).within("10s");
+        plc.await(on("Fault lamp")).within("20ms");
+        expectAborted(plc);
+        jam.end();
+        plc.tick(2);
+        recover(plc);
+        assertEquals(1, machine.rig().counters().jams());
+    }
+
+    @Test
+    void findsThatALiftHasBacklash(Plc plc, SimulatedRig machine) {
+        start(plc);
+        plc.inject("kind = \"model\"\nname = \"backlash of lift 1\"\nvalue = 8");
+        plc.await(on("Fault lamp")).within("20s");
+        expectAborted(plc);
+        assertTrue(machine.rig().notOk(), "a bottle has missed its sleeve");
+    }
+
+    @Test
     void goesBackToTheFaultWhenResetComesBeforeTheJamIsCleared(Plc plc, SimulatedRig machine) {
         start(plc);
         machine.rig().jamNext(Lift.LA2);

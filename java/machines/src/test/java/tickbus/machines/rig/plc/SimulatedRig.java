@@ -10,6 +10,7 @@ import tickbus.junit.Machine;
 import tickbus.junit.Plc;
 import tickbus.machines.rig.Rig;
 import tickbus.simulator.DriverSet;
+import tickbus.simulator.ModelFault;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.TimeSource;
 
@@ -45,6 +46,16 @@ public final class SimulatedRig implements Machine {
         line = new Line(plc);
         simulator = new Simulator(new DriverSet(List.of(line)), rig, CONTROL_TABLE, plc.stepNanos(),
                 TimeSource.system());
+    }
+
+    @Override
+    public List<String> faults() {
+        return rig.modelFaults().stream().map(ModelFault::name).toList();
+    }
+
+    @Override
+    public void fault(String name, double value) {
+        rig.fault(name, value);
     }
 
     @Override

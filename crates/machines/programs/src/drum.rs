@@ -66,6 +66,11 @@ impl<const STEPS: usize> Drum<STEPS> {
         }
     }
 
+    /// How long the active step has lasted at `now`; 0 in the call that enters it.
+    pub fn lasts(&self, now: Nanos) -> Nanos {
+        now - self.entered
+    }
+
     /// Evaluates the block and returns its power flow.
     pub fn call(&mut self, now: Nanos, enable: bool, reset: bool, step: bool) -> bool {
         let steps = 1..=STEPS;

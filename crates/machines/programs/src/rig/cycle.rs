@@ -1,5 +1,6 @@
 //! The treatment cycle: a drum sequencer and the rungs that turn it.
 
+use super::guard::EARLY;
 use super::image::command::{
     IM1_INDEX, IM2_INDEX, LA1_CODE_HIGH, LA1_CODE_LOW, LA1_RUN, LA2_RUN, LA2_UP, LAMP, SC1, SC2,
 };
@@ -74,6 +75,11 @@ impl Cycle {
     /// The command word of the active step, with the code of lift 1 MSB first.
     pub(super) fn command(&self) -> u16 {
         self.drum.q
+    }
+
+    /// The active step is reported as complete before the machine can have done it.
+    pub(super) fn early(&self, now: Nanos, status: u16) -> bool {
+        status & (1 << (self.drum.active - 1)) != 0 && self.drum.lasts(now) < EARLY
     }
 
     /// The active step has exceeded its time limit.

@@ -1,4 +1,4 @@
-//! The conditions that stop a running rig: jams and locked wheels.
+//! The conditions that stop a running rig: jams, locked wheels, and a "complete" that comes too early.
 
 use super::image::Inputs;
 use super::image::command::{IM1_INDEX, IM1_JOG, IM2_INDEX, IM2_JOG};
@@ -7,6 +7,10 @@ use tickbus_plc::blocks::Ton;
 
 /// A beam interrupted for longer than this is a jam. The machine itself reports it after 1 s.
 const JAM: Nanos = Nanos::from_millis(1_500);
+
+/// A step that is reported as complete sooner than this was reported before it began: the machine drops "complete" when it
+/// gets the word of the next step, and its shortest motion takes 0.4 s.
+pub(super) const EARLY: Nanos = Nanos::from_millis(50);
 
 /// Watches the package sensors while the drum turns.
 #[derive(Clone, Copy, Debug, Default)]

@@ -7,6 +7,7 @@
 //! case: while a bottle is in the pocket under lift 1, nothing has been handed over, and it goes up into an
 //! empty sleeve and comes down again.
 
+use super::guard::EARLY;
 use super::image::Inputs;
 use super::image::command::{
     ACKNOWLEDGE, IM1_JOG, IM2_JOG, LA1_CODE, LA1_RUN, LA2_RUN, SC1, SUCTION,
@@ -150,6 +151,10 @@ impl Homing {
             Step::Wheels if self.centred.q && self.fetches => Step::Fetch,
             Step::Wheels if self.centred.q => Step::Done,
             Step::Wheels if self.wheels.q => Step::Failed,
+            // Broken feedback: there before the lift can be, or together with the bottom switch.
+            Step::Fetch if inputs.fetched() && (self.fetch.et < EARLY || inputs.la1_bottom()) => {
+                Step::Failed
+            }
             Step::Fetch if inputs.fetched() => Step::Bring,
             Step::Fetch if self.fetch.q => Step::Failed,
             Step::Bring if self.brought.q => Step::Done,

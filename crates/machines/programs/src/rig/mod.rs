@@ -5,7 +5,7 @@
 //! | 0 initialise | nothing moves | home, when the peer is alive; abort, if the fault that it stood in was never reset |
 //! | 1 home | acknowledges if Not OK; homes | when home: finalise if Stop was pressed, else run if it had been running, else ready; abort when homing fails |
 //! | 2 ready | Ready lamp | run on Start; finalise on Stop; abort on Not OK |
-//! | 3 run | Running lamp; the drum turns | finalise after the cycle in which Stop was pressed; abort on Not OK, a jam, an overdue step, a wheel locked by a lift |
+//! | 3 run | Running lamp; the drum turns | finalise after the cycle in which Stop was pressed; abort on Not OK, a jam, an overdue step, a step that is complete too early, a wheel locked by a lift |
 //! | 4 abort | Fault lamp; nothing moves | recover on Reset |
 //! | 5 recover | acknowledges; homes | as home |
 //! | 6 finalise | homes | parked when home; abort when homing fails |
@@ -24,7 +24,7 @@
 //! | lower each lift that is not at its bottom switch | both switches have been on for 300 ms | 10 s have passed; Not OK, once a fault was acknowledged |
 //! | suction off | 1 s has passed | Not OK |
 //! | jog each wheel while its homing sensor is off | both sensors have been on for 300 ms; for 1.5 s, if one was off and lift 1 goes through the wheels next | 10 s have passed; Not OK; a lift off its switch |
-//! | lift 1 up with suction (home and recover) | "step 2 complete" is on: it is the word of step 2 | 5 s have passed; Not OK |
+//! | lift 1 up with suction (home and recover) | "step 2 complete" is on: it is the word of step 2 | 5 s have passed; Not OK; the bit is on within 50 ms, or while the lift's bottom switch is on |
 //! | lift 1 down with suction | its switch has been on for 300 ms | 5 s have passed; Not OK |
 //!
 //! The last two bring down a bottle that may be in the sleeve over lift 1, which must be empty in step 2 of
@@ -33,7 +33,8 @@
 //! Not OK while the lifts go down, if this homing has not acknowledged anything yet, leads back to the
 //! Acknowledge pulse once: a drive that still has its reference refuses to pass its bottom stop.
 //!
-//! Limits while running: a package sensor on for 1.5 s is a jam; a step may take 5 s. The times of homing
+//! Limits while running: a package sensor on for 1.5 s is a jam; a step may take 5 s, and takes at least 50 ms: a
+//! "complete" that was on before its step began is broken feedback, and nothing of the step is commanded. The times of homing
 //! start in the scan after the one that begins the step, because timers are called once per scan.
 //!
 //! The outputs are computed from scratch in each scan. A suction cup that holds a bottle keeps holding it through abort
@@ -297,7 +298,9 @@ impl Rig {
             if next != self.phase {
                 self.enter(next, inputs);
             }
-            if self.phase == Phase::Run && wheel_locked(self.cycle.command(), inputs) {
+            let refused =
+                wheel_locked(self.cycle.command(), inputs) || self.cycle.early(now, inputs.status);
+            if self.phase == Phase::Run && refused {
                 self.enter(Phase::Abort, inputs);
             }
         } else if self.phase != Phase::Initialise {

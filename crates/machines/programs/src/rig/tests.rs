@@ -279,6 +279,53 @@ fn a_step_that_never_completes_aborts_after_its_time() {
 }
 
 #[test]
+fn a_step_whose_complete_is_on_before_it_begins_is_not_commanded() {
+    for step in 1..=6 {
+        let mut cell = Cell::ready();
+        cell.plant.stuck[1] = 1 << (step - 1);
+        cell.press(START);
+        cell.until_phase(ABORT);
+        assert_eq!(cell.words, WORDS[..step - 1], "step {step}");
+        assert!(!cell.plant.not_ok, "step {step}");
+        cell.plant.stuck[1] = 0;
+        cell.press(RESET);
+        cell.until("the cycle", |cell| cell.seen.cycles == 1);
+    }
+}
+
+#[test]
+fn a_step_that_is_complete_within_50_ms_aborts_in_that_scan() {
+    for after in 0..4 {
+        let mut cell = Cell::in_step(4);
+        cell.scans(after);
+        assert_eq!((cell.seen.phase, cell.seen.step), (RUN, 4));
+        cell.plant.stuck[1] = 1 << 3;
+        cell.scan();
+        assert_eq!((cell.seen.phase, cell.seen.word), (ABORT, 0), "{after}");
+    }
+    let mut cell = Cell::in_step(4);
+    cell.scans(4);
+    cell.plant.stuck[1] = 1 << 3;
+    cell.scans(2);
+    assert_eq!((cell.seen.phase, cell.seen.step), (RUN, 5));
+}
+
+#[test]
+fn homing_does_not_believe_a_lift_that_is_up_at_once_or_at_its_bottom_too() {
+    for stuck in [[0, 1 << 1, 0], [0, 0, 1 << 3]] {
+        let mut cell = Cell::new(La1Code::MsbFirst);
+        cell.until("the stroke", |cell| cell.seen.word == WORDS[1]);
+        cell.plant.stuck = stuck;
+        cell.until_phase(ABORT);
+        assert_eq!((cell.seen.word, cell.plant.not_ok), (SC1, false));
+        cell.plant.stuck = [0; 3];
+        cell.press(RESET);
+        cell.until_phase(READY);
+        assert_eq!(cell.phases, [0, 1, 4, 5, 2]);
+    }
+}
+
+#[test]
 fn stop_in_abort_is_remembered_until_the_rig_is_home() {
     let mut cell = Cell::in_step(4);
     cell.plant.not_ok = true;

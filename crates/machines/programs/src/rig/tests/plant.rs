@@ -156,6 +156,8 @@ pub(super) struct Plant {
     pub(super) mute: bool,
     /// The code of lift 1 comes LSB first.
     pub(super) lsb_first: bool,
+    /// Bits of [`image`](Self::image) that are always on.
+    pub(super) stuck: [u8; 3],
     pub(super) bottles: Bottles,
     blocked: u32,
     complete: u16,
@@ -174,6 +176,7 @@ impl Plant {
             sees_jams: true,
             mute: false,
             lsb_first: false,
+            stuck: [0; 3],
             bottles: Bottles::default(),
             blocked: 0,
             complete: 0,
@@ -260,6 +263,7 @@ impl Plant {
         status |= u16::from(self.not_ok) << 15;
         let [high, low] = status.to_be_bytes();
         let panel = u8::from(self.la1.at_bottom()) << 3 | u8::from(self.la2.at_bottom()) << 4;
-        [high, low, panel]
+        let image = [high, low, panel];
+        std::array::from_fn(|byte| image[byte] | self.stuck[byte])
     }
 }

@@ -13,10 +13,11 @@ import tickbus.junit.PlcTest;
 @PlcTest(config = "../../driver.cfg", program = "rig", step = "2ms", machine = CellTest.Cell.class)
 @Tag("native")
 class CellTest {
-    /** Lift 1, as far as these tests need it. */
+    /** Lift 1 and wheel 1, as far as these tests need it. */
     static final class Cell implements Machine {
         private static final double TOP = 180;
         private double height;
+        private double angle;
         private boolean jammed;
 
         void jamNextBottle() {
@@ -31,7 +32,8 @@ class CellTest {
             }
             plc.set("LA1 position", height);
             plc.set("LA1 bottom", height == 0);
-            plc.set("Step 1 complete", plc.get("Step") == 1);
+            angle = plc.isOn("IM1 index") ? Math.min(angle + 0.3, 90) : 0;
+            plc.set("Step 1 complete", angle == 90);
             plc.set("Step 2 complete", height == TOP);
             plc.set("Not OK", jammed && height > 0);
             plc.set("LA2 bottom", true);

@@ -128,6 +128,37 @@ class RigFailsTest {
         recover(plc);
     }
 
+    /** Feedback that sticks on is told before the step begins, and so before a lift or a bottle is hurt. */
+    @ParameterizedTest
+    @ValueSource(ints = {1, 2, 3, 4, 5, 6})
+    void beginsNoStepThatIsCompleteAlready(int step, Plc plc, SimulatedRig machine) {
+        plc.await(on("Ready lamp")).within("25s");
+        plc.force("Step " + step + " complete", true);
+        plc.press("Start button");
+        plc.await(on("Fault lamp")).within("5s");
+        expectAborted(plc);
+        assertEquals(0, plc.rises("Not OK"));
+        assertEquals(List.of(), machine.rig().faults());
+
+        plc.release("Step " + step + " complete");
+        recover(plc);
+        double cycles = plc.get("Cycles");
+        plc.await(is("Cycles", cycles + 2)).within("30s");
+        assertEquals(0, machine.rig().counters().faults());
+    }
+
+    @Test
+    void homesWithoutBelievingALiftThatIsUpBeforeItRises(Plc plc, SimulatedRig machine) {
+        plc.force("Step 2 complete", true);
+        plc.await(on("Fault lamp")).within("25s");
+        expectAborted(plc);
+        assertEquals(List.of(), machine.rig().faults());
+
+        plc.release("Step 2 complete");
+        plc.press("Reset button");
+        plc.await(on("Ready lamp")).within("30s");
+    }
+
     @Test
     void stopsAtOnceWhenTheMachineReportsAFault(Plc plc) {
         start(plc);

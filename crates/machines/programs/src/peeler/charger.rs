@@ -327,7 +327,8 @@ impl Chains {
             }
             Transfer::AwaitLathe => {
                 let let_go = !matches!(self.centring.step, Centring::Held | Centring::Release);
-                if !ready || !let_go {
+                // A lathe that holds something is not ready: one of its two signals is broken.
+                if !ready || holds || !let_go {
                     return Nanos::ZERO;
                 }
                 arm_to(axes, 0.0);

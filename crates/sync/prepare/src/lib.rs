@@ -14,6 +14,8 @@
 //! byte, and an outline read from its tokens. XML is read with `roxmltree`, which reports the position of each element.
 
 mod addresses;
+mod block;
+mod branches;
 mod chart;
 mod check;
 mod code;
@@ -41,6 +43,8 @@ use structured_text::{Preparation, plan};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
 
+pub use block::{Block, Direction, NoBlock, Variable, Wired, Wrapped, unfit};
+pub use branches::Branch;
 pub use library::{Addresses, SOURCES};
 
 /// A file with a part of a program.

@@ -16,7 +16,9 @@ use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_driver::DriverError;
 use tickbus_driver_cfg::Kinds;
 use tickbus_report::{RunStatistics, page_beside};
-use tickbus_testing::{Case, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash};
+use tickbus_testing::{
+    Case, Coverage, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash,
+};
 
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///
@@ -48,6 +50,10 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with_all = ["only", "list"])]
     accept: bool,
 
+    /// Print which branches of a block (block = "...") the tests and the sweep have not taken.
+    #[arg(long, conflicts_with = "list")]
+    coverage: bool,
+
     /// Make this many runs of a sweep at once; by default as many as there are cores.
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroU16>,
@@ -65,6 +71,15 @@ struct Count {
     ticks: u64,
     /// The verdicts of the sweeps, in the order of their lists.
     verdicts: Vec<(String, Judgement)>,
+}
+
+/// The results of a file beside its tests.
+#[derive(Default)]
+struct Details {
+    /// The sweep, as JSON.
+    sweep: Value,
+    /// The branches of the block, if they are counted.
+    coverage: Option<Coverage>,
 }
 
 /// The data that each file of a run needs.
@@ -118,7 +133,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         kinds,
         progress: Progress::begin("test", "reading the tests"),
     };
-    let (groups, sweeps): (Vec<Group>, Vec<Value>) = files
+    let (groups, details): (Vec<Group>, Vec<Details>) = files
         .iter()
         .map(|file| run_file(file, &job, &mut count))
         .unzip();
@@ -129,10 +144,10 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         let reason = format!("test: {}: cannot be written: {error}", path.display());
         return arguments.format.fail("test", &reason, Outcome::WrongInput);
     }
-    conclude(&job, (&groups, &sweeps), &count)
+    conclude(&job, (&groups, &details), &count)
 }
 
-fn conclude(job: &Job<'_>, results: (&[Group], &[Value]), count: &Count) -> Outcome {
+fn conclude(job: &Job<'_>, results: (&[Group], &[Details]), count: &Count) -> Outcome {
     let arguments = job.arguments;
     let Count {
         passed,
@@ -144,6 +159,18 @@ fn conclude(job: &Job<'_>, results: (&[Group], &[Value]), count: &Count) -> Outc
     let green = failed + wrong == 0 && (*passed > 0 || arguments.list);
     if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
         eprintln!("test: no test has \"{only}\" in its name; --list lists them");
+    }
+    let mut blocks: Vec<Coverage> = Vec::new();
+    for found in results.1.iter().filter_map(|one| one.coverage.as_ref()) {
+        if !blocks.iter_mut().any(|block| block.add(found)) {
+            blocks.push(found.clone());
+        }
+    }
+    if blocks.is_empty() && arguments.coverage && *wrong == 0 {
+        eprintln!("test: --coverage counts the branches of a block, and no file here tests one");
+    }
+    for block in &blocks {
+        job.tell(&block.line());
     }
     let mut printed = Outcome::Done;
     if arguments.format.is_json() {
@@ -168,7 +195,7 @@ fn conclude(job: &Job<'_>, results: (&[Group], &[Value]), count: &Count) -> Outc
 /// Returns the results as a JSON document.
 fn document(
     arguments: &Arguments,
-    (groups, sweeps): (&[Group], &[Value]),
+    (groups, details): (&[Group], &[Details]),
     count: &Count,
     green: bool,
 ) -> Value {
@@ -188,9 +215,10 @@ fn document(
             "seconds": case.took.as_secs_f64(),
         })
     };
-    let files = groups.iter().zip(sweeps).map(|(group, sweep)| {
+    let files = groups.iter().zip(details).map(|(group, details)| {
         let tests: Value = group.cases.iter().map(of_case).collect();
-        json!({ "file": group.name, "tests": tests, "sweep": sweep })
+        let coverage = details.coverage.as_ref().map(of_coverage);
+        json!({ "file": group.name, "tests": tests, "sweep": details.sweep, "coverage": coverage })
     });
     json!({
         "ok": green,
@@ -199,6 +227,19 @@ fn document(
         "wrong": count.wrong,
         "ticks": count.ticks,
         "files": files.collect::<Value>(),
+    })
+}
+
+fn of_coverage(coverage: &Coverage) -> Value {
+    let branches = coverage
+        .branches
+        .iter()
+        .map(|branch| json!({ "line": branch.line, "label": branch.label, "taken": branch.taken }));
+    json!({
+        "block": coverage.block,
+        "file": coverage.file,
+        "taken": coverage.taken(),
+        "branches": branches.collect::<Value>(),
     })
 }
 
@@ -234,7 +275,7 @@ fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Returns true if a file in a folder is a test file: it has a driver.cfg or a test. Other TOML files, such as
+/// Returns true if a file in a folder is a test file: it has a driver.cfg, a block or a test. Other TOML files, such as
 /// Cargo.toml, can be in the same folder.
 fn is_test_file(path: &Path) -> bool {
     let Ok(text) = load_text(path) else {
@@ -243,23 +284,30 @@ fn is_test_file(path: &Path) -> bool {
     };
     text.lines().map(str::trim_start).any(|line| {
         let header = line.strip_prefix("[[").map(str::trim_start);
-        let key = line.strip_prefix("config").map(str::trim_start);
-        header.is_some_and(|rest| rest.starts_with("test"))
-            || key.is_some_and(|rest| rest.starts_with('='))
+        let has = |key| {
+            let rest = line.strip_prefix(key).map(str::trim_start);
+            rest.is_some_and(|rest| rest.starts_with('='))
+        };
+        header.is_some_and(|rest| rest.starts_with("test")) || has("config") || has("block")
     })
 }
 
-/// Runs the tests of a file, and its sweep, which is also returned as JSON.
-fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> (Group, Value) {
+/// Runs the tests of a file, and its sweep.
+fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> (Group, Details) {
     let arguments = job.arguments;
     let name = file.display().to_string();
-    let suite = match Suite::load(file, job.kinds) {
+    let load = if arguments.coverage {
+        Suite::load_counting
+    } else {
+        Suite::load
+    };
+    let suite = match load(file, job.kinds) {
         Ok(suite) => suite,
         Err(mistakes) => {
             count.wrong += mistakes.len();
             job.report(&mistakes);
             let cases = vec![wrong_file(&mistakes)];
-            return (Group { name, cases }, Value::Null);
+            return (Group { name, cases }, Details::default());
         }
     };
     let wanted = |test: &&Test| {
@@ -279,13 +327,14 @@ fn run_file(file: &Path, job: &Job<'_>, count: &mut Count) -> (Group, Value) {
             cases.push(run_test(&suite, test, job, count));
         }
     }
-    let mut swept = Value::Null;
+    let mut details = Details::default();
     if let Some(sweep) = &suite.sweep {
         let (runs, document) = sweep::run(&suite, sweep, job, count);
         cases.extend(runs);
-        swept = document;
+        details.sweep = document;
     }
-    (Group { name, cases }, swept)
+    details.coverage = suite.coverage();
+    (Group { name, cases }, details)
 }
 
 /// Describes a file that cannot be read, in the form that a CI server shows.

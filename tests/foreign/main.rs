@@ -1,6 +1,7 @@
 //! Tests in which third-party software is the other end, in one program with a harness that reports what is not installed.
 #![allow(missing_docs, reason = "tests")]
 
+mod block;
 #[cfg(feature = "mqtt")]
 mod bridge;
 #[cfg(any(feature = "mqtt", feature = "page"))]
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         ("fmi", fmi::TESTS),
         ("prepare", prepare::TESTS),
         ("iec2c", iec2c::TESTS),
+        ("block", block::TESTS),
         ("s7", s7::TESTS),
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),

@@ -6,6 +6,7 @@
 //! machine take turns on one thread, and the same test always gives the same run. A [`Sweep`] repeats a scenario with
 //! each fault of a list at each moment of a list, and judges what the program makes of it.
 
+mod block;
 mod condition;
 mod failure;
 mod junit;
@@ -18,10 +19,12 @@ mod sections;
 mod suite;
 mod sweep;
 mod sweeping;
+mod table;
 mod test;
 mod unswallowed;
 mod watch;
 
+pub use block::{Branch, Coverage};
 pub use condition::{Condition, Demand};
 pub use failure::Failure;
 pub use junit::{Case, Group, Verdict, junit_xml};

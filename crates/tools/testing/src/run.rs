@@ -120,6 +120,9 @@ impl Suite {
             let ended = stand.fmu.take()?.end();
             ended.err().map(|why| stand.broken(place, &why.to_string()))
         });
+        if let Some(counted) = &bench.counted {
+            counted.add(&stand.slots);
+        }
         let ran = Ran {
             ticks: stand.ticks,
             time: stand.time(),
@@ -262,12 +265,15 @@ impl Stand<'_> {
         }
         let mut expected = self.watched(&step.expect);
         expected.retain(|_| strict);
-        self.expect(&expected, "")?;
+        let row = step.row.map(|row| format!(" in row {row} of the table"));
+        let row = row.unwrap_or_default();
+        self.expect(&expected, &row)?;
         let unswallowed = if strict { &step.unswallowed[..] } else { &[] };
         self.check_unswallowed(unswallowed)?;
         if step.during > 0 {
             let from = self.ticks;
-            let when = format!(" for {} from tick {from}", span(step.during, self.step));
+            let lasts = span(step.during, self.step);
+            let when = format!(" for {lasts} from tick {from}{row}");
             for _ in 0..step.during {
                 self.tick(step.place)?;
                 self.expect(&expected, &when)?;

@@ -10,6 +10,7 @@ use tickbus_fieldbus::faults::{self, Effect, Fault, unknown};
 use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 
+use super::block::Counted;
 use super::condition::{Condition, Demand};
 use super::plant::{FmuKeys, Plant, check_model_fault};
 use super::playback::MachineRecording;
@@ -41,6 +42,8 @@ pub(super) struct Reader<'a> {
     pub(super) config: &'a Config,
     /// The FMU that is the machine, once it is read.
     pub(super) plant: Option<&'a Plant>,
+    /// The counted branches of a block.
+    pub(super) counted: Option<&'a Counted>,
 }
 
 /// The machine in a test file.
@@ -230,11 +233,22 @@ impl Reader<'_> {
             );
         }
         let steps: Vec<_> = tables.into_iter().map(|table| self.step(table)).collect();
-        steps.into_iter().collect()
+        let steps: Option<Vec<_>> = steps.into_iter().collect();
+        Some(steps?.concat())
     }
 
-    fn step(&self, mut table: Table<'_>) -> Option<Step> {
+    /// A step, or the steps of a table.
+    fn step(&self, mut table: Table<'_>) -> Option<Vec<Step>> {
         let place = table.collector().place(table.at());
+        if let Some(rows) = table.take("table") {
+            for (key, value) in table.all().filter(|(key, _)| *key != "table") {
+                let what = format!("\"{}\" stands beside \"table\" in one step", shown(key));
+                value.wrong(what, "write a step for each");
+            }
+            let collector = table.collector();
+            table.finish_open();
+            return self.table_steps(&rows, collector);
+        }
         let (set, force) = (table.take("set"), table.take("force"));
         let release = table.take("release");
         let (fault, end) = (table.take("fault"), table.take("end"));
@@ -293,8 +307,9 @@ impl Reader<'_> {
         };
         let (expect, unswallowed) = expect?;
         let (always, always_unswallowed) = always?;
-        Some(Step {
+        Some(vec![Step {
             place,
+            row: None,
             set: set?,
             force: force?,
             release: release?,
@@ -307,7 +322,7 @@ impl Reader<'_> {
             always,
             always_unswallowed,
             never: never?,
-        })
+        }])
     }
 
     fn passage(&self, key: &str, value: &Value<'_>, within: Option<&Value<'_>>) -> Option<Passage> {

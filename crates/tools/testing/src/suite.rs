@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
@@ -11,6 +12,7 @@ use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
+use super::block::{self, BlockKeys, Counted, Coverage};
 use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
@@ -41,6 +43,8 @@ pub(super) struct Bench {
     pub(super) rules: Vec<Rule>,
     pub(super) tape: Option<MachineRecording>,
     pub(super) fmu: Option<Plant>,
+    /// The branches of the block under test, if they are counted.
+    pub(super) counted: Option<Arc<Counted>>,
 }
 
 impl Suite {
@@ -50,26 +54,43 @@ impl Suite {
     ///
     /// With every mistake in the test file; if there are none, with those in its driver.cfg.
     pub fn load(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
-        let text = load_text(path)?;
-        let folder = path.parent().unwrap_or_else(|| Path::new(""));
-        Self::parse(&path.display().to_string(), &text, folder, kinds)
+        Self::read(path, kinds, false)
     }
 
-    /// Reads the text of a test file; its paths are relative to `folder`.
+    /// As [`load`](Self::load); if the file tests a block, its branches are counted in all runs.
     ///
     /// # Errors
     ///
     /// As [`load`](Self::load).
-    pub fn parse(
+    pub fn load_counting(path: &Path, kinds: &'static Kinds) -> Result<Self, Mistakes> {
+        Self::read(path, kinds, true)
+    }
+
+    fn read(path: &Path, kinds: &'static Kinds, counts: bool) -> Result<Self, Mistakes> {
+        let text = load_text(path)?;
+        let folder = path.parent().unwrap_or_else(|| Path::new(""));
+        Self::parse(&path.display().to_string(), &text, (folder, kinds), counts)
+    }
+
+    /// The branches of the block that the runs so far have taken; `None` if nothing is counted.
+    pub fn coverage(&self) -> Option<Coverage> {
+        self.bench
+            .counted
+            .as_ref()
+            .map(|counted| counted.coverage())
+    }
+
+    /// Reads the text of a test file; its paths are relative to `folder`.
+    fn parse(
         file: &str,
         text: &str,
-        folder: &Path,
-        kinds: &'static Kinds,
+        (folder, kinds): (&Path, &'static Kinds),
+        counts: bool,
     ) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
         let mut of_config = None;
         let read = read_text(&mut collector, text, |root| {
-            read(root, (folder, kinds), &mut of_config)
+            read(root, (folder, kinds), counts, &mut of_config)
         });
         match (collector.finish(), of_config) {
             (Some(mistakes), _) | (None, Some(mistakes)) => Err(mistakes),
@@ -90,10 +111,15 @@ impl Suite {
 fn read(
     mut root: Table<'_>,
     (folder, kinds): (&Path, &'static Kinds),
+    counts: bool,
     of_config: &mut Option<Mistakes>,
 ) -> Option<(Bench, Vec<Test>, Option<Sweep>)> {
     let right = "write the path of the driver.cfg, as seen from this file";
-    let config = root.require("config", format!("add config = \"driver.cfg\": {right}"));
+    let config = root.take("config");
+    let block = BlockKeys::take(&mut root);
+    if block.block().is_none() {
+        root.require("config", format!("add config = \"driver.cfg\": {right}"));
+    }
     let program = root.take("program");
     let options = root.take("program_options");
     let scan = root.take("scan");
@@ -103,7 +129,13 @@ fn read(
     let sweep = root.take("sweep");
     let either = "write a [[test]] with name and steps for each test";
     root.require_one_of(&["test", "sweep"], either);
-    if let (None, true) = (&program, root.is_whole()) {
+    block.check_beside(&[
+        ("config", config.as_ref()),
+        ("program", program.as_ref()),
+        ("program_options", options.as_ref()),
+        ("scan", scan.as_ref()),
+    ]);
+    if let (None, None, true) = (&program, block.block(), root.is_whole()) {
         for (key, value) in [("program_options", &options), ("scan", &scan)] {
             if let Some(value) = value {
                 let what = format!("\"{key}\" stands without \"program\"");
@@ -113,7 +145,17 @@ fn read(
     }
     root.finish();
 
-    let step = step.map_or(Some(STEP), |value| value.duration());
+    let usual = block.block().map_or(STEP, |_| block::STEP);
+    let step = step.map_or(Some(usual), |value| value.duration());
+    if let (Some(value), Some(step)) = (block.block(), step) {
+        let ready = block.read((folder, kinds), step, counts, of_config)?;
+        let config = on_simulation_time(ready.config, value, folder, Some(ready.peer))?;
+        let sections = (machine, tests, sweep);
+        let (mut bench, tests, sweep) =
+            read_sections(sections, config, step, folder, ready.counted, of_config)?;
+        bench.initial = [ready.initial, bench.initial].concat();
+        return Some((bench, tests, sweep));
+    }
     let peer = match &program {
         None => Some(None),
         // The driver.cfg may be in a different folder from this file.
@@ -126,7 +168,19 @@ fn read(
         let config = load_config(&value, right, (folder, kinds), of_config)?;
         on_simulation_time(config, &value, folder, peer?)
     });
-    let (config, step) = (config?, step?);
+    let sections = (machine, tests, sweep);
+    read_sections(sections, config?, step?, folder, None, of_config)
+}
+
+/// Reads the machine, the tests and the sweep, before the signals of `config`.
+fn read_sections(
+    (machine, tests, sweep): (Option<Value<'_>>, Option<Value<'_>>, Option<Value<'_>>),
+    config: Config,
+    step: Nanos,
+    folder: &Path,
+    counted: Option<Arc<Counted>>,
+    of_config: &mut Option<Mistakes>,
+) -> Option<(Bench, Vec<Test>, Option<Sweep>)> {
     let reader = Reader {
         table: &config.table,
         role: config.role,
@@ -134,6 +188,7 @@ fn read(
         folder,
         config: &config,
         plant: None,
+        counted: counted.as_deref(),
     };
     let mut machine = match machine {
         None => Machine::default(),
@@ -171,6 +226,7 @@ fn read(
         rules: machine.rules,
         tape: machine.tape,
         fmu: machine.fmu,
+        counted,
     };
     Some((bench, tests, sweep))
 }

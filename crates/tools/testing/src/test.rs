@@ -24,6 +24,8 @@ pub struct Test {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) place: TextPosition,
+    /// The row of the table that this step is, from 1.
+    pub(super) row: Option<usize>,
     pub(super) set: Vec<(usize, Slot)>,
     pub(super) force: Vec<(usize, Slot)>,
     pub(super) release: Vec<usize>,

@@ -123,6 +123,11 @@ impl<'t> Collector<'t> {
         }
     }
 
+    /// The text.
+    pub(super) fn text(&self) -> &'t str {
+        self.text
+    }
+
     /// Records a mistake at byte offset `at` of the text.
     pub fn report(&self, at: usize, what: impl Into<String>, right: impl Into<String>) {
         self.collect(at, Mistake::new(what, right));

@@ -250,6 +250,27 @@ impl<'a> Value<'a> {
         }
     }
 
+    /// The lines of a text, such as one in `"""..."""`, each with its byte offset in the file. `None` for another value,
+    /// and for a text with escapes.
+    pub fn text_lines(&self) -> Option<Vec<(usize, &'a str)>> {
+        self.as_text()?;
+        let span = self.node.span();
+        let raw = self.collector.text().get(span.clone())?;
+        let long = raw.starts_with("\"\"\"") || raw.starts_with("'''");
+        let quotes = if long { 3 } else { 1 };
+        let inner = raw.get(quotes..raw.len().checked_sub(quotes)?)?;
+        if raw.starts_with('"') && inner.contains('\\') {
+            return None;
+        }
+        let mut at = span.start + quotes;
+        let lines = inner.split_inclusive('\n').map(|line| {
+            let start = at;
+            at += line.len();
+            (start, line.trim_end_matches(['\n', '\r']))
+        });
+        Some(lines.collect())
+    }
+
     /// A text for people: not empty, at most `longest` characters, no control characters, no leading or
     /// trailing blanks.
     pub fn label(&self, longest: usize, right: &str) -> Option<&'a str> {

@@ -42,7 +42,11 @@ impl Reader<'_> {
         let within = table.require("within", right);
         let tolerance = table.take("tolerance");
         let accepted = table.take("accepted");
-        let usual = Mark::usual(self.table, self.own());
+        let mut usual = Mark::usual(self.table, self.own());
+        if let Some(counted) = self.counted {
+            usual
+                .retain(|mark| !matches!(mark, Mark::Value(signal) if counted.is_counter(*signal)));
+        }
         if usual.is_empty() && goes_on.is_none() {
             table.wrong(
                 "the PLC writes neither a BOOL nor an unscaled whole number that would show its progress",

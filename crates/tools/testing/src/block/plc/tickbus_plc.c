@@ -1,0 +1,1 @@
+../../../../../../plc/glue/tickbus_plc.c

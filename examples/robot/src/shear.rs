@@ -122,7 +122,7 @@ pub struct Outcome {
     pub seen: [u64; 2],
     /// Swallowed pulses of each sensor.
     pub swallowed: [u64; 2],
-    /// What tickbus says about each sensor with swallowed pulses.
+    /// A sentence of tickbus about each sensor with swallowed pulses.
     pub named: Vec<String>,
 }
 

@@ -76,7 +76,7 @@ fn delay(statistics: &RunStatistics, key: &str) -> Option<[Nanos; 3]> {
     Some([micros("min")?, micros("p50")?, micros("max")?])
 }
 
-/// Whether signals that changed in one tick can reach the PLC in different scans.
+/// Says if signals that changed in one tick can reach the PLC in different scans.
 fn races(statistics: &RunStatistics) -> &'static str {
     let has = |key| statistics.get(key).is_some();
     if (has("ticks") && has("plc.scans")) || has("sdsp.hash") {

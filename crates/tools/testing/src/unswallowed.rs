@@ -60,7 +60,7 @@ fn one_signal(name: &str, table: &SignalTable) -> Result<usize, Mistake> {
     })
 }
 
-/// What is wrong with a text that means this expectation, and is at the wrong place or misspelt.
+/// The mistake in a text that means this expectation, and is at the wrong place or misspelt.
 pub(super) fn mistake(text: &str, table: &SignalTable) -> Mistake {
     if signals_of(text, table).is_some() {
         return Mistake::new(

@@ -2,9 +2,12 @@
 
 mod sweep;
 
-use std::io::Write as _;
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
 use std::num::NonZeroU16;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 use serde_json::{Value, json};
@@ -15,7 +18,7 @@ use super::progress::Progress;
 use tickbus_base::toml_text::{Mistakes, load_text};
 use tickbus_driver::DriverError;
 use tickbus_driver_cfg::Kinds;
-use tickbus_report::{RunStatistics, page_beside};
+use tickbus_report::{RunStatistics, Sweeps, Swept, link, page_beside, write_sweeps_file};
 use tickbus_testing::{
     Case, Coverage, Group, Judgement, Suite, Test, Verdict, junit_xml, verdict_hash,
 };
@@ -37,6 +40,10 @@ pub(super) struct Arguments {
     /// Write a recording of each failed test, as VCD, and a report about it to DIR; of a sweep those of 20 runs.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
+
+    /// Write the matrices of the sweeps to FILE, as an HTML page whose cells open what --keep has kept.
+    #[arg(long, value_name = "FILE")]
+    page: Option<PathBuf>,
 
     /// Run only tests whose name or file name contains this text; of a sweep the one run with this name, if there is one.
     #[arg(long, value_name = "TEXT")]
@@ -62,6 +69,10 @@ pub(super) struct Arguments {
     format: Format,
 }
 
+/// The longest name of a recording, in characters, and in bytes; file systems allow 255.
+const LONGEST_NAME: usize = 120;
+const MOST_BYTES: usize = 200;
+
 /// The number of tests for each result.
 #[derive(Default)]
 struct Count {
@@ -71,6 +82,17 @@ struct Count {
     ticks: u64,
     /// The verdicts of the sweeps, in the order of their lists.
     verdicts: Vec<(String, Judgement)>,
+    /// Their matrices.
+    swept: Vec<Swept>,
+}
+
+impl Count {
+    /// The hash over all verdicts.
+    fn hash(&self) -> String {
+        let verdicts = self.verdicts.iter();
+        let pairs = verdicts.map(|(name, found)| (name.as_str(), found));
+        format!("{:016x}", verdict_hash(pairs))
+    }
 }
 
 /// The results of a file beside its tests.
@@ -87,14 +109,85 @@ struct Job<'a> {
     arguments: &'a Arguments,
     kinds: &'static Kinds,
     progress: Progress,
+    /// The names of the recordings so far, in small letters: some file systems do not distinguish them.
+    kept: Mutex<HashSet<String>>,
 }
 
 impl Job<'_> {
+    /// The address of a report as seen from the page of the sweeps.
+    fn link(&self, report: Option<&Path>) -> Option<String> {
+        link(self.arguments.page.as_deref()?, report?)
+    }
+
+    /// Removes the results of an earlier run, which would be taken for those of this run if it is interrupted.
+    fn clear(&self) -> Result<(), String> {
+        let arguments = self.arguments;
+        for path in [&arguments.junit, &arguments.page].into_iter().flatten() {
+            clear(path)
+                .map_err(|error| format!("test: {}: cannot be written: {error}", path.display()))?;
+        }
+        Ok(())
+    }
+
+    /// Writes the results to the files that the command line names.
+    fn write(&self, groups: &[Group], count: &mut Count) {
+        let mut failed = Vec::new();
+        if let Some(path) = &self.arguments.junit {
+            let written = write_file(path, &junit_xml(groups));
+            failed.extend(written.err().map(|error| (path, error)));
+        }
+        if let Some(path) = &self.arguments.page {
+            if count.swept.is_empty() && count.wrong == 0 {
+                self.report("test: no run of a [sweep] was made, so --page has nothing to show");
+                count.wrong += 1;
+            } else if !count.swept.is_empty() {
+                let sweeps = Sweeps {
+                    title: match &count.swept[..] {
+                        [one] => format!("Sweep of {}", one.file),
+                        several => format!("Sweeps of {} files", several.len()),
+                    },
+                    hash: count.hash(),
+                    files: std::mem::take(&mut count.swept),
+                };
+                let written = write_sweeps_file(&sweeps, path);
+                failed.extend(written.err().map(|error| (path, error)));
+            }
+        }
+        for (path, error) in failed {
+            count.wrong += 1;
+            self.report(format!(
+                "test: {}: cannot be written: {error}",
+                path.display()
+            ));
+        }
+    }
+
+    /// A file name, without ending, that all file systems allow and that no earlier recording of this run has.
+    fn recording_name(&self, name: &str) -> String {
+        let allowed = |c: char| match c {
+            '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' => '_',
+            c => c,
+        };
+        let mut name: String = name.chars().map(allowed).take(LONGEST_NAME).collect();
+        while name.len() > MOST_BYTES {
+            name.pop();
+        }
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut numbered = name.clone();
+        for number in 2.. {
+            if kept.insert(numbered.to_lowercase()) {
+                break;
+            }
+            numbered = format!("{name} {number}");
+        }
+        numbered
+    }
+
     /// Prints a line on stdout, unless a JSON document will say the same. The tests continue even if the reader is gone
     /// (`| head`).
     fn tell(&self, line: &str) {
         if !self.arguments.format.is_json() {
-            let print = || writeln!(std::io::stdout().lock(), "{line}");
+            let print = || writeln!(io::stdout().lock(), "{line}");
             let _ = self.progress.aside(print);
         }
     }
@@ -132,17 +225,19 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         arguments,
         kinds,
         progress: Progress::begin("test", "reading the tests"),
+        kept: Mutex::default(),
     };
+    if !arguments.list
+        && let Err(reason) = job.clear()
+    {
+        return arguments.format.fail("test", &reason, Outcome::WrongInput);
+    }
     let (groups, details): (Vec<Group>, Vec<Details>) = files
         .iter()
         .map(|file| run_file(file, &job, &mut count))
         .unzip();
-    if let Some(path) = &arguments.junit
-        && !arguments.list
-        && let Err(error) = write_file(path, &junit_xml(&groups))
-    {
-        let reason = format!("test: {}: cannot be written: {error}", path.display());
-        return arguments.format.fail("test", &reason, Outcome::WrongInput);
+    if !arguments.list {
+        job.write(&groups, &mut count);
     }
     conclude(&job, (&groups, &details), &count)
 }
@@ -155,6 +250,7 @@ fn conclude(job: &Job<'_>, results: (&[Group], &[Details]), count: &Count) -> Ou
         wrong,
         ticks,
         verdicts,
+        ..
     } = count;
     let green = failed + wrong == 0 && (*passed > 0 || arguments.list);
     if let (Some(only), 0) = (&arguments.only, passed + failed + wrong) {
@@ -178,11 +274,10 @@ fn conclude(job: &Job<'_>, results: (&[Group], &[Details]), count: &Count) -> Ou
         printed = job.progress.aside(|| print_document("test", document));
     }
     if !arguments.list {
-        let pairs = verdicts.iter().map(|(name, found)| (name.as_str(), found));
         let hash = if verdicts.is_empty() {
             String::new()
         } else {
-            format!(" hash={:016x}", verdict_hash(pairs))
+            format!(" hash={}", count.hash())
         };
         job.tell(&format!(
             "test: {} passed={passed} failed={failed} wrong={wrong} ticks={ticks}{hash}",
@@ -255,13 +350,13 @@ fn listed(test: &Test) -> Case {
 }
 
 /// Collects the test files at `path`, sorted by name.
-fn collect(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+fn collect(path: &Path, files: &mut Vec<PathBuf>) -> io::Result<()> {
     if !path.is_dir() {
         // Reading the file later shows whether it exists and can be read.
         files.push(path.to_owned());
         return Ok(());
     }
-    let entries: std::io::Result<Vec<_>> = std::fs::read_dir(path)?.collect();
+    let entries: io::Result<Vec<_>> = fs::read_dir(path)?.collect();
     let mut entries: Vec<PathBuf> = entries?.into_iter().map(|entry| entry.path()).collect();
     entries.sort();
     for entry in entries {
@@ -393,7 +488,7 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
                     if let Some(folder) = &job.arguments.keep {
                         let names = (suite.file.as_str(), test.name.as_str());
                         let texts = (full.as_str(), Some(ran.statistics.as_str()));
-                        let kept = record(names, folder, texts, |path| {
+                        let (kept, _) = record(job, names, folder, texts, |path| {
                             suite.run(test, Some(path)).map(drop)
                         });
                         full.push_str(&kept);
@@ -414,48 +509,54 @@ fn run_test(suite: &Suite, test: &Test, job: &Job<'_>, count: &mut Count) -> Cas
 }
 
 /// Runs a failed test of a file again with a recorder. Tests are deterministic, so it fails in the same way, and its
-/// statistics are those of the first run. Returns the path of the recording.
+/// statistics are those of the first run. Returns the paths of the recording and of its page as text, and the page.
 fn record(
+    job: &Job<'_>,
     (file, test): (&str, &str),
     folder: &Path,
     (failure, statistics): (&str, Option<&str>),
     run: impl FnOnce(&Path) -> Result<(), DriverError>,
-) -> String {
+) -> (String, Option<PathBuf>) {
     let stem = Path::new(file).file_stem().unwrap_or_default();
-    let name = format!("{} - {test}", stem.to_string_lossy());
-    // Replaces characters that some file systems do not allow.
-    let name: String = name
-        .chars()
-        .map(|c| match c {
-            '/' | '\\' | ':' | '*' | '?' | '"' | '<' | '>' | '|' => '_',
-            c => c,
-        })
-        .take(120)
-        .collect();
+    let name = job.recording_name(&format!("{} - {test}", stem.to_string_lossy()));
     let file = std::path::absolute(folder.join(format!("{name}.vcd")));
     let recorded = file.and_then(|file| {
-        std::fs::create_dir_all(folder)?;
-        run(&file).map_err(std::io::Error::other)?;
+        fs::create_dir_all(folder)?;
+        run(&file).map_err(io::Error::other)?;
         Ok(file)
     });
     let file = match recorded {
         Ok(file) => file,
-        Err(error) => return format!("\n      it could not be recorded: {error}"),
+        Err(error) => return (format!("\n      it could not be recorded: {error}"), None),
     };
     let texts = [("What failed".to_owned(), failure.to_owned())];
-    let page = match page_beside(&file, test, statistics, &texts) {
+    let page = page_beside(&file, test, statistics, &texts);
+    let told = match &page {
         Ok(page) => page.display().to_string(),
-        Err(error) => error,
+        Err(error) => error.clone(),
     };
-    format!(
-        "\n      recording: {}\n      report: {page}",
+    let text = format!(
+        "\n      recording: {}\n      report: {told}",
         file.display()
-    )
+    );
+    (text, page.ok())
 }
 
-fn write_file(path: &Path, text: &str) -> std::io::Result<()> {
+/// Removes a file, and fails if it could not be written later. What is not a plain file, such as a pipe, stays.
+fn clear(path: &Path) -> io::Result<()> {
     if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder)?;
+        fs::create_dir_all(folder)?;
     }
-    std::fs::write(path, text)
+    if fs::symlink_metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir()) {
+        return Ok(());
+    }
+    File::create(path)?;
+    fs::remove_file(path)
+}
+
+fn write_file(path: &Path, text: &str) -> io::Result<()> {
+    if let Some(folder) = path.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::write(path, text)
 }

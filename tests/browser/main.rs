@@ -4,6 +4,7 @@
 //! runs it, and so does `make test` if both are installed.
 
 mod samples;
+mod sweep;
 #[allow(dead_code, reason = "the live page's tests use the rest")]
 mod webdriver;
 

@@ -1,5 +1,7 @@
 //! `tickbus test` on files with a `[sweep]`.
 
+mod doors;
+
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -292,11 +294,53 @@ fn what_is_wrong_with_accepted_verdicts_has_its_place() {
             "{told}"
         );
     }
+    // A reason of several lines is kept as well.
+    let lines = text.replacen(
+        "why      = \"\"",
+        "why      = \"\"\"\nnobody\nreads it\"\"\"",
+        1,
+    );
+    fs::write(&path, lines).expect("the file");
+    let output = test(folder.path(), &["a.toml", "--accept"]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    let output = test(folder.path(), &["a.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    assert!(
+        fs::read_to_string(&path)
+            .expect("the file")
+            .contains("why      = \"nobody\\u000areads it\"\n")
+    );
     // Faults and moments that are no more are left out when the file is written again.
     fs::write(&path, text.replace("Height frozen", "Depth frozen")).expect("the file");
     let output = test(folder.path(), &["a.toml", "--accept"]);
     assert_eq!(output.status.code(), Some(0), "{}", err(&output));
     assert_eq!(fs::read_to_string(&path).expect("the file"), text);
+}
+
+#[test]
+fn two_sweeps_in_a_folder_do_not_share_their_accepted_verdicts() {
+    let folder = folder(SWEEP);
+    fs::copy(folder.path().join("a.toml"), folder.path().join("b.toml")).expect("a copy");
+    let output = test(folder.path(), &[".", "--accept"]);
+    assert_eq!(output.status.code(), Some(1));
+    let told = "these are the verdicts of the sweep in \"a.toml\"; in b.toml, name another file by accepted = \"…\"";
+    assert!(err(&output).contains(told), "{}", err(&output));
+    let own = SWEEP.replace("[sweep]", "[sweep]\naccepted = \"of b.toml\"");
+    fs::write(folder.path().join("b.toml"), own).expect("the file");
+    let output = test(folder.path(), &[".", "--accept"]);
+    assert_eq!(output.status.code(), Some(0), "{}", err(&output));
+    assert_eq!(test(folder.path(), &["."]).status.code(), Some(0));
+}
+
+#[test]
+fn names_are_for_people() {
+    let folder = folder(&SWEEP.replace("runs = \"Run\"", "\"ru\\nns\" = \"Run\""));
+    let output = test(folder.path(), &["a.toml"]);
+    assert!(
+        err(&output).contains("is no name for people; write a name of printable characters"),
+        "{}",
+        err(&output)
+    );
 }
 
 #[test]

@@ -1,15 +1,16 @@
 //! The sweep of a test file: its runs on all cores, the matrix, and the accepted verdicts.
 
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
+use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tickbus_testing::{
-    Accepted, Case, Cell, CellMark, Judgement, Plan, Suite, Sweep, Verdict, matrix, verdict_hash,
+    Accepted, Case, Cell, CellMark, Judgement, Plan, Suite, Sweep, Tally, Verdict, matrix, swept,
+    swept_run, verdict_hash,
 };
 
 use super::{Count, Job, record, write_file};
@@ -117,25 +118,23 @@ impl Work<'_> {
         let written = self.job.arguments.accept && self.accept(&made, count);
 
         let mut marks = vec![None; self.plan.cells.len()];
-        let mut words: BTreeMap<&str, usize> = BTreeMap::new();
-        let (mut accepted, mut unexplained, mut kept) = (0, 0, 0);
+        let (mut tally, mut kept) = (Tally::default(), 0);
         let mut cases = Vec::new();
+        let mut runs = vec![None; marks.len()];
         for made in &made {
             let cell = made.cell;
             let judgement = made.judgement.as_ref().ok();
             let passes = judgement
                 .is_some_and(|found| written || self.accepted.passes(&self.plan, cell, found));
-            *words
-                .entry(judgement.map_or("wrong", Judgement::word))
-                .or_default() += 1;
-            if passes && !judgement.is_some_and(Judgement::is_right) {
-                accepted += 1;
-                unexplained += usize::from(self.accepted.why(&self.plan, cell).is_empty());
-            }
+            let found = (judgement, passes);
+            tally.add((&self.plan, &self.accepted), cell, found);
             marks[cell.index] = Some(CellMark::of(judgement, passes));
             let wants_record = !passes && kept < MOST_KEPT || chosen.len() == 1;
             kept += usize::from(!passes);
-            let verdict = self.verdict(made, passes, wants_record, count);
+            let (verdict, report) = self.verdict(made, passes, wants_record, count);
+            let found = made.judgement.as_ref().map_err(String::as_str);
+            let report = self.job.link(report.as_deref());
+            runs[cell.index] = Some(swept_run(cell, found, passes, report));
             let output = judgement.map(ToString::to_string).unwrap_or_default();
             cases.push(Case {
                 output,
@@ -143,22 +142,17 @@ impl Work<'_> {
             });
         }
         self.job.tell(&matrix(&self.plan, &marks, has_colours()));
-        let words = Judgement::WORDS.iter().chain(&["wrong"]).map(|word| {
-            let times = words.get(word).copied().unwrap_or_default();
-            format!("{word}={times}")
-        });
-        let words: Vec<String> = words.collect();
-        self.job.tell(&format!(
-            "sweep: runs={} {} accepted={accepted} without_why={unexplained}",
-            made.len(),
-            words.join(" "),
-        ));
+        self.job.tell(&tally.to_string());
         if kept > MOST_KEPT && self.job.arguments.keep.is_some() {
             self.job.tell(&format!(
                 "       {MOST_KEPT} of {kept} failed runs were recorded; --only records any other"
             ));
         }
         let document = self.document(&made, written);
+        let file = &self.suite.file;
+        let again = format!("tickbus test {file} --only \"{{}}\"");
+        let of_file = swept((file, &again), (&self.plan, &self.accepted), runs);
+        count.swept.push(of_file);
         for made in made {
             if let Ok(judgement) = made.judgement {
                 count.verdicts.push((made.cell.name.clone(), judgement));
@@ -219,19 +213,20 @@ impl Work<'_> {
         }
     }
 
-    /// Counts a run, and reports it if it fails or is recorded.
+    /// Counts a run, and reports it if it fails or is recorded. Returns the page about its recording, too.
     fn verdict(
         &self,
         made: &Made<'_>,
         passes: bool,
         wants_record: bool,
         count: &mut Count,
-    ) -> Verdict {
+    ) -> (Verdict, Option<PathBuf>) {
         let (name, file) = (&made.cell.name, &self.suite.file);
         let what = match &made.judgement {
             Ok(judgement) => judgement.to_string(),
             Err(why) => format!("this run cannot be judged: {why}"),
         };
+        let mut report = None;
         let mut full = what.clone();
         if !passes {
             if let Some(word) = self.accepted.verdict(&self.plan, made.cell) {
@@ -241,26 +236,28 @@ impl Work<'_> {
             let _ = write!(full, "\n      again: tickbus test {file} --only \"{name}\"");
         }
         if let (Some(folder), true) = (&self.job.arguments.keep, wants_record) {
-            full.push_str(&record((file, name), folder, (&what, None), |path| {
+            let (kept, page) = record(self.job, (file, name), folder, (&what, None), |path| {
                 self.suite
                     .judge(&self.plan, made.cell, Some(path))
                     .map(drop)
-            }));
+            });
+            full.push_str(&kept);
+            report = page;
         }
         if passes {
             count.passed += 1;
             if full != what || self.job.arguments.only.as_deref() == Some(name) {
                 self.job.tell(&format!("ok    {name}\n      {full}"));
             }
-            return Verdict::Passed;
+            return (Verdict::Passed, report);
         }
         self.job.tell(&format!("FAIL  {name}\n      {full}"));
         if made.judgement.is_err() {
             count.wrong += 1;
-            return Verdict::Wrong(what, full);
+            return (Verdict::Wrong(what, full), report);
         }
         count.failed += 1;
-        Verdict::Failed(what, full)
+        (Verdict::Failed(what, full), report)
     }
 
     /// Writes the verdicts as accepted. Returns false if that is impossible.

@@ -11,6 +11,7 @@ use tickbus_driver::{Code, Driver, Exchange, Snapshot};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
+use tickbus_image::signal::Slot;
 
 use crate::description::SignalDescription;
 use crate::fault::{declare_model_faults, inject};
@@ -65,6 +66,11 @@ impl<K> Device<K> {
     pub fn send(&mut self) -> Code {
         let done = self.driver.send(self.shared.slots());
         self.tell(done)
+    }
+
+    /// Calls `work` with the driver and the slots, between two ticks.
+    pub fn between_ticks<R>(&mut self, work: impl FnOnce(&mut Driver, &mut [Slot]) -> R) -> R {
+        work(&mut self.driver, self.shared.slots())
     }
 
     /// Sets the time of the next tick, as if the simulator had written it.

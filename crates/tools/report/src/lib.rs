@@ -5,6 +5,8 @@
 //! bytes. The page is self-contained: style, script and data are inside, and its content security policy
 //! forbids loading anything.
 //!
+//! [`write_sweeps`] writes another page, about the runs of a sweep.
+//!
 //! Tables are written as HTML by Rust. The chart is a canvas on which `chart.js` draws the changes of the
 //! signals; `code` packs them, and the script unpacks them one signal at a time.
 
@@ -17,11 +19,13 @@ mod page;
 mod run;
 mod spans;
 mod statistics;
+mod sweep;
 mod tables;
 mod time;
 
-pub use file::{page_beside, write_file};
+pub use file::{link, page_beside, write_file, write_sweeps_file};
 pub use from::read;
 pub use page::{Contents, DRAW, LOOKUP, STYLE, still_head, write};
 pub use run::{Change, DEFAULT_BUDGET, Mark, MarkKind, Run, Signal, SignalKind};
 pub use statistics::RunStatistics;
+pub use sweep::{Sweeps, Swept, SweptRow, SweptRun, write_sweeps};

@@ -88,30 +88,43 @@ pub fn write(contents: &Contents<'_>, out: &mut dyn Write) -> io::Result<()> {
         unit: code::common_unit(begin, times.chain([end])),
     };
     let bands = bands(contents);
+    fill(out, |name, out| match name {
+        "title" => write_markup(html! { (contents.title) }, out),
+        "source" => write_markup(html! { (contents.source) }, out),
+        "facts" => write_markup(facts(contents, &bands), out),
+        "chart" => out.write_all(CHART.as_bytes()),
+        "sections" => write_markup(sections(contents, &bands, scale), out),
+        "data" => data(contents, &bands, scale, out),
+        "script" => SCRIPT
+            .iter()
+            .try_for_each(|part| out.write_all(part.as_bytes())),
+        _ => Ok(()),
+    })
+}
+
+/// Writes a page of the common form; `part` writes the part with this name.
+pub(super) fn fill(
+    out: &mut dyn Write,
+    mut part: impl FnMut(&str, &mut dyn Write) -> io::Result<()>,
+) -> io::Result<()> {
     let mut rest = TEMPLATE;
     while let Some((before, after)) = rest.split_once("{{") {
         let (name, after) = after.split_once("}}").expect("the template is whole");
         out.write_all(before.as_bytes())?;
         rest = after;
         match name {
-            "title" => write_markup(html! { (contents.title) }, out)?,
-            "source" => write_markup(html! { (contents.source) }, out)?,
             "version" => out.write_all(env!("CARGO_PKG_VERSION").as_bytes())?,
-            "style" => out.write_all(STYLE.as_bytes())?,
-            "facts" => write_markup(facts(contents, &bands), out)?,
-            "chart" => out.write_all(CHART.as_bytes())?,
-            "sections" => write_markup(sections(contents, &bands, scale), out)?,
-            "data" => data(contents, &bands, scale, out)?,
-            "script" => SCRIPT
-                .iter()
-                .try_for_each(|part| out.write_all(part.as_bytes()))?,
-            name => unreachable!("the template has no {name}"),
+            "style" => {
+                out.write_all(STYLE.as_bytes())?;
+                part(name, out)?;
+            }
+            name => part(name, out)?,
         }
     }
     out.write_all(rest.as_bytes())
 }
 
-fn write_markup(markup: Markup, out: &mut dyn Write) -> io::Result<()> {
+pub(super) fn write_markup(markup: Markup, out: &mut dyn Write) -> io::Result<()> {
     out.write_all(printable(markup).as_bytes())
 }
 
@@ -183,7 +196,6 @@ fn facts(contents: &Contents<'_>, bands: &[Band]) -> Markup {
         .iter()
         .map(|signal| signal.seen().saturating_sub(1))
         .sum();
-    let fact = |name: &str, value: &str, class: &str| html! { div class=(class) { dt { (name) } dd { (value) } } };
     let steps = of_kind(bands, "step").count();
     let faults = of_kind(bands, "fault").count() as u64;
     let gaps = of_kind(bands, "gap").count() as u64;
@@ -201,6 +213,11 @@ fn facts(contents: &Contents<'_>, bands: &[Band]) -> Markup {
         @if gaps == 0 { (fact("Recording", "complete", "good")) }
         @else { (fact("Recording", &counted(gaps, "gap", "gaps"), "warn")) }
     }
+}
+
+/// A figure of the page's head.
+pub(super) fn fact(name: &str, value: &str, class: &str) -> Markup {
+    html! { div class=(class) { dt { (name) } dd { (value) } } }
 }
 
 /// The share of the time for which all lines were live; `None` if nothing is known about them.

@@ -4,7 +4,8 @@
 //! steps that set signals, let time pass, and expect something. [`Suite::load`] reads a file, [`Suite::run`] runs one
 //! of its tests, and [`junit_xml`] writes the results for a CI server. Wall time has no influence: the program and the
 //! machine take turns on one thread, and the same test always gives the same run. A [`Sweep`] repeats a scenario with
-//! each fault of a list at each moment of a list, and judges what the program makes of it.
+//! each fault of a list at each moment of a list, and judges what the program makes of it; a [`Session`] does so where
+//! machine and scenario are code in another language.
 
 mod block;
 mod condition;
@@ -16,6 +17,7 @@ mod plant;
 mod playback;
 mod run;
 mod sections;
+mod session;
 mod suite;
 mod sweep;
 mod sweeping;
@@ -29,7 +31,10 @@ pub use condition::{Condition, Demand};
 pub use failure::Failure;
 pub use junit::{Case, Group, Verdict, junit_xml};
 pub use run::Ran;
+pub use session::{Session, SessionRun};
 pub use suite::Suite;
-pub use sweep::{Accepted, Cell, CellMark, Judgement, Plan, Sweep, matrix, verdict_hash};
+pub use sweep::{
+    Accepted, Cell, CellMark, Judgement, Plan, Sweep, Tally, matrix, swept, swept_run, verdict_hash,
+};
 pub use sweeping::{Judged, Refused};
 pub use test::{Test, TextPosition};

@@ -16,7 +16,7 @@ use super::block::{self, BlockKeys, Counted, Coverage};
 use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
-use super::sweep::Sweep;
+use super::sweep::{Scenario, Sweep};
 use super::test::{Rule, Test};
 
 /// The default step of a test file.
@@ -210,7 +210,7 @@ fn read_sections(
         Some(value) => {
             let table = value.table("[sweep]", "write one [sweep] table");
             table
-                .and_then(|table| reader.sweep(table, &tests))
+                .and_then(|table| reader.sweep(table, Scenario::Here(&tests)))
                 .map(Some)
         }
     };

@@ -4,6 +4,7 @@ use std::fmt;
 use std::path::Path;
 
 use tickbus_base::Mistake;
+use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Mistakes, PlacedMistake};
 use tickbus_driver::DriverError;
 
@@ -72,79 +73,10 @@ impl Suite {
                 failure.what
             );
             let right = "let the scenario pass as a [[test]] first";
-            return Err(self.refused(vec![(failure.place, what, right.to_owned())]));
+            let found = vec![(failure.place, what, right.to_owned())];
+            return Err(refused(&self.file, found));
         }
-        let found = self.found(sweep, &survey);
-        if !found.is_empty() {
-            return Err(self.refused(found));
-        }
-        let moments: Vec<Moment> = survey.moments.into_iter().flatten().collect();
-        let changes = survey.changes;
-        Ok(Plan::new(sweep, moments, changes, ran.ticks))
-    }
-
-    fn refused(&self, found: Vec<(TextPosition, String, String)>) -> Refused {
-        let mut list: Vec<PlacedMistake> = found
-            .into_iter()
-            .map(|(place, what, right)| PlacedMistake {
-                place: Some(place),
-                mistake: Mistake::new(what, right),
-            })
-            .collect();
-        list.sort_by_key(|found| found.place);
-        Refused::Mistakes(Mistakes::of_list(&self.file, list))
-    }
-
-    /// The mistakes in the sweep that the run without a fault shows.
-    fn found(&self, sweep: &Sweep, survey: &Survey<'_>) -> Vec<(TextPosition, String, String)> {
-        let step = self.bench.step;
-        let scenario = seconds(survey.scenario.unwrap_or_default(), step);
-        let mut found = Vec::new();
-        for (moments, came) in sweep.moments.iter().zip(&survey.moments) {
-            match moments {
-                Moments::First(named) if came.is_empty() => found.push((
-                    named.place,
-                    format!(
-                        "the moment \"{}\" never comes in the scenario, which lasts {scenario} without a fault",
-                        named.name
-                    ),
-                    "let the scenario go that far, or remove the moment".to_owned(),
-                )),
-                Moments::EachValue(_, place) if came.len() > MOST_VALUES => found.push((
-                    *place,
-                    format!("this signal takes more than {MOST_VALUES} values in the scenario"),
-                    "use the signal that numbers the steps, or write conditions".to_owned(),
-                )),
-                _ => {}
-            }
-        }
-        let names = survey.moments.iter().flatten().map(|moment| &moment.name);
-        let names: Vec<&String> = names.collect();
-        let twice = |(place, name): &(usize, &&String)| names[..*place].contains(*name);
-        if let Some((_, name)) = names.iter().enumerate().find(twice) {
-            found.push((
-                sweep.place,
-                format!("two of the moments are called \"{name}\""),
-                "remove one, or give them names: { \"before\" = \"…\" }".to_owned(),
-            ));
-        }
-        let mut held = |(tick, named): (u64, &Named), what: &str, right: &str| {
-            let at = moment(tick, step);
-            let what = format!("{at}: \"{}\" holds without a fault, {what}", named.name);
-            found.push((named.place, what, right.to_owned()));
-        };
-        if let Some(told) = survey.has_told {
-            let right = "write what the program does only after a fault";
-            held(told, "so it tells nothing", right);
-        }
-        if let Some(never) = survey.has_broken {
-            held(
-                never,
-                "although it never may",
-                "write what only a fault can cause",
-            );
-        }
-        found
+        planned(&self.file, sweep, survey, (bench.step, ran.ticks))
     }
 
     /// Makes one run of the plan; with a path, records the run to that file.
@@ -180,4 +112,86 @@ impl Suite {
     pub fn is_parallel(&self) -> bool {
         self.bench.fmu.as_ref().is_none_or(Plant::is_isolated)
     }
+}
+
+/// The list of runs, after the run without a fault, which took this many ticks.
+pub(super) fn planned<'a>(
+    file: &str,
+    sweep: &'a Sweep,
+    survey: Survey<'a>,
+    (step, ticks): (Nanos, u64),
+) -> Result<Plan<'a>, Refused> {
+    let found = mistakes(sweep, &survey, step);
+    if !found.is_empty() {
+        return Err(refused(file, found));
+    }
+    let moments: Vec<Moment> = survey.moments.into_iter().flatten().collect();
+    Ok(Plan::new(sweep, moments, survey.changes, ticks))
+}
+
+fn refused(file: &str, found: Vec<(TextPosition, String, String)>) -> Refused {
+    let mut list: Vec<PlacedMistake> = found
+        .into_iter()
+        .map(|(place, what, right)| PlacedMistake {
+            place: Some(place),
+            mistake: Mistake::new(what, right),
+        })
+        .collect();
+    list.sort_by_key(|found| found.place);
+    Refused::Mistakes(Mistakes::of_list(file, list))
+}
+
+/// The mistakes in the sweep that the run without a fault shows.
+fn mistakes(
+    sweep: &Sweep,
+    survey: &Survey<'_>,
+    step: Nanos,
+) -> Vec<(TextPosition, String, String)> {
+    let scenario = seconds(survey.scenario.unwrap_or_default(), step);
+    let mut found = Vec::new();
+    for (moments, came) in sweep.moments.iter().zip(&survey.moments) {
+        match moments {
+            Moments::First(named) if came.is_empty() => found.push((
+                named.place,
+                format!(
+                    "the moment \"{}\" never comes in the scenario, which lasts {scenario} without a fault",
+                    named.name
+                ),
+                "let the scenario go that far, or remove the moment".to_owned(),
+            )),
+            Moments::EachValue(_, place) if came.len() > MOST_VALUES => found.push((
+                *place,
+                format!("this signal takes more than {MOST_VALUES} values in the scenario"),
+                "use the signal that numbers the steps, or write conditions".to_owned(),
+            )),
+            _ => {}
+        }
+    }
+    let names = survey.moments.iter().flatten().map(|moment| &moment.name);
+    let names: Vec<&String> = names.collect();
+    let twice = |(place, name): &(usize, &&String)| names[..*place].contains(*name);
+    if let Some((_, name)) = names.iter().enumerate().find(twice) {
+        found.push((
+            sweep.place,
+            format!("two of the moments are called \"{name}\""),
+            "remove one, or give them names: { \"before\" = \"…\" }".to_owned(),
+        ));
+    }
+    let mut held = |(tick, named): (u64, &Named), what: &str, right: &str| {
+        let at = moment(tick, step);
+        let what = format!("{at}: \"{}\" holds without a fault, {what}", named.name);
+        found.push((named.place, what, right.to_owned()));
+    };
+    if let Some(told) = survey.has_told {
+        let right = "write what the program does only after a fault";
+        held(told, "so it tells nothing", right);
+    }
+    if let Some(never) = survey.has_broken {
+        held(
+            never,
+            "although it never may",
+            "write what only a fault can cause",
+        );
+    }
+    found
 }

@@ -11,7 +11,9 @@ use super::judgement::Judgement;
 use super::plan::{Cell, Plan};
 
 /// How to get rid of a row or a column that the sweep does not have any more.
-const AGAIN: &str = "write the file again by \"tickbus test --accept\"";
+fn again(plan: &Plan<'_>) -> String {
+    format!("write the file again by \"{}\"", plan.sweep.accept)
+}
 
 /// The accepted verdicts of one sweep.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -72,7 +74,7 @@ impl Accepted {
     /// The text of a file that accepts all these verdicts, in the order of the plan's cells, and keeps each "why".
     pub fn rewritten(&self, file: &str, plan: &Plan<'_>, verdicts: &[Judgement]) -> String {
         let mut text = format!(
-            "# The accepted verdicts of the sweep in {0}, which \"tickbus test --accept\" has written.\n\
+            "# The accepted verdicts of the sweep in {0}, which \"{3}\" has written.\n\
              # \"why\" is yours: say why a row may have what is neither told nor right. It is kept.\n\n\
              sweep   = {1}\nmoments = [{2}]\n",
             file_name(file),
@@ -81,6 +83,7 @@ impl Accepted {
                 .map(quoted)
                 .collect::<Vec<_>>()
                 .join(", "),
+            plan.sweep.accept,
         );
         let columns = plan.moments.len().max(1);
         for (cells, verdicts) in plan.cells.chunks(columns).zip(verdicts.chunks(columns)) {
@@ -109,9 +112,19 @@ fn file_name(file: &str) -> &str {
     file.rsplit(['/', '\\']).next().unwrap_or(file)
 }
 
-/// A text without control characters as a TOML string.
+/// A text as a TOML string.
 fn quoted(text: &str) -> String {
-    format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
+    let mut quoted = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' | '\\' => quoted.extend(['\\', c]),
+            // Writing to a string cannot fail.
+            c if c.is_control() => drop(write!(quoted, "\\u{:04x}", u32::from(c))),
+            c => quoted.push(c),
+        }
+    }
+    quoted.push('"');
+    quoted
 }
 
 fn read(mut root: Table<'_>, file: &str, plan: &Plan<'_>, rewriting: bool) -> Accepted {
@@ -144,10 +157,8 @@ fn read(mut root: Table<'_>, file: &str, plan: &Plan<'_>, rewriting: bool) -> Ac
         };
         if !rewriting && !known.contains(&name) {
             let near = nearest(&name, known.iter().map(String::as_str));
-            let right = near.map_or_else(
-                || AGAIN.to_owned(),
-                |near| format!("did you mean \"{near}\"?"),
-            );
+            let right =
+                near.map_or_else(|| again(plan), |near| format!("did you mean \"{near}\"?"));
             value.wrong(
                 format!("the sweep has no fault \"{}\"", shown(&name)),
                 right,
@@ -169,7 +180,7 @@ fn read_moments(value: &Value<'_>, plan: &Plan<'_>, rewriting: bool) -> Option<V
         if !rewriting && !names.contains(&name) {
             value.wrong(
                 format!("the moment \"{}\" does not come any more", shown(name)),
-                AGAIN,
+                again(plan),
             );
         }
         moments.push(name.to_owned());

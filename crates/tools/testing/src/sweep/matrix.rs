@@ -45,6 +45,13 @@ impl Mark {
         }
     }
 
+    /// The text without its column.
+    pub(super) fn as_text(&self) -> &str {
+        match self {
+            Self::Right(text) | Self::Accepted(text) | Self::Red(text) => text,
+        }
+    }
+
     /// The text in its column; with `colour`, for a terminal.
     fn text(&self, colour: bool) -> String {
         let (text, code) = match self {

@@ -10,10 +10,12 @@ mod judgement;
 mod late;
 mod matrix;
 mod named;
+mod page;
 mod plan;
 mod progress;
 mod section;
 mod survey;
+mod tally;
 mod trial;
 
 use std::path::PathBuf;
@@ -23,10 +25,14 @@ use disturbance::Disturbance;
 pub use judgement::{Judgement, verdict_hash};
 pub use matrix::{Mark as CellMark, matrix};
 pub(super) use named::Named;
+pub use page::{swept, swept_run};
 pub use plan::{Cell, Plan};
 use progress::Mark;
+pub(super) use section::Scenario;
 pub(super) use survey::{MOST_VALUES, Moment, Survey};
+pub use tally::Tally;
 use tickbus_image::signal::Slot;
+pub(super) use trial::Trial;
 
 use super::test::{Step, TextPosition};
 
@@ -50,6 +56,8 @@ pub struct Sweep {
     /// How many ticks sooner than without a fault a change may come.
     tolerance: u64,
     accepted: PathBuf,
+    /// The command that accepts all verdicts.
+    accept: &'static str,
 }
 
 /// One fault of a sweep, or a pair of them: a row of the matrix.

@@ -26,11 +26,28 @@ const MOMENTS: &str =
 const TOLD: &str = "write the condition by which the program tells a fault, such as \"Fault lamp\"";
 const KIND: &str = "write a kind in quotes, or such as { kind = \"late\", by = \"500ms\" }";
 
+/// Where the scenario of a sweep is, and with it the file of accepted verdicts, if the sweep names none.
+#[derive(Clone, Copy)]
+pub(crate) enum Scenario<'a> {
+    /// In the test file, which has these tests.
+    Here(&'a [Option<Test>]),
+    /// In a program in another language.
+    Elsewhere {
+        /// The usual file of accepted verdicts.
+        accepted: &'a str,
+        /// How all verdicts are accepted there.
+        accept: &'static str,
+    },
+}
+
 impl Reader<'_> {
     /// Reads `[sweep]`, after the tests of the file.
-    pub(crate) fn sweep(&self, mut table: Table<'_>, tests: &[Option<Test>]) -> Option<Sweep> {
+    pub(crate) fn sweep(&self, mut table: Table<'_>, source: Scenario<'_>) -> Option<Sweep> {
         let place = table.collector().place(table.at());
-        let scenario = table.require("scenario", SCENARIO);
+        let scenario = match source {
+            Scenario::Here(_) => table.require("scenario", SCENARIO),
+            Scenario::Elsewhere { .. } => None,
+        };
         let signals = table.take("signals");
         let kinds = table.take("kinds");
         let pairs = table.take("pairs");
@@ -55,7 +72,15 @@ impl Reader<'_> {
         }
         table.finish();
 
-        let scenario = scenario.and_then(|value| self.scenario(&value, tests));
+        let (scenario, usual_file, accept) = match source {
+            Scenario::Here(tests) => {
+                let steps = scenario.and_then(|value| self.scenario(&value, tests));
+                (steps, "accepted.toml", "tickbus test --accept")
+            }
+            Scenario::Elsewhere { accepted, accept } => {
+                (Some((Vec::new(), Vec::new())), accepted, accept)
+            }
+        };
         let signals = if let Some(value) = signals {
             self.names(&value).map(|names| once(&value, names))
         } else {
@@ -83,7 +108,7 @@ impl Reader<'_> {
             Some(value) => self.ticks(&value, true),
         };
         let accepted = match accepted {
-            None => Some("accepted.toml"),
+            None => Some(usual_file),
             Some(value) => value.text("write the path of the file with accepted verdicts"),
         };
         let (initial, scenario) = scenario?;
@@ -99,6 +124,7 @@ impl Reader<'_> {
             within: within?,
             tolerance: tolerance?,
             accepted: self.folder.join(accepted?),
+            accept,
         })
     }
 
@@ -273,6 +299,13 @@ impl Reader<'_> {
             entries.sort_by_key(|(_, value)| value.at());
             let named = |(name, value): (&str, Value<'_>)| {
                 let named = self.one_named(&value, right)?;
+                if name.trim().is_empty() || name.chars().any(char::is_control) {
+                    value.wrong(
+                        format!("\"{}\" is no name for people", shown(name)),
+                        "write a name of printable characters",
+                    );
+                    return None;
+                }
                 let name = name.to_owned();
                 Some(Named { name, ..named })
             };

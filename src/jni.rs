@@ -1,4 +1,4 @@
-//! The native methods of the Java class `tickbus.Tickbus`.
+//! The native methods of the Java class `tickbus.Tickbus`, and in modules those of others.
 //!
 //! Each is one line that calls into the rooms above. `xChangeData` is the tick; `receiveNative` and `sendNative` are
 //! its halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All others use
@@ -12,6 +12,7 @@
 mod failure;
 mod many;
 mod open;
+mod sweep;
 
 use std::ffi::c_void;
 use std::panic::catch_unwind;

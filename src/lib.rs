@@ -34,7 +34,7 @@
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
 //! | [`gateway`] | a real PLC, on its own bus, as a client of a run |
-//! | `jni` | the native methods of the Java class `tickbus.Tickbus` |
+//! | `jni` | the native methods of the Java classes `tickbus.Tickbus`, `DriverVector` and `SweepSession` |
 //! | `c_api` | the functions of `include/tickbus.h` |
 //! | `fmi_api` | the functions of FMI, for the FMU made from a driver.cfg |
 //! | [`cli`] | the `tickbus` command |

@@ -41,6 +41,8 @@ fn the_native_methods_of_tickbus_are_exported() {
         "Java_tickbus_ModelFaults_declareNative",
         "Java_tickbus_ModelFaults_takeNative",
         "Java_tickbus_Tickbus_reportNative",
+        "Java_tickbus_SweepSession_openNative",
+        "Java_tickbus_SweepSession_afterNative",
     ] {
         // SAFETY: the symbol is looked up, and never called.
         let symbol = unsafe { library.get::<unsafe extern "C" fn()>(name) };

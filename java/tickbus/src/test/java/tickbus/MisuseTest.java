@@ -2,6 +2,7 @@ package tickbus;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertFalse;
+import static org.junit.jupiter.api.Assertions.assertNull;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
@@ -45,6 +46,26 @@ class MisuseTest {
 
     private Path mirror() {
         return DriverCfg.mirror(1).signal("in", "%IW0").signal("out", "%QX0.0", "latch = \"rising\"").write(directory);
+    }
+
+    @Test
+    void aSweepThatIsUsedTooEarlyOrTooLateAnswers() {
+        String keys = "moments = \"out\"\ntold = \"out\"\nwithin = \"1s\"\n";
+        try (Tickbus bus = Tickbus.open(mirror())) {
+            SweepSession sweep = new SweepSession(bus, "up", directory, keys, 1_000_000);
+            assertStatus(Status.BAD_ARGUMENT, () -> sweep.plan(false));
+            assertStatus(Status.BAD_ARGUMENT, () -> sweep.begin(bus, 0));
+            assertStatus(Status.BAD_ARGUMENT, sweep::accept);
+            assertTrue(sweep.after(bus), "a run that never began is over");
+            assertEquals("", sweep.summary());
+            assertNull(sweep.verdict(-5));
+            sweep.close();
+            sweep.close();
+            assertStatus(Status.CLOSED, () -> sweep.beginWithoutFault(bus));
+            FieldbusException wrong = assertStatus(Status.BAD_ARGUMENT,
+                () -> new SweepSession(bus, "up", directory, keys.replace("told", "tolld"), 1_000_000));
+            assertTrue(wrong.getMessage().contains("did you mean \"told\"?"), wrong.getMessage());
+        }
     }
 
     @Test

@@ -3,7 +3,9 @@ package tickbus.junit;
 import java.lang.reflect.Constructor;
 import java.lang.reflect.InvocationTargetException;
 import java.lang.reflect.Modifier;
+import java.nio.file.Path;
 import java.util.Map;
+import java.util.Optional;
 import org.junit.jupiter.api.extension.ExtensionConfigurationException;
 import org.junit.jupiter.api.extension.ExtensionContext;
 import org.opentest4j.AssertionFailedError;
@@ -63,6 +65,15 @@ final class Bench {
             throw new ExtensionConfigurationException("@PlcTest(machine = " + type.getSimpleName()
                 + ".class): no machine can be made of it: " + e, e);
         }
+    }
+
+    Tickbus bus() {
+        return bus;
+    }
+
+    /** The page about the recording, should the test fail. */
+    Optional<Path> page() {
+        return keep.page();
     }
 
     Plc plc() {

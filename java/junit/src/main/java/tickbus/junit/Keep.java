@@ -4,6 +4,7 @@ import java.io.IOException;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.Map;
+import java.util.Optional;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
 import org.junit.jupiter.api.extension.ExtensionContext;
@@ -37,7 +38,8 @@ final class Keep {
         return new Keep(when, folder(context).resolve(test.replace('$', '.') + number + ".vcd"));
     }
 
-    private static Path folder(ExtensionContext context) {
+    /** The folder for everything that tests leave. */
+    static Path folder(ExtensionContext context) {
         return context.getConfigurationParameter(FOLDER).map(Path::of).orElseGet(() -> {
             if (Files.isDirectory(Path.of("target"))) {
                 return Path.of("target", "surefire-reports", "tickbus");
@@ -59,6 +61,12 @@ final class Keep {
                 + " cannot be made; name another folder with -D" + FOLDER + "=…, or say recording = NEVER", e);
         }
         return "[record]\nfile = " + Toml.text(recording.toString()) + "\n";
+    }
+
+    /** The page about the recording, should the test fail. */
+    Optional<Path> page() {
+        return Optional.ofNullable(recording)
+            .map(file -> file.resolveSibling(file.getFileName().toString().replaceAll("\\.vcd$", ".html")));
     }
 
     /**

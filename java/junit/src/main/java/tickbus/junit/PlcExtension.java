@@ -39,12 +39,17 @@ public final class PlcExtension implements BeforeEachCallback, AfterEachCallback
 
     @Override
     public Object resolveParameter(ParameterContext parameter, ExtensionContext context) {
-        Bench bench = store(context).get(Bench.class, Bench.class);
+        Bench bench = bench(context);
         if (bench == null) {
             throw new ParameterResolutionException("a " + parameter.getParameter().getType().getSimpleName()
                 + " lives for one test; take it as a parameter of a test, or of a @BeforeEach or @AfterEach method");
         }
         return parameter.getParameter().getType() == Plc.class ? bench.plc() : bench.machine();
+    }
+
+    /** The bench of a test, while the test runs. */
+    static Bench bench(ExtensionContext context) {
+        return store(context).get(Bench.class, Bench.class);
     }
 
     private static ExtensionContext.Store store(ExtensionContext context) {

@@ -11,6 +11,7 @@ mod failure;
 mod memory;
 mod opened;
 mod signal;
+mod sweep;
 mod vector;
 mod view;
 
@@ -35,6 +36,8 @@ mod _native {
     use crate::driver::Driver;
     #[pymodule_export]
     use crate::signal::{Event, Signal};
+    #[pymodule_export]
+    use crate::sweep::Sweep;
     #[pymodule_export]
     use crate::vector::DriverVector;
     #[pymodule_export]

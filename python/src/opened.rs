@@ -13,6 +13,7 @@ use tickbus_fieldbus::faults::{Fault, FaultBoard};
 use tickbus_image::Event;
 use tickbus_image::signal::Slot;
 use tickbus_kinds::KINDS;
+use tickbus_testing::Session;
 
 use crate::block::Block;
 use crate::memory::Memory;
@@ -69,6 +70,19 @@ impl Opened {
             self.scatter();
         }
         self.tell(done)
+    }
+
+    /// One exchange under the eyes of a sweep. Returns its code, and true if the run is over.
+    fn swept(&mut self, sweep: &mut Session, time: Nanos) -> Result<(Code, bool), Refusal> {
+        self.memory.count();
+        self.gather();
+        sweep
+            .before(&mut self.driver, &mut self.slots)
+            .map_err(|mistake| Refusal::new(Code::BadArgument, mistake))?;
+        let done = self.driver.exchange(Some(time), &mut self.slots);
+        let is_over = sweep.after(&mut self.slots);
+        self.scatter();
+        Ok((self.tell(done), is_over))
     }
 
     fn reset(&mut self) -> Result<(), Refusal> {
@@ -245,6 +259,23 @@ impl Handle {
                 .unwrap_or_else(|refusal| refusal.code),
             done => done.unwrap_or_else(|refused| refused),
         }
+    }
+
+    /// One exchange of a run of a sweep; returns true if the run is over.
+    pub(crate) fn swept(&self, sweep: &mut Session, time: Nanos) -> Result<bool, Refusal> {
+        let (code, is_over) = self.visit(|opened| opened.swept(sweep, time))??;
+        if code.code() < 0 {
+            return Err(self.reason(code));
+        }
+        Ok(is_over)
+    }
+
+    /// Calls `work` with the present values.
+    pub(crate) fn with_slots<R>(&self, work: impl FnOnce(&[Slot]) -> R) -> Result<R, Refusal> {
+        self.visit(|opened| {
+            opened.gather();
+            work(&opened.slots)
+        })
     }
 
     /// Returns why a call failed with this code.

@@ -349,9 +349,123 @@ def test_a_machine_that_is_not_there_is_told(tests):
     result.stdout.fnmatch_lines(["E *the test's mark plc names no machine; write machine=*"])
 
 
+# The sweep of tests/it/sweep.rs.
+SWEEP = """
+from tickbus.testing import sweep
+
+class Alarm:
+    falls = 0
+    due = float("inf")
+
+    def step(self, plc, time):
+        if plc.falls("Run") > self.falls:
+            self.falls, self.due = plc.falls("Run"), time + 0.0039
+        if time >= self.due:
+            self.due = float("inf")
+            plc.set("Height", 99)
+
+
+@pytest.mark.plc(program="mirror", scan="2ms", machine=Alarm, recording="never")
+@sweep(
+    signals=["Start", "Height"],
+    kinds=["stuck-on", "stuck-off", {"kind": "late", "by": "6ms"}, "frozen", "line-down", {"kind": "noise", "amplitude": 200, "chance": 0.5}],
+    moments={"at rest": "not Run", "runs": "Run", "moves": "Speed == 5"},
+    told="Speed == 99",
+    never="Speed < 0",
+    within="100ms",
+    tolerance="4ms",
+)
+def test_rises(plc):
+    plc.tick(5).set("Start", True).tick(10).expect(on("Run"))
+    plc.set("Height", 5).tick(10).set("Height", 6).tick(10)
+"""
+
+
+def test_each_fault_at_each_moment_is_a_test_with_the_verdict_that_a_test_file_gives(tests):
+    name = tests.makepyfile(HEAD + SWEEP).stem
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(passed=14, failed=11)
+    result.stdout.fnmatch_lines(
+        [
+            "E *continues differently: \"Run\" is on after 2ms already, without the fault after 12ms*",
+            "E *stands still: \"Speed\" stays 5 mm/s, 6 mm/s without the fault*",
+            f"*sweep {name}.test_rises*",
+            "stuck-off     at rest runs    moves",
+            "Start         DIFFERS 8ms     8ms",
+            "Height        NEVER   NEVER   NEVER",
+            "sweep: runs=24 told=*",
+            f"FAILED {name}.py::test_rises[[]Start stuck-on @ at rest[]]*",
+        ],
+        consecutive=False,
+    )
+    result = tests.runpytest_inprocess("-k", "frozen and moves", "-v")
+    result.assert_outcomes(failed=1, deselected=24)
+    result.stdout.fnmatch_lines([f"{name}.py::test_rises[[]Height frozen @ moves[]] FAILED*"])
+
+
+def test_the_page_of_a_sweep_opens_the_recordings_of_the_runs_that_failed(tests):
+    name = tests.makepyfile(HEAD + SWEEP.replace(', recording="never"', "")).stem
+    result = tests.runpytest_inprocess("-k", "frozen", "--tickbus-reports", "kept")
+    result.stdout.fnmatch_lines([f"page: *{name}.test_rises.html"])
+    kept = tests.path.joinpath("kept")
+    page = kept.joinpath(f"{name}.test_rises.html").read_text()
+    (report,) = kept.glob("*frozen*moves*.html")
+    assert f'href="{report.name}" title="stands still: ' in page
+    assert f'data-again="pytest &quot;{name}.py::test_rises[{{}}]&quot;"' in page
+
+
+def test_the_expectations_of_a_scenario_do_not_count_under_a_fault(tests):
+    own = 'assert plc.is_on("Run"), "it runs"\n    plc.set("Height", 5).await_(is_("Speed", 5)).within(10)\n    plc.tick(8)'
+    tests.makepyfile(HEAD + SWEEP.replace('plc.set("Height", 5).tick(10)', own + "\n    plc"))
+    result = tests.runpytest_inprocess()
+    # An assertion of its own that fails ends its actions: without a Run, the lift stays where it is.
+    result.stdout.fnmatch_lines(["Start         STILL   8ms     8ms", "sweep: runs=24 *"])
+    result.stdout.no_fnmatch_line("E *it runs")
+
+
+def test_accepted_verdicts_pass_and_any_other_fails(tests):
+    name = tests.makepyfile(HEAD + SWEEP).stem
+    file = tests.path.joinpath("accepted", f"{name}.test_rises.toml")
+    result = tests.runpytest_inprocess("--tickbus-accept", "-k", "frozen")
+    result.stdout.fnmatch_lines(["*21 of 24 runs were not made or could not be judged, so nothing was accepted*"])
+    assert result.ret == 1 and not file.exists()
+    result = tests.runpytest_inprocess("--tickbus-accept")
+    result.assert_outcomes(passed=25)
+    result.stdout.fnmatch_lines([f"accepted: {file}"])
+    tests.runpytest_inprocess().assert_outcomes(passed=25)
+    file.write_text(file.read_text().replace('"still   still   still"', '"still   told    still"', 1))
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(passed=24, failed=1)
+    result.stdout.fnmatch_lines(["E *stands still: *", "E *accepted: told"])
+
+
+@pytest.mark.parametrize(
+    "old, new, told",
+    [
+        ('["Start", "Height"]', '["Strat"]', 'there is no signal "Strat"; did you mean "Start"?'),
+        ('"frozen", "line', '"forzen", "line', '"forzen"*did you mean "frozen"?'),
+        ('"Speed == 5"', '"Speed == 7"', 'the moment "moves" never comes in the scenario, which lasts 70ms without a fault; let'),
+        ('told="Speed == 99"', 'told="Speed == 6"', '"Speed == 6" holds without a fault, so it tells nothing; write'),
+        ('expect(on("Run"))', 'expect(off("Run"))', "the scenario fails without a fault, so nothing was judged: tick 15 (30ms): 'Run'"),
+        ("test_rises(plc)", "test_rises(plc, tmp_path)", "a scenario that is swept takes plc and machine alone, and not tmp_path"),
+    ],
+)
+def test_what_is_wrong_with_a_sweep_is_told(tests, old, new, told):
+    assert old in SWEEP
+    tests.makepyfile(HEAD + SWEEP.replace(old, new))
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([f"*{told}*"])
+
+
 def test_the_tests_of_the_manual_pass(pytester):
     blocks = root("docs", "python.md").read_text().split("```python\n")
     (tests,) = (block.split("```")[0] for block in blocks if "import pytest" in block)
+    (sweep,) = (block.split("```")[0] for block in blocks if "import sweep" in block)
     pytester.path.joinpath("driver.cfg").write_text(root("driver.cfg").read_text())
     pytester.makepyfile(tests)
     pytester.runpytest_inprocess().assert_outcomes(passed=2)
+    name = pytester.makepyfile(tests + sweep).stem
+    result = pytester.runpytest_inprocess("--tickbus-accept")
+    assert result.ret == 0
+    result.stdout.fnmatch_lines(["sweep: runs=* wrong=0 *", f"accepted: *{name}.test_a_run_begins.toml"])

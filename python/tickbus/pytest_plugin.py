@@ -1,10 +1,11 @@
-"""The plug-in for pytest: the fixtures ``plc`` and ``machine``, and the mark ``plc``.
+"""The plug-in for pytest: the fixtures ``plc`` and ``machine``, the mark ``plc``, and sweeps of faults.
 
 The fixtures import the expensive modules, so that the plug-in costs nothing where no test uses it.
 """
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import warnings
@@ -19,11 +20,18 @@ import pytest
 
 if TYPE_CHECKING:
     from .testing import Plc
+    from .testing._sweep import Sweeping
 
 _MARK = (
     "plc(config, program=None, options=None, scan=None, step='1ms', machine=None, recording='on failure'):"
     " the PLC under test: the plant's driver.cfg, the program at its other end, and the machine in front of it"
 )
+_SWEEP = "tickbus_sweep"
+_SWEEP_MARK = f"{_SWEEP}(keys): tickbus.testing.sweep makes it"
+_CELL = "_tickbus_cell"
+"""The parameter of a run of a sweep."""
+_SWEEPS = pytest.StashKey["list[Sweeping]"]()
+_TOLD = pytest.StashKey["list[str]"]()
 _KEYS = ("config", "program", "options", "scan", "step", "machine", "recording")
 _RECORDING = ("on failure", "always", "never")
 _LONGEST = 200
@@ -36,11 +44,146 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group = parser.getgroup("tickbus")
     text = "folder for the recordings and pages of failed tests of PLC programs (default: tickbus-reports)"
     group.addoption("--tickbus-reports", metavar="DIR", help=text)
+    text = "accept all verdicts of the sweeps: write them to the files of accepted verdicts"
+    group.addoption("--tickbus-accept", action="store_true", help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Registers the mark."""
+    """Registers the marks."""
     config.addinivalue_line("markers", _MARK)
+    config.addinivalue_line("markers", _SWEEP_MARK)
+    config.stash[_SWEEPS] = []
+    config.stash[_TOLD] = []
+
+
+@dataclass
+class _Cell:
+    """One run of a sweep; without a number, that without a fault."""
+
+    sweep: Sweeping
+    number: int | None = None
+    failure: BaseException | None = None
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Makes a test of each run of a sweep. Which runs there are shows the one without a fault, which is made here."""
+    mark = metafunc.definition.get_closest_marker(_SWEEP)
+    if mark is None:
+        return
+    from .testing._sweep import Sweeping
+
+    place = _Place(metafunc.definition)
+    names = [place.path.stem, *([metafunc.cls.__name__] if metafunc.cls else []), metafunc.function.__name__]
+    rewriting = metafunc.config.getoption("--tickbus-accept")
+    node = metafunc.definition.nodeid
+    sweeping = Sweeping(".".join(names), node, place.path.parent, mark.args[0], rewriting=rewriting)
+    failure = None
+    try:
+        _survey(metafunc, place, sweeping)
+    except Exception as error:
+        failure = error
+    metafunc.config.stash[_SWEEPS].append(sweeping)
+    cells = [_Cell(sweeping, failure=failure), *(_Cell(sweeping, number) for number in range(len(sweeping.names)))]
+    metafunc.fixturenames.append(_CELL)
+    metafunc.parametrize(_CELL, cells, ids=["without a fault", *sweeping.names])
+
+
+def _survey(metafunc: pytest.Metafunc, place: _Place, sweeping: Sweeping) -> None:
+    """The run without a fault."""
+    import tickbus
+
+    from .testing import Plc
+    from .testing._sweep import Over
+
+    wanted = set(inspect.signature(metafunc.function).parameters) - {"self"}
+    if not wanted <= {"plc", "machine"}:
+        others = ", ".join(sorted(wanted - {"plc", "machine"}))
+        raise pytest.UsageError(f"a scenario that is swept takes plc and machine alone, and not {others}")
+    setup = _setup(place)
+    fresh = metafunc.cls() if metafunc.cls else None
+    scenario = getattr(fresh, metafunc.function.__name__) if fresh else metafunc.function
+    quiet = {"record": {"file": "none.vcd", "when": "never"}}
+    with tickbus.open(_config(setup["config"], place), quiet | _fieldbus(setup)) as driver:
+        plc, machine = Plc(driver, setup["step"]), _made(setup["machine"])
+        if machine is not None:
+            plc.connect(machine)
+        plc._run = sweeping.begin(driver, plc.step_ns, None)
+        try:
+            scenario(**{name: value for name, value in (("plc", plc), ("machine", machine)) if name in wanted})
+        except Over:
+            pass
+        except AssertionError as error:
+            raise AssertionError(
+                f"the scenario fails without a fault, so nothing was judged: {error}\nlet it pass as a test without @sweep first"
+            ) from error
+        else:
+            with suppress(Over):
+                plc._idle()
+    sweeping.plan()
+
+
+def _made(machine: Any) -> Any:
+    return machine() if isinstance(machine, type) else machine
+
+
+def _cell(item: pytest.Item) -> _Cell | None:
+    """The run of a sweep that a test is."""
+    callspec = getattr(item, "callspec", None)
+    return callspec.params.get(_CELL) if callspec else None
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> object:
+    """Makes a run of a sweep, and judges it."""
+    cell = _cell(pyfuncitem)
+    if cell is None:
+        return None
+    if cell.failure is not None:
+        raise cell.failure
+    if cell.number is None:
+        return None
+    from .testing._sweep import Over
+
+    plc = pyfuncitem.funcargs["_plc_bench"].plc
+    wanted = inspect.signature(pyfuncitem.obj).parameters
+    try:
+        # Its own assertions do not count, either; the one that fails ends its actions.
+        with suppress(AssertionError):
+            pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in wanted})
+        plc._idle()
+    except Over:
+        pass
+    cell.sweep.judge(cell.number)
+    return True
+
+
+def pytest_sessionfinish(session: pytest.Session) -> None:
+    """Accepts the verdicts of the sweeps, if that is wanted."""
+    import tickbus
+
+    if not session.config.getoption("--tickbus-accept"):
+        return
+    for sweeping in session.config.stash[_SWEEPS]:
+        if not sweeping.names or sweeping.native is None:
+            continue
+        try:
+            session.config.stash[_TOLD].append(f"accepted: {sweeping.native.accept()}")
+        except tickbus.FieldbusError as error:
+            session.config.stash[_TOLD].append(f"{sweeping.name}: {error}")
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """Prints the matrices of the sweeps."""
+    for sweeping in config.stash[_SWEEPS]:
+        summary = sweeping.native.summary() if sweeping.native and sweeping.names else ""
+        if "runs=0 " not in summary and summary:
+            terminalreporter.section(f"sweep {sweeping.name}")
+            terminalreporter.write(summary)
+            if sweeping.has_failed:
+                terminalreporter.write_line(_page(sweeping, _reports(config)))
+    for line in config.stash[_TOLD]:
+        terminalreporter.write_line(line)
 
 
 @pytest.hookimpl(wrapper=True)
@@ -56,6 +199,18 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[Any]) -> 
 def _note(error: BaseException, text: str) -> None:
     """Adds a note to the exception; before Python 3.11 only pytest shows it."""
     error.__notes__ = [*getattr(error, "__notes__", []), text]
+
+
+def _page(sweeping: Sweeping, folder: Path) -> str:
+    """Writes the page of a sweep, and returns where it is."""
+    import tickbus
+
+    page = folder / f"{sweeping.name}.html"
+    try:
+        sweeping.native.page(page, f'pytest "{sweeping.node}[{{}}]"', sweeping.reports)
+    except tickbus.FieldbusError as error:
+        return f"no page: {error}"
+    return f"page: {page}"
 
 
 @dataclass
@@ -88,33 +243,45 @@ def _plc_bench(request: pytest.FixtureRequest) -> Iterator[_Bench]:
 
     from .testing import Plc
 
-    setup = _setup(request)
+    place = _Place(request.node)
+    setup = _setup(place)
     keep = _Keep(setup["recording"], request)
-    config, fieldbus = _config(setup["config"], request), _fieldbus(setup)
+    config, fieldbus = _config(setup["config"], place), _fieldbus(setup)
     try:
         opened = tickbus.open(config, keep.table() | fieldbus)
     except tickbus.FieldbusError:
         keep.abandon()
         raise
     with opened as driver:
-        machine = setup["machine"]
-        bench = _Bench(Plc(driver, setup["step"]), machine() if isinstance(machine, type) else machine, keep)
+        bench = _Bench(Plc(driver, setup["step"]), _made(setup["machine"]), keep)
         if bench.machine is not None:
             bench.plc.connect(bench.machine)
+        cell = _cell(request.node)
+        if cell is not None and cell.number is not None:
+            bench.plc._run = cell.sweep.begin(driver, bench.plc.step_ns, cell.number)
         yield bench
         unfinished = bench.plc._unfinished() if bench.failure is None else None
         statistics = driver.statistics()
     keep.finish(bench.failure or unfinished, statistics)
+    if cell is not None and cell.number is not None and keep.page is not None:
+        cell.sweep.reports[cell.number] = keep.page
     if unfinished is not None:
         _note(unfinished, f"the test stood at {bench.plc._where()}{keep.told()}")
         raise unfinished
 
 
-def _setup(request: pytest.FixtureRequest) -> dict[str, Any]:
+class _Place:
+    """Where a test is."""
+
+    def __init__(self, node: pytest.Item) -> None:
+        self.node, self.path, self.config = node, node.path, node.config
+
+
+def _setup(place: _Place) -> dict[str, Any]:
     """The marks of the test, of its class and of its module together: the nearest one that has a key wins."""
     setup: dict[str, Any] = {"step": "1ms", "recording": "on failure"} | dict.fromkeys(("program", "options", "scan", "machine"))
     found: dict[str, Any] = {}
-    for mark in request.node.iter_markers("plc"):
+    for mark in place.node.iter_markers("plc"):
         stated = dict(mark.kwargs)
         if len(mark.args) == 1:
             stated.setdefault("config", mark.args[0])
@@ -135,9 +302,9 @@ def _setup(request: pytest.FixtureRequest) -> dict[str, Any]:
     return setup
 
 
-def _config(name: str | Path, request: pytest.FixtureRequest) -> Path:
+def _config(name: str | Path, place: _Place) -> Path:
     """The driver.cfg beside the test, or else relative to where pytest was started, or to its root folder."""
-    folders = (request.path.parent, request.config.invocation_params.dir, request.config.rootpath)
+    folders = (place.path.parent, place.config.invocation_params.dir, place.config.rootpath)
     for folder in folders:
         if (folder / name).is_file():
             return folder / name
@@ -163,17 +330,24 @@ def _fieldbus(setup: dict[str, Any]) -> dict[str, Any]:
     return {"fieldbus": table}
 
 
+def _reports(config: pytest.Config) -> Path:
+    """The folder of recordings and pages."""
+    return Path(config.getoption("--tickbus-reports") or config.rootpath / "tickbus-reports").resolve()
+
+
 class _Keep:
     """Keeps the recording of a test."""
 
     def __init__(self, when: str, request: pytest.FixtureRequest) -> None:
         self._when = when
+        self.page: Path | None = None
+        """The page about the recording, once it is written."""
         self._title = request.node.name
-        folder = request.config.getoption("--tickbus-reports") or request.config.rootpath / "tickbus-reports"
+        folder = _reports(request.config)
         name = re.sub(r"[^\w.\-]+", "-", request.node.nodeid.replace("::", ".").replace("/", ".")).strip("-")
         if len(os.fsencode(name)) > _LONGEST:
             name = f"{name[:40]}-{zlib.crc32(name.encode()):08x}"
-        self._recording = Path(folder).resolve() / f"{name}.vcd"
+        self._recording = folder / f"{name}.vcd"
 
     def table(self) -> dict[str, Any]:
         """Replaces driver.cfg's own table: tests must not write to the plant's recording."""
@@ -220,7 +394,7 @@ class _Keep:
             return
         texts = {"What failed": str(failure)} if failure is not None else {}
         try:
-            tickbus.report(self._recording, self._title, statistics, texts)
+            self.page = Path(tickbus.report(self._recording, self._title, statistics, texts))
         except tickbus.FieldbusError as error:
             # The test's own failure matters more.
             warnings.warn(f"there is no page of the recording: {error}", stacklevel=1)

@@ -16,6 +16,7 @@ The plug-in for pytest comes with tickbus, and passes a ``Plc`` to tests as the 
 from .._durations import minutes, ms, s, ticks
 from ._conditions import Condition, above, below, falls, is_, near, nothing_swallowed, off, on, rises, when
 from ._plc import Await, Expectation, Machine, Plc
+from ._sweep import sweep
 
 __all__ = [
     "Await",
@@ -35,6 +36,7 @@ __all__ = [
     "on",
     "rises",
     "s",
+    "sweep",
     "ticks",
     "when",
 ]

@@ -16,7 +16,7 @@ use tickbus_testing::Session;
 use super::failure::{Failure, ThrowFieldbusException};
 use super::with;
 
-/// How all verdicts are accepted under JUnit.
+/// How all verdicts are accepted under `JUnit`.
 const ACCEPT: &str = "-Dtickbus.accept=true";
 
 /// The sweeps of this process.

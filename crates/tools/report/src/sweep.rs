@@ -71,7 +71,7 @@ pub struct SweptRow {
 /// One run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SweptRun {
-    /// Its name: `Level stuck-on @ Step 3`.
+    /// The name: `Level stuck-on @ Step 3`.
     pub name: String,
     /// The text of its cell, as in the matrix of `tickbus test`.
     pub mark: String,

@@ -209,9 +209,9 @@ fn a_machine_in_another_language_gets_the_verdicts_of_a_test_file() {
     let mut session = read(keys).expect("the keys are right");
     tick_alone(&mut session, None);
     let cells = session.plan(false).expect("a plan");
-    for index in 0..cells.len() {
-        tick_alone(&mut session, Some(index));
-        assert!(session.result(index).is_some(), "{}", cells[index].name);
+    for cell in cells {
+        tick_alone(&mut session, Some(cell.index));
+        assert!(session.result(cell.index).is_some(), "{}", cell.name);
     }
     let (_, hash) = expected.rsplit_once("hash=").expect("a hash");
     let summary = session.summary();

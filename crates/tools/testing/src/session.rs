@@ -100,6 +100,8 @@ impl Session {
                 step,
                 folder,
                 config: &config,
+                plant: None,
+                counted: None,
             };
             let source = Scenario::Elsewhere {
                 accepted: &accepted,

@@ -11,123 +11,12 @@ use std::ops::Range;
 
 use super::branches::{self, Branch};
 use super::code::Code;
-use super::duration::milliseconds;
-use super::outline::{self, Outline, Section, Unit, UnitKind};
+use super::interface::{Variable, declarations, is_among, variables};
+use super::outline::{self, Outline, Section, UnitKind};
+use super::wrapper::{Wired, Wrapper};
 use super::{Source, decode, with_lines};
-use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
-
-/// The use of a variable by the caller of a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Direction {
-    /// `VAR_INPUT`.
-    Input,
-    /// `VAR_OUTPUT`.
-    Output,
-    /// `VAR_IN_OUT`.
-    InOut,
-    /// The result of a function, which has the function's name.
-    Result,
-}
-
-/// A variable of a block's interface.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
-    /// The name as declared.
-    pub name: String,
-    /// The use by the caller.
-    pub direction: Direction,
-    /// The type as declared.
-    pub data_type: String,
-    /// Line and column of the declaration, both from 1.
-    pub place: (usize, usize),
-    /// The elementary type behind the declared one; `None` if no signal can have it.
-    elementary: Option<&'static Elementary>,
-    /// The initial value if it is a literal, else 0; milliseconds of a TIME.
-    initial: f64,
-}
-
-/// A type that a signal can have.
-#[derive(Debug, PartialEq)]
-struct Elementary {
-    name: &'static str,
-    /// The type of the signal.
-    signal: &'static str,
-    /// The letter of its address, and its bytes.
-    size: (char, usize),
-}
-
-const fn elementary(name: &'static str, size: (char, usize)) -> Elementary {
-    let signal = name;
-    Elementary { name, signal, size }
-}
-
-const ELEMENTARY: &[Elementary] = &[
-    elementary("BOOL", ('X', 1)),
-    elementary("BYTE", ('B', 1)),
-    elementary("SINT", ('B', 1)),
-    elementary("USINT", ('B', 1)),
-    elementary("WORD", ('W', 2)),
-    elementary("INT", ('W', 2)),
-    elementary("UINT", ('W', 2)),
-    DWORD,
-    elementary("DINT", ('D', 4)),
-    elementary("UDINT", ('D', 4)),
-    elementary("REAL", ('D', 4)),
-    elementary("LWORD", ('L', 8)),
-    elementary("LINT", ('L', 8)),
-    elementary("ULINT", ('L', 8)),
-    elementary("LREAL", ('L', 8)),
-    TIME,
-];
-
-const DWORD: Elementary = elementary("DWORD", ('D', 4));
-
-/// A TIME is a signal in milliseconds.
-const TIME: Elementary = Elementary {
-    name: "TIME",
-    signal: "DINT",
-    size: ('D', 4),
-};
-
-impl Elementary {
-    /// The signal's value, as a value of this type.
-    fn of_signal(&self, value: &str) -> String {
-        if self.name == self.signal {
-            return value.to_owned();
-        }
-        // iec2c's conversion cuts off fractions of a nanosecond.
-        format!("LREAL_TO_TIME((DINT_TO_LREAL({value}) + 0.0000005) / 1000.0)")
-    }
-
-    /// A value of this type, as that of the signal.
-    fn to_signal(&self, value: &str) -> String {
-        if self.name == self.signal {
-            return value.to_owned();
-        }
-        format!("LREAL_TO_DINT(TIME_TO_LREAL({value}) * 1000.0)")
-    }
-
-    fn unit(&self) -> Option<&'static str> {
-        (self.name != self.signal).then_some("ms")
-    }
-}
-
-/// A signal of a wrapped block.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wired {
-    /// The name of the variable; of the value that a block leaves in a `VAR_IN_OUT`, with " out" behind it.
-    pub name: String,
-    /// The address, which counts bytes.
-    pub address: String,
-    /// The IEC type.
-    pub data_type: &'static str,
-    /// The unit of a TIME.
-    pub unit: Option<&'static str>,
-    /// The initial value.
-    pub initial: f64,
-}
 
 /// A block with a program around it.
 #[derive(Clone, Debug, PartialEq)]
@@ -254,9 +143,7 @@ impl Block {
         };
         let branches = if counted { &self.branches[..] } else { &[] };
         for number in 0..branches.len().div_ceil(branches::BITS) {
-            let address = made.locate('Q', &format!("TickbusC{number}"), &DWORD);
-            made.counters
-                .push(wired(&format!("(branches {number})"), address, &DWORD));
+            made.count(number);
         }
 
         let (mut text, mut lines, mut line) = (String::new(), Vec::new(), 1);
@@ -300,282 +187,11 @@ impl Block {
     }
 }
 
-/// The parts of the program around a block, while they are written.
-#[derive(Default)]
-struct Wrapper {
-    located: String,
-    own: String,
-    before: String,
-    after: String,
-    signals: Vec<Wired>,
-    counters: Vec<Wired>,
-    /// The next free byte of each area.
-    inputs: usize,
-    outputs: usize,
-}
-
-impl Wrapper {
-    /// Declares what a variable needs; returns its argument in the call.
-    fn wire(
-        &mut self,
-        number: usize,
-        variable: &Variable,
-        signal: Option<&'static Elementary>,
-        is_function: bool,
-    ) -> Option<String> {
-        let Variable {
-            name, data_type, ..
-        } = variable;
-        let (input, output) = (format!("TickbusI{number}"), format!("TickbusQ{number}"));
-        let (held, last) = (format!("TickbusV{number}"), format!("TickbusL{number}"));
-        match variable.direction {
-            Direction::Input => {
-                let signal = signal?;
-                let address = self.locate('I', &input, signal);
-                let initial = variable.initial;
-                self.signals.push(Wired {
-                    initial,
-                    ..wired(name, address, signal)
-                });
-                Some(format!("{name} := {}", signal.of_signal(&input)))
-            }
-            Direction::Output if is_function => {
-                let signal = signal?;
-                let _ = writeln!(self.own, "  {held} : {data_type};");
-                self.show(name, &output, &held, signal);
-                Some(format!("{name} => {held}"))
-            }
-            Direction::Output => {
-                self.show(name, &output, &format!("TickbusB.{name}"), signal?);
-                None
-            }
-            Direction::Result => {
-                let _ = writeln!(self.own, "  TickbusR : {data_type};");
-                self.show(name, &output, "TickbusR", signal?);
-                None
-            }
-            Direction::InOut => {
-                let _ = writeln!(self.own, "  {held} : {data_type};");
-                if let Some(signal) = signal {
-                    let address = self.locate('I', &input, signal);
-                    self.signals.push(wired(name, address, signal));
-                    // The block's own value stays until the test sets another one.
-                    let _ = writeln!(self.own, "  {last} : {};", signal.signal);
-                    let value = signal.of_signal(&input);
-                    let _ = writeln!(
-                        self.before,
-                        "IF {input} <> {last} THEN {held} := {value}; {last} := {input}; END_IF;"
-                    );
-                    self.show(&format!("{name} out"), &output, &held, signal);
-                }
-                Some(format!("{name} := {held}"))
-            }
-        }
-    }
-
-    /// Makes an output of the value.
-    fn show(&mut self, name: &str, output: &str, value: &str, signal: &'static Elementary) {
-        let address = self.locate('Q', output, signal);
-        self.signals.push(wired(name, address, signal));
-        let _ = writeln!(self.after, "{output} := {};", signal.to_signal(value));
-    }
-
-    /// Declares a located variable; returns its address.
-    fn locate(&mut self, area: char, name: &str, signal: &Elementary) -> String {
-        let next = if area == 'I' {
-            &mut self.inputs
-        } else {
-            &mut self.outputs
-        };
-        let (letter, bytes) = signal.size;
-        let at = next.next_multiple_of(bytes);
-        *next = at + bytes;
-        let bit = if letter == 'X' { ".0" } else { "" };
-        let address = format!("%{area}{letter}{at}{bit}");
-        let _ = writeln!(self.located, "  {name} AT {address} : {};", signal.signal);
-        address
-    }
-}
-
-fn wired(name: &str, address: String, signal: &Elementary) -> Wired {
-    Wired {
-        name: name.to_owned(),
-        address,
-        data_type: signal.signal,
-        unit: signal.unit(),
-        initial: 0.0,
-    }
-}
-
-fn is_among(names: &[String], name: &str) -> bool {
-    names.iter().any(|one| one.eq_ignore_ascii_case(name))
-}
-
 /// A duration as `iec2c` reads it behind `T#`, without its unit.
 fn short_milliseconds(interval: Nanos) -> String {
     let (whole, part) = (interval.0 / 1_000_000, interval.0 % 1_000_000);
     let text = format!("{whole}.{part:06}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
-}
-
-/// One declaration: `a, b : INT := 5;`.
-struct Declaration {
-    names: Vec<usize>,
-    kind: Range<usize>,
-    initial: Range<usize>,
-}
-
-/// Words before the names of a section.
-const QUALIFIERS: &[&str] = &["RETAIN", "NON_RETAIN", "PERSISTENT", "CONSTANT"];
-
-/// The declarations of a section or a `TYPE`.
-fn declarations(code: &Code<'_>, inner: Range<usize>) -> Vec<Declaration> {
-    let mut found = Vec::new();
-    let mut at = inner.start;
-    // Moves to the next of these symbols outside of brackets and structures.
-    let next = |mut at: usize, ends: &[&str]| {
-        let mut depth = 0_usize;
-        while at < inner.end && (depth > 0 || !ends.contains(&code.word(at))) {
-            match code.capitals(at).as_str() {
-                "(" | "[" => at = code.closing(at, inner.end),
-                "STRUCT" | "UNION" => depth += 1,
-                "END_STRUCT" | "END_UNION" => depth = depth.saturating_sub(1),
-                _ => {}
-            }
-            at += 1;
-        }
-        at
-    };
-    while at < inner.end {
-        let colon = next(at, &[":", ";"]);
-        let mut names = Vec::new();
-        while at < colon {
-            if code.is(at, "AT") {
-                at += 1;
-            } else if code.is_word(at) && !code.is_any(at, QUALIFIERS) {
-                names.push(at);
-            }
-            at += 1;
-        }
-        let kind = colon + 1..next(colon + 1, &[":=", ";"]);
-        let end = next(kind.end, &[";"]);
-        let initial = (kind.end + 1).min(end)..end;
-        if code.word(colon) == ":" {
-            at = end + 1;
-            found.push(Declaration {
-                names,
-                kind,
-                initial,
-            });
-        } else {
-            at = colon + 1;
-        }
-    }
-    found
-}
-
-type Types<'c, 't> = HashMap<String, (&'c Code<'t>, Range<usize>)>;
-
-fn variables(code: &Code<'_>, unit: &Unit, types: &Types<'_, '_>) -> Vec<Variable> {
-    let collector = Collector::new("", code.text);
-    let mut found = Vec::new();
-    let mut add = |name: usize, direction, kind: &Range<usize>, initial: &Range<usize>| {
-        // An input with R_EDGE is a BOOL for the caller.
-        let edge = kind
-            .clone()
-            .find(|at| code.is_any(*at, &["R_EDGE", "F_EDGE"]));
-        let kind = kind.start..edge.unwrap_or(kind.end);
-        found.push(Variable {
-            name: code.word(name).to_owned(),
-            direction,
-            data_type: written(code, &kind),
-            place: collector.place(code.start(name)),
-            elementary: resolved(code, &kind, types),
-            initial: literal(&words(code, initial)).unwrap_or_default(),
-        });
-    };
-    for section in &unit.sections {
-        let direction = match code.capitals(section.inner.start - 1).as_str() {
-            "VAR_INPUT" => Direction::Input,
-            "VAR_OUTPUT" => Direction::Output,
-            "VAR_IN_OUT" => Direction::InOut,
-            _ => continue,
-        };
-        for declared in declarations(code, section.inner.clone()) {
-            for name in &declared.names {
-                add(*name, direction, &declared.kind, &declared.initial);
-            }
-        }
-    }
-    if unit.kind == UnitKind::Function {
-        add(unit.name, Direction::Result, &unit.returns, &(0..0));
-    }
-    found
-}
-
-/// Tokens as they are written, in one line.
-fn written(code: &Code<'_>, range: &Range<usize>) -> String {
-    let Some(last) = range.end.checked_sub(1) else {
-        return String::new();
-    };
-    let text = &code.text[code.start(range.start)..code.end(last)];
-    let parts: Vec<&str> = text.split_whitespace().collect();
-    parts.join(" ")
-}
-
-fn words(code: &Code<'_>, range: &Range<usize>) -> String {
-    let words: Vec<&str> = range.clone().map(|at| code.word(at)).collect();
-    words.join(" ")
-}
-
-/// The elementary type behind these words, through the names of types.
-fn resolved(
-    code: &Code<'_>,
-    kind: &Range<usize>,
-    types: &Types<'_, '_>,
-) -> Option<&'static Elementary> {
-    let mut part = (code, kind.clone());
-    // A chain of names that is longer than this is a circle.
-    for _ in 0..20 {
-        let (code, kind) = part;
-        let is_plain = kind.len() == 1 || code.word(kind.start + 1) == "(";
-        if !is_plain || !code.is_word(kind.start) {
-            return None;
-        }
-        let known = ELEMENTARY.iter().find(|one| code.is(kind.start, one.name));
-        if known.is_some() {
-            return known;
-        }
-        let (code, kind) = types.get(&code.capitals(kind.start))?;
-        part = (code, kind.clone());
-    }
-    None
-}
-
-/// The value of a literal: a number, TRUE or FALSE, or the milliseconds of a TIME.
-fn literal(words: &str) -> Option<f64> {
-    let text = words.replace([' ', '_'], "").to_ascii_uppercase();
-    match text.as_str() {
-        "TRUE" | "BOOL#TRUE" => return Some(1.0),
-        "FALSE" | "BOOL#FALSE" => return Some(0.0),
-        _ => {}
-    }
-    if let Ok(time) = milliseconds(words) {
-        return Some(f64::from(time));
-    }
-    let number = match text.split_once('#') {
-        Some((kind, rest)) if kind.starts_with(|c: char| c.is_ascii_alphabetic()) => rest,
-        _ => &text,
-    };
-    let radix = |prefix: &str, radix| {
-        let digits = number.strip_prefix(prefix)?;
-        let number = u32::from_str_radix(digits, radix).ok()?;
-        Some(f64::from(number))
-    };
-    radix("16#", 16)
-        .or_else(|| radix("8#", 8))
-        .or_else(|| radix("2#", 2))
-        .or_else(|| number.parse().ok())
 }
 
 /// The bytes of a section, from its keyword to `END_VAR`.
@@ -624,21 +240,9 @@ fn stripped(code: &Code<'_>, outline: &Outline) -> String {
     text.replace('\u{FEFF}', "   ")
 }
 
-/// The mistake of a variable of which no signal can be made.
-pub fn unfit(variable: &Variable) -> Mistake {
-    let Variable {
-        name, data_type, ..
-    } = variable;
-    Mistake::new(
-        format!("\"{name}\" is of the type {data_type}, of which no signal can be made"),
-        format!(
-            "leave it out with without = [\"{name}\"], or test a small block around this one that has its parts as inputs and outputs"
-        ),
-    )
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::interface::Direction;
     use super::*;
 
     fn source(text: &str) -> Source {
@@ -707,7 +311,7 @@ END_FUNCTION_BLOCK
             .expect("it");
         // Lines stay where they were, without the other program.
         assert_eq!(first.lines().count(), FIRST.lines().count());
-        assert_eq!(wrapped.lines, [1..FIRST.lines().count() + 1]);
+        assert_eq!(wrapped.lines[0].end, FIRST.lines().count() + 1);
         assert!(!first.contains("Main"), "{first}");
         assert!(first.ends_with("END_FUNCTION_BLOCK\n"), "{first}");
         assert_eq!(
@@ -779,23 +383,5 @@ END_CONFIGURATION
         };
         let told = "b.st:1:1: A has no END_FUNCTION_BLOCK; end it";
         assert_eq!(mistakes.to_string(), told);
-    }
-
-    #[test]
-    fn literals_have_their_value() {
-        for (text, value) in [
-            ("TRUE", Some(1.0)),
-            ("- 5", Some(-5.0)),
-            ("1_000", Some(1000.0)),
-            ("16#FF", Some(255.0)),
-            ("INT#-5", Some(-5.0)),
-            ("BYTE#2#101", Some(5.0)),
-            ("1.5E3", Some(1500.0)),
-            ("T#1s500ms", Some(1500.0)),
-            ("T#0s", None),
-            ("Other", None),
-        ] {
-            assert_eq!(literal(text), value, "{text}");
-        }
     }
 }

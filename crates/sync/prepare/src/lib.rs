@@ -21,6 +21,7 @@ mod check;
 mod code;
 mod duration;
 mod edit;
+mod interface;
 mod lexer;
 mod library;
 mod outline;
@@ -31,6 +32,7 @@ mod structured_text;
 #[cfg(test)]
 mod tests;
 mod words;
+mod wrapper;
 mod xml;
 
 use std::borrow::Cow;
@@ -43,9 +45,11 @@ use structured_text::{Preparation, plan};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
 
-pub use block::{Block, Direction, NoBlock, Variable, Wired, Wrapped, unfit};
+pub use block::{Block, NoBlock, Wrapped};
 pub use branches::Branch;
+pub use interface::{Direction, Variable, unfit};
 pub use library::{Addresses, SOURCES};
+pub use wrapper::Wired;
 
 /// A file with a part of a program.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -238,7 +238,9 @@ mod tests {
             ] {
                 assert!(told <= pulses && pulses <= told + 1, "{found:?}");
             }
-            let words = format!("\"Mark seen\" changed and changed back {mark} times between two");
+            let words = format!(
+                "\"Mark seen\" changed and changed back {mark} times between two bus cycles of {cycle}ms"
+            );
             assert!(found.named[0].starts_with(&words), "{found:?}");
         }
     }

@@ -81,7 +81,7 @@ fn open_hosted(
         .map_err(|source| program_error(config, source))?;
     check_fit(config, &mut *program, Role::Controller)?;
     let scan = plc::interval(&*program, scan);
-    swallowed.scanned_every(scan);
+    swallowed.scanned_every(scan, Some(cycle).filter(|_| mode == Mode::Free));
     if mode == Mode::Stepped {
         let (host, scan_counters) = SteppedHost::new(program, config, scan, swallowed.counts());
         return Ok((

@@ -51,8 +51,9 @@ struct Shared {
     role: Role,
     /// The steps of the peer, and of this end.
     steps: [Steps; 2],
-    /// How often the PLC program at the other end is scanned, if this process scans it.
-    scan: OnceLock<Nanos>,
+    /// How often the PLC program at the other end is scanned, if this process scans it, and the steps in which it takes
+    /// frames.
+    scan: OnceLock<(Nanos, Steps)>,
     /// True once the log has the length of the ticks.
     has_told_ticks: AtomicBool,
     /// The line that is reported.
@@ -115,9 +116,15 @@ impl SwallowedSignals {
         current.unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The peer is a PLC program that this process scans so often: nothing shorter reaches it.
-    pub fn scanned_every(&self, scan: Nanos) {
-        let _ = self.shared.scan.set(scan);
+    /// The peer is a PLC program that this process scans so often, over a bus with this cycle if there is one: nothing
+    /// shorter than either reaches it.
+    pub fn scanned_every(&self, scan: Nanos, cycle: Option<Nanos>) {
+        let slower = cycle.filter(|cycle| *cycle > scan);
+        let steps = Steps {
+            name: slower.map_or("scans", |_| "bus cycles"),
+            span: slower.or(Some(scan)),
+        };
+        let _ = self.shared.scan.set((scan, steps));
     }
 
     /// The counters of this line, per signal of the table.
@@ -181,7 +188,7 @@ impl SwallowedSignals {
     }
 
     fn long_ticks(&self, (ticks, shortest): (u64, Nanos)) -> Option<String> {
-        let scan = *self.shared.scan.get()?;
+        let (scan, _) = *self.shared.scan.get()?;
         // A tenth is no more than the pace of a busy computer.
         let is_long = ticks >= TICKS && shortest > scan + Nanos(scan.0 / 10);
         let shortest = shortest.rounded();
@@ -197,10 +204,7 @@ impl SwallowedSignals {
     /// The steps in which the peer, or this end, takes frames.
     fn steps(&self, is_sent: bool) -> Steps {
         match self.shared.scan.get() {
-            Some(scan) if is_sent => Steps {
-                name: "scans",
-                span: Some(*scan),
-            },
+            Some((_, steps)) if is_sent => *steps,
             _ => self.shared.steps[usize::from(!is_sent)],
         }
     }
@@ -332,7 +336,7 @@ mod tests {
              station.A.swallowed_outputs=0\nstation.B.swallowed_inputs=0\nstation.B.swallowed_outputs=1\n\
              swallowed.In 0=243\nswallowed.In 1=243\nswallowed.Out=1\n"
         );
-        of.scanned_every(Nanos::from_millis(20));
+        of.scanned_every(Nanos::from_millis(20), Some(Nanos::from_millis(10)));
         assert_eq!(of.steps(true).to_string(), "scans of 20ms");
         for (ticks, millis, is_long) in [(9, 50, false), (10, 22, false), (10, 50, true)] {
             let line = of.long_ticks((ticks, Nanos::from_millis(millis)));
@@ -357,6 +361,8 @@ mod tests {
         assert_eq!(of.sentences(), [(0, sentence(0)), (1, sentence(1))]);
         assert_eq!(of.news(), [sentence(0), sentence(1)]);
         let many = SwallowedSignals::new("x", &table(60), Role::Controller, steps);
+        many.scanned_every(Nanos::from_millis(20), Some(Nanos::from_millis(50)));
+        assert_eq!(many.steps(true).to_string(), "bus cycles of 50ms");
         pulse(&many, 0, Area::Input, 1);
         let news = many.news();
         assert_eq!(news.len(), MOST + 1);

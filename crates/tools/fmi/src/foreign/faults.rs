@@ -186,7 +186,8 @@ mod tests {
             (
                 "level",
                 1.0,
-                "\"level\" is an output of the FMU, which cannot be changed while it runs; did you mean \"valve\"?",
+                "\"level\" is an output of the FMU, which cannot be changed while it runs; name one of its inputs or \
+                 tunable parameters",
             ),
             (
                 "v",

@@ -21,7 +21,7 @@ import tickbus.Signal;
 class CellSweepTest extends CellLoop {
     private static final String ACCEPTED = "src/test/resources/tickbus/cell/sweep.txt";
     /** Longer than the nets need for a cylinder. */
-    private static final long PATIENCE_NANOS = 40_000_000_000L;
+    private static final long PATIENCE_NANOS = 25_000_000_000L;
 
     @Test
     void eachInputThatSticksHasTheAcceptedVerdict() throws IOException {

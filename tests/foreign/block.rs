@@ -122,18 +122,20 @@ fn every_type_of_a_signal_goes_in_and_out() -> Result<(), Absent> {
         ("Length", "7", "7"),
         ("Percent", "50", "50"),
     ];
-    let mut source = "TYPE\n  Length : INT;\n  Percent : INT (0..100);\nEND_TYPE\n".to_owned();
-    let (mut inputs, mut outputs, mut body) = (String::new(), String::new(), String::new());
-    let (mut head, mut row) = (String::new(), String::new());
-    for (number, (name, given, expected)) in types.iter().enumerate() {
-        inputs += &format!("    a{number} : {name};\n");
-        outputs += &format!("    b{number} : {name};\n");
-        body += &format!("  b{number} := a{number};\n");
-        head += &format!("| a{number} | b{number} ");
-        row += &format!("| {given} | {expected} ");
-    }
-    source += &format!(
-        "FUNCTION_BLOCK Pass\n  VAR_INPUT\n{inputs}  END_VAR\n  VAR_OUTPUT\n{outputs}  END_VAR\n{body}END_FUNCTION_BLOCK\n"
+    let all = |write: &dyn Fn(usize, &str) -> String| -> String {
+        let written = types.iter().enumerate();
+        let written = written.map(|(number, (name, ..))| write(number, name));
+        written.collect::<Vec<_>>().concat()
+    };
+    let inputs = all(&|number, name| format!("    a{number} : {name};\n"));
+    let outputs = all(&|number, name| format!("    b{number} : {name};\n"));
+    let body = all(&|number, _| format!("  b{number} := a{number};\n"));
+    let head = all(&|number, _| format!("| a{number} | b{number} "));
+    let cells = types.map(|(_, given, expected)| format!("| {given} | {expected} "));
+    let row = cells.concat();
+    let source = format!(
+        "TYPE\n  Length : INT;\n  Percent : INT (0..100);\nEND_TYPE\nFUNCTION_BLOCK Pass\n  \
+         VAR_INPUT\n{inputs}  END_VAR\n  VAR_OUTPUT\n{outputs}  END_VAR\n{body}END_FUNCTION_BLOCK\n"
     );
     let rest =
         format!("[[test]]\nname = \"t\"\nsteps = [{{ table = \"\"\"\n{head}\n{row}\n\"\"\" }}]\n");
@@ -265,7 +267,7 @@ fn messages_of_the_compiler_have_the_users_line() -> Result<(), Absent> {
     for coverage in [false, true] {
         let folder = folder(&wrong, "Delay", test_of);
         let arguments = ["a.toml", "--coverage"];
-        let output = test(folder.path(), &arguments[..1 + usize::from(coverage)])?;
+        let output = test(folder.path(), &arguments[..=usize::from(coverage)])?;
         let told = err(&output);
         assert!(told.starts_with("b.st:14:"), "{told}");
         assert!(told.contains("; so the compiler says"), "{told}");

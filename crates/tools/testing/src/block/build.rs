@@ -96,7 +96,8 @@ fn made(work: &Path, name: &str, text: &str) -> Result<PathBuf, Unbuilt> {
         Some(reason) if !reason.ends_with("was not compiled") => reason.to_owned(),
         _ => {
             // A name of the source can disturb iec2c's library, whose lines say nothing to the user.
-            let first = words.lines().find(|line| line.contains("error: "));
+            let mut lines = words.lines();
+            let first = lines.find(|line| line.contains("undefined ") || line.contains("error: "));
             format!(
                 "the block cannot be built: {}",
                 first.unwrap_or(words.trim())

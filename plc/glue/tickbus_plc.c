@@ -25,6 +25,9 @@ typedef struct {
 tickbus_time __CURRENT_TIME;
 uint8_t __DEBUG;
 
+/* The number of the scan, which the hosts of Beremiz and OpenPLC have: blocks of OSCAT read their clock by it. */
+unsigned long __tick;
+
 /* The types of located variables, as iec2c has them. */
 typedef uint8_t tickbus_BOOL;
 typedef int8_t tickbus_SINT;
@@ -91,7 +94,8 @@ static void scan(int64_t seconds, int64_t nanoseconds, uint64_t tick)
 {
     __CURRENT_TIME.tv_sec = (long int)seconds;
     __CURRENT_TIME.tv_nsec = (long int)nanoseconds;
-    config_run__((unsigned long)tick);
+    __tick = (unsigned long)tick;
+    config_run__(__tick);
 }
 
 const struct tickbus_plc tickbus_plc = {

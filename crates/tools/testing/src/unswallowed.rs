@@ -124,7 +124,16 @@ mod tests {
             "[driver]\nid = 1\nname = \"T\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"l\"\n"
                 .to_owned();
         for (name, address, more) in signals {
-            text += &format!("[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\n{more}\n");
+            let section = [
+                "[[signal]]\nname = \"",
+                name,
+                "\"\naddress = \"",
+                address,
+                "\"\n",
+                more,
+                "\n",
+            ];
+            text.push_str(&section.concat());
         }
         Config::parse("t", &text, &Kinds::LOOPBACK)
             .unwrap_or_else(|mistakes| panic!("{mistakes}"))

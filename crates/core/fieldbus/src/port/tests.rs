@@ -158,7 +158,10 @@ fn only_stations_whose_peer_is_gone_stop_counting_what_is_swallowed() {
 #[test]
 fn the_age_of_what_a_bus_takes_is_recorded_at_most_once_in_a_millisecond() {
     let mut rig = Rig::new();
-    let mut take = |micros: i64| drop(rig.port.take_all(Nanos::from_micros(micros)));
+    let mut take = |micros: i64| {
+        let now = Nanos::from_micros(micros);
+        assert!(rig.port.take_all(now).is_some(), "the line is up");
+    };
     take(100);
     rig.tick.write(Nanos::from_micros(1_000), |_, _| {});
     for micros in [4_000, 4_900, 5_000] {

@@ -240,7 +240,7 @@ def tests(pytester: pytest.Pytester) -> pytest.Pytester:
 
 def test_tests_with_all_words_of_the_kit_pass(tests):
     tests.makepyfile(HEAD + GREEN)
-    tests.runpytest_inprocess("--strict-markers").assert_outcomes(passed=15)
+    tests.runpytest_inprocess("--strict-markers").assert_outcomes(passed=16)
     assert not tests.path.joinpath("tickbus-reports").exists()
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
+    from ._native import Sweep
     from .testing import Plc
     from .testing._sweep import Sweeping
 
@@ -144,7 +145,8 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> object:
         return None
     from .testing._sweep import Over
 
-    plc = pyfuncitem.funcargs["_plc_bench"].plc
+    bench: Any = pyfuncitem.funcargs["_plc_bench"]
+    plc = bench.plc
     wanted = inspect.signature(pyfuncitem.obj).parameters
     try:
         # Its own assertions do not count, either; the one that fails ends its actions.
@@ -176,12 +178,13 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
     """Prints the matrices of the sweeps."""
     for sweeping in config.stash[_SWEEPS]:
-        summary = sweeping.native.summary() if sweeping.native and sweeping.names else ""
-        if "runs=0 " not in summary and summary:
+        native = sweeping.native
+        summary = native.summary() if native and sweeping.names else ""
+        if native and summary and "runs=0 " not in summary:
             terminalreporter.section(f"sweep {sweeping.name}")
             terminalreporter.write(summary)
             if sweeping.has_failed:
-                terminalreporter.write_line(_page(sweeping, _reports(config)))
+                terminalreporter.write_line(_page(sweeping, native, _reports(config)))
     for line in config.stash[_TOLD]:
         terminalreporter.write_line(line)
 
@@ -201,13 +204,13 @@ def _note(error: BaseException, text: str) -> None:
     error.__notes__ = [*getattr(error, "__notes__", []), text]
 
 
-def _page(sweeping: Sweeping, folder: Path) -> str:
+def _page(sweeping: Sweeping, native: Sweep, folder: Path) -> str:
     """Writes the page of a sweep, and returns where it is."""
     import tickbus
 
     page = folder / f"{sweeping.name}.html"
     try:
-        sweeping.native.page(page, f'pytest "{sweeping.node}[{{}}]"', sweeping.reports)
+        native.page(page, f'pytest "{sweeping.node}[{{}}]"', sweeping.reports)
     except tickbus.FieldbusError as error:
         return f"no page: {error}"
     return f"page: {page}"

@@ -24,10 +24,17 @@ fuzz_target!(|data: &[u8]| {
         body: body.trim().to_owned(),
     };
     match order(&change) {
-        Ok(Order::Force { value, .. }) => {
+        Ok(
+            Order::Force { value, .. }
+            | Order::Fault {
+                value: Some(value), ..
+            },
+        ) => {
             assert_eq!((verb, value), (Verb::Put, change.body.clone()))
         }
-        Ok(Order::Release { .. } | Order::ReleaseAll) => assert_eq!(verb, Verb::Delete),
+        Ok(Order::Release { .. } | Order::ReleaseAll | Order::Fault { value: None, .. }) => {
+            assert_eq!(verb, Verb::Delete)
+        }
         Err(refused) => assert!((400..500).contains(&refused.status) && !refused.text.is_empty()),
     }
     let data_type = DataType::ALL[usize::from(first >> 1) % DataType::ALL.len()];

@@ -7,6 +7,7 @@ mod build;
 mod coverage;
 
 use std::fmt::Write as _;
+use std::io::ErrorKind;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -229,6 +230,7 @@ fn sources(value: &Value<'_>, folder: &Path) -> Option<Vec<Source>> {
             Ok((true, ..=MOST_BYTES)) => std::fs::read(&path).map_err(|error| error.to_string()),
             Ok((true, _)) => Err(format!("has more than {MOST_BYTES} bytes")),
             Ok((false, _)) => Err("is no file".to_owned()),
+            Err(error) if error.kind() == ErrorKind::NotFound => Err("is not there".to_owned()),
             Err(error) => Err(error.to_string()),
         };
         match read {

@@ -1,8 +1,8 @@
 //! The native methods of the Java class `tickbus.Tickbus`, and in modules those of others.
 //!
 //! Each is one line that calls into the rooms above. `xChangeData` is the tick; `receiveNative` and `sendNative` are
-//! its halves: raw functions that take no lock, make no system call, allocate nothing and never throw. All others use
-//! the jni crate and throw `tickbus.FieldbusException`.
+//! its halves; `countNative` and `hasNative` say after it whether there is something to ask for. They are raw functions
+//! that take no lock, make no system call, allocate nothing and never throw. All others use the jni crate and throw `tickbus.FieldbusException`.
 
 #![allow(
     unsafe_code,
@@ -195,6 +195,18 @@ extern "system" fn Java_tickbus_Tickbus_statisticsNative<'local>(
     .resolve::<ThrowFieldbusException>()
 }
 
+/// `static native long countNative(long handle)` of `SwallowedChanges`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_SwallowedChanges_countNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jlong {
+    // As in a tick. A driver that cannot be looked at has -1.
+    let count = DRIVERS.tick(handle, |device| device.swallowed_changes());
+    count.map_or(-1, |count| jlong::try_from(count).unwrap_or(jlong::MAX))
+}
+
 /// `static native String linesNative(long handle)` of `SwallowedChanges`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SwallowedChanges_linesNative<'local>(
@@ -262,6 +274,18 @@ extern "system" fn Java_tickbus_ModelFaults_declareNative<'local>(
         Ok::<(), Failure>(with(handle, |device| device.declare_model_faults(names))??)
     })
     .resolve::<ThrowFieldbusException>();
+}
+
+/// `static native boolean hasNative(long handle)` of `ModelFaults`
+#[unsafe(no_mangle)]
+extern "system" fn Java_tickbus_ModelFaults_hasNative(
+    _env: *mut jni::sys::JNIEnv,
+    _class: jclass,
+    handle: jlong,
+) -> jboolean {
+    // As in a tick. For a driver that cannot be looked at, `takeNative` says why.
+    let has = DRIVERS.tick(handle, |device| device.has_model_change());
+    jboolean::from(has.unwrap_or(true))
 }
 
 /// `static native int takeNative(long handle, double[] into)` of `ModelFaults`

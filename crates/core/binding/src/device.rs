@@ -129,6 +129,12 @@ impl<K> Device<K> {
         swallowed(&self.driver)
     }
 
+    /// How many changes were swallowed, of all signals.
+    #[inline]
+    pub fn swallowed_changes(&self) -> u64 {
+        self.driver.swallowed().counts().of_all()
+    }
+
     /// The configuration that the driver was opened with.
     pub fn config(&self) -> Arc<Config> {
         Arc::clone(self.driver.config())
@@ -155,6 +161,12 @@ impl<K> Device<K> {
     /// `BAD_ARGUMENT` if a name is not usable, or a fault of the model has none of the names.
     pub fn declare_model_faults(&mut self, names: Vec<String>) -> Result<(), Refusal> {
         declare_model_faults(&mut self.driver, names)
+    }
+
+    /// Whether there may be a change of a fault of the model: see [`Driver::has_model_change`].
+    #[inline]
+    pub fn has_model_change(&self) -> bool {
+        self.driver.has_model_change()
     }
 
     /// The next change of a fault of the model: see [`Driver::next_model_change`].

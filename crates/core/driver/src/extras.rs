@@ -97,6 +97,13 @@ impl Extras {
         self.faults.as_mut().is_some_and(|faults| faults.end(id))
     }
 
+    /// Returns whether [`next_model_change`](Self::next_model_change) may have one.
+    #[inline]
+    pub(super) fn has_model_change(&self) -> bool {
+        let faults = self.faults.as_ref();
+        faults.is_some_and(|faults| faults.has_model_change())
+    }
+
     /// Returns the next change of a fault of the simulation's model that the model has not been told.
     #[inline]
     pub(super) fn next_model_change(&mut self) -> Option<(usize, Option<f64>)> {

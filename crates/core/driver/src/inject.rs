@@ -75,6 +75,12 @@ impl Driver {
         self.extras.make_room(&self.board).declare(names)
     }
 
+    /// Returns whether [`next_model_change`](Self::next_model_change) may have one: false costs a look.
+    #[inline]
+    pub fn has_model_change(&self) -> bool {
+        self.extras.has_model_change()
+    }
+
     /// Returns the next fault of the model that began, ended or changed its value in the ticks since the model was last
     /// told: its place among the declared names, and its value; `None` for a fault that is off. The simulation asks
     /// after each exchange, or between [`receive`](Self::receive) and [`send`](Self::send), until there is no more.

@@ -40,12 +40,21 @@ pub fn counted_signals(table: &SignalTable, station: usize, area: Area) -> Box<[
 
 /// Per signal of a table, how many of its changes were swallowed; readable at any time and from any thread.
 #[derive(Clone, Debug)]
-pub struct Swallowed(Arc<[AtomicU64]>);
+pub struct Swallowed(Arc<Counts>);
+
+#[derive(Debug)]
+struct Counts {
+    signals: Box<[AtomicU64]>,
+    all: AtomicU64,
+}
 
 impl Swallowed {
     /// Counts from zero, for a table of this many signals.
     pub fn new(signals: usize) -> Self {
-        Self((0..signals).map(|_| AtomicU64::new(0)).collect())
+        Self(Arc::new(Counts {
+            signals: (0..signals).map(|_| AtomicU64::new(0)).collect(),
+            all: AtomicU64::new(0),
+        }))
     }
 
     /// Returns how often the signal with this index in the signal table changed and changed back unseen.
@@ -54,12 +63,18 @@ impl Swallowed {
     ///
     /// If the table has no such signal.
     pub fn of(&self, signal: usize) -> u64 {
-        self.0[signal].load(Ordering::Relaxed)
+        self.0.signals[signal].load(Ordering::Relaxed)
+    }
+
+    /// Returns how often that happened, over all signals.
+    pub fn of_all(&self) -> u64 {
+        self.0.all.load(Ordering::Relaxed)
     }
 
     /// Returns the signals with swallowed changes, and their numbers.
     pub fn iter(&self) -> impl Iterator<Item = (usize, u64)> {
-        let counts = self.0.iter().map(|count| count.load(Ordering::Relaxed));
+        let signals = self.0.signals.iter();
+        let counts = signals.map(|count| count.load(Ordering::Relaxed));
         counts.enumerate().filter(|(_, count)| *count > 0)
     }
 
@@ -74,7 +89,8 @@ impl Swallowed {
 
     #[inline]
     fn add(&self, signal: usize) {
-        self.0[signal].fetch_add(1, Ordering::Relaxed);
+        self.0.signals[signal].fetch_add(1, Ordering::Relaxed);
+        self.0.all.fetch_add(1, Ordering::Relaxed);
     }
 }
 

@@ -197,6 +197,12 @@ impl Faults {
         Ok(())
     }
 
+    /// Returns whether [`next_model_change`](Self::next_model_change) may have one.
+    #[inline]
+    pub fn has_model_change(&self) -> bool {
+        self.models.has_change()
+    }
+
     /// The next fault of the model that has begun, ended or changed its value since the model was last told: its place
     /// among the declared names, and its value; `None` for a fault that is off.
     #[inline]

@@ -50,6 +50,11 @@ impl Models {
         self.has_news = self.states.iter().any(|state| state.now != state.told);
     }
 
+    /// Whether there may be a change that the model has not been told.
+    pub(super) const fn has_change(&self) -> bool {
+        self.has_news
+    }
+
     /// The next change that the model has not been told, with the place of the fault in the list of names.
     pub(super) fn next_change(&mut self) -> Option<(usize, Option<f64>)> {
         if !self.has_news {

@@ -26,6 +26,9 @@ final class ModelFaults {
 
     /** Hands over all changes since the last call, and returns their number; throws {@link FieldbusException}. */
     int poll(FaultHandler handler) {
+        if (!hasNative(handle)) {
+            return 0;
+        }
         int total = 0;
         int count = CHANGES;
         while (count == CHANGES) {
@@ -51,6 +54,9 @@ final class ModelFaults {
 
     /** Takes the names of the model's faults, one a line; throws {@link FieldbusException}. */
     private static native void declareNative(long handle, String names);
+
+    /** False if there is no change; like a tick, this does not enter the JVM again. */
+    private static native boolean hasNative(long handle);
 
     /** Moves changes into {@code into}, and returns their number; throws {@link FieldbusException}. */
     private static native int takeNative(long handle, double[] into);

@@ -10,6 +10,17 @@ public final class SwallowedChanges {
     }
 
     /**
+     * The number of swallowed changes of all signals, for a look after each tick: only when it has grown does {@link #of}
+     * find something new.
+     *
+     * @param bus an open driver
+     * @return -1 while another thread has the driver, or if it is closed
+     */
+    public static long count(Tickbus bus) {
+        return countNative(bus.handle());
+    }
+
+    /**
      * The signals with swallowed changes.
      *
      * @param bus an open driver
@@ -28,6 +39,9 @@ public final class SwallowedChanges {
         });
         return Collections.unmodifiableMap(found);
     }
+
+    /** Like a tick, this does not enter the JVM again. */
+    static native long countNative(long handle);
 
     /** A line per signal, its index and a tab before the text; throws {@link FieldbusException}. */
     static native String linesNative(long handle);

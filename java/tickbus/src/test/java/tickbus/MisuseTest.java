@@ -81,6 +81,7 @@ class MisuseTest {
             assertStatus(Status.NOT_OPEN, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.statisticsNative(handle));
             assertStatus(Status.NOT_OPEN, () -> SwallowedChanges.linesNative(handle));
+            assertEquals(-1, SwallowedChanges.countNative(handle));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.eventsNative(handle, new long[3]));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
             assertStatus(Status.NOT_OPEN, () -> Tickbus.endFaultNative(handle, 1));
@@ -102,6 +103,7 @@ class MisuseTest {
             assertStatus(Status.CLOSED, () -> Tickbus.finalizeNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.statisticsNative(handle));
             assertStatus(Status.CLOSED, () -> SwallowedChanges.linesNative(handle));
+            assertEquals(-1, SwallowedChanges.countNative(handle));
             assertStatus(Status.CLOSED, () -> Tickbus.eventsNative(handle, new long[3]));
             assertStatus(Status.CLOSED, () -> Tickbus.injectNative(handle, "kind = \"link-down\""));
             assertStatus(Status.CLOSED, () -> Tickbus.endFaultNative(handle, 1));

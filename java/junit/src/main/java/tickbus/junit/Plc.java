@@ -52,6 +52,8 @@ public final class Plc {
     private final Set<Await> open = new LinkedHashSet<>();
     /** The tick at which changes of a signal were swallowed first, by its name. */
     private final Map<String, Long> swallowed = new HashMap<>();
+    /** How many changes were swallowed up to the last tick. */
+    private long swallowedChanges;
     private long ticks;
     private boolean inStep;
     /** Sees every tick of a run of a sweep; else null. */
@@ -360,8 +362,12 @@ public final class Plc {
         for (Watch watch : watches) {
             watch.look(ticks);
         }
-        for (String signal : SwallowedChanges.of(bus).keySet()) {
-            swallowed.putIfAbsent(signal, ticks);
+        long swallowedNow = SwallowedChanges.count(bus);
+        if (swallowedNow != swallowedChanges) {
+            swallowedChanges = swallowedNow;
+            for (String signal : SwallowedChanges.of(bus).keySet()) {
+                swallowed.putIfAbsent(signal, ticks);
+            }
         }
         for (int i = 0; i < standing.size(); i++) {
             Standing one = standing.get(i);

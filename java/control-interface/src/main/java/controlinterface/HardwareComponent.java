@@ -26,4 +26,14 @@ public record HardwareComponent(String name, Direction direction, String type, S
             throw new IllegalArgumentException("a hardware component needs a name; this one's is blank");
         }
     }
+
+    /**
+     * Returns whether the component is a signal of the hardware, and not a value about the exchange itself. By convention a
+     * driver names the latter {@code bus.<value>}, and the number of a signal's edges {@code <signal>.edges}.
+     *
+     * @return false for such names
+     */
+    public boolean isSignal() {
+        return !name.startsWith("bus.") && !name.endsWith(".edges");
+    }
 }

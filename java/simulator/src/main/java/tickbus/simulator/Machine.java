@@ -49,6 +49,15 @@ public interface Machine {
     double output(int index);
 
     /**
+     * Further variables of the model, for observers; a control table reads them as {@code model:<name>}.
+     *
+     * @return always the same, in the order of a list for people; empty for a machine without any
+     */
+    default List<ModelVariable> variables() {
+        return List.of();
+    }
+
+    /**
      * The faults that the machine can have, by name.
      *
      * @return always the same; empty for a machine without faults

@@ -6,6 +6,7 @@ import java.nio.file.Path;
 import java.util.List;
 import java.util.function.BooleanSupplier;
 import java.util.function.DoubleSupplier;
+import java.util.stream.IntStream;
 import tickbus.simulator.control.ControlTable;
 import tickbus.simulator.control.ControlTableException;
 import tickbus.simulator.control.Endpoints;
@@ -35,11 +36,16 @@ public final class Simulator implements AutoCloseable {
         }
     }
 
+    /** A variable of the model that the control table reads. */
+    private record Observed(int source, DoubleSupplier value) {
+    }
+
     private final DriverSet drivers;
     private final Machine machine;
     private final ControlTable table;
     private final long stepNanos;
     private final Seat[] seats;
+    private final Observed[] observed;
     private final int machineInputs;
     private final int machineOutputs;
     private final int firstMachineInput;
@@ -57,7 +63,7 @@ public final class Simulator implements AutoCloseable {
      * @param stepNanos step size in nanoseconds, above 0
      * @param time the clock for real-time mode
      * @throws ControlTableException if the control table has mistakes
-     * @throws WrongInput if a driver is to inject a fault that the machine does not have
+     * @throws WrongInput if two names are equal, or a driver is to inject a fault that the machine does not have
      * @throws IllegalArgumentException if the step size is not above 0
      */
     public Simulator(DriverSet drivers, Machine machine, Path controlTable, long stepNanos, TimeSource time) {
@@ -71,12 +77,16 @@ public final class Simulator implements AutoCloseable {
                 throw new IllegalArgumentException(
                         "the step size is " + Durations.text(stepNanos) + "; it must be above 0");
             }
-            Endpoints endpoints = new Endpoints(list, machine.inputs(), machine.outputs());
+            Endpoints endpoints = endpoints(list, machine);
             table = ControlTable.load(controlTable, endpoints, stepNanos);
             machineInputs = machine.inputs().size();
             machineOutputs = machine.outputs().size();
             firstMachineInput = endpoints.destinationStart(list.size());
             firstMachineOutput = endpoints.sourceStart(list.size());
+            int modelStart = endpoints.modelStart();
+            List<ModelVariable> model = machine.variables();
+            observed = IntStream.range(0, model.size()).filter(i -> table.reads(modelStart + i))
+                    .mapToObj(i -> new Observed(modelStart + i, model.get(i).value())).toArray(Observed[]::new);
             seats = new Seat[list.size()];
             for (int i = 0; i < seats.length; i++) {
                 seats[i] = seat(list.get(i), endpoints.sourceStart(i), endpoints.destinationStart(i));
@@ -88,6 +98,16 @@ public final class Simulator implements AutoCloseable {
                 e.addSuppressed(second);
             }
             throw e;
+        }
+    }
+
+    /** The names that a control table of the machine can use. */
+    static Endpoints endpoints(List<ControlInterfaceDeviceDriver> drivers, Machine machine) {
+        try {
+            return new Endpoints(drivers, machine.inputs(), machine.outputs(),
+                    machine.variables().stream().map(ModelVariable::name).toList());
+        } catch (IllegalArgumentException e) {
+            throw new WrongInput("drivers and machine " + machine.name() + ": " + e.getMessage(), e);
         }
     }
 
@@ -144,6 +164,9 @@ public final class Simulator implements AutoCloseable {
         for (int i = 0; i < machineOutputs; i++) {
             table.setSource(firstMachineOutput + i, machine.output(i));
         }
+        for (Observed variable : observed) {
+            table.setSource(variable.source, variable.value.getAsDouble());
+        }
         table.computeAfterStep();
         for (Seat seat : seats) {
             table.getDestinations(seat.firstDestination, seat.written);
@@ -194,11 +217,18 @@ public final class Simulator implements AutoCloseable {
     /**
      * A window on a value.
      *
-     * @param name {@code <driver id>:<component>}, {@code machine:<variable>} or a variable of the table
+     * @param name {@code <driver id>:<component>}, {@code machine:<variable>}, {@code model:<variable>} or a variable of the
+     * table
      * @return gives the value as of the last tick
      * @throws IllegalArgumentException if nothing has this name
      */
     public DoubleSupplier probe(String name) {
+        // The table has only those that a row reads.
+        for (ModelVariable variable : machine.variables()) {
+            if (name.equals(Endpoints.MODEL + ":" + variable.name())) {
+                return variable.value();
+            }
+        }
         return table.probe(name);
     }
 
@@ -209,6 +239,15 @@ public final class Simulator implements AutoCloseable {
      */
     public List<String> unconnected() {
         return table.unconnected();
+    }
+
+    /**
+     * Sources that the control table leaves out.
+     *
+     * @return the names of signals and machine variables that no row reads
+     */
+    public List<String> unread() {
+        return table.unread();
     }
 
     /**

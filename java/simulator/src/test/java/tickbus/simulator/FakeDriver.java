@@ -41,6 +41,15 @@ public final class FakeDriver extends ControlInterfaceDeviceDriver {
         answer = new double[read.size()];
     }
 
+    /** Writes one BOOL, and reads another one. */
+    public FakeDriver(int id, String lamp, String button) {
+        this.id = id;
+        components.add(new HardwareComponent(lamp, Direction.WRITTEN_BY_SIMULATION, "BOOL", ""));
+        components.add(new HardwareComponent(button, Direction.READ_BY_SIMULATION, "BOOL", ""));
+        got = new double[1];
+        answer = new double[1];
+    }
+
     @Override
     public void simulationTime(long nanos) {
         time = nanos;

@@ -72,6 +72,7 @@ class MainTest {
     void helpsWithTheFunctions() {
         assertEquals(0, run("--help"));
         assertTrue(out().contains("--duration") && out().contains("deadband(width)"), out());
+        assertTrue(out().contains("TON(IN, PT) .Q .ET"), out());
     }
 
     @Test
@@ -99,11 +100,50 @@ class MainTest {
     }
 
     @Test
+    void runsAMachineOfOnesOwn(@TempDir Path machines) throws IOException {
+        MachineJar.write(work, machines.resolve("press.jar"), MachineJar.PRESS);
+        String[] line = {"--drivers", folder.toString(), "--control", table.toString(), "--machines", machines.toString(),
+            "--machine", "my press", "--mode", "best-effort", "--duration", "10ms"};
+        Files.writeString(table, "1:lamp | | | machine:down\nmachine:force | | | 1:level\n");
+        assertEquals(0, run(line), err());
+        assertTrue(out().startsWith("machine my press, 1 driver(s)"), out());
+        out.reset();
+        assertEquals(0, run("--list", "--drivers", folder.toString(), "--machines", machines.toString(), "--machine",
+                "my press"));
+        assertTrue(out().contains("\nmachine my press\n  variable       unit\n"), out());
+        assertTrue(out().contains("  model:strokes\n"), out());
+        out.reset();
+        assertEquals(0, run("--help", "--machines", machines.toString()));
+        assertTrue(out().contains("--machine NAME   press (default), my press, none;"), out());
+        String[] model = {"--machines", machines.toString(), "--machine", "my press", "--model-cfg",
+            work.resolve("model.cfg").toString()};
+        assertEquals(0, run(model), err());
+        assertTrue(Files.readString(work.resolve("model.cfg")).contains("name    = \"model:strokes\"\naddress = \"%IL0\""));
+        assertEquals(1, run(model));
+        assertTrue(err().contains("model.cfg: this file exists already; name a new one"), err());
+        assertEquals(1, run("--list", "--drivers", folder.toString(), "--machines", work.resolve("no").toString()));
+        assertTrue(err().contains("there is no such folder; name the folder that holds the machines' jars"), err());
+    }
+
+    @Test
     void notesWhatIsNotConnected() throws IOException {
         Files.writeString(table, "");
         run("--drivers", folder.toString(), "--control", table.toString(), "--machine", "none", "--mode",
                 "best-effort", "--duration", "10ms");
         assertTrue(out().contains("writes 1:level; it stays 0"), out());
+        assertTrue(out().contains("reads 1:lamp; --list --control " + table + " lists what no row uses\n"), out());
+    }
+
+    @Test
+    void listsWhatNoRowUses() throws IOException {
+        Files.writeString(table, "");
+        assertEquals(0, run("--drivers", folder.toString(), "--list", "--control", table.toString(), "--machine", "none"));
+        assertTrue(out().contains("1:lamp                 reads it\n"), out());
+        assertTrue(out().contains("1:level                writes it; it stays 0\n"), out());
+        out.reset();
+        Files.writeString(table, "1:lamp | | not | 1:level\n");
+        assertEquals(0, run("--drivers", folder.toString(), "--list", "--control", table.toString(), "--machine", "none"));
+        assertTrue(out().endsWith("\nrows of " + table + " use every input and output\n"), out());
     }
 
     @ParameterizedTest

@@ -41,6 +41,11 @@ class SimulatorTest {
         }
 
         @Override
+        public List<ModelVariable> variables() {
+            return List.of(new ModelVariable("input", "1/tick", () -> input), new ModelVariable("slip", "", () -> slip));
+        }
+
+        @Override
         public String name() {
             return "integrator";
         }
@@ -87,6 +92,46 @@ class SimulatorTest {
         Path file = folder.resolve("control.table");
         Files.writeString(file, table);
         return new Simulator(new DriverSet(List.of(first, second)), new Integrator(), file, step, time);
+    }
+
+    @Test
+    void aRowReadsTheModelsVariablesAsOfTheStep() throws IOException {
+        String table = """
+                1:speed       | | | machine:rate
+                model:input   | | | 1:position
+                              | | SEL("model:input" * 2 + "model:slip" > 15, 0, 1) | 2:full
+                """;
+        try (Simulator simulator = simulator(table, STEP, TimeSource.system())) {
+            first.deliversFirst = true;
+            first.answer[0] = 10;
+            simulator.tick();
+            assertEquals(10, first.got[0]);
+            assertEquals(1, second.got[0]);
+            assertEquals(0, simulator.probe("model:slip").getAsDouble());
+            first.faultListener.machineFault("slip", 0.25);
+            assertEquals(0.25, simulator.probe("model:slip").getAsDouble());
+            assertEquals(List.of("machine:sum"), simulator.unread(), "nobody needs to read the model's variables");
+        }
+    }
+
+    @Test
+    void aComponentWithTheNameOfAModelsVariableNeedsNoRow() throws IOException {
+        FakeDriver sheet = new FakeDriver(9, List.of("model:input", "model:slip", "model:no"), List.of());
+        Path file = Files.writeString(folder.resolve("control.table"), "model:input | | scale(0.5, 0) | 9:model:slip\n"
+                + " | | const(3) | machine:rate\n");
+        try (Simulator simulator = new Simulator(new DriverSet(List.of(sheet)), new Integrator(), file, STEP,
+                TimeSource.system())) {
+            simulator.tick();
+            assertArrayEquals(new double[] {3, 1.5, 0}, sheet.got);
+            assertEquals(List.of("9:model:no"), simulator.unconnected());
+        }
+    }
+
+    @Test
+    void twoEqualNamesAreTheUsersMistake() {
+        FakeDriver twice = new FakeDriver(1, List.of("a", "a"), List.of());
+        assertEquals("drivers and machine integrator: there are two \"1:a\"; names must be unique",
+                assertThrows(WrongInput.class, () -> Simulator.endpoints(List.of(twice), new Integrator())).getMessage());
     }
 
     @Test

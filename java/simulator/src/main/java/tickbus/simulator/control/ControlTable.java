@@ -7,6 +7,7 @@ import java.nio.file.NoSuchFileException;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.Collection;
+import java.util.HashSet;
 import java.util.LinkedHashSet;
 import java.util.List;
 import java.util.Map;
@@ -25,19 +26,26 @@ import tickbus.simulator.text.NearestName;
  * machine:tank.level           | level    | scale(0.001, 0)  | 4711:Level
  * level                        | full     | gt(2.5)          | 4711:Tank full
  * full, 4711:Enable            |          | and              | machine:valve.open
+ *                              |          | TON(full AND NOT "4711:Enable", T#2s) | 4711:Alarm
  * </pre>
  *
  * <ul>
  * <li><b>source</b>: one or several, separated by commas: {@code <driver id>:<component>},
- *       {@code machine:<variable>}, or the name of a variable of this table. {@code const} has none.
+ *       {@code machine:<variable>}, {@code model:<variable>}, or the name of a variable of this table. {@code const} has
+ *       none.
  *   <li><b>variable</b>: a name for the row's result, so that other rows can use it; may be empty.
- *   <li><b>transfer</b>: a {@linkplain TransferFunctions transfer function}; empty copies the source.
+ *   <li><b>transfer</b>: a {@linkplain TransferFunctions transfer function}, empty for a copy of the source; or an {@linkplain
+ *       tickbus.simulator.expression.Expression expression in Structured Text}. An expression names variables of the table
+ *       as they are, sources in double quotes, and those of its source column {@code IN1}, {@code IN2}, …, or {@code IN}
+ *       where there is one. A signal of type BOOL is BOOL there, every other signal LREAL, in its unit; a variable of
+ *       the machine is BOOL or LREAL, as the table uses it.
  *   <li><b>destination</b>: {@code <driver id>:<component>} or {@code machine:<variable>}; may be empty if
  *       there is a variable. No destination is written twice.
  * </ul>
  *
  * <p>{@code #} at the start of a line or after a blank begins a comment. A name that contains a bar, a comma, or
- * {@code #} after a blank must be in double quotes. Destinations that no row writes stay 0.
+ * {@code #} after a blank must be in double quotes. Destinations that no row writes stay 0, except components that have the
+ * name of a model's variable, {@code model:<variable>}: they get its value.
  *
  * <p>Rows are computed once per tick, each after the rows whose variables it reads, otherwise in the order
  * of the file. The rows that write to the machine, and those that they depend on, are computed before the machine's
@@ -192,6 +200,41 @@ public final class ControlTable {
         names.removeAll(written(List.of(beforeStep)));
         names.removeAll(written(List.of(afterStep)));
         return List.copyOf(names);
+    }
+
+    /**
+     * Signals and machine outputs that no row reads. Values that only an observer reads are not among them: those about the
+     * exchange itself, such as the age of data, and the model's variables.
+     *
+     * @return their names in numerical order
+     */
+    public List<String> unread() {
+        Set<Integer> read = read();
+        return endpoints.sources().entrySet().stream()
+                .filter(source -> !read.contains(source.getValue()) && endpoints.isSignal(source.getValue()))
+                .map(Map.Entry::getKey).toList();
+    }
+
+    /**
+     * Returns whether a row reads a source.
+     *
+     * @param index the source's number in {@link Endpoints#sources}
+     * @return false if the source need not be set
+     */
+    public boolean reads(int index) {
+        return read().contains(index);
+    }
+
+    private Set<Integer> read() {
+        Set<Integer> read = new HashSet<>();
+        for (Binder.BoundRow[] rows : List.of(beforeStep, afterStep)) {
+            for (Binder.BoundRow row : rows) {
+                for (int index : row.from) {
+                    read.add(index);
+                }
+            }
+        }
+        return read;
     }
 
     private static Set<String> written(Collection<Binder.BoundRow> rows) {

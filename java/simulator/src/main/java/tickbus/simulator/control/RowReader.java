@@ -6,6 +6,8 @@ import java.util.List;
 /** Splits a control table's text into rows: columns at bars, sources at commas, without comments and quotes. */
 final class RowReader {
     private static final int COLUMNS = 4;
+    /** The transfer column is the third one. */
+    private static final int TRANSFER = 3;
 
     private final String file;
     private final List<Mistake> mistakes;
@@ -34,6 +36,9 @@ final class RowReader {
         List<String> column = new ArrayList<>();
         StringBuilder part = new StringBuilder();
         boolean quoted = false;
+        int begin = 0;
+        int transfer = 0;
+        String expression = "";
         for (int i = 0; i < line.length(); i++) {
             char c = line.charAt(i);
             if (c == '"') {
@@ -46,6 +51,11 @@ final class RowReader {
                 close(column, part);
                 columns.add(column);
                 column = new ArrayList<>();
+                if (columns.size() == TRANSFER) {
+                    transfer = begin;
+                    expression = line.substring(begin, i);
+                }
+                begin = i + 1;
             } else if (c == ',' && columns.isEmpty()) {
                 close(column, part);
             } else {
@@ -61,7 +71,8 @@ final class RowReader {
         }
         close(column, part);
         columns.add(column);
-        return row(number, columns);
+        int blanks = expression.length() - expression.stripLeading().length();
+        return row(number, columns, expression.strip(), transfer + blanks + 1);
     }
 
     private static void close(List<String> column, StringBuilder part) {
@@ -69,7 +80,7 @@ final class RowReader {
         part.setLength(0);
     }
 
-    private Row row(int number, List<List<String>> columns) {
+    private Row row(int number, List<List<String>> columns, String expression, int column) {
         if (columns.size() != COLUMNS) {
             mistake(number, "a row has four columns, source | variable | transfer | destination; this one has "
                     + columns.size());
@@ -83,7 +94,7 @@ final class RowReader {
             return null;
         }
         Row row = new Row(number, List.copyOf(sources), columns.get(1).get(0), columns.get(2).get(0),
-                columns.get(3).get(0));
+                expression, column, columns.get(3).get(0));
         if (row.result().isEmpty()) {
             mistake(number, "the result goes nowhere; name a variable or a destination");
             return null;

@@ -3,15 +3,19 @@ package tickbus.simulator.control;
 import java.util.ArrayList;
 import java.util.LinkedHashMap;
 import java.util.List;
+import java.util.Locale;
 import java.util.Map;
+import java.util.Set;
 import java.util.regex.Matcher;
 import java.util.regex.Pattern;
+import tickbus.simulator.expression.Expression;
+import tickbus.simulator.expression.Type;
 import tickbus.simulator.text.Columns;
 import tickbus.simulator.text.Durations;
 import tickbus.simulator.text.NearestName;
 
 /**
- * The fixed set of transfer functions.
+ * The fixed set of transfer functions. Any other text of a transfer column is an {@link Expression}.
  *
  * <p>Values are doubles; 0 is false, every other value is true, and Boolean results are 0 or 1. Every function is assumed to
  * have seen 0 before its first tick, so that a value that starts at 1 rises at once.
@@ -21,6 +25,11 @@ public final class TransferFunctions {
     private static final long LONGEST_DELAY_TICKS = 1_000_000;
 
     private static final Pattern CALL = Pattern.compile("([A-Za-z-]+)\\s*(?:\\((.*)\\))?");
+
+    /** Words that begin an expression, although a function could have the same name. */
+    private static final Set<String> WORDS = Set.of("NOT", "TRUE", "FALSE", "IN");
+    private static final Set<String> BOOLEAN = Set.of("not", "and", "or", "bit", "rising", "falling", "gt", "lt");
+    private static final Set<String> AS_SOURCE = Set.of("copy", "const", "deadband", "delay");
 
     private static final Map<String, Kind> KINDS = new LinkedHashMap<>();
 
@@ -87,23 +96,66 @@ public final class TransferFunctions {
     }
 
     /**
+     * Returns whether a text calls one of these functions, rightly or not; else it is an expression.
+     *
+     * @param text of the transfer column
+     * @param variables the names of the table's variables
+     * @return true also for an unknown word, which is more likely a function than a name
+     */
+    static boolean isCall(String text, Set<String> variables) {
+        Matcher call = CALL.matcher(text);
+        if (text.isEmpty() || !call.matches()) {
+            return text.isEmpty();
+        }
+        String name = call.group(1);
+        if (KINDS.containsKey(name)) {
+            // "not" alone is the function, not (a OR b) an expression.
+            return !name.equals("not") || call.group(2) == null;
+        }
+        String capitals = name.toUpperCase(Locale.ROOT);
+        return name.indexOf('-') < 0 && !variables.contains(name) && !WORDS.contains(capitals)
+                && !Expression.functions().contains(capitals);
+    }
+
+    private static Matcher call(String text) {
+        Matcher call = CALL.matcher(text.isEmpty() ? "copy" : text);
+        if (!call.matches()) {
+            throw new IllegalArgumentException("\"" + text + "\" calls no transfer function");
+        }
+        return call;
+    }
+
+    /**
+     * The type of a function's result in expressions.
+     *
+     * @param text of the transfer column, with a function that exists
+     * @param source the type of its source, null if that has none
+     * @return null if the result has no type either
+     */
+    static Type result(String text, Type source) {
+        String name = call(text).group(1);
+        if (AS_SOURCE.contains(name)) {
+            return source;
+        }
+        return BOOLEAN.contains(name) ? Type.BOOL : Type.LREAL;
+    }
+
+    /**
      * Makes a function from the text of a transfer column.
      *
-     * @param text such as {@code scale(2, 0)}; empty for copy
+     * @param text such as {@code scale(2, 0)}, of which {@link #isCall} is true
      * @param sources the number of the row's sources
      * @param stepNanos the simulation's step size
      * @return the function
      * @throws IllegalArgumentException with a text for people, if there is no such function or it does not fit
      */
     static TransferFunction read(String text, int sources, long stepNanos) {
-        Matcher call = CALL.matcher(text.isEmpty() ? "copy" : text);
-        if (!call.matches()) {
-            throw new IllegalArgumentException(
-                    "\"" + text + "\" is no transfer function; write name or name(value, …), such as scale(2, 0)");
-        }
+        Matcher call = call(text);
         Kind kind = KINDS.get(call.group(1));
         if (kind == null) {
-            String hint = NearestName.hint(call.group(1), KINDS.keySet());
+            List<String> known = new ArrayList<>(KINDS.keySet());
+            known.addAll(Expression.functions());
+            String hint = NearestName.hint(call.group(1), known);
             throw new IllegalArgumentException("there is no transfer function \"" + call.group(1) + "\""
                     + (hint.isEmpty() ? "; there are " + String.join(", ", KINDS.keySet()) : hint));
         }

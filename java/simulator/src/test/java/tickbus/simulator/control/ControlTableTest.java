@@ -112,9 +112,8 @@ class ControlTableTest {
         "1:r | | | machine:mottor; there is no destination \"machine:mottor\"; did you mean \"machine:motor\"?",
         "1:r | a | scael(1, 2) |; there is no transfer function \"scael\"; did you mean \"scale\"?",
         "1:r | a | xyz |; there is no transfer function \"xyz\"; there are copy, not, and, or,",
-        "1:r | a | 5 + 3 |; \"5 + 3\" is no transfer function; write name or name(value, …)",
         "1:r | a | scale(1) |; \"scale(1)\" has 1 value in parentheses; right is scale(gain, offset)",
-        "1:r | a | not(1) |; \"not(1)\" has 1 value in parentheses; right is not",
+        "1:r | a | and(1) |; \"and(1)\" has 1 value in parentheses; right is and",
         "1:r, 2:r | a | not |; not takes one source, this row has 2 sources",
         " | a | and |; and takes at least one source, this row has no sources",
         "1:r | a | const(1) |; const takes no source, this row has 1 source",
@@ -131,6 +130,83 @@ class ControlTableTest {
     void aMistakeIsToldWithItsLineAndWhatWouldBeRight(String row, String what) {
         String told = mistakes("# first line", row);
         assertTrue(told.startsWith("t.table:2: " + what), told);
+    }
+
+    @Test
+    void anExpressionReadsVariablesSourcesAndTheSourceColumn() {
+        ControlTable table = table(
+                "1:r              | half   | IN / 2.0 > \"2:r\"                     |",
+                "1:r, machine:level | sum  | IN1 + IN2 * 2                        | 1:w",
+                "                 |        | half AND NOT (sum < 10)              | machine:valve",
+                "                 | a name | \"1:Level, left | #1\" + TO_LREAL(half) | machine:motor",
+                "                 | twice  | 2 * \"a name\"                        |");
+        table.setSources(0, new double[] {9, 4, 1, 3});
+        table.computeBeforeStep();
+        assertEquals(1, table.destination(3));
+        assertEquals(5, table.destination(4));
+        table.computeAfterStep();
+        assertEquals(15, table.destination(0), "as of before the step, for the valve needs it");
+        assertEquals(10, table.probe("twice").getAsDouble());
+    }
+
+    @Test
+    void aVariableOfTheMachineHasOneTypeInTheWholeTable() {
+        assertEquals("t.table:3:13: \"machine:level\" is used as LREAL elsewhere in the table; NOT takes BOOL",
+                mistakes("1:r | b | gt(1) |", "  | a | \"machine:level\" > 1.0 |", "  | c | NOT \"machine:level\" |"));
+        table(" | a | \"machine:level\" AND b |", "1:r | b | rising |", "machine:level | c | |", " | d | NOT c |");
+    }
+
+    @Test
+    void theOldFunctionsHaveTypes() {
+        table("1:r | on | bit(3) |", "1:r | level | scale(2, 1) |", "on | later | delay(4ms) |", "1:r | held | deadband(1) |",
+                " | a | NOT later AND level > held |", " | one | const(1) |", " | both | one AND a |",
+                "a | b | not |", " | c | not (a OR b) |");
+    }
+
+    /** The mistake's place is behind the mark ^. */
+    @ParameterizedTest
+    @CsvSource(delimiter = ';', quoteCharacter = '\u0001', value = {
+        "1:r | a | ^IN AND TRUE |; AND takes BOOL§ this is LREAL§ compare it, such as … <> 0",
+        "| a | ^\"1:x\" > 2.0 |; there is no source \"1:x\"§ did you mean \"1:r\"?",
+        "| a | ^\"1:w\" > 2.0 |; \"1:w\" can only be written§ it is a destination, not a source",
+        "| abc | 1.0 + ^abd |; no row gives variable \"abd\" a value§ did you mean \"abc\"?",
+        "| a | 1.0 + ^level |; no row gives variable \"level\" a value§ did you mean \"machine:level\"?",
+        "1:r, 2:r | a | ^IN1 > 2.0 |; the expression does not use the source \"2:r\"§ its name there is IN2",
+        "1:r, 2:r | a | ^IN > IN2 |; \"IN\" is no source of this row§ it has IN1 to IN2",
+        "1:r | a | ^5 + 3 |; the expression does not use the source \"1:r\"§ its name there is IN",
+        "1:r |  |   IN ^> 2.0 | 1:w; the result is BOOL, and \"1:w\" is a number§ write SEL(…, 0, 1)",
+        "1:r | a | TON(IN > 0.0, ^5) |; PT of TON takes TIME§ this is LINT§ write a duration, such as T#500ms",
+        "1:r | a | IN > ^? |; \"?\" has no meaning in Structured Text",
+        "\"1:Level, left | #1\" | a | IN > ^TRUE |; > takes numbers or durations§ this is BOOL§ SEL(…, 0, 1) makes",
+    })
+    void aMistakeInAnExpressionIsToldWithItsColumn(String row, String what) {
+        int column = row.indexOf('^') + 1;
+        assertTrue(mistakes("# first line", row.replace("^", "")).startsWith(
+                "t.table:2:" + column + ": " + what.replace('§', ';')), mistakes("# first line", row.replace("^", "")));
+    }
+
+    @Test
+    void anExpressionCannotReadItself() {
+        assertEquals("t.table:1: a cycle, each value waits for the next: a -> a", mistakes("| a | NOT a |"));
+    }
+
+    @Test
+    void aSignalOfTypeBoolTakesAndGivesBools() {
+        Endpoints two = new Endpoints(List.of(new FakeDriver(1, "lamp", "button")), List.of(),
+                List.of());
+        ControlTable.parse("t.table", "| | NOT \"1:button\" | 1:lamp", two, STEP);
+        String told = assertThrows(ControlTableException.class,
+                () -> ControlTable.parse("t.table", "| | SEL(\"1:button\", 0.0, 1.0) | 1:lamp", two, STEP)).getMessage();
+        assertEquals("t.table:1:5: the result is LREAL, and \"1:lamp\" is BOOL; compare it, such as … <> 0", told);
+    }
+
+    @Test
+    void whatNoRowReadsIsListed() {
+        assertEquals(List.of("1:Level, left | #1", "machine:level"),
+                table("1:r | a | IN > \"2:r\" |", "a | | | 1:w").unread());
+        Endpoints counting = new Endpoints(List.of(new FakeDriver(1, List.of(), List.of("r", "r.edges", "bus.age"))),
+                List.of(), List.of());
+        assertEquals(List.of("1:r"), ControlTable.parse("t.table", "", counting, STEP).unread());
     }
 
     @Test

@@ -5,9 +5,11 @@ import java.util.List;
 import java.util.function.BooleanSupplier;
 import java.util.function.DoubleConsumer;
 import java.util.function.DoubleSupplier;
+import java.util.function.IntSupplier;
 import tickbus.simulator.Machine;
 import tickbus.simulator.ModelFault;
 import tickbus.simulator.ModelFaults;
+import tickbus.simulator.ModelVariable;
 
 /**
  * The whole cell as a machine. Its variables have the names of the signals in plc/cell/cell.cfg and plc/cell/reader.cfg. The
@@ -30,6 +32,7 @@ public final class ManufacturingCell implements Machine {
 
     private final Counters counters = new Counters();
     private final ModelFaults modelFaults = new ModelFaults();
+    private final List<ModelVariable> variables = new ArrayList<>();
     private final StationOne one = new StationOne(counters);
     private final StationThree three = new StationThree(counters);
     private final StationFour four = new StationFour(counters);
@@ -63,6 +66,7 @@ public final class ManufacturingCell implements Machine {
         in("Belt back", on -> transport.backward = on);
         in("Running lamp", on -> runningLamp = on);
         declareFaults();
+        declareCounts();
         head(1, one.head);
         head(3, three.head);
         head(4, four.head);
@@ -158,8 +162,27 @@ public final class ManufacturingCell implements Machine {
         modelFaults.add(name, effect, on -> (on ? begin : end).run());
     }
 
+    private void declareCounts() {
+        count("sleeves in the magazine", one::sleeves);
+        count("parts in the magazine", three.parts::stock);
+        count("heads in the magazine", three.heads::stock);
+        count("caps in the magazine", four.caps::stock);
+        count("pieces begun", counters::begun);
+        count("pieces delivered", four.delivered()::size);
+        count("pieces fallen", counters::fallen);
+        count("parts wasted", counters::wasted);
+        count("collisions", counters::collisions);
+        count("vacuum losses", counters::vacuumLosses);
+        count("carriers missed", counters::carriersMissed);
+    }
+
+    private void count(String name, IntSupplier value) {
+        variables.add(new ModelVariable(name, "", value::getAsInt));
+    }
+
     private void worn(String name, PneumaticCylinder cylinder) {
         modelFaults.add("wear of " + name, MOST_WEAR, "", "the cylinder has this part less of its speed", cylinder::wear);
+        variables.add(new ModelVariable(name + " stroke", "%", cylinder::percent));
     }
 
     private void head(int number, ReadWriteHead head) {
@@ -198,6 +221,11 @@ public final class ManufacturingCell implements Machine {
     @Override
     public List<String> outputs() {
         return List.copyOf(outputs);
+    }
+
+    @Override
+    public List<ModelVariable> variables() {
+        return List.copyOf(variables);
     }
 
     @Override

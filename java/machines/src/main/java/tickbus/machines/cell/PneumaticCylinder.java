@@ -35,6 +35,11 @@ final class PneumaticCylinder {
         }
     }
 
+    /** The part of the stroke that the cylinder is forward, in percent. */
+    double percent() {
+        return 100.0 * at / strokeNanos;
+    }
+
     boolean isForward() {
         return at == strokeNanos;
     }

@@ -5,6 +5,7 @@ import java.util.List;
 import tickbus.simulator.Machine;
 import tickbus.simulator.ModelFault;
 import tickbus.simulator.ModelFaults;
+import tickbus.simulator.ModelVariable;
 
 /**
  * The peeling line as a machine: charger and lathe, with 25 axes.
@@ -26,6 +27,7 @@ public final class Peeler implements Machine {
     private final ModelFaults modelFaults = new ModelFaults();
     private final Charger charger;
     private final Lathe lathe;
+    private final List<ModelVariable> variables;
     private long now;
 
     /** A line with an unlimited supply of blocks, and blocks on all steps of its feeder. */
@@ -44,6 +46,7 @@ public final class Peeler implements Machine {
         axes.declare(modelFaults);
         charger = new Charger(axes, new BlockSupply(blocks), mishaps, onSteps);
         lathe = new Lathe(axes, mishaps);
+        variables = PeelerVariables.of(this);
     }
 
     @Override
@@ -66,6 +69,11 @@ public final class Peeler implements Machine {
         names.add("pre-centring distance 2");
         names.add("simulation time");
         return names;
+    }
+
+    @Override
+    public List<ModelVariable> variables() {
+        return variables;
     }
 
     @Override

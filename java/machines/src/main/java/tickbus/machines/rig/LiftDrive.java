@@ -63,6 +63,11 @@ final class LiftDrive {
         return ramp.position();
     }
 
+    /** The speed of the motor, in millimetres per second; upwards positive. */
+    double velocity() {
+        return ramp.velocity();
+    }
+
     /** The play between motor and lift, in millimetres; 0 for none. */
     void backlash(double millimetres) {
         backlash = millimetres;

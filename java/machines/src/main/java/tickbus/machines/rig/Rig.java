@@ -4,6 +4,7 @@ import java.util.List;
 import tickbus.simulator.Machine;
 import tickbus.simulator.ModelFault;
 import tickbus.simulator.ModelFaults;
+import tickbus.simulator.ModelVariable;
 
 /**
  * The bottle treatment cell of the test rig.
@@ -23,6 +24,7 @@ public final class Rig implements Machine {
     private final StepMonitor monitor = new StepMonitor();
     private final ModelFaults modelFaults = new ModelFaults();
     private final Cell cell;
+    private final List<ModelVariable> variables;
     private long time;
 
     /**
@@ -44,6 +46,7 @@ public final class Rig implements Machine {
     public Rig(double wheel1Degrees, double wheel2Degrees, double lift1Millimetres, double lift2Millimetres) {
         cell = new Cell(wheel1Degrees, wheel2Degrees, lift1Millimetres, lift2Millimetres);
         cell.declare(modelFaults);
+        variables = RigVariables.of(cell, monitor);
         show();
     }
 
@@ -60,6 +63,11 @@ public final class Rig implements Machine {
     @Override
     public List<String> outputs() {
         return Outputs.NAMES;
+    }
+
+    @Override
+    public List<ModelVariable> variables() {
+        return variables;
     }
 
     @Override

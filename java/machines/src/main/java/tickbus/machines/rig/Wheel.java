@@ -56,6 +56,11 @@ final class Wheel {
         return ramp.position();
     }
 
+    /** Degrees per second. */
+    double velocity() {
+        return ramp.velocity();
+    }
+
     boolean moving() {
         return state != State.REST || pending;
     }

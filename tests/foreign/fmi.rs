@@ -356,5 +356,22 @@ fn by_pythonfmu() -> Result<(), Absent> {
     assert!((395.0..=405.0).contains(&level(2000)), "{}", level(2000));
     assert!((395.0..=405.0).contains(&level(500)), "{}", level(500));
     assert!((270.0..=290.0).contains(&level(800)), "{}", level(800));
+
+    // The same machine in a sweep, of which two runs take place at once.
+    let sweep = "config = \"tank.cfg\"\nstep = \"10ms\"\n\
+                 [machine]\nfmu = \"Machine.fmu\"\nmap = \"tank.toml\"\nisolated = true\n\
+                 [sweep]\nscenario = [{ run = \"10s\" }]\nmoments = [\"Level < 450\", \"Valve\"]\n\
+                 told = \"Level < 300\"\nwithin = \"5s\"\n\
+                 kinds = [\"stuck-off\", { kind = \"model\", name = \"leak\", value = 0.08 }]\n";
+    std::fs::write(folder.path().join("sweep.toml"), sweep).expect("a file");
+    let ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(["test", "sweep.toml", "--jobs", "2"])
+        .env("LD_PRELOAD", &shared)
+        .current_dir(folder.path())
+        .output()
+        .expect("it runs");
+    let told = text(&ran.stdout);
+    assert!(ran.status.success(), "{told}\n{}", text(&ran.stderr));
+    assert!(told.contains("sweep: runs=4 told=4 "), "{told}");
     Ok(())
 }

@@ -1,12 +1,12 @@
-"""Imports FMUs of tickbus with tools that others wrote: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
-Imports FMUs of tickbus with third-party tools: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
+"""Imports FMUs of tickbus with third-party tools: FMPy, libcosim, pathsim-fmi, the FMU Manipulation Toolbox.
+
     fmi_tools.py TOOL FMU...
 
-The FMU is that of tests/fmi/types.cfg: a PLC that brings every input back on the output of the same type. Prints one line,
-The FMU is that of tests/fmi/types.cfg: a PLC that copies every input to the output of the same type. Prints one line,
+The FMU is that of tests/fmi/types.cfg: a PLC that copies every input to the output of the same type. Prints one line.
 """
 
 import ctypes
+import os
 import sys
 import tempfile
 from pathlib import Path
@@ -330,4 +330,7 @@ TOOLS = [fmpy, tank, toolbox, cosim, pathsim, misuse, rig, rig_in_c]
 
 if __name__ == "__main__":
     tool, *arguments = sys.argv[1:]
-    print("fmi_tools: ok", {one.__name__: one for one in TOOLS}[tool](*arguments))
+    # FMPy leaves what it extracts, 50 MB each.
+    with tempfile.TemporaryDirectory() as folder:
+        tempfile.tempdir = os.environ["TMPDIR"] = folder
+        print("fmi_tools: ok", {one.__name__: one for one in TOOLS}[tool](*arguments))

@@ -1,4 +1,4 @@
-//! Tests of the faults of a simulation's model: when it is told, and which names it knows.
+//! Tests of the faults of a simulation's model: when the model hears of them, and which names it knows.
 
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_driver_cfg::Config;
@@ -34,7 +34,7 @@ fn told(driver: &mut Driver) -> String {
     told.join(" ")
 }
 
-/// Ticks with each of these values of `a`, in one piece or in halves; returns what the model is told in each tick.
+/// Ticks with each of these values of `a`, in one piece or in halves; returns the changes that the model gets per tick.
 fn run(driver: &mut Driver, values: &[u8], is_halved: bool) -> Vec<String> {
     let mut slots = driver.initial_slots();
     let tick = |(number, value): (i64, &u8)| {

@@ -182,18 +182,20 @@ impl Faults {
         retired
     }
 
-    /// Takes the names of the faults that the simulation's model can have, in place of earlier ones. The model is told
-    /// by [`next_model_change`](Self::next_model_change) which of them are on.
+    /// Takes the names of the faults that the simulation's model can have, in place of earlier ones.
+    /// [`next_model_change`](Self::next_model_change) then returns those that are on.
     ///
     /// # Errors
     ///
     /// A name is not usable or there twice, or a fault that is not over has another name. Then the names are not taken.
     pub fn declare(&mut self, names: Vec<String>) -> Result<(), Mistake> {
-        self.models = Models::new(self.board.declare(names)?);
+        let models = Models::new(self.board.declare(names)?);
+        let earlier = std::mem::replace(&mut self.models, models);
         for entry in &mut self.entries {
             entry.join(&self.models);
         }
         self.note_models();
+        self.models.keep_ends(&earlier);
         Ok(())
     }
 

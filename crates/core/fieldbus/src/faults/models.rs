@@ -50,6 +50,16 @@ impl Models {
         self.has_news = self.states.iter().any(|state| state.now != state.told);
     }
 
+    /// Takes over the ends that the model has not been told under these earlier names: one who declares again, as an
+    /// episode begins, still hears of them.
+    pub(super) fn keep_ends(&mut self, earlier: &Self) {
+        for (name, state) in self.names.iter().zip(&mut self.states) {
+            let place = earlier.position(name).filter(|_| state.now.is_none());
+            state.told = place.and_then(|place| earlier.states[place].told);
+            self.has_news |= state.now != state.told;
+        }
+    }
+
     /// Whether there may be a change that the model has not been told.
     pub(super) const fn has_change(&self) -> bool {
         self.has_news
@@ -103,6 +113,15 @@ mod tests {
         models.set([(0, 1.0)].into_iter());
         models.set([(1, 0.5)].into_iter());
         assert_eq!(models.next_change(), None);
+        // Both end, and the model declares them again before it asks.
+        models.set([(0, 1.0), (1, 0.5)].into_iter());
+        assert_eq!(models.next_change(), Some((0, Some(1.0))));
+        models.set([].into_iter());
+        let mut again = Models::new(Arc::from(["wear", "pump", "leak"].map(str::to_owned)));
+        again.keep_ends(&models);
+        assert_eq!(again.next_change(), Some((0, None)));
+        assert_eq!(again.next_change(), Some((2, None)));
+        assert_eq!(again.next_change(), None);
     }
 
     #[test]

@@ -145,7 +145,7 @@ fn answers_come_in_any_pieces() {
     assert!(session.is_idle());
 }
 
-/// A session as `session`, before its first cycle: the CPU allows so many jobs at once, each way.
+/// Takes a new session to its first cycle, before a CPU that allows this many jobs at once in each direction.
 fn met_with(session: ClientSession, calling: u16, called: u16) -> ClientSession {
     let mut session = session;
     said(&mut session);

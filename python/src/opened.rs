@@ -303,6 +303,11 @@ impl Handle {
         self.visit(|opened| opened.driver.is_over())
     }
 
+    /// Calls `work` with the driver, between two ticks.
+    pub(crate) fn with_driver<R>(&self, work: impl FnOnce(&Driver) -> R) -> Result<R, Refusal> {
+        self.visit(|opened| work(&opened.driver))
+    }
+
     pub(crate) fn config(&self) -> Result<Arc<Config>, Refusal> {
         self.visit(|opened| Arc::clone(opened.driver.config()))
     }

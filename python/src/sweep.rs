@@ -59,10 +59,11 @@ impl Sweep {
         step_ns: i64,
     ) -> PyResult<Self> {
         let read = || {
-            let config = driver.get().handle.config()?;
             let keys = (name.as_str(), keys.as_str());
-            Session::read(keys, ACCEPT, &folder, config, Nanos(step_ns))
-                .map_err(|mistakes| refused(format!("the sweep cannot be read:\n{mistakes}")))
+            let handle = &driver.get().handle;
+            let read = handle
+                .with_driver(|driver| Session::read(keys, ACCEPT, &folder, driver, Nanos(step_ns)));
+            read?.map_err(|mistakes| refused(format!("the sweep cannot be read:\n{mistakes}")))
         };
         let session = Refusal::instead_of_panic(read).map_err(|refusal| raised(py, &refusal))?;
         Ok(Self {
@@ -99,8 +100,8 @@ impl Sweep {
     /// The names of the runs with a fault, after the run without one.
     fn plan(&self, py: Python<'_>, rewriting: bool) -> PyResult<Vec<String>> {
         self.with(py, |session| {
-            let cells = session.plan(rewriting).map_err(refused)?;
-            Ok(cells.iter().map(|cell| cell.name.clone()).collect())
+            let plan = session.plan(rewriting).map_err(refused)?;
+            Ok(plan.cells.iter().map(|cell| cell.name.clone()).collect())
         })
     }
 

@@ -4,13 +4,14 @@
 
 use std::path::{Path, PathBuf};
 
-use jni::EnvUnowned;
 use jni::objects::{JClass, JString};
 use jni::sys::{jboolean, jint, jlong};
+use jni::{Env, EnvUnowned};
 
 use tickbus_base::time::Nanos;
 use tickbus_binding::{Handles, Refusal};
-use tickbus_driver::Code;
+use tickbus_driver::{Code, Driver};
+use tickbus_image::signal::Slot;
 use tickbus_testing::Session;
 
 use super::failure::{Failure, ThrowFieldbusException};
@@ -22,8 +23,34 @@ const ACCEPT: &str = "-Dtickbus.accept=true";
 /// The sweeps of this process.
 static SWEEPS: Handles<Box<Session>> = Handles::new();
 
+/// Runs a native method: returns its result, or throws its failure.
+fn answer<'local, R: Default + 'local>(
+    mut env: EnvUnowned<'local>,
+    work: impl FnOnce(&mut Env<'local>) -> Result<R, Failure>,
+) -> R {
+    env.with_env(work).resolve::<ThrowFieldbusException>()
+}
+
 fn visit<R>(sweep: jlong, work: impl FnOnce(&mut Session) -> R) -> Result<R, Failure> {
     Ok(SWEEPS.visit(sweep, |session| work(session))?)
+}
+
+/// Calls `work` with the sweep, the driver of its run, and the driver's slots.
+fn visit_run<R>(
+    sweep: jlong,
+    driver: jlong,
+    work: impl FnOnce(&mut Session, &mut Driver, &mut [Slot]) -> R,
+) -> Result<R, Failure> {
+    visit(sweep, |session| {
+        with(driver, |device| {
+            device.between_ticks(|driver, slots| work(session, driver, slots))
+        })
+    })?
+}
+
+/// The text of a native method's result.
+fn text<'local>(env: &mut Env<'local>, text: impl AsRef<str>) -> Result<JString<'local>, Failure> {
+    Ok(env.new_string(text.as_ref())?)
 }
 
 fn refused(why: impl std::fmt::Display) -> Failure {
@@ -33,7 +60,7 @@ fn refused(why: impl std::fmt::Display) -> Failure {
 /// `static native long openNative(long driver, String name, String folder, String keys, long stepNanos)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_openNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     driver: jlong,
     name: JString<'local>,
@@ -41,183 +68,161 @@ extern "system" fn Java_tickbus_SweepSession_openNative<'local>(
     keys: JString<'local>,
     step: jlong,
 ) -> jlong {
-    env.with_env(|env| {
+    answer(env, |env| {
         let place = SWEEPS.reserve()?;
         let [name, folder, keys] = [&name, &folder, &keys].map(|text| text.try_to_string(env));
         let (name, folder, keys) = (name?, folder?, keys?);
-        let config = with(driver, |device| device.config())?;
         let folder = Path::new(&folder);
-        let session = Session::read((&name, &keys), ACCEPT, folder, config, Nanos(step));
+        let session = with(driver, |device| {
+            device.between_ticks(|driver, _| {
+                Session::read((&name, &keys), ACCEPT, folder, driver, Nanos(step))
+            })
+        })?;
         let session = session
             .map_err(|mistakes| refused(format!("the sweep cannot be read:\n{mistakes}")))?;
-        Ok::<_, Failure>(place.fill(&name, Box::new(session)))
+        Ok(place.fill(&name, Box::new(session)))
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native void closeNative(long sweep)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_closeNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
 ) {
-    env.with_env(|_| Ok::<(), Failure>(SWEEPS.close(sweep, drop).map_err(Refusal::plain)?))
-        .resolve::<ThrowFieldbusException>();
+    answer(env, |_| {
+        Ok(SWEEPS.close(sweep, drop).map_err(Refusal::plain)?)
+    });
 }
 
 /// `static native void beginNative(long sweep, long driver, int cell)`; a cell below 0 is the run without a fault.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_beginNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     driver: jlong,
     cell: jint,
 ) {
-    env.with_env(|_| {
-        let begin = |session: &mut Session| {
-            let cell = usize::try_from(cell).ok();
-            with(driver, |device| {
-                device.between_ticks(|_, slots| session.begin(cell, slots))
-            })
-        };
-        visit(sweep, begin)??.map_err(refused)
-    })
-    .resolve::<ThrowFieldbusException>();
+    let cell = usize::try_from(cell).ok();
+    answer(env, |_| {
+        let begun = visit_run(sweep, driver, |session, _, slots| {
+            session.begin(cell, slots)
+        });
+        begun?.map_err(refused)
+    });
 }
 
 /// `static native void beforeNative(long sweep, long driver)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_beforeNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     driver: jlong,
 ) {
-    env.with_env(|_| {
-        let before = |session: &mut Session| {
-            with(driver, |device| {
-                device.between_ticks(|driver, slots| session.before(driver, slots))
-            })
-        };
-        visit(sweep, before)??.map_err(refused)
-    })
-    .resolve::<ThrowFieldbusException>();
+    answer(env, |_| {
+        visit_run(sweep, driver, Session::before)?.map_err(refused)
+    });
 }
 
 /// `static native boolean afterNative(long sweep, long driver)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_afterNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     driver: jlong,
 ) -> jboolean {
-    env.with_env(|_| {
-        let after = |session: &mut Session| {
-            with(driver, |device| {
-                device.between_ticks(|_, slots| session.after(slots))
-            })
-        };
-        visit(sweep, after)?
+    answer(env, |_| {
+        visit_run(sweep, driver, |session, _, slots| session.after(slots))
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native boolean idleNative(long sweep, long driver)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_idleNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     driver: jlong,
 ) -> jboolean {
-    env.with_env(|_| {
-        let idle = |session: &mut Session| {
-            with(driver, |device| {
-                device.between_ticks(|_, slots| session.idle(slots))
-            })
-        };
-        visit(sweep, idle)?
+    answer(env, |_| {
+        visit_run(sweep, driver, |session, _, slots| session.idle(slots))
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native String planNative(long sweep, boolean rewriting)`: the names of the runs, one per line.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_planNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     rewriting: jboolean,
 ) -> JString<'local> {
-    env.with_env(|env| {
-        let cells = visit(sweep, |session| session.plan(rewriting))?.map_err(refused)?;
-        let names: Vec<&str> = cells.iter().map(|cell| cell.name.as_str()).collect();
-        Ok::<_, Failure>(env.new_string(names.join("\n"))?)
+    answer(env, |env| {
+        let plan = visit(sweep, |session| session.plan(rewriting))?.map_err(refused)?;
+        let names: Vec<&str> = plan.cells.iter().map(|cell| cell.name.as_str()).collect();
+        text(env, names.join("\n"))
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native String resultNative(long sweep, int cell)`: whether it passes, its word, and the verdict, on one line
 /// each; empty if the run is not over.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_resultNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     cell: jint,
 ) -> JString<'local> {
-    env.with_env(|env| {
+    answer(env, |env| {
         let cell = usize::try_from(cell).unwrap_or(usize::MAX);
         let run = visit(sweep, |session| session.result(cell))?;
-        let text = run.map(|run| format!("{}\n{}\n{}", run.passes, run.word, run.what));
-        Ok::<_, Failure>(env.new_string(text.unwrap_or_default())?)
+        let lines = run.map(|run| format!("{}\n{}\n{}", run.passes, run.word, run.what));
+        text(env, lines.unwrap_or_default())
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native String summaryNative(long sweep)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_summaryNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
 ) -> JString<'local> {
-    env.with_env(|env| {
+    answer(env, |env| {
         let summary = visit(sweep, |session| session.summary())?;
-        Ok::<_, Failure>(env.new_string(summary)?)
+        text(env, summary)
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native String acceptNative(long sweep)`
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_acceptNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
 ) -> JString<'local> {
-    env.with_env(|env| {
+    answer(env, |env| {
         let file = visit(sweep, Session::accept)?.map_err(refused)?;
-        Ok::<_, Failure>(env.new_string(file.to_string_lossy())?)
+        text(env, file.to_string_lossy())
     })
-    .resolve::<ThrowFieldbusException>()
 }
 
 /// `static native void pageNative(long sweep, String page, String again, String reports)`: the report of each run on a line,
 /// or an empty line.
 #[unsafe(no_mangle)]
 extern "system" fn Java_tickbus_SweepSession_pageNative<'local>(
-    mut env: EnvUnowned<'local>,
+    env: EnvUnowned<'local>,
     _class: JClass<'local>,
     sweep: jlong,
     page: JString<'local>,
     again: JString<'local>,
     reports: JString<'local>,
 ) {
-    env.with_env(|env| {
+    answer(env, |env| {
         let [page, again, reports] = [&page, &again, &reports].map(|text| text.try_to_string(env));
         let (page, again, reports) = (page?, again?, reports?);
         let reports: Vec<&str> = reports.split('\n').collect();
@@ -229,6 +234,5 @@ extern "system" fn Java_tickbus_SweepSession_pageNative<'local>(
             session.page(Path::new(&page), &again, report)
         })?
         .map_err(refused)
-    })
-    .resolve::<ThrowFieldbusException>();
+    });
 }

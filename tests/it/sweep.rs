@@ -3,30 +3,9 @@
 mod doors;
 
 use std::fs;
-use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
-fn repository() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// Runs `tickbus test` in `directory`.
-fn test(directory: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_tickbus"))
-        .arg("test")
-        .args(arguments)
-        .current_dir(directory)
-        .output()
-        .expect("the tickbus program runs")
-}
-
-fn out(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn err(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
+use crate::testing::{err, folder, out, repository, test};
 
 /// The mirror shows "Start" as "Run", and "Height" as "Speed". When it stops, its machine jumps to 99, which is taken
 /// for the alarm.
@@ -57,15 +36,6 @@ scenario = [
     { set = { Height = 6 }, tick = 10 },
 ]
 ";
-
-/// A folder with the mirror program's line and one test file.
-fn folder(file: &str) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a folder");
-    let line = repository().join("tests/wrong-tests/line.cfg");
-    fs::copy(line, folder.path().join("line.cfg")).expect("the driver.cfg");
-    fs::write(folder.path().join("a.toml"), file).expect("the test file");
-    folder
-}
 
 /// The last line, which has the hash.
 fn last(output: &Output) -> String {
@@ -359,7 +329,10 @@ fn runs_are_listed_and_reported_as_tests_and_one_is_recorded() {
         report.contains("tests=\"24\" failures=\"11\" errors=\"0\""),
         "{report}"
     );
-    assert!(report.contains("<testcase name=\"Height frozen @ moves\" classname=\"a.toml\" time="), "{report}");
+    assert!(
+        report.contains("<testcase name=\"Height frozen @ moves\" classname=\"a.toml\" time="),
+        "{report}"
+    );
     let document: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
     let sweep = &document["files"][0]["sweep"];
     assert_eq!(sweep["moments"][1], "runs");

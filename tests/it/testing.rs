@@ -6,12 +6,12 @@ use std::process::{Command, Output};
 
 use tickbus::testing::Suite;
 
-fn repository() -> &'static Path {
+pub(crate) fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
 /// Runs `tickbus test` in `directory`.
-fn test(directory: &Path, arguments: &[&str]) -> Output {
+pub(crate) fn test(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_tickbus"))
         .arg("test")
         .args(arguments)
@@ -20,16 +20,16 @@ fn test(directory: &Path, arguments: &[&str]) -> Output {
         .expect("the tickbus program runs")
 }
 
-fn out(output: &Output) -> String {
+pub(crate) fn out(output: &Output) -> String {
     String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
-fn err(output: &Output) -> String {
+pub(crate) fn err(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
 /// A folder with the mirror program's line and one test file.
-fn folder(file: &str) -> tempfile::TempDir {
+pub(crate) fn folder(file: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     let line = repository().join("tests/wrong-tests/line.cfg");
     fs::copy(line, folder.path().join("line.cfg")).expect("the driver.cfg");

@@ -1,8 +1,10 @@
 //! The sweep of a test file: its runs on all cores, the matrix, and the accepted verdicts.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -30,7 +32,7 @@ struct Made<'p> {
 /// A sweep that was read and whose scenario passes.
 struct Work<'a> {
     suite: &'a Suite,
-    plan: Plan<'a>,
+    plan: Arc<Plan>,
     accepted: Accepted,
     job: &'a Job<'a>,
 }
@@ -38,7 +40,7 @@ struct Work<'a> {
 /// Runs the sweep of a file, as far as it is wanted. Returns its runs as tests, and as JSON.
 pub(super) fn run(
     suite: &Suite,
-    sweep: &Sweep,
+    sweep: &Arc<Sweep>,
     job: &Job<'_>,
     count: &mut Count,
 ) -> (Vec<Case>, Value) {
@@ -64,7 +66,7 @@ pub(super) fn run(
         Ok((plan, accepted)) => {
             let work = Work {
                 suite,
-                plan,
+                plan: Arc::new(plan),
                 accepted,
                 job,
             };
@@ -150,7 +152,7 @@ impl Work<'_> {
         }
         let document = self.document(&made, written);
         let file = &self.suite.file;
-        let again = format!("tickbus test {file} --only \"{{}}\"");
+        let again = format!("tickbus test {} --only \"{{}}\"", word(file));
         let of_file = swept((file, &again), (&self.plan, &self.accepted), runs);
         count.swept.push(of_file);
         for made in made {
@@ -233,7 +235,8 @@ impl Work<'_> {
                 // Writing to a string cannot fail.
                 let _ = write!(full, "\n      accepted: {word}");
             }
-            let _ = write!(full, "\n      again: tickbus test {file} --only \"{name}\"");
+            let (file, name) = (word(file), quoted(name));
+            let _ = write!(full, "\n      again: tickbus test {file} --only {name}");
         }
         if let (Some(folder), true) = (&self.job.arguments.keep, wants_record) {
             let (kept, page) = record(self.job, (file, name), folder, (&what, None), |path| {
@@ -316,6 +319,25 @@ impl Work<'_> {
             "hash": format!("{:016x}", verdict_hash(judged)),
             "runs": made.iter().map(of_run).collect::<Value>(),
         })
+    }
+}
+
+/// A text in quotes, as a shell reads it.
+fn quoted(text: &str) -> String {
+    if text.contains(['"', '$', '`']) {
+        format!("'{}'", text.replace('\'', "'\\''"))
+    } else {
+        format!("\"{text}\"")
+    }
+}
+
+/// A path as one word of a command, in quotes if it needs them.
+fn word(path: &str) -> Cow<'_, str> {
+    let is_plain = |c: char| c.is_alphanumeric() || "._-/\\:".contains(c);
+    if path.chars().all(is_plain) {
+        Cow::Borrowed(path)
+    } else {
+        Cow::Owned(quoted(path))
     }
 }
 

@@ -2,9 +2,8 @@
 
 use std::fs;
 use std::process::Command;
-use std::sync::Arc;
 
-use tickbus::driver_cfg::Config;
+use tickbus::driver::Driver;
 use tickbus::signal::Slot;
 use tickbus::testing::Session;
 use tickbus::time::Nanos;
@@ -124,6 +123,32 @@ fn what_cannot_be_written_is_told_before_the_runs() {
 
 #[cfg(unix)]
 #[test]
+fn a_shell_reads_the_command_that_repeats_a_run() {
+    let folder = folder(&SWEEP.replace("runs = \"Run\"", "'$it \"runs\"' = \"Run\""));
+    let file = folder.path().join("a b.toml");
+    fs::rename(folder.path().join("a.toml"), file).expect("the file");
+    let output = out(&test(folder.path(), &["a b.toml"]));
+    for name in ["Height frozen @ $it \"runs\"", "Height frozen @ moves"] {
+        let (_, rest) = output
+            .split_once(&format!("FAIL  {name}\n"))
+            .expect("it fails");
+        let (_, again) = rest.split_once("again: tickbus ").expect("a command");
+        let (again, _) = again.split_once('\n').expect("its end");
+        let output = Command::new("sh")
+            .args([
+                "-c",
+                &format!("'{}' {again}", env!("CARGO_BIN_EXE_tickbus")),
+            ])
+            .current_dir(folder.path())
+            .output()
+            .expect("a shell");
+        assert!(out(&output).contains("sweep: runs=1 "), "{again}");
+        assert!(out(&output).contains(name), "{again}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_run_leaves_no_results_of_an_earlier_one() {
     use rustix::process::{Pid, Signal, kill_process};
 
@@ -153,17 +178,22 @@ fn an_interrupted_run_leaves_no_results_of_an_earlier_one() {
     gone().expect("an interrupted run leaves no results");
 }
 
-/// The machine of [`SWEEP`] and its scenario, tick by tick.
-fn tick_alone(session: &mut Session, cell: Option<usize>) {
+/// The driver of [`SWEEP`].
+fn driver() -> Driver {
     let overlay = "[fieldbus]\nkind = \"loopback\"\nrole = \"device\"\nmode = \"stepped\"\nprogram = \"mirror\"\nscan = \"2ms\"\n";
     let line = repository().join("tests/wrong-tests/line.cfg");
-    let mut driver = tickbus_binding::open(&line, overlay, &tickbus::KINDS).expect("a driver");
+    tickbus_binding::open(&line, overlay, &tickbus::KINDS).expect("a driver")
+}
+
+/// The machine of [`SWEEP`] and its scenario, tick by tick. The scenario does not stop at the end of the run.
+fn tick_alone(session: &mut Session, cell: Option<usize>, begin: i64) {
+    let mut driver = driver();
     let mut slots = driver.initial_slots();
     let position = |name| driver.config().table.position(name).expect("a signal");
     let [start, height, run] = ["Start", "Height", "Run"].map(position);
     let on = Slot::from_real(1.0);
     session.begin(cell, &slots).expect("a run");
-    let (mut ran, mut due) = (false, None);
+    let (mut ran, mut due, mut more) = (false, None, 60);
     for tick in 1_i64.. {
         let runs = slots[run] == on;
         if ran && !runs {
@@ -171,10 +201,12 @@ fn tick_alone(session: &mut Session, cell: Option<usize>) {
         }
         ran = runs;
         match tick {
-            6 => slots[start] = on,
+            _ if tick == begin => slots[start] = on,
             16 => slots[height] = Slot::from_real(5.0),
             26 => slots[height] = Slot::from_real(6.0),
-            36 if session.idle(&slots) => return,
+            36 => {
+                session.idle(&slots);
+            }
             _ => {}
         }
         if due == Some(tick) {
@@ -183,6 +215,9 @@ fn tick_alone(session: &mut Session, cell: Option<usize>) {
         session.before(&mut driver, &mut slots).expect("a fault");
         driver.exchange(Some(Nanos::from_millis(2).times(tick)), &mut slots);
         if session.after(&mut slots) {
+            more -= 1;
+        }
+        if more == 0 {
             return;
         }
     }
@@ -194,23 +229,15 @@ fn a_machine_in_another_language_gets_the_verdicts_of_a_test_file() {
     let expected = last(&test(folder.path(), &["a.toml"]));
     let (_, keys) = SWEEP.split_once("[sweep]\n").expect("the keys");
     let (keys, _) = keys.split_once("scenario").expect("the scenario");
-    let config =
-        Config::load(&folder.path().join("line.cfg"), &tickbus::KINDS).expect("a driver.cfg");
     let read = |keys: &str| {
-        let config = Arc::new(config.clone());
-        Session::read(
-            ("up", keys),
-            "accept them",
-            folder.path(),
-            config,
-            Nanos::from_millis(2),
-        )
+        let step = Nanos::from_millis(2);
+        Session::read(("up", keys), "accept them", folder.path(), &driver(), step)
     };
     let mut session = read(keys).expect("the keys are right");
-    tick_alone(&mut session, None);
-    let cells = session.plan(false).expect("a plan");
-    for cell in cells {
-        tick_alone(&mut session, Some(cell.index));
+    tick_alone(&mut session, None, 6);
+    let plan = session.plan(false).expect("a plan");
+    for cell in &plan.cells {
+        tick_alone(&mut session, Some(cell.index), 6);
         assert!(session.result(cell.index).is_some(), "{}", cell.name);
     }
     let (_, hash) = expected.rsplit_once("hash=").expect("a hash");
@@ -225,9 +252,19 @@ fn a_machine_in_another_language_gets_the_verdicts_of_a_test_file() {
     let text = fs::read_to_string(accepted).expect("the file");
     assert!(text.contains("which \"accept them\" has written"), "{text}");
 
+    // A machine with a memory makes another run of the same scenario.
+    tick_alone(&mut session, Some(4), 7);
+    let run = session.result(4).expect("it is over");
+    assert_eq!((run.passes, run.word), (false, "wrong"));
+    let told = "this run cannot be judged: tick 6 (12ms): this run differs from the one without a fault before its fault has come; ";
+    assert!(run.what.starts_with(told), "{}", run.what);
+    assert!(session.summary().contains(" wrong=1 "));
+    let missing = session.accept().expect_err("one was not judged");
+    assert!(missing.starts_with("1 of 24 runs"), "{missing}");
+
     // Whoever asks too early gets an answer.
     let mut early = read(keys).expect("the keys are right");
-    let slots = vec![Slot::default(); config.table.signals.len()];
+    let slots = driver().initial_slots();
     assert!(early.begin(Some(0), &slots).is_err());
     let what = early.plan(false).expect_err("there is no run").to_string();
     assert!(

@@ -12,6 +12,7 @@ mod condition;
 mod failure;
 mod junit;
 mod machine;
+mod model_faults;
 mod observer;
 mod plant;
 mod playback;

@@ -39,6 +39,15 @@ impl Plant {
         self.fmu.model.fault_switches(&self.join)
     }
 
+    /// Checks a fault of the FMU.
+    ///
+    /// # Errors
+    ///
+    /// It has no such fault.
+    pub(super) fn check_fault(&self, name: &str, value: f64) -> Result<(), Mistake> {
+        self.fmu.model.check_fault(name, value)
+    }
+
     /// Starts a run of the FMU, with its faults in the driver; sets `slots` to the initial sensor values.
     pub(super) fn start(
         &self,
@@ -50,25 +59,6 @@ impl Plant {
         declared.map_err(|mistake| mistake.to_string())?;
         let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
         machine.map_err(|failure| failure.to_string())
-    }
-}
-
-/// Checks a fault of the kind "model" of a machine.
-///
-/// # Errors
-///
-/// The machine has no such fault.
-pub(super) fn check_model_fault(
-    plant: Option<&Plant>,
-    name: &str,
-    value: f64,
-) -> Result<(), Mistake> {
-    match plant {
-        Some(plant) => plant.fmu.model.check_fault(name, value),
-        None => Err(Mistake::new(
-            "this machine has no faults of its own",
-            "name an FMU that has them, or let a rule of the machine do what the fault does",
-        )),
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use tickbus_base::time::{Manual, Nanos};
 use tickbus_driver::{Code, Driver, DriverError};
+use tickbus_driver_cfg::Config;
 use tickbus_fmi::foreign::{Machine, Stepped};
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record as record;
@@ -64,7 +65,7 @@ impl Suite {
         play: impl FnOnce(&mut Stand<'a>) -> Result<(), Halt>,
     ) -> Result<Ran, DriverError> {
         let bench = &self.bench;
-        let mut config = bench.config.clone();
+        let mut config = Config::clone(&bench.config);
         // A recording configured in the driver.cfg is for the plant, not for tests.
         config.record = record
             .map(record::Options::to)

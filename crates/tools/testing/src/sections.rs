@@ -12,7 +12,8 @@ use tickbus_image::signal::{Area, SignalTable, Slot};
 
 use super::block::Counted;
 use super::condition::{Condition, Demand};
-use super::plant::{FmuKeys, Plant, check_model_fault};
+use super::model_faults::ModelFaults;
+use super::plant::{FmuKeys, Plant};
 use super::playback::MachineRecording;
 use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition, Unswallowed};
 use super::unswallowed;
@@ -40,8 +41,8 @@ pub(super) struct Reader<'a> {
     pub(super) step: Nanos,
     pub(super) folder: &'a Path,
     pub(super) config: &'a Config,
-    /// The FMU that is the machine, once it is read.
-    pub(super) plant: Option<&'a Plant>,
+    /// The faults of the machine, once it is read.
+    pub(super) model: ModelFaults<'a>,
     /// The counted branches of a block.
     pub(super) counted: Option<&'a Counted>,
 }
@@ -442,7 +443,7 @@ impl Reader<'_> {
             // The mistakes of an unreadable section were reported.
             let fault = faults::read_sections(vec![section], Some(self.table.into())).pop()?;
             if let Effect::Model(number) = fault.effect {
-                let checked = check_model_fault(self.plant, &fault.name, number);
+                let checked = self.model.check(&fault.name, number);
                 checked.map_err(|mistake| value.refuse(mistake)).ok()?;
             }
             Some((fault, value.place()))

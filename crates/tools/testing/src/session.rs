@@ -14,6 +14,8 @@ use tickbus_driver_cfg::Config;
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_report::{Sweeps, link, write_sweeps_file};
 
+use super::failure::Halt;
+use super::model_faults::ModelFaults;
 use super::observer::Observer;
 use super::sections::Reader;
 use super::sweep::{
@@ -26,15 +28,17 @@ use super::watch::Watch;
 /// The runs of a sweep, one after the other.
 pub struct Session {
     name: String,
-    sweep: &'static Sweep,
-    config: &'static Config,
+    sweep: Arc<Sweep>,
+    config: Arc<Config>,
     step: Nanos,
-    plan: Option<&'static Plan<'static>>,
+    plan: Option<Arc<Plan>>,
     accepted: Accepted,
     run: Option<Run>,
-    /// The verdicts so far, by the index of the cell.
-    verdicts: Vec<Option<Judgement>>,
+    /// The verdicts so far, by the index of the cell; or why a run could not be judged.
+    verdicts: Vec<Option<Verdict>>,
 }
+
+type Verdict = Result<Judgement, String>;
 
 /// The run that takes place now.
 struct Run {
@@ -42,11 +46,13 @@ struct Run {
     ticks: u64,
     watches: Vec<Watch>,
     is_over: bool,
+    /// Why the run could not be judged.
+    wrong: Option<String>,
 }
 
 enum Observed {
-    WithoutFault(Survey<'static>),
-    Fault(usize, Trial<'static>),
+    WithoutFault(Survey),
+    Fault(usize, Trial),
 }
 
 /// A run that is over.
@@ -54,9 +60,9 @@ enum Observed {
 pub struct SessionRun {
     /// True if the verdict is right, or accepted.
     pub passes: bool,
-    /// The verdict in one word.
+    /// The verdict in one word; `wrong` if the run could not be judged.
     pub word: &'static str,
-    /// The verdict as a sentence; if it does not pass and another one was accepted, with that one.
+    /// The verdict as a sentence, or why there is none; if it does not pass and another one was accepted, with that one.
     pub what: String,
 }
 
@@ -70,16 +76,25 @@ impl Observed {
 }
 
 impl Run {
+    /// Judges the present values, unless the run is over: its verdict stands, whatever a scenario does then.
     fn look(&mut self, slots: &[Slot]) {
+        if self.is_over {
+            return;
+        }
         let observer = self.observed.observer();
-        self.is_over |= observer.look(self.ticks, &self.watches, slots).is_err();
+        if let Err(halt) = observer.look(self.ticks, &self.watches, slots) {
+            self.is_over = true;
+            if let Halt::Failed(failure) = halt {
+                self.wrong = Some(failure.what);
+            }
+        }
     }
 }
 
 impl Session {
-    /// Reads the keys of a sweep but for `scenario`, about the signals of this driver, which ticks every `step`. Paths are
-    /// seen from `folder`. Messages and the file of accepted verdicts call the sweep `name`, which is a file name; `accept`
-    /// is the command that accepts all verdicts.
+    /// Reads the keys of a sweep but for `scenario`, about the signals of this driver and the faults that its model has
+    /// declared; the driver ticks every `step`. Paths are seen from `folder`. Messages and the file of accepted verdicts
+    /// call the sweep `name`, which is a file name; `accept` is the command that accepts all verdicts.
     ///
     /// # Errors
     ///
@@ -88,9 +103,10 @@ impl Session {
         (name, keys): (&str, &str),
         accept: &'static str,
         folder: &Path,
-        config: Arc<Config>,
+        driver: &Driver,
         step: Nanos,
     ) -> Result<Self, Mistakes> {
+        let config = Arc::clone(driver.config());
         let mut collector = Collector::new(name, keys);
         let accepted = format!("accepted/{name}.toml");
         let read = read_text(&mut collector, keys, |table| {
@@ -100,7 +116,7 @@ impl Session {
                 step,
                 folder,
                 config: &config,
-                plant: None,
+                model: ModelFaults::Declared(driver.board()),
                 counted: None,
             };
             let source = Scenario::Elsewhere {
@@ -113,11 +129,9 @@ impl Session {
             return Err(mistakes);
         }
         let sweep = read.expect("what is not read has a mistake");
-        // The observers of a run borrow from these from call to call. A process with tests has few sweeps, which end with it.
-        let (sweep, config) = (Box::leak(Box::new(sweep)), Box::leak(Box::new(config)));
         Ok(Self {
             name: name.to_owned(),
-            sweep,
+            sweep: Arc::new(sweep),
             config,
             step,
             plan: None,
@@ -134,13 +148,14 @@ impl Session {
     ///
     /// There is no such cell, or no plan yet.
     pub fn begin(&mut self, cell: Option<usize>, slots: &[Slot]) -> Result<(), String> {
-        let signals: &'static [Signal] = &self.config.table.signals;
+        let signals = &self.config.table.signals;
         let observed = match cell {
-            None => Observed::WithoutFault(Survey::new(self.sweep, signals)),
+            None => Observed::WithoutFault(Survey::new(&self.sweep, &self.config)),
             Some(index) => {
-                let plan = self.plan.ok_or("the run without a fault comes first")?;
+                let plan = self.plan.as_ref();
+                let plan = plan.ok_or("the run without a fault comes first")?;
                 let cell = plan.cells.get(index).ok_or("the sweep has no such run")?;
-                Observed::Fault(index, plan.trial(cell, (signals, self.step)))
+                Observed::Fault(index, Trial::new(plan, cell, &self.config, self.step))
             }
         };
         let watch = |(signal, slot): (&Signal, &Slot)| Watch::new(*slot, signal);
@@ -149,6 +164,7 @@ impl Session {
             ticks: 0,
             watches: signals.iter().zip(slots).map(watch).collect(),
             is_over: false,
+            wrong: None,
         };
         run.look(slots);
         self.run = Some(run);
@@ -199,7 +215,7 @@ impl Session {
         };
         if run.is_over
             && let Observed::Fault(index, trial) = &mut run.observed
-            && let Some(verdict) = trial.verdict.take()
+            && let Some(verdict) = run.wrong.take().map(Err).or(trial.verdict.take().map(Ok))
         {
             self.verdicts[*index] = Some(verdict);
         }
@@ -212,9 +228,9 @@ impl Session {
     /// # Errors
     ///
     /// A moment never came, a condition held that only a fault may cause, or the accepted verdicts are wrong.
-    pub fn plan(&mut self, rewriting: bool) -> Result<&'static [Cell], Refused> {
-        if let Some(plan) = self.plan {
-            return Ok(&plan.cells);
+    pub fn plan(&mut self, rewriting: bool) -> Result<Arc<Plan>, Refused> {
+        if let Some(plan) = &self.plan {
+            return Ok(Arc::clone(plan));
         }
         let Some(Run {
             observed: Observed::WithoutFault(survey),
@@ -227,31 +243,40 @@ impl Session {
             let list = Mistakes::of_file(&self.name, what, "let it end first");
             return Err(Refused::Mistakes(list));
         };
-        let plan = planned(&self.name, self.sweep, survey, (self.step, ticks))?;
+        let plan = planned(&self.name, &self.sweep, survey, (self.step, ticks))?;
         self.accepted = Accepted::load(&self.name, &plan, rewriting).map_err(Refused::Mistakes)?;
         self.verdicts = vec![None; plan.cells.len()];
-        let plan = Box::leak(Box::new(plan));
-        self.plan = Some(plan);
-        Ok(&plan.cells)
+        let plan = Arc::new(plan);
+        self.plan = Some(Arc::clone(&plan));
+        Ok(plan)
     }
 
     /// The cells that were judged, each with its verdict and whether it passes.
-    fn judged(
-        &self,
-    ) -> impl Iterator<Item = (&'static Plan<'static>, &'static Cell, &Judgement, bool)> {
-        let plan = self.plan.into_iter();
+    fn judged(&self) -> impl Iterator<Item = (&Plan, &Cell, Result<&Judgement, &str>, bool)> {
+        let plan = self.plan.as_deref().into_iter();
         let cells = plan.flat_map(|plan| plan.cells.iter().map(move |cell| (plan, cell)));
         cells.filter_map(|(plan, cell)| {
             let verdict = self.verdicts[cell.index].as_ref()?;
-            let passes = self.accepted.passes(plan, cell, verdict);
+            let verdict = verdict.as_ref().map_err(String::as_str);
+            let passes = verdict.is_ok_and(|found| self.accepted.passes(plan, cell, found));
             Some((plan, cell, verdict, passes))
         })
     }
 
     /// A run with a fault; `None` if it is not over.
     pub fn result(&self, cell: usize) -> Option<SessionRun> {
-        let (plan, verdict) = (self.plan?, self.verdicts.get(cell)?.as_ref()?);
+        let (plan, verdict) = (self.plan.as_ref()?, self.verdicts.get(cell)?.as_ref()?);
         let cell = &plan.cells[cell];
+        let verdict = match verdict {
+            Ok(verdict) => verdict,
+            Err(why) => {
+                return Some(SessionRun {
+                    passes: false,
+                    word: "wrong",
+                    what: format!("this run cannot be judged: {why}"),
+                });
+            }
+        };
         let passes = self.accepted.passes(plan, cell, verdict);
         let accepted = self.accepted.verdict(plan, cell);
         let what = match accepted {
@@ -267,14 +292,14 @@ impl Session {
 
     /// The matrix of the runs so far, with the counts and the hash below it.
     pub fn summary(&self) -> String {
-        let Some(plan) = self.plan else {
+        let Some(plan) = &self.plan else {
             return String::new();
         };
         let mut marks = vec![None; plan.cells.len()];
         let mut tally = Tally::default();
         for (plan, cell, verdict, passes) in self.judged() {
-            tally.add((plan, &self.accepted), cell, (Some(verdict), passes));
-            marks[cell.index] = Some(CellMark::of(Some(verdict), passes));
+            tally.add((plan, &self.accepted), cell, (verdict.ok(), passes));
+            marks[cell.index] = Some(CellMark::of(verdict.ok(), passes));
         }
         format!(
             "{}\n{tally} hash={}\n",
@@ -286,7 +311,8 @@ impl Session {
     /// The hash over the verdicts so far.
     fn hash(&self) -> String {
         let pairs = self.judged();
-        let pairs = pairs.map(|(_, cell, verdict, _)| (cell.name.as_str(), verdict));
+        let pairs =
+            pairs.filter_map(|(_, cell, verdict, _)| Some((cell.name.as_str(), verdict.ok()?)));
         format!("{:016x}", verdict_hash(pairs))
     }
 
@@ -302,11 +328,12 @@ impl Session {
         again: &str,
         report: impl Fn(usize) -> Option<PathBuf>,
     ) -> Result<(), String> {
-        let plan = self.plan.ok_or("nothing was judged, so there is no page")?;
+        let plan = self.plan.as_ref();
+        let plan = plan.ok_or("nothing was judged, so there is no page")?;
         let mut runs = vec![None; plan.cells.len()];
         for (_, cell, verdict, passes) in self.judged() {
             let report = report(cell.index).and_then(|report| link(page, &report));
-            runs[cell.index] = Some(swept_run(cell, Ok(verdict), passes, report));
+            runs[cell.index] = Some(swept_run(cell, verdict, passes, report));
         }
         let sweeps = Sweeps {
             title: format!("Sweep of {}", self.name),
@@ -331,10 +358,9 @@ impl Session {
     ///
     /// A run was not made or not judged, or the file cannot be written.
     pub fn accept(&mut self) -> Result<PathBuf, String> {
-        let plan = self
-            .plan
-            .ok_or("nothing was judged, so nothing was accepted")?;
-        let verdicts: Vec<Judgement> = self.verdicts.iter().flatten().cloned().collect();
+        let plan = self.plan.as_ref();
+        let plan = plan.ok_or("nothing was judged, so nothing was accepted")?;
+        let verdicts: Vec<Judgement> = self.verdicts.iter().flatten().flatten().cloned().collect();
         let missing = plan.cells.len() - verdicts.len();
         if missing > 0 {
             return Err(format!(

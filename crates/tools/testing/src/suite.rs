@@ -13,6 +13,7 @@ use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
 
 use super::block::{self, BlockKeys, Counted, Coverage};
+use super::model_faults::ModelFaults;
 use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
@@ -30,14 +31,14 @@ pub struct Suite {
     /// The file's tests. Empty only in a file with a sweep.
     pub tests: Vec<Test>,
     /// The file's sweep.
-    pub sweep: Option<Sweep>,
+    pub sweep: Option<Arc<Sweep>>,
     pub(super) bench: Bench,
 }
 
 /// The parts that all tests of a file share.
 #[derive(Clone, Debug)]
 pub(super) struct Bench {
-    pub(super) config: Config,
+    pub(super) config: Arc<Config>,
     pub(super) step: Nanos,
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
@@ -99,7 +100,7 @@ impl Suite {
                 Ok(Self {
                     file: file.to_owned(),
                     tests,
-                    sweep,
+                    sweep: sweep.map(Arc::new),
                     bench,
                 })
             }
@@ -187,7 +188,7 @@ fn read_sections(
         step,
         folder,
         config: &config,
-        plant: None,
+        model: ModelFaults::None,
         counted: counted.as_deref(),
     };
     let mut machine = match machine {
@@ -198,7 +199,10 @@ fn read_sections(
         *of_config = Some(mistakes);
     }
     let reader = Reader {
-        plant: machine.fmu.as_ref(),
+        model: machine
+            .fmu
+            .as_ref()
+            .map_or(ModelFaults::None, ModelFaults::Fmu),
         ..reader
     };
     let tables = tests.map(|value| value.tables("[[test]]"));
@@ -220,7 +224,7 @@ fn read_sections(
         return None;
     }
     let bench = Bench {
-        config,
+        config: Arc::new(config),
         step,
         initial: machine.initial,
         rules: machine.rules,

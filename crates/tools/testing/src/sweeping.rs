@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::path::Path;
+use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
@@ -10,7 +11,9 @@ use tickbus_driver::DriverError;
 
 use super::plant::Plant;
 use super::suite::Suite;
-use super::sweep::{Cell, Judgement, MOST_VALUES, Moment, Moments, Named, Plan, Survey, Sweep};
+use super::sweep::{
+    Cell, Judgement, MOST_VALUES, Moment, Moments, Named, Plan, Survey, Sweep, Trial,
+};
 use super::test::TextPosition;
 use super::watch::{moment, seconds};
 
@@ -57,9 +60,9 @@ impl Suite {
     /// # Errors
     ///
     /// The scenario fails without a fault, or it says what the sweep takes for the sign of one, or a moment never comes.
-    pub fn plan<'a>(&'a self, sweep: &'a Sweep) -> Result<Plan<'a>, Refused> {
+    pub fn plan(&self, sweep: &Arc<Sweep>) -> Result<Plan, Refused> {
         let bench = &self.bench;
-        let mut survey = Survey::new(sweep, &bench.config.table.signals);
+        let mut survey = Survey::new(sweep, &bench.config);
         let begin = (&sweep.initial[..], sweep.place);
         let ran = self
             .play(begin, None, Some(&mut survey), |stand| {
@@ -86,12 +89,12 @@ impl Suite {
     /// The PLC program cannot be started again, or the recording cannot be written.
     pub fn judge(
         &self,
-        plan: &Plan<'_>,
+        plan: &Arc<Plan>,
         cell: &Cell,
         record: Option<&Path>,
     ) -> Result<Judged, DriverError> {
-        let (sweep, bench) = (plan.sweep, &self.bench);
-        let mut trial = plan.trial(cell, (&bench.config.table.signals, bench.step));
+        let (sweep, bench) = (&plan.sweep, &self.bench);
+        let mut trial = Trial::new(plan, cell, &bench.config, bench.step);
         let begin = (&sweep.initial[..], sweep.place);
         let ran = self.play(begin, record, Some(&mut trial), |stand| {
             sweep.scenario.iter().try_for_each(|step| stand.run(step))?;
@@ -115,12 +118,12 @@ impl Suite {
 }
 
 /// The list of runs, after the run without a fault, which took this many ticks.
-pub(super) fn planned<'a>(
+pub(super) fn planned(
     file: &str,
-    sweep: &'a Sweep,
-    survey: Survey<'a>,
+    sweep: &Arc<Sweep>,
+    survey: Survey,
     (step, ticks): (Nanos, u64),
-) -> Result<Plan<'a>, Refused> {
+) -> Result<Plan, Refused> {
     let found = mistakes(sweep, &survey, step);
     if !found.is_empty() {
         return Err(refused(file, found));
@@ -142,11 +145,7 @@ fn refused(file: &str, found: Vec<(TextPosition, String, String)>) -> Refused {
 }
 
 /// The mistakes in the sweep that the run without a fault shows.
-fn mistakes(
-    sweep: &Sweep,
-    survey: &Survey<'_>,
-    step: Nanos,
-) -> Vec<(TextPosition, String, String)> {
+fn mistakes(sweep: &Sweep, survey: &Survey, step: Nanos) -> Vec<(TextPosition, String, String)> {
     let scenario = seconds(survey.scenario.unwrap_or_default(), step);
     let mut found = Vec::new();
     for (moments, came) in sweep.moments.iter().zip(&survey.moments) {
@@ -177,21 +176,18 @@ fn mistakes(
             "remove one, or give them names: { \"before\" = \"…\" }".to_owned(),
         ));
     }
-    let mut held = |(tick, named): (u64, &Named), what: &str, right: &str| {
+    let mut held = |tick, named: &Named, what: &str, right: &str| {
         let at = moment(tick, step);
         let what = format!("{at}: \"{}\" holds without a fault, {what}", named.name);
         found.push((named.place, what, right.to_owned()));
     };
-    if let Some(told) = survey.has_told {
+    if let Some((tick, place)) = survey.has_told {
         let right = "write what the program does only after a fault";
-        held(told, "so it tells nothing", right);
+        held(tick, &sweep.told[place], "so it tells nothing", right);
     }
-    if let Some(never) = survey.has_broken {
-        held(
-            never,
-            "although it never may",
-            "write what only a fault can cause",
-        );
+    if let Some((tick, place)) = survey.has_broken {
+        let (what, right) = ("although it never may", "write what only a fault can cause");
+        held(tick, &sweep.never[place], what, right);
     }
     found
 }

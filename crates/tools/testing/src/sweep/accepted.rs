@@ -11,7 +11,7 @@ use super::judgement::Judgement;
 use super::plan::{Cell, Plan};
 
 /// How to get rid of a row or a column that the sweep does not have any more.
-fn again(plan: &Plan<'_>) -> String {
+fn again(plan: &Plan) -> String {
     format!("write the file again by \"{}\"", plan.sweep.accept)
 }
 
@@ -35,7 +35,7 @@ impl Accepted {
     /// # Errors
     ///
     /// With every mistake in the file.
-    pub fn load(file: &str, plan: &Plan<'_>, rewriting: bool) -> Result<Self, Mistakes> {
+    pub fn load(file: &str, plan: &Plan, rewriting: bool) -> Result<Self, Mistakes> {
         let path = plan.accepted_file();
         if !path.exists() {
             return Ok(Self::default());
@@ -52,13 +52,13 @@ impl Accepted {
     }
 
     /// The accepted verdict of a run, if there is one.
-    pub fn verdict(&self, plan: &Plan<'_>, cell: &Cell) -> Option<&'static str> {
+    pub fn verdict(&self, plan: &Plan, cell: &Cell) -> Option<&'static str> {
         let row = self.rows.get(&plan.row_name(cell))?;
         row.verdicts.get(&plan.moments[cell.moment].name).copied()
     }
 
     /// True if a run with this verdict passes: as accepted, or right if nothing was accepted.
-    pub fn passes(&self, plan: &Plan<'_>, cell: &Cell, judgement: &Judgement) -> bool {
+    pub fn passes(&self, plan: &Plan, cell: &Cell, judgement: &Judgement) -> bool {
         match self.verdict(plan, cell) {
             Some(word) => word == judgement.word(),
             None => judgement.is_right(),
@@ -66,13 +66,13 @@ impl Accepted {
     }
 
     /// Why the verdicts of a run's row were accepted; empty if nobody has said it.
-    pub fn why(&self, plan: &Plan<'_>, cell: &Cell) -> &str {
+    pub fn why(&self, plan: &Plan, cell: &Cell) -> &str {
         let row = self.rows.get(&plan.row_name(cell));
         row.map_or("", |row| &row.why)
     }
 
     /// The text of a file that accepts all these verdicts, in the order of the plan's cells, and keeps each "why".
-    pub fn rewritten(&self, file: &str, plan: &Plan<'_>, verdicts: &[Judgement]) -> String {
+    pub fn rewritten(&self, file: &str, plan: &Plan, verdicts: &[Judgement]) -> String {
         let mut text = format!(
             "# The accepted verdicts of the sweep in {0}, which \"{3}\" has written.\n\
              # \"why\" is yours: say why a row may have what is neither told nor right. It is kept.\n\n\
@@ -127,7 +127,7 @@ fn quoted(text: &str) -> String {
     quoted
 }
 
-fn read(mut root: Table<'_>, file: &str, plan: &Plan<'_>, rewriting: bool) -> Accepted {
+fn read(mut root: Table<'_>, file: &str, plan: &Plan, rewriting: bool) -> Accepted {
     const SWEEP: &str = "write the name of the test file with the sweep";
     let sweep = root.require("sweep", SWEEP);
     let moments = root.require("moments", "write the moments, in the order of the verdicts");
@@ -171,7 +171,7 @@ fn read(mut root: Table<'_>, file: &str, plan: &Plan<'_>, rewriting: bool) -> Ac
     accepted
 }
 
-fn read_moments(value: &Value<'_>, plan: &Plan<'_>, rewriting: bool) -> Option<Vec<String>> {
+fn read_moments(value: &Value<'_>, plan: &Plan, rewriting: bool) -> Option<Vec<String>> {
     const RIGHT: &str = "write the names of the moments in quotes";
     let names: Vec<&str> = plan.moment_names().collect();
     let mut moments = Vec::new();

@@ -82,7 +82,7 @@ fn short(time: Nanos) -> String {
 }
 
 /// The matrix of a sweep, with a mark for each cell that was run, in the order of the plan's cells.
-pub fn matrix(plan: &Plan<'_>, marks: &[Option<Mark>], colour: bool) -> String {
+pub fn matrix(plan: &Plan, marks: &[Option<Mark>], colour: bool) -> String {
     let columns = plan.moments.len().max(1);
     let rows: Vec<(&str, &str, &[Option<Mark>])> = plan
         .sweep

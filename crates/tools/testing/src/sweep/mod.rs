@@ -46,12 +46,12 @@ pub struct Sweep {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) scenario: Vec<Step>,
     /// Any of these is the program's word that something is wrong. Never empty.
-    told: Vec<Named>,
+    pub(super) told: Vec<Named>,
     /// None of these may hold.
-    never: Vec<Named>,
+    pub(super) never: Vec<Named>,
     /// The changes of these are the progress. Never empty.
     goes_on: Vec<Mark>,
-    /// The ticks in which a fault is told, or the run continues.
+    /// The ticks in which the program tells a fault, or continues.
     within: u64,
     /// How many ticks sooner than without a fault a change may come.
     tolerance: u64,

@@ -15,43 +15,46 @@ pub(crate) struct Named {
 }
 
 /// Named conditions from tick to tick: an edge holds at the tick in which it came.
-#[derive(Clone, Debug)]
-pub(crate) struct Watcher<'a> {
-    pub(crate) named: &'a Named,
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Watcher {
     since: Vec<Bookmark>,
 }
 
-impl<'a> Watcher<'a> {
-    /// Watches each of `named`.
-    pub(crate) fn all(named: &'a [Named]) -> Vec<Self> {
-        let watcher = |named: &'a Named| Self {
-            named,
+impl Watcher {
+    /// Watches these conditions.
+    pub(crate) fn of(named: &Named) -> Self {
+        Self {
             since: vec![Bookmark::default(); named.all.len()],
-        };
-        named.iter().map(watcher).collect()
+        }
     }
 
-    /// Returns true if the conditions hold at this tick. Call this at every tick.
-    pub(crate) fn holds(&mut self, watches: &[Watch], slots: &[Slot]) -> bool {
-        let mut pairs = self.named.all.iter().zip(&self.since);
+    /// Watches each of `named`.
+    pub(crate) fn all(named: &[Named]) -> Vec<Self> {
+        named.iter().map(Self::of).collect()
+    }
+
+    /// Returns true if the watched conditions hold at this tick. Call this at every tick.
+    pub(crate) fn holds(&mut self, named: &Named, watches: &[Watch], slots: &[Slot]) -> bool {
+        let mut pairs = named.all.iter().zip(&self.since);
         let holds = pairs.all(|(one, since)| one.holds(&watches[one.signal], slots, *since));
-        for (one, since) in self.named.all.iter().zip(&mut self.since) {
+        for (one, since) in named.all.iter().zip(&mut self.since) {
             *since = Bookmark::of(&watches[one.signal]);
         }
         holds
     }
 }
 
-/// The first of `watchers` that holds at this tick. Call this at every tick.
-pub(crate) fn holding<'a>(
-    watchers: &mut [Watcher<'a>],
+/// The place of the first of `named` that holds at this tick, which these `watchers` watch. Call this at every tick.
+pub(crate) fn holding(
+    watchers: &mut [Watcher],
+    named: &[Named],
     watches: &[Watch],
     slots: &[Slot],
-) -> Option<&'a Named> {
+) -> Option<usize> {
     let mut found = None;
-    for watcher in watchers {
-        if watcher.holds(watches, slots) {
-            found = found.or(Some(watcher.named));
+    for (place, (watcher, named)) in watchers.iter_mut().zip(named).enumerate() {
+        if watcher.holds(named, watches, slots) {
+            found = found.or(Some(place));
         }
     }
     found

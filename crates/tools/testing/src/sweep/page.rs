@@ -30,7 +30,7 @@ pub fn swept_run(
 /// run, with `{}` in the place of its name.
 pub fn swept(
     (file, again): (&str, &str),
-    (plan, accepted): (&Plan<'_>, &Accepted),
+    (plan, accepted): (&Plan, &Accepted),
     mut runs: Vec<Option<SweptRun>>,
 ) -> Swept {
     let columns = plan.moments.len().max(1);

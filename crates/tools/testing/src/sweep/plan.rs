@@ -1,22 +1,20 @@
 //! The list of runs, from the run without a fault.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::Sweep;
 use super::progress::Change;
 use super::survey::Moment;
-use super::trial::Trial;
-use tickbus_base::time::Nanos;
-use tickbus_image::signal::Signal;
 
 /// The runs of a sweep, and the run without a fault that they are compared with.
 #[derive(Clone, Debug)]
-pub struct Plan<'a> {
-    pub(crate) sweep: &'a Sweep,
+pub struct Plan {
+    pub(crate) sweep: Arc<Sweep>,
     pub(super) moments: Vec<Moment>,
     /// The runs: row by row, and in a row in the order of the moments.
     pub cells: Vec<Cell>,
-    changes: Vec<Change>,
+    pub(super) changes: Vec<Change>,
     /// The ticks of the run without a fault.
     pub ticks: u64,
 }
@@ -32,7 +30,7 @@ pub struct Cell {
     pub(super) moment: usize,
 }
 
-impl Plan<'_> {
+impl Plan {
     /// The name of the fault of a cell, without the moment.
     pub fn row_name(&self, cell: &Cell) -> String {
         self.sweep.rows[cell.row].name()
@@ -52,12 +50,10 @@ impl Plan<'_> {
     pub fn moment_names(&self) -> impl Iterator<Item = &str> {
         self.moments.iter().map(|moment| moment.name.as_str())
     }
-}
 
-impl<'a> Plan<'a> {
     /// The runs of a sweep with these moments, row by row.
     pub(crate) fn new(
-        sweep: &'a Sweep,
+        sweep: &Arc<Sweep>,
         moments: Vec<Moment>,
         changes: Vec<Change>,
         ticks: u64,
@@ -74,24 +70,11 @@ impl<'a> Plan<'a> {
             }
         }
         Self {
-            sweep,
+            sweep: Arc::clone(sweep),
             moments,
             cells,
             changes,
             ticks,
         }
-    }
-
-    /// The observer of a run.
-    pub(crate) fn trial<'t>(
-        &'t self,
-        cell: &Cell,
-        (signals, step): (&'t [Signal], Nanos),
-    ) -> Trial<'t> {
-        let fault = (
-            &self.sweep.rows[cell.row].disturbances[..],
-            self.moments[cell.moment].tick,
-        );
-        Trial::new(self.sweep, fault, &self.changes, (signals, step))
     }
 }

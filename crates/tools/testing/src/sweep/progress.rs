@@ -66,33 +66,24 @@ pub(crate) struct Change {
 }
 
 /// The values of marks, from tick to tick.
-#[derive(Clone, Debug)]
-pub(crate) struct Progress<'a> {
-    marks: &'a [Mark],
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Progress {
     pub(crate) values: Vec<Slot>,
     /// The values of the tick before.
     pub(crate) before: Vec<Slot>,
 }
 
-impl<'a> Progress<'a> {
-    pub(crate) fn of(marks: &'a [Mark]) -> Self {
-        Self {
-            marks,
-            values: Vec::new(),
-            before: Vec::new(),
-        }
-    }
-
+impl Progress {
     /// Takes over the values of this tick. Returns true if one has changed.
-    pub(crate) fn look(&mut self, watches: &[Watch], slots: &[Slot]) -> bool {
+    pub(crate) fn look(&mut self, marks: &[Mark], watches: &[Watch], slots: &[Slot]) -> bool {
         if self.values.is_empty() {
-            let values = self.marks.iter().map(|mark| mark.value(watches, slots));
+            let values = marks.iter().map(|mark| mark.value(watches, slots));
             self.values.extend(values);
             return true;
         }
         self.before.clone_from(&self.values);
         let mut changed = false;
-        for (mark, kept) in self.marks.iter().zip(&mut self.values) {
+        for (mark, kept) in marks.iter().zip(&mut self.values) {
             let value = mark.value(watches, slots);
             changed |= *kept != value;
             *kept = value;
@@ -105,9 +96,9 @@ impl<'a> Progress<'a> {
         &self,
         verb: &str,
         other: &[Slot],
-        signals: &[Signal],
+        (marks, signals): (&[Mark], &[Signal]),
     ) -> Option<(String, String)> {
-        let pairs = self.marks.iter().zip(self.values.iter().zip(other));
+        let pairs = marks.iter().zip(self.values.iter().zip(other));
         let mut differing = pairs.filter(|(_, (here, there))| here != there);
         let (mark, (here, there)) = differing.next()?;
         let mut words = mark.say(verb, *here, signals);

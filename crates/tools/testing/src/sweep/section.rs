@@ -9,7 +9,7 @@ use super::disturbance::Kind;
 use super::named::Named;
 use super::progress::Mark;
 use super::{Moments, Row, Sweep};
-use crate::plant::{Plant, check_model_fault};
+use crate::model_faults::ModelFaults;
 use crate::sections::Reader;
 use crate::test::{Step, Test, TextPosition};
 
@@ -174,7 +174,7 @@ impl Reader<'_> {
         }
         let read: Vec<Option<_>> = values
             .into_iter()
-            .map(|value| kind(&value, self.plant).map(|kind| (value, kind)))
+            .map(|value| kind(&value, self.model).map(|kind| (value, kind)))
             .collect();
         read.into_iter().collect()
     }
@@ -201,9 +201,7 @@ impl Reader<'_> {
                 let right = match kind {
                     Kind::StationDown(_) => "this driver has one station: write \"line-down\"",
                     Kind::Noise(_, None) => "numbers need a strength: add amplitude = 2.5",
-                    Kind::Model(..) if self.plant.is_none() => {
-                        "the machine has no faults of its own: remove it, or name an FMU that has some"
-                    }
+                    Kind::Model(..) if self.model.names().is_empty() => self.model.how_to_have(),
                     Kind::Model(..) => {
                         "name each: { kind = \"model\", name = \"leak\", value = 0.4 }"
                     }
@@ -249,11 +247,9 @@ impl Reader<'_> {
 
     /// The faults of the machine's model that a kind means: one of them, or each that is on or off.
     fn model_faults(&self, kind: Kind) -> Vec<String> {
-        match (self.plant, kind) {
-            (Some(plant), Kind::Model(None, _)) => plant.switches(),
-            (Some(plant), Kind::Model(Some(place), _)) => {
-                vec![plant.fault_names().swap_remove(place)]
-            }
+        match kind {
+            Kind::Model(None, _) => self.model.switches(),
+            Kind::Model(Some(place), _) => vec![self.model.names().swap_remove(place)],
             _ => Vec::new(),
         }
     }
@@ -412,7 +408,7 @@ fn once(value: &Value<'_>, names: Vec<usize>) -> Vec<usize> {
 }
 
 /// A kind of fault: its name, or a table with its numbers.
-fn kind(value: &Value<'_>, plant: Option<&Plant>) -> Option<Kind> {
+fn kind(value: &Value<'_>, faults: ModelFaults<'_>) -> Option<Kind> {
     if !value.is_table() {
         value.text(KIND)?;
         return value.choice("kinds", &Kind::USUAL);
@@ -448,7 +444,7 @@ fn kind(value: &Value<'_>, plant: Option<&Plant>) -> Option<Kind> {
         }
         Kind::Model(..) => {
             let (name, value) = (table.take("name"), table.take("value"));
-            model(name, value, plant)
+            model(name, value, faults)
         }
         plain => Some(plain),
     };
@@ -457,7 +453,11 @@ fn kind(value: &Value<'_>, plant: Option<&Plant>) -> Option<Kind> {
 }
 
 /// A fault of the machine's model, by its name; without a name each that is on or off.
-fn model(name: Option<Value<'_>>, value: Option<Value<'_>>, plant: Option<&Plant>) -> Option<Kind> {
+fn model(
+    name: Option<Value<'_>>,
+    value: Option<Value<'_>>,
+    faults: ModelFaults<'_>,
+) -> Option<Kind> {
     let number = model_value(value.as_ref())?;
     let Some(place) = name else {
         if let Some(value) = value {
@@ -467,9 +467,9 @@ fn model(name: Option<Value<'_>>, value: Option<Value<'_>>, plant: Option<&Plant
         return Some(Kind::Model(None, 1.0));
     };
     let name = place.text("write the name of a fault of the machine")?;
-    let checked = check_model_fault(plant, name, number);
+    let checked = faults.check(name, number);
     checked.map_err(|mistake| place.refuse(mistake)).ok()?;
-    let names = plant?.fault_names();
+    let names = faults.names();
     let found = names.iter().position(|known| known == name)?;
     Some(Kind::Model(Some(found), number))
 }

@@ -1,11 +1,14 @@
 //! The run without a fault: its progress, and when each moment comes.
 
+use std::sync::Arc;
+
 use crate::failure::Halt;
 use crate::observer::Observer;
 use crate::watch::{Watch, real, text_of};
-use tickbus_image::signal::{Signal, Slot};
+use tickbus_driver_cfg::Config;
+use tickbus_image::signal::Slot;
 
-use super::named::{Named, Watcher, holding};
+use super::named::{Watcher, holding};
 use super::progress::{Change, Progress};
 use super::{Moments, Sweep};
 
@@ -17,53 +20,54 @@ pub(crate) struct Moment {
 }
 
 /// The observer of the run without a fault.
-pub(crate) struct Survey<'a> {
-    signals: &'a [Signal],
+pub(crate) struct Survey {
+    sweep: Arc<Sweep>,
+    config: Arc<Config>,
     /// The moments of each entry of the file, as they came.
     pub(crate) moments: Vec<Vec<Moment>>,
-    seekers: Vec<Seeker<'a>>,
-    progress: Progress<'a>,
+    seekers: Vec<Seeker>,
+    progress: Progress,
     pub(crate) changes: Vec<Change>,
-    told: Vec<Watcher<'a>>,
-    never: Vec<Watcher<'a>>,
-    /// The first tick from the first moment on at which a condition held that should not, and which one.
-    pub(crate) has_told: Option<(u64, &'a Named)>,
-    pub(crate) has_broken: Option<(u64, &'a Named)>,
-    within: u64,
+    told: Vec<Watcher>,
+    never: Vec<Watcher>,
+    /// The first tick from the first moment on at which a condition held that should not, and the place of that condition.
+    pub(crate) has_told: Option<(u64, usize)>,
+    pub(crate) has_broken: Option<(u64, usize)>,
     /// The ticks of the scenario, once it is over.
     pub(crate) scenario: Option<u64>,
 }
 
-/// The values or the condition that one entry of the file waits for.
-enum Seeker<'a> {
-    Values(usize, Vec<Slot>),
-    First(Watcher<'a>),
+/// The state of one entry of the file: the values that its signal has taken, or its condition.
+#[derive(Default)]
+struct Seeker {
+    known: Vec<Slot>,
+    watcher: Watcher,
 }
 
 /// A step signal with more values than this is a measurement.
 pub(crate) const MOST_VALUES: usize = 200;
 
-impl<'a> Survey<'a> {
-    pub(crate) fn new(sweep: &'a Sweep, signals: &'a [Signal]) -> Self {
-        let seeker = |moments: &'a Moments| match moments {
-            Moments::EachValue(signal, _) => Seeker::Values(*signal, Vec::new()),
-            Moments::First(named) => {
-                let mut watchers = Watcher::all(std::slice::from_ref(named));
-                Seeker::First(watchers.remove(0))
-            }
+impl Survey {
+    pub(crate) fn new(sweep: &Arc<Sweep>, config: &Arc<Config>) -> Self {
+        let seeker = |moments: &Moments| match moments {
+            Moments::EachValue(..) => Seeker::default(),
+            Moments::First(named) => Seeker {
+                watcher: Watcher::of(named),
+                ..Seeker::default()
+            },
         };
         Self {
-            signals,
             moments: vec![Vec::new(); sweep.moments.len()],
             seekers: sweep.moments.iter().map(seeker).collect(),
-            progress: Progress::of(&sweep.goes_on),
+            progress: Progress::default(),
             changes: Vec::new(),
             told: Watcher::all(&sweep.told),
             never: Watcher::all(&sweep.never),
             has_told: None,
             has_broken: None,
-            within: sweep.within,
             scenario: None,
+            sweep: Arc::clone(sweep),
+            config: Arc::clone(config),
         }
     }
 
@@ -71,25 +75,26 @@ impl<'a> Survey<'a> {
     fn end(&self, scenario: u64) -> u64 {
         let ticks = self.moments.iter().flatten().map(|moment| moment.tick);
         let last = ticks.max().unwrap_or_default();
-        scenario.max(last + 2 * self.within)
+        scenario.max(last + 2 * self.sweep.within)
     }
 
     fn seek(&mut self, ticks: u64, watches: &[Watch], slots: &[Slot]) {
-        for (seeker, found) in self.seekers.iter_mut().zip(&mut self.moments) {
-            match seeker {
-                Seeker::Values(signal, known) => {
-                    let slot = slots[*signal];
+        let entries = self.seekers.iter_mut().zip(&self.sweep.moments);
+        for ((seeker, moments), found) in entries.zip(&mut self.moments) {
+            match moments {
+                Moments::EachValue(signal, _) => {
+                    let (slot, known) = (slots[*signal], &mut seeker.known);
                     if known.contains(&slot) || known.len() > MOST_VALUES {
                         continue;
                     }
                     known.push(slot);
-                    let signal = &self.signals[*signal];
+                    let signal = &self.config.table.signals[*signal];
                     let name = format!("{} {}", signal.name, text_of(real(slot, signal), signal));
                     found.push(Moment { name, tick: ticks });
                 }
-                Seeker::First(watcher) => {
-                    if watcher.holds(watches, slots) && found.is_empty() {
-                        let name = watcher.named.name.clone();
+                Moments::First(named) => {
+                    if seeker.watcher.holds(named, watches, slots) && found.is_empty() {
+                        let name = named.name.clone();
                         found.push(Moment { name, tick: ticks });
                     }
                 }
@@ -98,13 +103,13 @@ impl<'a> Survey<'a> {
     }
 }
 
-impl Observer for Survey<'_> {
+impl Observer for Survey {
     fn idle(&mut self, ticks: u64) {
         self.scenario = Some(ticks);
     }
 
     fn look(&mut self, ticks: u64, watches: &[Watch], slots: &[Slot]) -> Result<(), Halt> {
-        if self.progress.look(watches, slots) {
+        if self.progress.look(&self.sweep.goes_on, watches, slots) {
             self.changes.push(Change {
                 tick: ticks,
                 values: self.progress.values.clone(),
@@ -116,11 +121,11 @@ impl Observer for Survey<'_> {
         if self.scenario.is_none() {
             self.seek(ticks, watches, slots);
         }
-        let told = holding(&mut self.told, watches, slots);
-        let broken = holding(&mut self.never, watches, slots);
+        let told = holding(&mut self.told, &self.sweep.told, watches, slots);
+        let broken = holding(&mut self.never, &self.sweep.never, watches, slots);
         if self.moments.iter().any(|found| !found.is_empty()) {
-            self.has_told = self.has_told.or(told.map(|named| (ticks, named)));
-            self.has_broken = self.has_broken.or(broken.map(|named| (ticks, named)));
+            self.has_told = self.has_told.or(told.map(|place| (ticks, place)));
+            self.has_broken = self.has_broken.or(broken.map(|place| (ticks, place)));
         }
         if is_over {
             return Err(Halt::Over);

@@ -23,7 +23,7 @@ impl Tally {
     /// Counts a run, which passes or does not.
     pub fn add(
         &mut self,
-        (plan, accepted): (&Plan<'_>, &Accepted),
+        (plan, accepted): (&Plan, &Accepted),
         cell: &Cell,
         (judgement, passes): (Option<&Judgement>, bool),
     ) {

@@ -38,7 +38,8 @@ public final class SweepSession implements AutoCloseable {
         /**
          * The verdict in one word.
          *
-         * @return {@code told}, {@code right}, {@code differs}, {@code still} or {@code never}
+         * @return {@code told}, {@code right}, {@code differs}, {@code still} or {@code never}; {@code wrong} if the run could
+         *     not be judged
          */
         public String word() {
             return word;

@@ -134,6 +134,12 @@ def test_a_machine_has_faults_by_name(plc):
     plc.tick(2).expect(is_("Height", 100))
     with pytest.raises(Exception, match='did you mean "leak"'):
         plc.inject(kind="model", name="leck")
+    with pytest.raises(ValueError, match='two faults of the machines are called "leak"'):
+        plc.connect(LeakingLift())
+    leaking = LeakingLift()
+    leaking.faults = "leak"
+    with pytest.raises(TypeError, match="a list of names, not one text"):
+        plc.connect(leaking)
 
 
 def test_conditions_join(plc):
@@ -336,6 +342,13 @@ def test_names_may_be_longer_than_those_of_files(tests):
     assert len(list(tests.path.joinpath("tickbus-reports").glob("*.vcd"))) == 2
 
 
+def test_a_test_that_passes_leaves_nothing_of_an_earlier_run_that_failed(tests):
+    for body, outcome in [("assert plc.ticks", "failed"), ("assert not plc.ticks", "passed")]:
+        tests.makepyfile(f"{HEAD}\ndef test(plc):\n    {body}\n")
+        tests.runpytest_inprocess().assert_outcomes(**{outcome: 1})
+        assert tests.path.joinpath("tickbus-reports").exists() == (outcome == "failed")
+
+
 def test_a_driver_cfg_with_mistakes_leaves_nothing(tests):
     tests.path.joinpath("line.cfg").write_text("[driver]\n")
     tests.makepyfile(HEAD + "\ndef test(plc):\n    pass\n")
@@ -411,7 +424,53 @@ def test_the_page_of_a_sweep_opens_the_recordings_of_the_runs_that_failed(tests)
     page = kept.joinpath(f"{name}.test_rises.html").read_text()
     (report,) = kept.glob("*frozen*moves*.html")
     assert f'href="{report.name}" title="stands still: ' in page
-    assert f'data-again="pytest &quot;{name}.py::test_rises[{{}}]&quot;"' in page
+    assert f'data-again="pytest &quot;{name}.py::test_rises&quot; --tickbus-only &quot;{{}}&quot;"' in page
+
+    # The page goes when nothing fails any more.
+    tests.runpytest_inprocess("-k", "late", "--tickbus-reports", "kept").assert_outcomes(passed=6, deselected=19)
+    assert not kept.joinpath(f"{name}.test_rises.html").exists()
+
+
+def test_one_run_is_made_by_its_name_and_several_by_a_part_of_it(tests):
+    moments = SWEEP.replace('"moves"', '"fährt"')
+    tests.makepyfile(HEAD + moments)
+    tests.runpytest_inprocess("--tickbus-only", "Height frozen @ fährt").assert_outcomes(passed=1, failed=1)
+    tests.runpytest_inprocess("--tickbus-only", "Height frozen").assert_outcomes(passed=1, failed=3)
+    result = tests.runpytest_inprocess("--tickbus-only", "forzen")
+    result.stdout.fnmatch_lines(['*no run of the sweep *.test_rises has "forzen" in its name; the first one is "Start stuck-on @ at rest"*'])
+    result.assert_outcomes(failed=1)
+
+
+def test_the_faults_of_a_machine_are_in_its_sweep(tests):
+    faults = 'class Alarm:\n    faults = ["wire"]\n\n    def fault(self, name, value):\n        self.due = 0.0 if value else float("inf")\n\n'
+    kinds = SWEEP[SWEEP.index("kinds=") : SWEEP.index("    moments=")]
+    model = SWEEP.replace("class Alarm:\n", faults)
+    tests.makepyfile(HEAD + model.replace(kinds, 'kinds=["model"],\n'))
+    result = tests.runpytest_inprocess()
+    result.assert_outcomes(passed=4)
+    result.stdout.fnmatch_lines(["wire  4ms     4ms     4ms", "sweep: runs=3 told=3 *"])
+    tests.makepyfile(HEAD + model.replace(kinds, 'kinds=[{"kind": "model", "name": "wier"}],\n'))
+    tests.runpytest_inprocess().stdout.fnmatch_lines(['*the model has no fault "wier"; did you mean "wire"?*'])
+
+
+def test_a_scenario_in_a_class_is_prepared_by_its_own_method(tests):
+    head, scenario = SWEEP.split("@pytest.mark.plc", 1)
+    scenario = "@pytest.mark.plc" + scenario.replace("(plc):", "(self, plc):").replace('"Start", True', '"Start", self.on')
+    prepare = "class TestLift:\n    def setup_method(self, method):\n        self.on = True\n\n"
+    tests.makepyfile(HEAD + head + prepare + "".join(f"    {line}\n" for line in scenario.splitlines()))
+    tests.runpytest_inprocess().assert_outcomes(passed=14, failed=11)
+
+
+def test_a_scenario_may_fail_and_skip_itself(tests):
+    for end, outcome in [("pytest.fail", "failed"), ("pytest.skip", "skipped")]:
+        own = f'plc.is_on("Run") or {end}("it stands")\n    plc.set("Height", 5)'
+        tests.makepyfile(HEAD + SWEEP.replace('plc.set("Height", 5)', own))
+        result = tests.runpytest_inprocess()
+        result.stdout.fnmatch_lines(["Start         STILL   8ms     8ms", "sweep: runs=24 *"])
+        result.stdout.no_fnmatch_line("*it stands*")
+        # Without a fault as well.
+        tests.makepyfile(HEAD + SWEEP.replace('plc.set("Height", 5)', f'{end}("it stands")'))
+        tests.runpytest_inprocess().assert_outcomes(**{outcome: 1})
 
 
 def test_the_expectations_of_a_scenario_do_not_count_under_a_fault(tests):
@@ -439,6 +498,9 @@ def test_accepted_verdicts_pass_and_any_other_fails(tests):
     result.stdout.fnmatch_lines(["E *stands still: *", "E *accepted: told"])
 
 
+USED = "@pytest.fixture(autouse=True)\ndef ready(plc):\n    plc.tick(3)\n\n\nclass Alarm:"
+
+
 @pytest.mark.parametrize(
     "old, new, told",
     [
@@ -447,6 +509,8 @@ def test_accepted_verdicts_pass_and_any_other_fails(tests):
         ('"Speed == 5"', '"Speed == 7"', 'the moment "moves" never comes in the scenario, which lasts 70ms without a fault; let'),
         ('told="Speed == 99"', 'told="Speed == 6"', '"Speed == 6" holds without a fault, so it tells nothing; write'),
         ('expect(on("Run"))', 'expect(off("Run"))', "the scenario fails without a fault, so nothing was judged: tick 15 (30ms): 'Run'"),
+        ("machine=Alarm", "machine=Alarm()", "each run of a sweep has a new machine: name its class"),
+        ("class Alarm:", USED, "the fixture ready is no part of a scenario that is swept; do its work in the test"),
         ("test_rises(plc)", "test_rises(plc, tmp_path)", "a scenario that is swept takes plc and machine alone, and not tmp_path"),
     ],
 )

@@ -33,6 +33,8 @@ _CELL = "_tickbus_cell"
 """The parameter of a run of a sweep."""
 _SWEEPS = pytest.StashKey["list[Sweeping]"]()
 _TOLD = pytest.StashKey["list[str]"]()
+_ENDS = (pytest.fail.Exception, pytest.skip.Exception)
+"""By these a scenario ends itself, beside assertions."""
 _KEYS = ("config", "program", "options", "scan", "step", "machine", "recording")
 _RECORDING = ("on failure", "always", "never")
 _LONGEST = 200
@@ -47,10 +49,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--tickbus-reports", metavar="DIR", help=text)
     text = "accept all verdicts of the sweeps: write them to the files of accepted verdicts"
     group.addoption("--tickbus-accept", action="store_true", help=text)
+    text = "of the sweeps make only the run with this name, or the runs whose names contain it"
+    group.addoption("--tickbus-only", metavar="TEXT", default="", help=text)
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Registers the marks."""
+    if config.getoption("--tickbus-accept") and config.getoption("dist", "no") != "no":
+        raise pytest.UsageError("each process of pytest-xdist sees a part of the verdicts: accept them with -n 0")
     config.addinivalue_line("markers", _MARK)
     config.addinivalue_line("markers", _SWEEP_MARK)
     config.stash[_SWEEPS] = []
@@ -78,15 +84,16 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     rewriting = metafunc.config.getoption("--tickbus-accept")
     node = metafunc.definition.nodeid
     sweeping = Sweeping(".".join(names), node, place.path.parent, mark.args[0], rewriting=rewriting)
-    failure = None
+    failure, chosen = None, []
     try:
         _survey(metafunc, place, sweeping)
-    except Exception as error:
+        chosen = sweeping.chosen(metafunc.config.getoption("--tickbus-only"))
+    except (Exception, *_ENDS) as error:
         failure = error
     metafunc.config.stash[_SWEEPS].append(sweeping)
-    cells = [_Cell(sweeping, failure=failure), *(_Cell(sweeping, number) for number in range(len(sweeping.names)))]
+    cells = [_Cell(sweeping, failure=failure), *(_Cell(sweeping, number) for number in chosen)]
     metafunc.fixturenames.append(_CELL)
-    metafunc.parametrize(_CELL, cells, ids=["without a fault", *sweeping.names])
+    metafunc.parametrize(_CELL, cells, ids=["without a fault", *(sweeping.names[number] for number in chosen)])
 
 
 def _survey(metafunc: pytest.Metafunc, place: _Place, sweeping: Sweeping) -> None:
@@ -100,9 +107,18 @@ def _survey(metafunc: pytest.Metafunc, place: _Place, sweeping: Sweeping) -> Non
     if not wanted <= {"plc", "machine"}:
         others = ", ".join(sorted(wanted - {"plc", "machine"}))
         raise pytest.UsageError(f"a scenario that is swept takes plc and machine alone, and not {others}")
+    own = {"plc", "machine", "_plc_bench"}
+    for name, definitions in metafunc._arg2fixturedefs.items():
+        if (name not in own or len(definitions) > 1) and own & set(definitions[-1].argnames):
+            raise pytest.UsageError(f"the fixture {name} is no part of a scenario that is swept; do its work in the test")
     setup = _setup(place)
+    if hasattr(setup["machine"], "step") and not isinstance(setup["machine"], type):
+        raise pytest.UsageError("each run of a sweep has a new machine: name its class in the mark plc, machine=…, not an object")
     fresh = metafunc.cls() if metafunc.cls else None
     scenario = getattr(fresh, metafunc.function.__name__) if fresh else metafunc.function
+    prepare = getattr(fresh, "setup_method", None)
+    if prepare is not None:
+        prepare(*[scenario][: len(inspect.signature(prepare).parameters)])
     quiet = {"record": {"file": "none.vcd", "when": "never"}}
     with tickbus.open(_config(setup["config"], place), quiet | _fieldbus(setup)) as driver:
         plc, machine = Plc(driver, setup["step"]), _made(setup["machine"])
@@ -113,7 +129,7 @@ def _survey(metafunc: pytest.Metafunc, place: _Place, sweeping: Sweeping) -> Non
             scenario(**{name: value for name, value in (("plc", plc), ("machine", machine)) if name in wanted})
         except Over:
             pass
-        except AssertionError as error:
+        except (AssertionError, pytest.fail.Exception) as error:
             raise AssertionError(
                 f"the scenario fails without a fault, so nothing was judged: {error}\nlet it pass as a test without @sweep first"
             ) from error
@@ -150,7 +166,7 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> object:
     wanted = inspect.signature(pyfuncitem.obj).parameters
     try:
         # Its own assertions do not count, either; the one that fails ends its actions.
-        with suppress(AssertionError):
+        with suppress(AssertionError, *_ENDS):
             pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in wanted})
         plc._idle()
     except Over:
@@ -183,8 +199,13 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: p
         if native and summary and "runs=0 " not in summary:
             terminalreporter.section(f"sweep {sweeping.name}")
             terminalreporter.write(summary)
+            page = _reports(config) / f"{sweeping.name}.html"
             if sweeping.has_failed:
-                terminalreporter.write_line(_page(sweeping, native, _reports(config)))
+                terminalreporter.write_line(_page(sweeping, native, page))
+            else:
+                # The page of an earlier run that has failed.
+                with suppress(OSError):
+                    page.unlink()
     for line in config.stash[_TOLD]:
         terminalreporter.write_line(line)
 
@@ -204,13 +225,12 @@ def _note(error: BaseException, text: str) -> None:
     error.__notes__ = [*getattr(error, "__notes__", []), text]
 
 
-def _page(sweeping: Sweeping, native: Sweep, folder: Path) -> str:
+def _page(sweeping: Sweeping, native: Sweep, page: Path) -> str:
     """Writes the page of a sweep, and returns where it is."""
     import tickbus
 
-    page = folder / f"{sweeping.name}.html"
     try:
-        native.page(page, f'pytest "{sweeping.node}[{{}}]"', sweeping.reports)
+        native.page(page, f'pytest "{sweeping.node}" --tickbus-only "{{}}"', sweeping.reports)
     except tickbus.FieldbusError as error:
         return f"no page: {error}"
     return f"page: {page}"
@@ -393,6 +413,8 @@ class _Keep:
         if self._when == "never":
             return
         if failure is None and self._when != "always":
+            # The page is of an earlier run that has failed.
+            self._recording.with_suffix(".html").unlink(missing_ok=True)
             self._drop()
             return
         texts = {"What failed": str(failure)} if failure is not None else {}

@@ -67,7 +67,12 @@ class Plc:
         connect = getattr(machine, "connect", None)
         if connect is not None:
             connect(self)
-        for name in getattr(machine, "faults", ()):
+        faults = getattr(machine, "faults", ())
+        if isinstance(faults, str):
+            raise TypeError(f"the faults of {machine!r} are a list of names, not one text")
+        for name in faults:
+            if name in self._model_faults:
+                raise ValueError(f'two faults of the machines are called "{name}"; give each a name of its own')
             self._model_faults[name] = machine.fault  # type: ignore[union-attr]
         if self._model_faults:
             self._driver.declare_faults(self._model_faults)

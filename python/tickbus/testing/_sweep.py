@@ -61,6 +61,13 @@ class Sweeping:
         assert self.native is not None
         self.names = self.native.plan(self.rewriting)
 
+    def chosen(self, only: str) -> list[int]:
+        """The runs that are made: the one with exactly this name, or all whose names contain it."""
+        chosen = [number for number, name in enumerate(self.names) if only in name]
+        if not chosen:
+            raise ValueError(f'no run of the sweep {self.name} has "{only}" in its name; the first one is "{self.names[0]}"')
+        return [self.names.index(only)] if only in self.names else chosen
+
     def judge(self, cell: int) -> None:
         """Fails unless the verdict of a run is right or accepted."""
         assert self.native is not None

@@ -93,6 +93,8 @@ final class Keep {
         }
         try {
             Files.deleteIfExists(recording);
+            // The page of an earlier run that has failed.
+            Files.deleteIfExists(page().orElse(recording));
         } catch (IOException e) {
             // A superfluous file does no harm, and the next run overwrites it.
             context.publishReportEntry("tickbus.recording", recording + " could not be deleted: " + e);

@@ -78,7 +78,10 @@ public final class Plc {
         Objects.requireNonNull(machine, "machine");
         machine.connect(this);
         for (String name : machine.faults()) {
-            faulty.put(name, machine);
+            if (faulty.putIfAbsent(name, machine) != null) {
+                throw new IllegalArgumentException("two faults of the machines are called \"" + name
+                    + "\"; give each a name of its own");
+            }
         }
         if (!faulty.isEmpty()) {
             bus.declareFaults(List.copyOf(faulty.keySet()));
@@ -341,6 +344,7 @@ public final class Plc {
                 + " let the test tick");
         }
         inStep = true;
+        boolean over;
         try {
             long time = ticks * stepNanos + stepNanos;
             for (int i = 0; i < machines.size(); i++) {
@@ -354,6 +358,7 @@ public final class Plc {
                 sweep.before();
             }
             bus.exchange(time);
+            over = sweep != null && sweep.after();
             bus.pollFaults(faults);
         } finally {
             inStep = false;
@@ -375,8 +380,8 @@ public final class Plc {
                 throw failure(one.condition(), "at every tick since tick " + one.since());
             }
         }
-        if (sweep != null) {
-            sweep.after();
+        if (over) {
+            SweepRun.end();
         }
     }
 

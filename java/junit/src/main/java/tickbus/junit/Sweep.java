@@ -28,7 +28,9 @@ final class Sweep implements AutoCloseable {
     private final ExtensionContext context;
     /** The test as build tools name it. */
     private final String selector;
-    private final Path folder;
+    private final Path matrix;
+    private final Path page;
+    private boolean begun;
     private SweepSession session;
     /** The names of the runs, once that without a fault is over. */
     private List<String> names = List.of();
@@ -44,7 +46,9 @@ final class Sweep implements AutoCloseable {
         this.only = context.getConfigurationParameter(ONLY).orElse("");
         this.context = context;
         this.selector = type + "#" + context.getRequiredTestMethod().getName();
-        this.folder = Keep.folder(context);
+        Path folder = Keep.folder(context);
+        this.matrix = folder.resolve(name + ".txt");
+        this.page = folder.resolve(name + ".html");
     }
 
     TestTemplateInvocationContext withoutFault() {
@@ -53,6 +57,10 @@ final class Sweep implements AutoCloseable {
 
     /** The runs with a fault; none if the one without has failed. After the last one, the sweep is concluded. */
     Stream<TestTemplateInvocationContext> runs() {
+        if (!begun) {
+            throw new ExtensionConfigurationException("@FaultSweep: the runs of " + name + " need the run without a fault,"
+                + " which was not chosen; run the method as a whole, or choose runs with -D" + ONLY + "=TEXT");
+        }
         if (names.isEmpty()) {
             return Stream.empty();
         }
@@ -87,10 +95,8 @@ final class Sweep implements AutoCloseable {
         if (accepting) {
             context.publishReportEntry("tickbus.accepted", session.accept().toString());
         }
-        Path matrix = folder.resolve(name + ".txt");
-        Path page = folder.resolve(name + ".html");
         try {
-            Files.createDirectories(folder);
+            Files.createDirectories(matrix.getParent());
             Files.writeString(matrix, session.summary());
         } catch (IOException e) {
             throw new UncheckedIOException(matrix + ": the matrix cannot be written", e);
@@ -107,12 +113,24 @@ final class Sweep implements AutoCloseable {
             session.begin(bench.bus(), run);
             return;
         }
+        begun = true;
+        clear();
         try {
             session = new SweepSession(bench.bus(), name, Path.of("").toAbsolutePath(), keys, bench.plc().stepNanos());
         } catch (FieldbusException e) {
             throw new ExtensionConfigurationException("@FaultSweep: " + e.getMessage(), e);
         }
         session.beginWithoutFault(bench.bus());
+    }
+
+    /** Removes the results of an earlier run, which would be taken for those of this run if it is interrupted. */
+    private void clear() {
+        try {
+            Files.deleteIfExists(matrix);
+            Files.deleteIfExists(page);
+        } catch (IOException e) {
+            throw new UncheckedIOException("the results of an earlier sweep cannot be removed", e);
+        }
     }
 
     /** The page about the recording of a run that has failed. */

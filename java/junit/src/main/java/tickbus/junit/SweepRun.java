@@ -6,6 +6,7 @@ import org.junit.jupiter.api.extension.ExtensionContext;
 import org.junit.jupiter.api.extension.InvocationInterceptor;
 import org.junit.jupiter.api.extension.ReflectiveInvocationContext;
 import org.opentest4j.AssertionFailedError;
+import org.opentest4j.TestAbortedException;
 import tickbus.SweepSession;
 import tickbus.Tickbus;
 
@@ -19,6 +20,8 @@ final class SweepRun implements BeforeEachCallback, InvocationInterceptor {
     private Bench bench;
     private Plc plc;
     private Tickbus bus;
+    /** The actions of the scenario have ended. */
+    private boolean done;
 
     SweepRun(Sweep sweep, int run) {
         this.sweep = sweep;
@@ -52,17 +55,27 @@ final class SweepRun implements BeforeEachCallback, InvocationInterceptor {
         sweep.session().before(bus);
     }
 
-    void after() {
-        if (sweep.session().after(bus)) {
-            throw new Over();
-        }
+    /** Looks at an exchange, and gives delayed sensors their true values again; true if the run is over. */
+    boolean after() {
+        return sweep.session().after(bus);
+    }
+
+    /** Ends the scenario: the run is over. */
+    static void end() {
+        throw new Over();
+    }
+
+    @Override
+    public void interceptBeforeEachMethod(Invocation<Void> invocation, ReflectiveInvocationContext<Method> method,
+        ExtensionContext context) throws Throwable {
+        scenario(invocation);
     }
 
     @Override
     public void interceptTestTemplateMethod(Invocation<Void> invocation, ReflectiveInvocationContext<Method> method,
         ExtensionContext context) throws Throwable {
+        scenario(invocation);
         try {
-            scenario(invocation);
             // What had to hold so far need not hold any more.
             plc.sweep(this);
             boolean over = sweep.session().idle(bus);
@@ -70,7 +83,7 @@ final class SweepRun implements BeforeEachCallback, InvocationInterceptor {
                 plc.tick();
             }
         } catch (Over e) {
-            // So ends nearly every run, in the midst of the scenario or after it.
+            // So ends the run without a fault, and a run with one if it outlives the scenario.
         }
         plc.sweep(null);
         if (isStrict()) {
@@ -80,15 +93,29 @@ final class SweepRun implements BeforeEachCallback, InvocationInterceptor {
         }
     }
 
+    /** Runs a method of the scenario, unless the scenario has ended in an earlier one. */
     private void scenario(Invocation<Void> invocation) throws Throwable {
+        if (done) {
+            invocation.skip();
+            return;
+        }
         try {
             invocation.proceed();
+        } catch (Over e) {
+            done = true;
         } catch (AssertionError e) {
             if (isStrict()) {
                 throw new AssertionFailedError("the scenario fails without a fault, so nothing was judged: "
                     + e.getMessage() + "\nlet the scenario pass as a @Test first", e);
             }
             // An expectation of the scenario's own does not count under a fault.
+            done = true;
+        } catch (TestAbortedException e) {
+            // Nor does an assumption.
+            if (isStrict()) {
+                throw e;
+            }
+            done = true;
         }
     }
 

@@ -10,11 +10,13 @@ import java.nio.file.Path;
 import java.util.LinkedHashMap;
 import java.util.List;
 import java.util.Map;
+import java.util.stream.Stream;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.CsvSource;
+import org.junit.platform.engine.DiscoverySelector;
 import org.junit.platform.engine.TestExecutionResult;
 import org.junit.platform.engine.discovery.DiscoverySelectors;
 import org.junit.platform.launcher.TestExecutionListener;
@@ -30,8 +32,12 @@ class FaultSweepTest {
 
     /** Runs a sweep; the failures by the names of the runs, empty for a run that passed. */
     private Map<String, String> run(Class<?> samples, String method, String... parameters) {
+        return run(DiscoverySelectors.selectMethod(samples, method, Plc.class), parameters);
+    }
+
+    private Map<String, String> run(DiscoverySelector selector, String... parameters) {
         LauncherDiscoveryRequestBuilder request = LauncherDiscoveryRequestBuilder.request()
-            .selectors(DiscoverySelectors.selectMethod(samples, method, Plc.class))
+            .selectors(selector)
             .configurationParameter("tickbus.reports", reports.toString());
         for (String parameter : parameters) {
             String[] pair = parameter.split("=", 2);
@@ -96,6 +102,61 @@ class FaultSweepTest {
     }
 
     @Test
+    void whatAClassDoesBeforeEachTestIsPartOfTheScenario() throws IOException {
+        Map<String, String> results = run(SweepSamples.Prepared.class, "rises");
+        assertEquals(5, results.size(), results::toString);
+        // Under this fault the method before the test would wait forever.
+        assertEquals("stands still: \"Run\" stays off, on without the fault", results.get("Start stuck-off @ at rest"));
+        results = run(SweepSamples.Prepared.class, "assumes");
+        assertEquals(25, results.size(), results::toString);
+        results.forEach((name, failure) -> assertFalse(failure.contains("it runs"), name + ": " + failure));
+        assertTrue(matrix("SweepSamples.Prepared.assumes").contains("sweep: runs=24 told="));
+    }
+
+    @Test
+    void aDelayedSensorReachesThePlcLateAndTheScenarioAtOnce() {
+        String failure = run(SweepSamples.Lift.class, "watches").get("Start late 6ms @ at rest");
+        assertEquals("continues differently: \"Run\" is off (and 1 more) after 14ms, on without the fault", failure);
+    }
+
+    @Test
+    void theFaultsOfAMachineAreInItsSweep() throws IOException {
+        assertEquals(Map.of("without a fault", "", "wire model @ Run", ""), run(SweepSamples.Model.class, "rises"));
+        assertTrue(matrix("SweepSamples.Model.rises").contains(" told=1 "), matrix("SweepSamples.Model.rises"));
+        String failure = run(SweepSamples.Model.class, "unknownFault").get("without a fault");
+        assertTrue(failure.contains("the model has no fault \"wier\"; did you mean \"wire\"?"), failure);
+    }
+
+    @Test
+    void testsThatRunAtOnceDoNotDisturbTheOrderOfARun() {
+        Map<String, String> results = run(SweepSamples.Lift.class, "rises", "junit.jupiter.execution.parallel.enabled=true",
+            "junit.jupiter.execution.parallel.mode.default=concurrent");
+        assertEquals(run(SweepSamples.Lift.class, "rises"), results);
+        assertEquals("without a fault", results.keySet().iterator().next());
+    }
+
+    @Test
+    void aRunAloneIsNotChosenByItsId() {
+        String method = "[engine:junit-jupiter]/[class:" + SweepSamples.Lift.class.getName()
+            + "]/[test-template:rises(tickbus.junit.Plc)]";
+        Map<String, String> results = run(
+            DiscoverySelectors.selectUniqueId(method + "/[test-template-invocation:#5]"));
+        assertEquals(1, results.size(), results::toString);
+        assertTrue(results.get("rises(Plc)").contains("need the run without a fault"), results::toString);
+    }
+
+    @Test
+    void aSweepThatIsNotJudgedLeavesNoResultsOfAnEarlierOne() throws IOException {
+        for (String end : List.of(".txt", ".html")) {
+            Files.writeString(reports.resolve("SweepSamples.Wrong.failsWithoutAFault" + end), "of an earlier run");
+        }
+        run(SweepSamples.Wrong.class, "failsWithoutAFault");
+        try (Stream<Path> left = Files.list(reports)) {
+            assertEquals(List.of(), left.toList());
+        }
+    }
+
+    @Test
     void oneRunIsMadeByItsNameAndSeveralByAPartOfIt() {
         assertEquals(List.of("without a fault", "Height frozen @ runs"),
             List.copyOf(run(SweepSamples.Lift.class, "rises", "tickbus.only=Height frozen @ runs").keySet()));
@@ -138,6 +199,7 @@ class FaultSweepTest {
         "unknownSignal        | SweepSamples.Wrong.unknownSignal:1:12: there is no signal \"Strat\"; did you mean \"Start\"?",
         "unknownKind          | SweepSamples.Wrong.unknownKind:1:10: ",
         "unknownKind          | did you mean \"stuck-o",
+        "noFaultsOfTheModel   | none of the signals can have the fault \"model\"; the machine has declared no faults: remove it",
         "momentThatNeverComes | the moment \"far up\" never comes in the scenario, which lasts 70ms without a fault; "
             + "let the scenario go that far, or remove the moment",
         "scenarioInTheKeys    | unknown key \"scenario\"",

@@ -1,5 +1,6 @@
 package tickbus.junit;
 
+import static org.junit.jupiter.api.Assertions.assertThrows;
 import static tickbus.junit.Condition.above;
 import static tickbus.junit.Condition.is;
 import static tickbus.junit.Condition.near;
@@ -115,6 +116,16 @@ final class Samples {
             check(wire.isActive() && plc.faults().size() == 1);
             wire.end();
             plc.await(on("Run")).within(3);
+        }
+
+        @Test
+        void aMachineHasFaultsByName(Plc plc) {
+            plc.connect(new SweepSamples.Wired()).tick();
+            plc.inject("kind = \"model\"\nname = \"wire\"");
+            plc.tick().expect(is("Height", 0));
+            plc.tick().expect(is("Height", 99));
+            Exception twice = assertThrows(IllegalArgumentException.class, () -> plc.connect(new SweepSamples.Wired()));
+            check(twice.getMessage().contains("two faults of the machines are called \"wire\""));
         }
 
         @Test

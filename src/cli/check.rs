@@ -7,6 +7,7 @@ use std::collections::HashSet;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use super::columns::aligned;
 use super::json::{Format, print_document};
 use super::{Outcome, print};
 use tickbus_base::time::Nanos;
@@ -111,17 +112,18 @@ fn report(config: &Config) -> String {
     }
     out.push('\n');
     if !config.axes.is_empty() {
-        out.push_str(&aligned(&axes::HEADINGS, config.axes.iter().map(axes::row)));
+        let rows = config.axes.iter().map(|axis| axes::row(axis).to_vec());
+        out.push_str(&aligned(&axes::HEADINGS, &rows.collect::<Vec<_>>()));
         out.push('\n');
     }
-    out.push_str(&aligned(
-        &HEADINGS,
-        config
-            .table
-            .signals
-            .iter()
-            .map(|signal| row(signal, &config.table, &taken, &config.bus)),
-    ));
+    let signals = config.table.signals.iter();
+    let rows = signals.map(|signal| row(signal, &config.table, &taken, &config.bus).to_vec());
+    let rows: Vec<Vec<String>> = rows.collect();
+    if rows.is_empty() {
+        out.push_str("no signals\n");
+    } else {
+        out.push_str(&aligned(&HEADINGS, &rows));
+    }
     let total = |area| {
         stations
             .iter()
@@ -358,42 +360,4 @@ fn fail_safe(signal: &Signal) -> String {
         }
         _ => short_number(slot.real()),
     }
-}
-
-/// Arranges rows under their headings in columns; columns without content are left out.
-fn aligned<const N: usize>(
-    headings: &[&str; N],
-    rows: impl Iterator<Item = [String; N]>,
-) -> String {
-    let rows: Vec<[String; N]> = rows.collect();
-    if rows.is_empty() {
-        return String::from("no signals\n");
-    }
-    let length = |text: &str| text.chars().count();
-    let widths: [usize; N] = std::array::from_fn(|column| {
-        let longest = rows
-            .iter()
-            .map(|row| length(&row[column]))
-            .max()
-            .unwrap_or(0);
-        if longest == 0 {
-            0
-        } else {
-            longest.max(length(headings[column]))
-        }
-    });
-    let mut out = String::new();
-    let mut put = |cells: [&str; N]| {
-        let columns = cells.iter().zip(widths).filter(|(_, width)| *width > 0);
-        let cells: Vec<String> = columns
-            .map(|(cell, width)| format!("{cell:width$}"))
-            .collect();
-        out.push_str(cells.join("  ").trim_end());
-        out.push('\n');
-    };
-    put(*headings);
-    for row in &rows {
-        put(row.each_ref().map(String::as_str));
-    }
-    out
 }

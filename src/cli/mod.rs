@@ -13,6 +13,7 @@ macro_rules! eprintln {
 mod axes;
 mod bridge;
 mod check;
+mod columns;
 mod completions;
 mod dispatch;
 mod export;

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use std::io::IsTerminal as _;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
+use tickbus_base::parallel::{cores, in_parallel};
 use tickbus_testing::{
     Accepted, Case, Cell, CellMark, Judgement, Plan, Suite, Sweep, Tally, Verdict, matrix, swept,
     swept_run, verdict_hash,
@@ -163,40 +163,21 @@ impl Work<'_> {
         (cases, document)
     }
 
-    /// Makes the runs, several at once. Each result has its place, whichever thread made it.
+    /// Makes the runs, several at once.
     fn make<'p>(&self, chosen: &[&'p Cell]) -> Vec<Made<'p>> {
-        let cores = || std::thread::available_parallelism().map_or(1, usize::from);
         let threads = match self.job.arguments.jobs {
             _ if !self.suite.is_parallel() => 1,
             None => cores(),
             Some(jobs) => usize::from(jobs.get()),
         };
-        let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-        let results: Mutex<Vec<(usize, Made<'p>)>> = Mutex::default();
-        let work = || {
-            loop {
-                let index = next.fetch_add(1, Ordering::Relaxed);
-                let Some(cell) = chosen.get(index) else {
-                    return;
-                };
-                let made = self.make_one(cell);
-                if let Ok(mut results) = results.lock() {
-                    results.push((index, made));
-                }
-                let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-                let text = format!("{done} of {} faults done", chosen.len());
-                self.job.progress.now(text);
-            }
-        };
-        std::thread::scope(|scope| {
-            for _ in 1..threads.min(chosen.len()) {
-                scope.spawn(work);
-            }
-            work();
-        });
-        let mut results = results.into_inner().unwrap_or_default();
-        results.sort_by_key(|(index, _)| *index);
-        results.into_iter().map(|(_, made)| made).collect()
+        let done = AtomicUsize::new(0);
+        in_parallel(threads, chosen, |cell| {
+            let made = self.make_one(cell);
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            let text = format!("{done} of {} faults done", chosen.len());
+            self.job.progress.now(text);
+            made
+        })
     }
 
     fn make_one<'p>(&self, cell: &'p Cell) -> Made<'p> {

@@ -5,6 +5,7 @@
 //! | [`time`] | integer nanoseconds, the injected clock, the stop token |
 //! | [`net`] | TCP sockets, of the operating system or simulated |
 //! | [`os`] | what only the operating system can do, such as waiting for sockets and time |
+//! | [`parallel`] | the same work for many items, on several cores |
 //! | [`thread`] | threads whose end can be awaited with a time limit |
 //! | [`statistics`] | counts, times and facts with their keys, and their text |
 //! | [`toml_text`] | reading configuration text: spans, collected mistakes, nearest names |
@@ -12,6 +13,7 @@
 mod mistake;
 pub mod net;
 pub mod os;
+pub mod parallel;
 mod percent;
 mod quick_clock;
 pub mod statistics;

@@ -64,6 +64,7 @@ fn main() {
         faults: &[],
         statistics: None,
         texts: &[],
+        tables: &[],
     };
     report::write(&contents, &mut file).expect("there is room for a page");
     let bytes = file.get_ref().metadata().expect("it is there").len();

@@ -162,7 +162,7 @@ fn make(arguments: &Arguments) -> Result<Made, Vec<String>> {
     let mut number = |option: &str, name: &String| {
         let found = run.signal(name);
         if found.is_none() {
-            mistakes.push(unknown(option, name, &run));
+            mistakes.push(unknown(option, name, "the recording", &run));
         }
         found
     };
@@ -190,6 +190,7 @@ fn make(arguments: &Arguments) -> Result<Made, Vec<String>> {
         faults: &faults,
         statistics: beside.statistics.as_ref(),
         texts: &beside.texts,
+        tables: &[],
     };
     let mut made = None;
     // A recording is worth a page up to a damaged place; mistakes on the command line are not.
@@ -225,11 +226,12 @@ fn file_name(path: &Path) -> String {
         .into_owned()
 }
 
-fn unknown(option: &str, name: &str, run: &Run) -> String {
+/// That the recording with this title has no signal `name`.
+pub(super) fn unknown(option: &str, name: &str, title: &str, run: &Run) -> String {
     let names = run.signals().iter().map(|signal| &*signal.name);
     let right = nearest(name, names).map_or_else(
         || "tickbus check lists the names of a driver.cfg".to_owned(),
         |near| format!("did you mean \"{near}\"?"),
     );
-    format!("{option}: the recording has no signal \"{name}\"; {right}")
+    format!("{option}: {title} has no signal \"{name}\"; {right}")
 }

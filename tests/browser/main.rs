@@ -44,6 +44,7 @@ fn contents(run: &Run) -> Contents<'_> {
         faults: &[],
         statistics: None,
         texts: &[],
+        tables: &[],
     }
 }
 

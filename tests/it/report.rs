@@ -175,6 +175,7 @@ fn page(run: &Run) -> String {
         faults: &[],
         statistics: None,
         texts: &[],
+        tables: &[],
     };
     report::write(&contents, &mut out).expect("memory takes all");
     text(&out)

@@ -72,6 +72,7 @@ pub fn page_beside(
         faults: &[],
         statistics: statistics.as_ref(),
         texts,
+        tables: &[],
     };
     let page = recording.with_extension("html");
     match write_file(&contents, &page) {

@@ -2,11 +2,15 @@
 
 use super::{Mark, MarkKind, Run, SignalKind};
 use tickbus_base::time::Nanos;
+use tickbus_image::signal::Slot;
 use tickbus_record as record;
 use tickbus_record::{Columns, Recording, RecordingError, Tick};
 
 /// From this status of an exchange on, data are stale.
 const STALE: i32 = 2;
+
+/// The text of a [`MarkKind::Link`] from which on data are fresh.
+pub const LIVE: &str = "live";
 
 /// The destination of a column's values.
 enum Target {
@@ -25,6 +29,7 @@ pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingE
     let targets = targets(&columns, &mut run);
     let mut lines = Lines::new(&columns);
     let mut tick = Tick::new(&columns);
+    let mut last: Vec<Slot> = Vec::new();
     let mut before: Option<(u64, Nanos, u64)> = None;
     let error = loop {
         match recording.next(&mut tick) {
@@ -51,7 +56,15 @@ pub fn read(recording: &mut Recording, budget: usize) -> (Run, Option<RecordingE
         }
         run.tick(now);
         lines.tick(&tick, &mut run);
-        for (target, slot) in targets.iter().zip(&tick.values) {
+        let is_first = last.is_empty();
+        last.resize(tick.values.len(), Slot::default());
+        let values = tick.values.iter().zip(&mut last);
+        for (target, (slot, last)) in targets.iter().zip(values) {
+            // Most values of a tick are those of the one before.
+            if *slot == *last && !is_first && !matches!(target, Target::Edges(_)) {
+                continue;
+            }
+            *last = *slot;
             match target {
                 Target::Signal(signal, kind) => run.change(*signal, now, number(*kind, *slot)),
                 Target::Edges(signal) => {
@@ -127,7 +140,7 @@ fn targets(columns: &Columns, run: &mut Run) -> Vec<Target> {
     clippy::cast_precision_loss,
     reason = "a chart shows no more than a double has"
 )]
-fn number(kind: record::ValueKind, slot: tickbus_image::signal::Slot) -> f64 {
+fn number(kind: record::ValueKind, slot: Slot) -> f64 {
     match kind {
         record::ValueKind::Signed => slot.signed() as f64,
         record::ValueKind::Unsigned => slot.unsigned() as f64,
@@ -174,7 +187,7 @@ impl<'a> Lines<'a> {
                 continue;
             }
             let text = match status {
-                0 => "live".to_owned(),
+                0 => LIVE.to_owned(),
                 STALE => "stale: nothing new for longer than max_age".to_owned(),
                 code => format!("failed: status {code}"),
             };

@@ -15,6 +15,7 @@ mod figures;
 mod file;
 mod from;
 mod html;
+mod more;
 mod page;
 mod run;
 mod spans;
@@ -24,7 +25,8 @@ mod tables;
 mod time;
 
 pub use file::{link, page_beside, write_file, write_sweeps_file};
-pub use from::read;
+pub use from::{LIVE, read};
+pub use more::{Cell, MoreTable};
 pub use page::{Contents, DRAW, LOOKUP, STYLE, still_head, write};
 pub use run::{Change, DEFAULT_BUDGET, Mark, MarkKind, Run, Signal, SignalKind};
 pub use statistics::RunStatistics;

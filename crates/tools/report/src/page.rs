@@ -8,7 +8,7 @@ use maud::{Markup, html};
 use super::html::{Json, count, counted, digits, printable, span};
 use super::spans::{self, Span};
 use super::tables::{self, Scale};
-use super::{MarkKind, Run, RunStatistics, SignalKind, code, figures, time};
+use super::{MarkKind, MoreTable, Run, RunStatistics, SignalKind, code, figures, time};
 use tickbus_base::time::Nanos;
 
 const TEMPLATE: &str = include_str!("template.html");
@@ -62,6 +62,8 @@ pub struct Contents<'a> {
     pub statistics: Option<&'a RunStatistics>,
     /// Texts shown verbatim, each under its heading.
     pub texts: &'a [(String, String)],
+    /// Tables shown before all others.
+    pub tables: &'a [MoreTable],
 }
 
 /// States that last, drawn above the signals.
@@ -201,7 +203,7 @@ fn facts(contents: &Contents<'_>, bands: &[Band]) -> Markup {
     let gaps = of_kind(bands, "gap").count() as u64;
     html! {
         (fact("Simulated", &span(end - begin), ""))
-        (fact("Ticks", &count(run.ticks()), ""))
+        @if run.ticks() > 0 { (fact("Ticks", &count(run.ticks()), "")) }
         (fact("Signals", &count(run.signals().len() as u64), ""))
         (fact("Changes", &count(changes), ""))
         @if steps > 0 { (fact("Steps", &count(steps as u64), "")) }
@@ -249,6 +251,9 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
     let distributions = contents.statistics.map(RunStatistics::distributions);
     let distributions = distributions.filter(|distributions| !distributions.is_empty());
     html! {
+        @for (place, table) in contents.tables.iter().enumerate() {
+            (section(&format!("table{place}"), &table.heading, &table.markup(scale)))
+        }
         @if !steps.is_empty() { (section("steps", "Steps", &tables::steps(&steps, scale))) }
         (section("faults", "Faults and gaps", &html! {
             @if events.is_empty() { p { "No faults and no gaps were recorded." } }

@@ -30,8 +30,13 @@ impl Scale {
 
     /// A link that shows a span in the chart.
     fn link(self, from: Nanos, until: Nanos) -> Markup {
+        self.link_with(from, until, &seconds(from))
+    }
+
+    /// As [`link`](Self::link), with this text.
+    pub(super) fn link_with(self, from: Nanos, until: Nanos, text: &str) -> Markup {
         let (begin, end) = (self.units(from), self.units(until));
-        html! { a href="#signals" data-from=(begin) data-to=(end) { (seconds(from)) } }
+        html! { a href="#signals" data-from=(begin) data-to=(end) { (text) } }
     }
 }
 

@@ -18,6 +18,7 @@
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`record`] | recordings: the values that every tick saw, written to VCD or CSV and read again |
 //! | [`report`] | one HTML page about one run |
+//! | [`compare`] | the recording of a machine beside that of its model, and fitting the model |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
 //! | [`programs`] | the PLC programs of demos and measurements |
 //! | [`fieldbus`] | the bus traits, and one room per bus |
@@ -52,6 +53,7 @@ mod page;
 pub use tickbus_axis as axis;
 pub use tickbus_base::{Mistake, os, statistics, time, toml_text};
 pub use tickbus_bridge as bridge;
+pub use tickbus_compare as compare;
 pub use tickbus_dispatcher as dispatcher;
 pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;

@@ -14,6 +14,7 @@ mod axes;
 mod bridge;
 mod check;
 mod columns;
+mod compare;
 mod completions;
 mod dispatch;
 mod export;
@@ -57,7 +58,7 @@ struct Arguments {
 const EXIT_CODES: &str = "\
 Exit codes:
     0  done
-    1  the input is wrong, or a test has failed
+    1  the input is wrong, a test has failed, or a limit is exceeded
     2  the command line is wrong
     3  the bus or the peer has failed
   130  interrupted";
@@ -67,6 +68,7 @@ enum Command {
     Axes(axes::Arguments),
     Bridge(bridge::Arguments),
     Check(check::Arguments),
+    Compare(compare::Arguments),
     Completions(completions::Arguments),
     Dispatch(dispatch::Arguments),
     Export(export::Arguments),
@@ -146,6 +148,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Axes(arguments) => axes::run(&arguments, kinds),
         Command::Bridge(arguments) => bridge::run(&arguments),
         Command::Check(arguments) => check::run(&arguments, kinds),
+        Command::Compare(arguments) => compare::run(&arguments, kinds),
         Command::Completions(arguments) => completions::run(&arguments),
         Command::Dispatch(arguments) => dispatch::run(&arguments),
         Command::Export(arguments) => export::run(&arguments, kinds),

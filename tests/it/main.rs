@@ -9,6 +9,7 @@ mod codec;
 #[cfg(unix)]
 #[path = "../peers/commands.rs"]
 mod commands;
+mod compare;
 mod dispatch;
 mod ending;
 mod export;

@@ -4,6 +4,7 @@
 
 mod export;
 mod faults;
+mod fit;
 mod fixture;
 mod run;
 mod wrong;

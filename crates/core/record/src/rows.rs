@@ -41,7 +41,7 @@ impl Rows {
     }
 
     /// Replaces the values that this end sends by those on the line: saturated, rounded, fail-safe values for NaN.
-    pub(super) fn put_on_the_line(&mut self, values: &mut [Slot]) {
+    pub fn put_on_the_line(&mut self, values: &mut [Slot]) {
         for (codec, frame) in &mut self.sent {
             codec.encode(values, frame);
             codec.decode(frame, values);

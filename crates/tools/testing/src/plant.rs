@@ -4,10 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Mistakes, Table, Value};
+use tickbus_base::toml_text::{Mistakes, Table, Value, nearest, shown};
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::Config;
-use tickbus_fmi::foreign::{Join, Machine, MachineOptions, Map, Unpacked};
+use tickbus_fmi::foreign::{ForeignVariable, Join, Machine, MachineOptions, Map, Unpacked};
+use tickbus_fmi::{Value as FmuValue, ValueType};
 use tickbus_image::signal::{SignalTable, Slot};
 
 use super::test::TextPosition;
@@ -48,6 +49,71 @@ impl Plant {
         self.fmu.model.check_fault(name, value)
     }
 
+    /// The variable with this name, if it is a number that can be set before a run, with its unit, and its value if the map
+    /// has one.
+    ///
+    /// # Errors
+    ///
+    /// The FMU has no such parameter.
+    pub(super) fn parameter(&self, name: &str) -> Result<(usize, String, Option<f64>), Mistake> {
+        let model = &self.fmu.model;
+        let is_real = |one: &ForeignVariable| {
+            matches!(
+                one.value_type,
+                Some(ValueType::Float32 | ValueType::Float64)
+            )
+        };
+        let is_joined = |index| {
+            let mut joined = self.join.inputs.iter().chain(&self.join.outputs);
+            joined.any(|joined| joined.variable == index)
+        };
+        let found = model.position(name);
+        let Some(index) = found.filter(|index| !is_joined(*index)) else {
+            let names = model.variables.iter().filter(|one| is_real(one));
+            let near = nearest(name, names.map(|one| &*one.name));
+            let right = near.map_or_else(
+                || "name one of its parameters, as its modelDescription.xml has them".to_owned(),
+                |near| format!("did you mean \"{near}\"?"),
+            );
+            let what = if found.is_some() {
+                format!("\"{}\" is joined with a signal", shown(name))
+            } else {
+                format!("the FMU has no variable \"{}\"", shown(name))
+            };
+            return Err(Mistake::new(what, right));
+        };
+        let variable = &model.variables[index];
+        if !is_real(variable) {
+            return Err(Mistake::new(
+                format!("\"{}\" is of type {}", shown(name), variable.type_name),
+                "only floating point numbers can be fitted",
+            ));
+        }
+        let set = self.join.parameters.iter().find(|(at, _)| *at == index);
+        let unit = variable.unit.clone().unwrap_or_default();
+        Ok((index, unit, set.map(|(_, value)| value.real())))
+    }
+
+    /// This FMU with other values of some variables.
+    pub(super) fn with(&self, values: &[(usize, f64)]) -> Self {
+        let mut plant = self.clone();
+        let parameters = &mut plant.join.parameters;
+        parameters.retain(|(at, _)| values.iter().all(|(other, _)| at != other));
+        let values = values.iter();
+        parameters.extend(values.map(|(at, value)| (*at, FmuValue::Real(*value))));
+        plant
+    }
+
+    /// Starts a run of the FMU without a driver; sets `slots` to the initial sensor values.
+    pub(super) fn start_alone(
+        &self,
+        table: &SignalTable,
+        slots: &mut [Slot],
+    ) -> Result<Machine, String> {
+        let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
+        machine.map_err(|failure| failure.to_string())
+    }
+
     /// Starts a run of the FMU, with its faults in the driver; sets `slots` to the initial sensor values.
     pub(super) fn start(
         &self,
@@ -57,8 +123,7 @@ impl Plant {
     ) -> Result<Machine, String> {
         let declared = driver.declare_model_faults(self.fmu.model.fault_names());
         declared.map_err(|mistake| mistake.to_string())?;
-        let machine = Machine::open(&self.fmu, &self.join, table, self.options, slots);
-        machine.map_err(|failure| failure.to_string())
+        self.start_alone(table, slots)
     }
 }
 

@@ -84,7 +84,7 @@ impl MachineRecording {
 }
 
 /// The column of a signal, if the recording has one of the same kind.
-fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Mistake> {
+pub(super) fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Mistake> {
     let columns = recording.columns();
     let Some(index) = columns.position(&signal.name, false) else {
         return Ok(None);
@@ -105,7 +105,7 @@ fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Mista
     Ok(Some(index))
 }
 
-fn kind(signal: &Signal) -> ValueKind {
+pub(super) fn kind(signal: &Signal) -> ValueKind {
     ValueKind::of(signal.data_type, signal.scale.is_some())
 }
 

@@ -120,6 +120,7 @@ impl Reader<'_> {
     }
 
     fn rule(&self, mut table: Table<'_>) -> Option<Rule> {
+        let name = table.take("name");
         let when = table.require("when", "write a condition, such as \"LA1 run\"");
         let after = table.take("after");
         let set = table.take("set");
@@ -143,7 +144,10 @@ impl Reader<'_> {
             None => Some(None),
             Some(value) => self.ramp(&value).map(Some),
         };
+        let name =
+            name.map(|value| value.label(NAME_LIMIT, "name the rule, such as \"lift 1 up\""));
         Some(Rule {
+            name: name.flatten().map(str::to_owned),
             when: when?.into_iter().map(|(condition, _)| condition).collect(),
             after: after?,
             set: set?,

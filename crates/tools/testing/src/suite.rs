@@ -235,7 +235,7 @@ fn read_sections(
     Some((bench, tests, sweep))
 }
 
-fn load_config(
+pub(super) fn load_config(
     value: &Value<'_>,
     right: &str,
     (folder, kinds): (&Path, &'static Kinds),

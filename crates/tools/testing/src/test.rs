@@ -76,6 +76,8 @@ pub(super) enum Passage {
 /// One rule of the machine's stub.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Rule {
+    /// The name by which a fit changes the rule's times.
+    pub(super) name: Option<String>,
     /// All of these must hold. Never empty.
     pub(super) when: Vec<Condition>,
     pub(super) after: Nanos,

@@ -26,7 +26,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{BusError, Port, Stepped};
 use tickbus_image::TickEnd;
 use tickbus_image::signal::{Signal, Slot};
-use tickbus_record::{Columns, FileClaim, Recording, RecordingError, Tick, ValueKind};
+use tickbus_record::{Columns, FileClaim, Recording, RecordingError, Tape, ValueKind};
 
 /// The most missing signals that an error message names.
 const NAMED: usize = 5;
@@ -69,16 +69,9 @@ struct Map {
 
 /// A recording as the other end of a stepped bus.
 pub(super) struct Replay {
-    recording: Recording,
+    tape: Tape,
     map: Map,
     stations: Vec<Station>,
-    /// The next recorded tick, if there is one.
-    next: Tick,
-    more: bool,
-    /// The reason why there is no next tick, if the recording is damaged.
-    broken: Option<RecordingError>,
-    /// The last replayed tick.
-    present: Tick,
     /// This driver's slots with the recorded values.
     slots: Vec<Slot>,
     /// True if a recorded tick fell on the current tick.
@@ -87,8 +80,6 @@ pub(super) struct Replay {
     sent: Option<Nanos>,
     /// True if the current tick has not been compared yet.
     uncompared: bool,
-    /// Simulation time at the start of the replay, minus the recording's time.
-    offset: Option<Nanos>,
     max_age: Nanos,
     differences: Differences,
     scan_counters: Arc<ReplayCounters>,
@@ -107,7 +98,7 @@ impl Replay {
         path: &Path,
     ) -> Result<(Self, Arc<ReplayCounters>), DriverError> {
         let place = FileClaim::to_replay(path)?;
-        let mut recording = Recording::open(path, Some(&config.table))?;
+        let recording = Recording::open(path, Some(&config.table))?;
         let map = Map::new(config, recording.columns()).map_err(|what| {
             RecordingError::of_file(
                 path,
@@ -129,8 +120,7 @@ impl Replay {
                 unknown.join(", ")
             );
         }
-        let mut next = Tick::new(recording.columns());
-        let more = recording.next(&mut next)?;
+        let tape = Tape::start(recording)?;
         let scan_counters = Arc::new(ReplayCounters {
             file: path.display().to_string(),
             unknown: unknown.len() as u64,
@@ -143,45 +133,29 @@ impl Replay {
         let stations = Station::all(config, &map.edges);
         let replay = Self {
             stations,
-            present: next.clone(),
-            next,
-            more,
-            broken: None,
+            tape,
             slots,
             is_new: false,
             sent: None,
             uncompared: false,
-            offset: None,
             max_age: config.timing.max_age,
             differences: Differences::new(path),
             scan_counters: Arc::clone(&scan_counters),
-            recording,
             map,
             _place: place,
         };
         Ok((replay, scan_counters))
     }
 
-    /// Returns the time when the next recorded tick is due, if there is one.
-    fn due(&self, now: Nanos) -> Option<Nanos> {
-        let offset = self.offset.unwrap_or(now - self.next.time);
-        self.more.then(|| self.next.time + offset)
-    }
-
-    /// Applies the next recorded tick, and reads the one after it.
+    /// Applies the recorded tick that was just taken.
     fn advance(&mut self) {
-        self.present.clone_from(&self.next);
-        self.more = self.recording.next(&mut self.next).unwrap_or_else(|error| {
-            // The ticks before the damaged one are valid.
-            self.broken = Some(error);
-            false
-        });
+        let present = self.tape.present();
         for (index, station) in self.stations.iter_mut().enumerate() {
             let status = match self.map.stations[index] {
-                Some(column) => self.present.stations[column],
-                None => self.present.status,
+                Some(column) => present.stations[column],
+                None => present.status,
             };
-            station.advance(status, &self.present, &self.slots, &self.map.signals);
+            station.advance(status, present, &self.slots, &self.map.signals);
         }
         self.take_values();
         self.scan_counters.ticks.fetch_add(1, Ordering::Relaxed);
@@ -191,7 +165,7 @@ impl Replay {
     fn take_values(&mut self) {
         for (slot, column) in self.slots.iter_mut().zip(&self.map.signals) {
             if let Some(column) = column {
-                *slot = self.present.values[*column];
+                *slot = self.tape.present().values[*column];
             }
         }
     }
@@ -255,7 +229,11 @@ impl Replay {
         self.uncompared = false;
         self.differences.compared();
         self.scan_counters.compared.fetch_add(1, Ordering::Relaxed);
-        let (map, tick, list) = (&self.map.signals, &self.present, &mut self.differences);
+        let (map, tick, list) = (
+            &self.map.signals,
+            self.tape.present(),
+            &mut self.differences,
+        );
         let mut found = 0;
         for station in &mut self.stations {
             station.compare(now, &self.slots, |signal, kind, name, expected, seen| {
@@ -296,17 +274,16 @@ impl Stepped for Replay {
     fn receive(&mut self, now: Nanos, port: &mut Port) -> Result<Nanos, BusError> {
         self.is_new = false;
         self.stations.iter_mut().for_each(Station::begin);
-        if self.offset.is_some() {
+        if self.tape.has_begun() {
             // The previous tick may have shaped the levels.
             self.take_values();
         }
-        while let Some(due) = self.due(now).filter(|due| *due <= now) {
-            self.offset.get_or_insert(due - self.next.time);
+        while self.tape.take(now) {
             self.advance();
             self.is_new = true;
         }
         // The peer was also alive between two recorded ticks.
-        if self.is_new || self.more {
+        if self.is_new || self.tape.has_more() {
             self.deliver(now, port);
         }
         for station in &mut self.stations {
@@ -317,24 +294,28 @@ impl Stepped for Replay {
             port.running("the recording is replayed");
             self.uncompared = true;
             self.compare(now);
-            if self.present.status < 0 {
+            let present = self.tape.present();
+            if present.status < 0 {
                 return Err(BusError::Link(format!(
                     "tick {} failed when it was recorded, too",
-                    self.present.number
+                    present.number
                 )));
             }
         }
-        if let Some(due) = self.due(now) {
+        if let Some(due) = self.tape.due(now) {
             return Ok(due.max(now));
         }
-        match &self.broken {
+        match self.tape.broken() {
             Some(_) if taken => return Ok(now),
             Some(broken) => return Err(BusError::Protocol(broken.to_string())),
             None => {}
         }
         if !self.scan_counters.ended.swap(true, Ordering::Relaxed) {
-            let last = self.present.number;
-            let why = format!("tick {last} was its last, {}", self.recording.ending());
+            let last = self.tape.present().number;
+            let why = format!(
+                "tick {last} was its last, {}",
+                self.tape.recording().ending()
+            );
             port.lost(&BusError::Left(why), "nothing follows");
         }
         Ok(now)

@@ -1,6 +1,8 @@
 //! The contents of a recording for every tick.
 
+use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::shown;
 use tickbus_image::signal::{Address, DataType, Signal, SignalTable, Slot};
 
 /// The type of a column's values, in a slot and in the file.
@@ -119,6 +121,41 @@ impl Columns {
             columns: signals
                 .chain(counted.map(|(signal, _)| column(signal, true)))
                 .collect(),
+        }
+    }
+
+    /// The index of the column of `signal`, if there is one of its name.
+    ///
+    /// # Errors
+    ///
+    /// That column is of another kind, direction or unit.
+    pub fn of_signal(&self, signal: &Signal) -> Result<Option<usize>, Mistake> {
+        let Some(index) = self.position(&signal.name, false) else {
+            return Ok(None);
+        };
+        let column = &self.columns[index];
+        let name = shown(&signal.name);
+        let moved = column.address.is_some_and(|was| was.area != signal.area);
+        if moved || column.kind != ValueKind::of(signal.data_type, signal.scale.is_some()) {
+            return Err(Mistake::new(
+                format!(
+                    "\"{name}\" ({} {}) is another signal in this recording",
+                    signal.address(),
+                    signal.data_type
+                ),
+                "use a recording of a driver with this signal table",
+            ));
+        }
+        match (&column.unit, &signal.unit) {
+            (Some(was), Some(unit)) if was != unit => Err(Mistake::new(
+                format!(
+                    "\"{name}\" is in {} in this recording, and in {} in the driver.cfg",
+                    shown(was),
+                    shown(unit)
+                ),
+                "give it the same unit and scale, or use another recording",
+            )),
+            _ => Ok(Some(index)),
         }
     }
 

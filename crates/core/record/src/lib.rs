@@ -13,6 +13,7 @@ mod reading;
 mod recorder;
 mod rows;
 mod sink;
+mod tape;
 mod vcd;
 
 #[cfg(all(test, not(loom)))]
@@ -30,6 +31,7 @@ pub use places::FileClaim;
 pub use reading::{Recording, RecordingError};
 pub use recorder::{Recorder, RecorderCounters, RecorderError};
 pub use rows::Rows;
+pub use tape::Tape;
 
 /// The version of the layout of these files; they state it at the beginning.
 const VERSION: u32 = 1;

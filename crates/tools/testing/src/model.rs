@@ -14,7 +14,7 @@ use tickbus_report::{DEFAULT_BUDGET, Run, SignalKind};
 use super::machine::Stub;
 use super::model_faults::ModelFaults;
 use super::plant::Plant;
-use super::playback::{column, kind};
+use super::playback::kind;
 use super::sections::Reader;
 use super::suite::load_config;
 use super::test::Rule;
@@ -81,7 +81,7 @@ impl Model {
         let mut recording = Recording::open(path, Some(table))?;
         let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
         for (index, signal) in table.signals.iter().enumerate() {
-            let found = column(&recording, signal)
+            let found = recording.columns().of_signal(signal)
                 .map_err(|mistake| RecordingError::of_file(path, mistake.what, mistake.right))?;
             match (found, signal.area) {
                 (None, _) => {}

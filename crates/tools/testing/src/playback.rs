@@ -6,7 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{nearest, shown};
 use tickbus_image::signal::{Area, Signal, SignalTable, Slot};
-use tickbus_record::{Recording, RecordingError, Tick, ValueKind};
+use tickbus_record::{Recording, RecordingError, Tape, ValueKind};
 
 use super::test::TextPosition;
 
@@ -38,7 +38,7 @@ impl MachineRecording {
         let mut sent = Vec::new();
         for (index, signal) in table.signals.iter().enumerate() {
             if signal.area == own
-                && let Some(column) = column(&recording, signal)?
+                && let Some(column) = recording.columns().of_signal(signal)?
             {
                 sent.push((column, index));
             }
@@ -61,7 +61,7 @@ impl MachineRecording {
     pub(super) fn compare(&mut self, index: usize, table: &SignalTable) -> Result<(), Mistake> {
         let signal = &table.signals[index];
         let recording = Recording::open(&self.file, Some(table)).map_err(|error| error.mistake)?;
-        let Some(column) = column(&recording, signal)? else {
+        let Some(column) = recording.columns().of_signal(signal)? else {
             let names = recording.columns().columns.iter();
             let near = nearest(&signal.name, names.map(|column| column.name.as_str()));
             let right = near.map_or_else(
@@ -83,28 +83,6 @@ impl MachineRecording {
     }
 }
 
-/// The column of a signal, if the recording has one of the same kind.
-pub(super) fn column(recording: &Recording, signal: &Signal) -> Result<Option<usize>, Mistake> {
-    let columns = recording.columns();
-    let Some(index) = columns.position(&signal.name, false) else {
-        return Ok(None);
-    };
-    let column = &columns.columns[index];
-    let moved = column.address.is_some_and(|was| was.area != signal.area);
-    if moved || column.kind != kind(signal) {
-        return Err(Mistake::new(
-            format!(
-                "\"{}\" ({} {}) is another signal in this recording",
-                shown(&signal.name),
-                signal.address(),
-                signal.data_type
-            ),
-            "use a recording of a driver with this signal table",
-        ));
-    }
-    Ok(Some(index))
-}
-
 pub(super) fn kind(signal: &Signal) -> ValueKind {
     ValueKind::of(signal.data_type, signal.scale.is_some())
 }
@@ -121,47 +99,34 @@ pub(super) struct Difference {
 /// A recording that is being played.
 #[derive(Debug)]
 pub(super) struct Playback<'a> {
-    tape: &'a MachineRecording,
-    recording: Recording,
-    next: Tick,
-    more: bool,
-    present: Tick,
+    of: &'a MachineRecording,
+    tape: Tape,
     /// True if a recorded tick was applied in this tick.
     taken: bool,
-    offset: Option<Nanos>,
 }
 
 impl<'a> Playback<'a> {
     pub(super) fn start(
-        tape: &'a MachineRecording,
+        of: &'a MachineRecording,
         table: &SignalTable,
     ) -> Result<Self, RecordingError> {
-        let mut recording = Recording::open(&tape.file, Some(table))?;
-        let mut next = Tick::new(recording.columns());
-        let more = recording.next(&mut next)?;
-        Ok(Self {
-            tape,
-            present: next.clone(),
-            recording,
-            next,
-            more,
-            taken: false,
-            offset: None,
-        })
+        let tape = Tape::start(Recording::open(&of.file, Some(table))?)?;
+        let taken = false;
+        Ok(Self { of, tape, taken })
     }
 
     /// One tick that ends at `now`: sets the sensors. The first call applies the first recorded tick.
     pub(super) fn step(&mut self, now: Nanos, slots: &mut [Slot]) -> Result<(), RecordingError> {
-        let offset = *self.offset.get_or_insert(now - self.next.time);
         self.taken = false;
-        while self.more && self.next.time + offset <= now {
-            self.present.clone_from(&self.next);
+        while self.tape.take(now) {
             self.taken = true;
-            self.more = self.recording.next(&mut self.next)?;
+        }
+        if let Some(broken) = self.tape.broken() {
+            return Err(broken.clone());
         }
         if self.taken {
-            for (column, signal) in &self.tape.sent {
-                slots[*signal] = self.present.values[*column];
+            for (column, signal) in &self.of.sent {
+                slots[*signal] = self.tape.present().values[*column];
             }
         }
         Ok(())
@@ -174,13 +139,13 @@ impl<'a> Playback<'a> {
         }
         let differs = |(column, signal): &&(usize, usize)| {
             let kept = kind(&signals[*signal]).kept(slots[*signal]);
-            kept != self.present.values[*column]
+            kept != self.tape.present().values[*column]
         };
-        let (column, signal) = self.tape.compared.iter().find(differs)?;
+        let (column, signal) = self.of.compared.iter().find(differs)?;
         Some(Difference {
             signal: *signal,
-            expected: self.present.values[*column],
-            tick: self.present.number,
+            expected: self.tape.present().values[*column],
+            tick: self.tape.present().number,
         })
     }
 }

@@ -7,6 +7,7 @@ use crate::bus_handle::{BusHandle, SteppedBus};
 use crate::{Driver, Exchange};
 use tickbus_base::time::Manual;
 use tickbus_fieldbus::PlcState;
+use tickbus_record::Tick;
 
 /// The number of ticks in a run.
 const TICKS: usize = 1_500;

@@ -59,7 +59,7 @@ pub(super) struct Hosting {
 
 impl Hosting {
     /// Prints lines while the program runs: on stdout, or with `--json` on stderr.
-    fn say(&self, text: &str) -> io::Result<()> {
+    pub(super) fn say(&self, text: &str) -> io::Result<()> {
         let mut out: Box<dyn io::Write> = if self.format.is_json() {
             Box::new(io::stderr().lock())
         } else {

@@ -28,6 +28,7 @@ mod lab;
 mod logo;
 mod man;
 mod mirror;
+mod play;
 mod plc;
 mod plugin_helper;
 mod profibus;
@@ -77,6 +78,7 @@ enum Command {
     Logo(logo::Arguments),
     Man(man::Arguments),
     Mirror(mirror::Arguments),
+    Play(play::Arguments),
     Plc(plc::Arguments),
     Profibus(profibus::Arguments),
     Report(report::Arguments),
@@ -157,6 +159,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Logo(arguments) => logo::run(&arguments),
         Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
+        Command::Play(arguments) => play::run(&arguments, kinds),
         Command::Plc(arguments) => plc::run(&arguments, kinds),
         Command::Profibus(arguments) => profibus::run(&arguments, kinds),
         Command::Report(arguments) => report::run(&arguments),

@@ -22,6 +22,7 @@ mod logo;
 mod loopback;
 mod own_program;
 mod peeler;
+mod play;
 mod record;
 mod report;
 mod sessions;

@@ -66,10 +66,9 @@ impl Host {
             mistake: Mistake::new(what, right),
         };
         check_fit(config, &mut *program, config.role)?;
-        if config.table.stations.len() > 1 && !(config.faults.is_empty() && config.record.is_none())
-        {
+        if config.table.stations.len() > 1 && !config.faults.is_empty() {
             return Err(unfit(
-                "a program behind several stations can neither be recorded nor have faults injected",
+                "a program behind several stations can have no faults injected",
                 "use one driver.cfg per station for that",
             ));
         }

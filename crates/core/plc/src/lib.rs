@@ -66,8 +66,10 @@ pub trait Program: Send {
     /// How many bytes of `%Q` the program writes; 0 if it uses the whole area.
     fn output_bytes(&self) -> usize;
 
-    /// A further instance for another station of the driver; `None` if the program serves a single station.
-    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+    /// A further instance for the station of the driver with this index, from 1; `None` if the program serves a single
+    /// station.
+    fn for_another_station(&self, station: usize) -> Option<Box<dyn Program>> {
+        let _ = station;
         None
     }
 

@@ -45,7 +45,7 @@ impl Program for Mirror {
         0
     }
 
-    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+    fn for_another_station(&self, _station: usize) -> Option<Box<dyn Program>> {
         Some(Box::new(*self))
     }
 

@@ -152,7 +152,7 @@ mod tests {
             1
         }
 
-        fn for_another_station(&self) -> Option<Box<dyn Program>> {
+        fn for_another_station(&self, _station: usize) -> Option<Box<dyn Program>> {
             Some(Box::new(Self(Arc::clone(&self.0))))
         }
 

@@ -18,7 +18,7 @@ pub(crate) fn check_fit(
         mistake: Mistake::new(what, right),
     };
     let stations = &config.table.stations;
-    if stations.len() > 1 && program.for_another_station().is_none() {
+    if stations.len() > 1 && program.for_another_station(1).is_none() {
         return Err(refused(
             format!(
                 "the PLC program \"{name}\" serves one station, but this driver has {}",

@@ -222,8 +222,10 @@ impl OwnEnd {
         }
         if let Some(recorder) = &mut self.recorder {
             let TickTime { time, tick } = self.moment;
-            let none = std::iter::empty();
-            recorder.record(tick, time, code.code(), none, &self.slots);
+            // A recording of one station has no status of its own for it.
+            let codes = units.iter().filter(|_| units.len() > 1);
+            let codes = codes.map(|unit| unit.code().code());
+            recorder.record(tick, time, code.code(), codes, &self.slots);
         }
     }
 

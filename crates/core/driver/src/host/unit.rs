@@ -204,7 +204,7 @@ pub(super) fn units(
     scan_counters: &ScanCounters,
 ) -> Vec<Unit> {
     let others = (1..config.table.stations.len())
-        .filter_map(|station| Some((program.for_another_station()?, station)))
+        .filter_map(|station| Some((program.for_another_station(station)?, station)))
         .collect::<Vec<_>>();
     std::iter::once((program, 0))
         .chain(others)

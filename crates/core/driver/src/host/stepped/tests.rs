@@ -29,7 +29,7 @@ impl Program for Witness {
         0
     }
 
-    fn for_another_station(&self) -> Option<Box<dyn Program>> {
+    fn for_another_station(&self, _station: usize) -> Option<Box<dyn Program>> {
         Some(Box::new(Self { scans: 0 }))
     }
 

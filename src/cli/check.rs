@@ -12,7 +12,7 @@ use super::json::{Format, print_document};
 use super::{Outcome, print};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
-use tickbus_driver_cfg::{Config, Kinds, Options, Timing};
+use tickbus_driver_cfg::{Config, Kinds, Timing};
 use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::{
     Area, ByteOrder, DataType, Latch, Scale, Signal, SignalTable, Station, Width,
@@ -42,8 +42,9 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
 /// Returns the complete report on a valid driver.cfg.
 fn report(config: &Config) -> String {
     let mut out = String::new();
-    let stations = &config.table.stations;
-    let taken = words_of_values(&config.table.signals);
+    let table = config.table.as_in_plc();
+    let stations = &table.stations;
+    let taken = words_of_values(&table.signals);
     let mut line = |head: &str, text: &str| {
         writeln!(out, "{head:9} {text}").expect("a String takes all");
     };
@@ -116,8 +117,8 @@ fn report(config: &Config) -> String {
         out.push_str(&aligned(&axes::HEADINGS, &rows.collect::<Vec<_>>()));
         out.push('\n');
     }
-    let signals = config.table.signals.iter();
-    let rows = signals.map(|signal| row(signal, &config.table, &taken, &config.bus).to_vec());
+    let signals = table.signals.iter();
+    let rows = signals.map(|signal| row(signal, &table, &taken, config).to_vec());
     let rows: Vec<Vec<String>> = rows.collect();
     if rows.is_empty() {
         out.push_str("no signals\n");
@@ -145,12 +146,13 @@ fn role(config: &Config) -> &'static str {
     match config.role {
         Role::Device => "device: the machine, which writes %I and reads %Q",
         Role::Controller => "controller: the PLC, which reads %I and writes %Q",
+        Role::Observer => "observer: reads %I and %Q, and writes nothing",
     }
 }
 
 fn bus(config: &Config) -> String {
     let mut parts = vec![config.bus.kind().to_owned()];
-    parts.extend(config.bus.summary(config.role, &config.table));
+    parts.extend(config.bus.summary(config.role, &config.table.as_in_plc()));
     if config.events == Events::Writes {
         parts.extend(config.bus.summary_of_writes().map(str::to_owned));
     }
@@ -243,7 +245,7 @@ fn row(
     signal: &Signal,
     table: &SignalTable,
     taken: &HashSet<WordKey>,
-    bus: &Options,
+    config: &Config,
 ) -> [String; HEADINGS.len()] {
     let stations = &table.stations;
     let station = &stations[signal.station];
@@ -255,16 +257,18 @@ fn row(
         },
         signal.address().to_string(),
         bit_of_word(signal, station, taken),
-        bus.place(signal, table),
+        config.bus.place(signal, table),
         signal.data_type.to_string(),
         if signal.order == ByteOrder::Abcd {
             String::new()
         } else {
             signal.order.to_string()
         },
-        match signal.area {
-            Area::Input => "simulation → PLC input",
-            Area::Output => "PLC output → simulation",
+        match (signal.area, config.role) {
+            (Area::Input, Role::Observer) => "PLC input → observer",
+            (Area::Output, Role::Observer) => "PLC output → observer",
+            (Area::Input, _) => "simulation → PLC input",
+            (Area::Output, _) => "PLC output → simulation",
         }
         .to_owned(),
         latch(signal),

@@ -152,9 +152,11 @@ fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
     {
         return Err(format.refuse(title, &mistakes));
     }
-    // The [record] table belongs to the simulation, which may run at the other end of the same line.
+    // The [record] table belongs to the simulation, which may run at the other end of the same line. An observer has
+    // its own.
+    let own = (config.record.take()).filter(|_| job.role == Role::Observer);
     config.record = match arguments.record.as_deref().map(recording).transpose() {
-        Ok(record) => record,
+        Ok(record) => record.or(own),
         Err(error) => {
             return Err(format.fail(title, &format!("--record: {error}"), Outcome::WrongInput));
         }

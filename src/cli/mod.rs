@@ -28,6 +28,7 @@ mod lab;
 mod logo;
 mod man;
 mod mirror;
+mod observe;
 mod play;
 mod plc;
 mod plugin_helper;
@@ -78,6 +79,7 @@ enum Command {
     Logo(logo::Arguments),
     Man(man::Arguments),
     Mirror(mirror::Arguments),
+    Observe(observe::Arguments),
     Play(play::Arguments),
     Plc(plc::Arguments),
     Profibus(profibus::Arguments),
@@ -159,6 +161,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Logo(arguments) => logo::run(&arguments),
         Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),
+        Command::Observe(arguments) => observe::run(&arguments, kinds),
         Command::Play(arguments) => play::run(&arguments, kinds),
         Command::Plc(arguments) => plc::run(&arguments, kinds),
         Command::Profibus(arguments) => profibus::run(&arguments, kinds),

@@ -221,11 +221,17 @@ fn configured(arguments: &Arguments, kinds: &'static Kinds) -> Result<Config, Re
     let mut config = match arguments.role {
         FmuRole::Machine => {
             let config = Config::load(&arguments.config, kinds).map_err(wrong)?;
-            if config.role == Role::Controller {
-                return Err(wrong(format!(
-                    "{}: role = \"controller\" is the PLC's end; remove it, or run the FMU with --role plc",
-                    arguments.config.display()
-                )));
+            let other = match config.role {
+                Role::Device => None,
+                Role::Controller => Some(
+                    "role = \"controller\" is the PLC's end; remove it, or run the FMU with --role plc",
+                ),
+                Role::Observer => Some(
+                    "role = \"observer\" only looks at a PLC; run the FMU with the machine's driver.cfg",
+                ),
+            };
+            if let Some(why) = other {
+                return Err(wrong(format!("{}: {why}", arguments.config.display())));
             }
             config
         }

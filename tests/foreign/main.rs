@@ -16,6 +16,7 @@ mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
 mod modbus;
+mod observer;
 #[cfg(feature = "opcua")]
 mod opcua;
 #[cfg(feature = "page")]
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),
         ("modbus", modbus::TESTS),
+        ("observer", observer::TESTS),
         #[cfg(feature = "mqtt")]
         ("bridge", bridge::TESTS),
         #[cfg(feature = "page")]

@@ -47,6 +47,7 @@ fn table(signals: Vec<Signal>, bytes: usize) -> SignalTable {
         name: String::new(),
         input_bytes: bytes,
         output_bytes: bytes,
+        observed_bytes: 0,
     };
     SignalTable {
         stations: vec![station; 2],
@@ -590,6 +591,7 @@ fn placed(stretches: &[Stretch], scales: &[Scale]) -> SignalTable {
         name: format!("station {station}"),
         input_bytes: bytes(station, 0),
         output_bytes: bytes(station, 1),
+        observed_bytes: 0,
     };
     SignalTable {
         stations: vec![station(0), station(1)],

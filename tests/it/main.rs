@@ -20,6 +20,7 @@ mod import;
 mod installed;
 mod logo;
 mod loopback;
+mod observer;
 mod own_program;
 mod peeler;
 mod play;

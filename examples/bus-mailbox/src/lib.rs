@@ -27,7 +27,7 @@ pub struct Mailbox {
 impl Mailbox {
     fn new(folder: &Path, role: Role, cycle: Nanos) -> Self {
         let (writes, reads) = match role {
-            Role::Device => ("inputs", "outputs"),
+            Role::Device | Role::Observer => ("inputs", "outputs"),
             Role::Controller => ("outputs", "inputs"),
         };
         Self {

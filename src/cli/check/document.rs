@@ -9,11 +9,11 @@ use tickbus_axis::{Axis, Field};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{Events, Outputs};
-use tickbus_image::signal::{Area, DataType, Signal};
+use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 use tickbus_record::When;
 
 pub(super) fn document(config: &Config) -> Value {
-    let table = &config.table;
+    let table = &config.table.as_in_plc();
     let name = |signal: usize| &table.signals[signal].name;
     let taken = words_of_values(&table.signals);
     let signals = table.signals.iter();
@@ -35,7 +35,7 @@ pub(super) fn document(config: &Config) -> Value {
     });
     let watches = config
         .life_signs
-        .watches(table, config.role, config.timing.max_age);
+        .watches(&config.table, config.role, config.timing.max_age);
     let watches = watches
         .iter()
         .map(|watch| json!({ "signal": watch.name, "within_ns": watch.within.0 }));
@@ -57,7 +57,7 @@ pub(super) fn document(config: &Config) -> Value {
         "stations": stations.collect::<Value>(),
         "faults": faults.collect::<Value>(),
         "axes": config.axes.iter().map(axis).collect::<Value>(),
-        "signals": signals.map(|signal| row(signal, config, &taken)).collect::<Value>(),
+        "signals": signals.map(|signal| row((signal, table), config, &taken)).collect::<Value>(),
     })
 }
 
@@ -70,7 +70,7 @@ fn bus(config: &Config) -> Value {
     let details = details.map(|(head, text)| json!({ "head": head, "text": text }));
     json!({
         "kind": bus.kind(),
-        "summary": bus.summary(config.role, table),
+        "summary": bus.summary(config.role, &table.as_in_plc()),
         "events": match config.events {
             Events::None => json!(false),
             Events::Changes => json!(true),
@@ -127,15 +127,19 @@ fn axis(axis: &Axis) -> Value {
 }
 
 /// Returns one signal. A text that would be empty is null.
-fn row(signal: &Signal, config: &Config, taken: &HashSet<WordKey>) -> Value {
-    let station = &config.table.stations[signal.station];
+fn row(
+    (signal, table): (&Signal, &SignalTable),
+    config: &Config,
+    taken: &HashSet<WordKey>,
+) -> Value {
+    let station = &table.stations[signal.station];
     let some = |text: String| (!text.is_empty()).then_some(text);
     json!({
         "name": signal.name,
         "station": some(station.name.clone()),
         "address": signal.address().to_string(),
         "in_word": some(bit_of_word(signal, station, taken)),
-        "place": some(config.bus.place(signal, &config.table)),
+        "place": some(config.bus.place(signal, table)),
         "type": signal.data_type.name(),
         "order": signal.order.name(),
         "area": match signal.area { Area::Input => "input", Area::Output => "output" },

@@ -55,7 +55,7 @@ struct Wire {
 impl Free for Wire {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         let (own, peers) = match self.role {
-            Role::Device => (0, 1),
+            Role::Device | Role::Observer => (0, 1),
             Role::Controller => (1, 0),
         };
         port.opening("waiting for the other end");

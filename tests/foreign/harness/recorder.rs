@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::Duration;
 
-use tickbus::fieldbus::Role;
-use tickbus::signal::{Area, Slot};
+use tickbus::signal::Slot;
 
 use super::machine::Machine;
 use super::pcap::{From, Heard, listen_before};
@@ -55,10 +54,7 @@ impl Recorder {
         machine: &Machine,
     ) -> (Self, SocketAddr) {
         let config = machine.driver.config();
-        let own = match config.role {
-            Role::Device => Area::Input,
-            Role::Controller => Area::Output,
-        };
+        let (own, _) = config.role.areas();
         let signals = config
             .table
             .signals

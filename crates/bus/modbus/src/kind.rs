@@ -58,6 +58,7 @@ impl BusOptions for ServerOptions {
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "modbus-client";
+    const CAN_OBSERVE: bool = true;
     const KEYS: &'static [&'static [Key]] = &[keys::LINE, keys::CLIENT];
     const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
@@ -105,8 +106,8 @@ impl BusOptions for ClientOptions {
     }
 
     fn place(&self, signal: &Signal, table: &SignalTable) -> String {
-        let station = &table.stations[signal.station];
-        self.place(signal, station.bytes(signal.area))
+        let (station, signal) = (&table.stations[signal.station], signal.as_in_plc());
+        self.place(&signal, station.plc_bytes(signal.area))
     }
 
     fn requests(&self, table: &SignalTable) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! Descriptions of the line and of signals' places for people, in both notations.
 
-use tickbus_fieldbus::Role;
+use tickbus_fieldbus::{OBSERVES, Role};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable};
 
 use super::{Block, ClientOptions, ElementAddress, Request, ServerOptions, Side, Table};
@@ -60,17 +60,19 @@ impl ServerOptions {
 impl ClientOptions {
     /// Describes the line, for the end with `role`, given the signal table.
     pub fn shown(&self, role: Role, table: &SignalTable) -> Vec<String> {
-        let (writes, reads) = role.areas();
+        let (own, others) = role.areas();
         let mut parts = vec![format!("asks {}", self.line)];
         parts.extend(self.stations.shown(Some(self.unit(0))));
-        parts.extend([(reads, "reads"), (writes, "writes")].map(|(area, does)| {
+        parts.extend([others, own].map(|area| {
+            let does = if role.writes(area) { "writes" } else { "reads" };
             if !self.lies_as_a_whole(area, table) {
                 return format!("{does} {area} where [fieldbus.at] says");
             }
             let places: Vec<String> = self.places(area).map(|place| place.to_string()).collect();
             let places = places.join(" and from ");
-            let elsewhere =
-                |signal: &Signal| signal.area == area && self.at.contains_key(&signal.name);
+            let elsewhere = |signal: &Signal| {
+                signal.plc_address().area == area && self.at.contains_key(&signal.name)
+            };
             if table.signals.iter().any(elsewhere) {
                 format!("{does} {area} where [fieldbus.at] says, the rest from {places} on")
             } else {
@@ -84,6 +86,10 @@ impl ClientOptions {
             }
             None => "answers within 1s".to_owned(),
         });
+        if role == Role::Observer {
+            parts.push(OBSERVES.to_owned());
+            return parts;
+        }
         if !self.combine {
             parts.push("never writes and reads in one request".to_owned());
         }

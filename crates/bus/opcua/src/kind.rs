@@ -10,6 +10,7 @@ use super::{ClientOptions, ServerOptions, keys, options, security};
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "opcua-client";
+    const CAN_OBSERVE: bool = true;
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT, security::KEYS];
 
     fn read(_role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
@@ -18,8 +19,8 @@ impl BusKind for ClientOptions {
 }
 
 impl BusOptions for ClientOptions {
-    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
-        self.summary()
+    fn summary(&self, role: Role, _table: &SignalTable) -> Vec<String> {
+        self.summary(role)
     }
 
     fn files(&self) -> Vec<NamedFile> {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, HashMap};
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
-use tickbus_fieldbus::At;
 use tickbus_fieldbus::tcp::Writers;
+use tickbus_fieldbus::{At, OBSERVES, Role};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 use tickbus_net::{Address, Host};
 
@@ -152,7 +152,7 @@ impl ClientOptions {
 
 impl ClientOptions {
     /// The options as text for people.
-    pub fn summary(&self) -> Vec<String> {
+    pub fn summary(&self, role: Role) -> Vec<String> {
         let mut parts = vec![format!("connects to {}", self.url)];
         parts.push(protection(&[self.security], self.credentials.mode));
         parts.push(match &self.credentials.login {
@@ -165,6 +165,7 @@ impl ClientOptions {
             others => format!("nodes {pattern} but for {others}"),
         });
         parts.push(match &self.write_to {
+            _ if role == Role::Observer => OBSERVES.to_owned(),
             Some(identity) => format!("writes into \"{}\" alone", shown(identity)),
             None => "writes nothing".to_owned(),
         });

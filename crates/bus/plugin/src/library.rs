@@ -93,7 +93,7 @@ impl Library {
         let config = abi::Config {
             size: abi::size_of::<abi::Config>(),
             role: match setup.role {
-                Role::Device => abi::ROLE_DEVICE,
+                Role::Device | Role::Observer => abi::ROLE_DEVICE,
                 Role::Controller => abi::ROLE_CONTROLLER,
             },
             name: texts.name.as_ptr(),

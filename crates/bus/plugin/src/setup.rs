@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use super::Options;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{BusSetup, CYCLE, Cycles, Role};
-use tickbus_image::signal::Area;
 
 /// The smallest default time-out of an exchange.
 const LEAST_TIMEOUT: Nanos = Nanos::from_millis(10);
@@ -54,14 +53,12 @@ pub struct Setup {
 enum Sent {
     Device,
     Controller,
+    Observer,
 }
 
 impl Setup {
     pub(super) fn new(options: &Options, library: PathBuf, line: &BusSetup<'_>) -> Self {
-        let (tx, rx) = match line.role {
-            Role::Device => (Area::Input, Area::Output),
-            Role::Controller => (Area::Output, Area::Input),
-        };
+        let (tx, rx) = line.role.areas();
         let size = |bytes: usize| u32::try_from(bytes).expect("an image is far below 4 GiB");
         let stations = line.table.stations.iter();
         let stations = stations.map(|station| Station {

@@ -4,7 +4,9 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
 use tickbus_fieldbus::tcp::Writers;
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OpenError, Role};
+use tickbus_fieldbus::{
+    At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OBSERVES, OpenError, Role,
+};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::{ClientOptions, S7Client, S7Server, ServerOptions, keys};
@@ -60,6 +62,7 @@ impl BusOptions for ServerOptions {
 
 impl BusKind for ClientOptions {
     const NAME: &'static str = "s7-client";
+    const CAN_OBSERVE: bool = true;
     const KEYS: &'static [&'static [Key]] = &[keys::CLIENT];
     const STATION_KEYS: &'static [Key] = keys::POLLED_STATION;
 
@@ -69,7 +72,7 @@ impl BusKind for ClientOptions {
 }
 
 impl BusOptions for ClientOptions {
-    fn summary(&self, _role: Role, _table: &SignalTable) -> Vec<String> {
+    fn summary(&self, role: Role, _table: &SignalTable) -> Vec<String> {
         let mut parts = vec![
             format!("connects to {}", self.address),
             format!("TSAP {}", self.called),
@@ -80,6 +83,7 @@ impl BusOptions for ClientOptions {
             }
         }
         parts.push(match &self.write_to {
+            _ if role == Role::Observer => OBSERVES.to_owned(),
             // Always one line; shown completely, because every character matters.
             Some(identity) => format!("writes into \"{identity}\" alone"),
             None => "writes nothing".to_owned(),

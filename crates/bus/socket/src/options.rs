@@ -230,7 +230,7 @@ fn check_port(address: &Address, tcp: TcpRole) -> Result<(), Mistake> {
 /// A machine listens for its PLC, like a PLC's I/O device.
 const fn default_tcp(role: Role) -> TcpRole {
     match role {
-        Role::Device => TcpRole::Listen,
+        Role::Device | Role::Observer => TcpRole::Listen,
         Role::Controller => TcpRole::Connect,
     }
 }

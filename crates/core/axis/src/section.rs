@@ -372,6 +372,7 @@ fn signal(axis: &Axis, field: Field, scales: Scales, band: Option<f64>) -> Signa
         fail_safe: scale.map_or_else(Slot::default, |scale| Slot::from_real(scale.offset)),
         dead_band: band.filter(|_| feedback).unwrap_or_default(),
         range: None,
+        in_plc: None,
     }
 }
 

@@ -2,8 +2,7 @@
 
 use tickbus_driver::{Driver, SlotMap};
 use tickbus_driver_cfg::Config;
-use tickbus_fieldbus::Role;
-use tickbus_image::signal::{Area, DataType, Slot};
+use tickbus_image::signal::{DataType, Slot};
 
 /// How a slot holds its value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,13 +50,10 @@ impl<'d> SignalDescription<'d> {
     /// The signal with this index of a driver that need not be open.
     pub fn in_config(config: &'d Config, slots: &SlotMap, index: usize) -> Self {
         let signal = &config.table.signals[index];
-        let written = match config.role {
-            Role::Device => Area::Input,
-            Role::Controller => Area::Output,
-        };
+        let (written, _) = config.role.areas();
         Self {
             name: &signal.name,
-            address: signal.address().to_string(),
+            address: signal.plc_address().to_string(),
             data_type: signal.data_type.name(),
             unit: signal.unit.as_deref().unwrap_or_default(),
             station: &config.table.stations[signal.station].name,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::driver_table::read_driver;
 use super::layout;
+use super::observer;
 use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
 use crate::{Kinds, Options, PageOptions};
@@ -123,6 +124,8 @@ impl Config {
     pub fn add_faults(&mut self, path: &Path) -> Result<(), Mistakes> {
         let text = load_text(path)?;
         let file = path.display().to_string();
+        let allowed = self.role.check_faults();
+        allowed.map_err(|mistake| Mistakes::of(&file, mistake))?;
         let more = faults::read_file(&file, &text, self.fault_scope())?;
         if self.faults.len() + more.len() > faults::LIMIT {
             let what = format!("there are {} faults", self.faults.len() + more.len());
@@ -181,15 +184,22 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let record = root.take("record");
     let page = root.take("page");
 
-    let driver = driver
-        .and_then(|value| value.table("[driver]", "write a [driver] table"))
-        .map(read_driver);
+    let driver = driver.and_then(|value| value.table("[driver]", "write a [driver] table"));
+    let fault_file = driver.as_ref().and_then(|table| {
+        let mut faults = table.all().filter(|(key, _)| *key == "faults");
+        faults.next().map(|(_, value)| value)
+    });
+    let driver = driver.map(read_driver);
     let addressing = driver
         .as_ref()
         .map_or(Addressing::Bytes, |driver| driver.addressing);
     let mut fieldbus = fieldbus
         .and_then(|value| value.table("[fieldbus]", "write a [fieldbus] table"))
         .map(|table| read_fieldbus(table, given));
+    let role = fieldbus.as_ref().map(|fieldbus| fieldbus.role);
+    let observes = role == Some(Role::Observer);
+    // A file of both ends may have keys about values that they write. The command that observes ignores them.
+    let is_observers = observes && fieldbus.as_ref().is_some_and(|it| !it.is_for_both);
     let replayed = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     let replayed = replayed.and_then(Options::replayed);
     let record = record.map(|value| {
@@ -204,6 +214,14 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let axes = axes
         .map(|value| value.tables("[[axis]]"))
         .unwrap_or_default();
+    if is_observers {
+        for table in declared.iter().flatten() {
+            observer::refuse_keys(table, observer::OF_LINE);
+        }
+        for table in &signals {
+            observer::refuse_keys(table, observer::OF_SIGNAL);
+        }
+    }
     for (tables, limit, what) in [
         (&signals, layout::SIGNAL_LIMIT, "signals"),
         (&axes, layout::AXIS_LIMIT, "axes"),
@@ -231,14 +249,18 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     {
         bus.place_signals(&At::read(at, table), table);
     }
-    let life_signs = match (&fieldbus, &table) {
-        (Some(fieldbus), Some(table)) => fieldbus.read_life_signs(table),
-        _ => LifeSigns::default(),
-    };
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     if let (Some(bus), Some(table)) = (bus, &table) {
         bus.fit(table, root.collector());
     }
+    let observed = table.as_ref().filter(|_| observes).cloned();
+    let observed = observed.map(SignalTable::observed);
+    // An observer reads both areas, and each of its signals can be a life sign.
+    let seen = observed.as_ref().filter(|_| is_observers);
+    let life_signs = match (&fieldbus, seen.or(table.as_ref())) {
+        (Some(fieldbus), Some(table)) => fieldbus.read_life_signs(table),
+        _ => LifeSigns::default(),
+    };
     let empty = |station: &Station| station.input_bytes + station.output_bytes == 0;
     if table
         .as_ref()
@@ -250,6 +272,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         );
     }
     root.finish();
+    let table = observed.or(table);
     if let Some(table) = &table {
         axis::resolve(&mut axes, table);
     }
@@ -259,14 +282,20 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         // Mistakes in the bus table have been reported already.
         has_diagnosis: bus.is_none_or(|bus| bus.has_diagnosis()),
     });
+    if is_observers {
+        for value in faults.iter().chain(&fault_file) {
+            observer::refuse_faults(value);
+        }
+    }
     let faults = faults
+        .filter(|_| !is_observers)
         .map(|value| faults::read_sections(value.tables("[[fault]]"), scope))
         .unwrap_or_default();
 
     let (driver, fieldbus) = (driver?, fieldbus?);
     // In a file that serves both ends, the faults belong to the machine: injected at both ends, they would happen
     // twice.
-    let is_other_end = fieldbus.is_for_both && fieldbus.role == Role::Controller;
+    let is_other_end = fieldbus.is_for_both && fieldbus.role != Role::Device;
     let (faults, fault_file) = if is_other_end {
         (Vec::new(), None)
     } else {
@@ -289,7 +318,8 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         faults,
         fault_file,
         record: match record {
-            Some(record) => Some(record?),
+            // That of a file of both ends is the simulation's.
+            Some(record) => Some(record?).filter(|_| !observes || is_observers),
             None => None,
         },
         page: match page {
@@ -346,6 +376,9 @@ fn read_fieldbus(mut table: Table<'_>, (asked, kinds): Given) -> FieldbusTable<'
         );
     }
     let role = stated.or(asked.map(|asked| asked.role)).unwrap_or_default();
+    if stated == Some(Role::Observer) {
+        observer::refuse_keys(&table, observer::OF_LINE);
+    }
     let read = if let Some(kind) = kind {
         let moved = asked.is_some_and(|asked| asked.moved);
         // A loopback in a separate process is reported below; a role that only the command gave must cause no other

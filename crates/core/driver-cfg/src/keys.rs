@@ -12,7 +12,11 @@ use crate::{driver_table, layout, page, timing};
 pub use crate::kind_keys::KindKeys;
 pub use crate::layout::STATION_LIMIT;
 
-const ROLES: [&str; Role::ALL.len()] = [Role::ALL[0].name(), Role::ALL[1].name()];
+const ROLES: [&str; Role::ALL.len()] = [
+    Role::ALL[0].name(),
+    Role::ALL[1].name(),
+    Role::ALL[2].name(),
+];
 
 /// The keys of `[fieldbus]` on every bus, beside `kind` and `events`, in groups.
 pub const FIELDBUS: &[&[Key]] = &[
@@ -20,7 +24,7 @@ pub const FIELDBUS: &[&[Key]] = &[
         Key::new(
             "role",
             Shape::Choice(&ROLES),
-            "\"device\": this end is the machine; \"controller\": this end is the PLC. A file without it serves both ends",
+            "\"device\": this end is the machine; \"controller\": this end is the PLC; \"observer\": this end only reads. A file without it serves both ends",
         ),
         Key::new(
             "at",

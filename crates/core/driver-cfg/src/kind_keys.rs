@@ -9,6 +9,8 @@ pub struct KindKeys {
     pub name: &'static str,
     /// True if `events` can be `"writes"`.
     pub learns_of_writes: bool,
+    /// True if `role` can be `"observer"`.
+    pub can_observe: bool,
     /// The keys in `[fieldbus]`, in groups.
     pub keys: &'static [&'static [Key]],
     /// Those of which a file has at least one; empty if it can be without all of them.

@@ -27,6 +27,7 @@ impl Kind {
             keys: KindKeys {
                 name: K::NAME,
                 learns_of_writes: K::LEARNS_OF_WRITES,
+                can_observe: K::CAN_OBSERVE,
                 keys: K::KEYS,
                 one_of: K::ONE_OF,
                 station_keys: K::STATION_KEYS,
@@ -160,6 +161,21 @@ impl Kinds {
                 return None;
             }
         };
+        let keys = self.keys();
+        if role == Role::Observer
+            && let Some(name) = name
+            && !keys
+                .iter()
+                .any(|kind| kind.name == name && kind.can_observe)
+        {
+            let can: Vec<&str> = (keys.iter().filter(|kind| kind.can_observe))
+                .map(|kind| kind.name)
+                .collect();
+            kind.wrong(
+                format!("nobody can observe on the bus \"{}\"", shown(name)),
+                format!("observe with one of {}", can.join(", ")),
+            );
+        }
         let events = table.take("events");
         table.finish();
         let events = events.map_or(Some(Events::None), |value| {

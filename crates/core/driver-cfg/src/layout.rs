@@ -137,6 +137,7 @@ pub(super) fn lay_out<'a>(
                 name: station.name.clone(),
                 input_bytes: bytes(Area::Input),
                 output_bytes: bytes(Area::Output),
+                observed_bytes: 0,
             }
         })
         .collect();

@@ -10,6 +10,7 @@ mod kind_keys;
 mod kinds;
 mod layout;
 pub mod loopback;
+mod observer;
 mod options;
 mod overlay;
 mod page;

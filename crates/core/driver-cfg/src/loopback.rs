@@ -93,6 +93,7 @@ const ONE_OF: [&str; 3] = ["program", "link", "replay"];
 pub(super) const KIND_KEYS: KindKeys = KindKeys {
     name: NAME,
     learns_of_writes: false,
+    can_observe: false,
     keys: &[KEYS],
     one_of: &ONE_OF,
     station_keys: &[],

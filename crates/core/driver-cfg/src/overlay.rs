@@ -68,8 +68,15 @@ fn read_fieldbus(
 ) -> Option<()> {
     if let Some(kind) = table.take("kind") {
         let collector = table.collector();
+        if config.role == Role::Observer {
+            kind.wrong(
+                "this driver.cfg is an observer's, which has no other end",
+                "take the machine's or the PLC's driver.cfg",
+            );
+            return None;
+        }
         let at = table.take("at");
-        let roles = Role::ALL.map(|role| (role.name(), role));
+        let roles = Role::ENDS.map(|role| (role.name(), role));
         let role = match table.take("role") {
             None => config.role,
             Some(value) => value.choice("roles", &roles)?,

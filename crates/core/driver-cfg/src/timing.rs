@@ -150,6 +150,10 @@ impl Timing {
         } else {
             Outputs::Hold
         };
+        if line.role == Role::Observer {
+            // The peer gets no values at all.
+            (self.watchdog, self.at_close) = (None, Outputs::Hold);
+        }
     }
 }
 

@@ -24,6 +24,7 @@ impl Driver {
 
     /// As [`inject`](Self::inject), while the model may still declare its faults.
     pub(super) fn inject_unchecked(&mut self, fault: &Fault) -> Result<u32, Mistake> {
+        self.config.role.check_faults()?;
         let slots = Slots {
             table: &self.config.table,
             writes: self.config.role.areas().0,

@@ -143,7 +143,7 @@ pub(super) fn swallowed_of(config: &Config, name: &str) -> SwallowedSignals {
         span: config.timing.cycle.or(config.bus.cycle()),
     };
     let own = match config.role {
-        Role::Device => "ticks",
+        Role::Device | Role::Observer => "ticks",
         Role::Controller => "scans",
     };
     let own = Steps {
@@ -192,7 +192,7 @@ pub(super) fn extras(config: &Config) -> Extras {
     // Reflexes belong to the machine: a PLC has its own.
     let reflexes = match config.role {
         Role::Device => Reflexes::new(&config.axes),
-        Role::Controller => None,
+        Role::Controller | Role::Observer => None,
     };
     Extras::new(reflexes, Beat::all(config, config.role))
 }

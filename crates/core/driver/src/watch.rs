@@ -195,6 +195,7 @@ impl Watch {
     }
 
     fn inject(&mut self, name: String, effect: Effect) -> Result<u32, Mistake> {
+        self.role().check_faults()?;
         let fault = Fault {
             name,
             effect,

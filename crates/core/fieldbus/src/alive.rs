@@ -182,7 +182,10 @@ impl<'a> Written<'a> {
             };
             signs.alive = each(value, "alive", RIGHT, read);
         }
-        if let Some(value) = &self.heartbeat {
+        // An observer's heartbeat is refused as a whole.
+        if let Some(value) = &self.heartbeat
+            && role != Role::Observer
+        {
             const RIGHT: &str = "write heartbeat = { signal = \"<name>\", every = \"100ms\" }, or a list of such tables";
             let read = |mut table: Table<'a>, taken: &mut Vec<usize>| {
                 let signal = table.require("signal", RIGHT);

@@ -215,6 +215,10 @@ pub trait BusKind: BusOptions + Sized {
     /// events](Events::Writes).
     const LEARNS_OF_WRITES: bool = false;
 
+    /// True if an end of this bus can be an [observer](Role::Observer): it then places a signal by its [address in the
+    /// PLC](Signal::plc_address).
+    const CAN_OBSERVE: bool = false;
+
     /// The keys that [`read`](Self::read) takes, in groups that kinds can share: for the schema of a driver.cfg.
     const KEYS: &'static [&'static [Key]];
 

@@ -37,7 +37,7 @@ pub use link::{Cause, Link, LinkState, LinkStatus};
 pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use renewal::Renewal;
-pub use role::Role;
+pub use role::{OBSERVES, Role};
 pub use swallowed::{Steps, SwallowedSignals};
 pub use tickbus_image::is_stale;
 pub use validity::{PlcState, Validity};

@@ -132,16 +132,20 @@ impl SwallowedSignals {
         &self.counts
     }
 
-    /// Adds this end's role, the numbers of both directions, of each station if there are several, and of each signal
+    /// Adds this end's role, that it never writes if it observes, the numbers of both directions, of each station if there are several, and of each signal
     /// that has any.
     pub fn write(&self, statistics: &mut Statistics) {
         let table = &self.shared.table;
         let mut sums = vec![[0; 2]; table.stations.len()];
         let found: Vec<(usize, u64)> = self.current().counts.iter().collect();
         statistics.text("role", self.shared.role.name());
+        if self.shared.role == Role::Observer {
+            statistics.text("writes", "never");
+        }
         for (signal, count) in &found {
             let signal = &table.signals[*signal];
-            sums[signal.station][usize::from(signal.area == Area::Output)] += count;
+            let area = signal.plc_address().area;
+            sums[signal.station][usize::from(area == Area::Output)] += count;
         }
         let sum = |direction: usize| sums.iter().map(|sums| sums[direction]).sum();
         statistics.count("swallowed_inputs", sum(0));
@@ -237,9 +241,10 @@ impl SwallowedSignals {
         let signal = &table.signals[signal];
         let (written, _) = role.areas();
         let is_sent = signal.area == written;
-        let reader = match signal.area {
-            Area::Input => "the PLC",
-            Area::Output => "the machine",
+        let reader = match (signal.area, role) {
+            (_, Role::Observer) => "the observer",
+            (Area::Input, _) => "the PLC",
+            (Area::Output, _) => "the machine",
         };
         let times = if count == 1 {
             "once".to_owned()
@@ -272,6 +277,7 @@ mod tests {
             name: name.to_owned(),
             input_bytes: 8,
             output_bytes: 1,
+            observed_bytes: 0,
         };
         let inputs = (0..signals).map(|place| Signal {
             bit: (place % 8).to_le_bytes()[0],

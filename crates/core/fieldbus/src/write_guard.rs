@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::Port;
+use super::{Port, Role};
 use tickbus_base::os::one_line;
 
 /// Keeps a bus that connects to a PLC from writing to the wrong one.
@@ -15,6 +15,8 @@ pub struct WriteGuard {
     may_write: bool,
     /// The identity last logged as the wrong one.
     told: Option<String>,
+    /// True at an end that has nothing to write, and so no PLC that it may write to.
+    observes: bool,
 }
 
 impl WriteGuard {
@@ -24,6 +26,16 @@ impl WriteGuard {
             write_to: write_to.map(str::to_owned),
             may_write: false,
             told: None,
+            observes: false,
+        }
+    }
+
+    /// The guard of the end with `role`: an observer's permits no writes, whatever `write_to` names.
+    pub fn of(role: Role, write_to: Option<&str>) -> Self {
+        let observes = role == Role::Observer;
+        Self {
+            observes,
+            ..Self::new(write_to.filter(|_| !observes))
         }
     }
 
@@ -41,6 +53,11 @@ impl WriteGuard {
     /// write to this PLC. If not, statistics and log report this, and the setting that would permit it.
     pub fn meet(&mut self, port: &mut Port, stations: Range<usize>, identity: &str) -> bool {
         let identity = &*one_line(identity);
+        if self.observes {
+            port.set_may_write(stations, false);
+            port.tell("identity", identity);
+            return false;
+        }
         self.may_write = self.write_to.as_deref() == Some(identity);
         port.set_may_write(stations, self.may_write);
         port.tell("identity", identity);
@@ -80,7 +97,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::{LinkStatus, Role};
+    use crate::LinkStatus;
     use tickbus_base::time::{Manual, Nanos};
     use tickbus_image::image;
     use tickbus_test_log as logged;
@@ -120,6 +137,15 @@ mod tests {
             !WriteGuard::new(None).meet(&mut port, 0..0, "ACME 7"),
             "none was named"
         );
+    }
+
+    #[test]
+    fn an_observer_may_not_write_to_the_plc_that_is_named() {
+        let (mut port, status, _logged) = port();
+        let mut guard = WriteGuard::of(Role::Observer, Some("ACME 7"));
+        assert!(!guard.names_one());
+        assert!(!guard.meet(&mut port, 0..0, "ACME 7") && !guard.may_write());
+        assert!(statistics(&status).contains("\nidentity=ACME 7\n"));
     }
 
     #[test]

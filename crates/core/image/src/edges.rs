@@ -526,6 +526,7 @@ mod tests {
             name: String::new(),
             input_bytes: 8,
             output_bytes: 8,
+            observed_bytes: 0,
         };
         let signals = signals
             .iter()

@@ -51,6 +51,7 @@ fn table() -> SignalTable {
         name: String::new(),
         input_bytes: size,
         output_bytes: size,
+        observed_bytes: 0,
     });
     SignalTable {
         stations: stations.into(),
@@ -268,6 +269,7 @@ fn direct(signals: Vec<Signal>) -> (DirectStream, Swallowed) {
             name: String::new(),
             input_bytes: 12,
             output_bytes: 0,
+            observed_bytes: 0,
         }],
         signals,
         structures: Vec::new(),

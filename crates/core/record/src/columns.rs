@@ -101,7 +101,7 @@ impl Columns {
             } else {
                 ValueKind::of(signal.data_type, signal.scale.is_some())
             },
-            address: Some(signal.address()),
+            address: Some(signal.plc_address()),
             data_type: Some(signal.data_type),
             unit: signal.unit.clone().filter(|_| !is_edges),
             station: table.stations[signal.station].name.clone(),

@@ -35,6 +35,7 @@ fn table(stations: &[&str]) -> SignalTable {
         name: (*name).to_owned(),
         input_bytes: 200,
         output_bytes: 200,
+        observed_bytes: 0,
     });
     SignalTable {
         stations: stations.collect(),

@@ -99,6 +99,7 @@ mod tests {
             name: "B".to_owned(),
             input_bytes: 1,
             output_bytes: 0,
+            observed_bytes: 0,
         });
         let channel = |text: &str| Channel::parse(text.as_bytes()).expect("a channel");
         let placed = placed

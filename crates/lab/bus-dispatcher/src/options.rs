@@ -140,7 +140,7 @@ impl Options {
     pub(super) fn profile(&self, setup: &BusSetup<'_>) -> Result<Profile, Mistake> {
         let name = match (&self.name, self.role) {
             (Some(name), _) => name.clone(),
-            (None, Role::Device) => setup.name.to_owned(),
+            (None, Role::Device | Role::Observer) => setup.name.to_owned(),
             // One driver.cfg may serve both ends.
             (None, Role::Controller) => format!("{}-PLC", setup.name),
         };
@@ -166,7 +166,7 @@ impl Options {
     /// The part in the laboratory.
     pub(super) const fn part(&self) -> Part {
         match self.role {
-            Role::Device => Part::Process,
+            Role::Device | Role::Observer => Part::Process,
             Role::Controller => Part::Controller,
         }
     }

@@ -203,7 +203,7 @@ impl Options {
     ) -> Result<Declaration, Mistake> {
         let name = match (&self.client, setup.role) {
             (Some(client), _) => client.clone(),
-            (None, Role::Device) => setup.name.to_owned(),
+            (None, Role::Device | Role::Observer) => setup.name.to_owned(),
             // One driver.cfg may serve both ends.
             (None, Role::Controller) => format!("{} PLC", setup.name),
         };

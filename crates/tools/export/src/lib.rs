@@ -81,12 +81,14 @@ pub struct Export {
 /// The driver.cfg describes the PLC's end, or an image that does not fit into the PLC.
 pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
     let file = config.path.display().to_string();
-    if config.role == Role::Controller {
-        return Err(Mistakes::of_file(
-            &file,
-            "role = \"controller\": this file is the PLC's end itself",
-            "export the machine's driver.cfg, or remove \"role\"",
-        ));
+    let no_machine = match config.role {
+        Role::Device => None,
+        Role::Controller => Some("role = \"controller\": this file is the PLC's end itself"),
+        Role::Observer => Some("role = \"observer\": this file only looks at a PLC"),
+    };
+    if let Some(what) = no_machine {
+        let right = "export the machine's driver.cfg, or remove \"role\"";
+        return Err(Mistakes::of_file(&file, what, right));
     }
     if let Exported::Socket(options) = Exported::of(&config.bus)
         && !options.stations.is_empty()

@@ -7,7 +7,7 @@ use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{did_you_mean, shown};
 use tickbus_driver::Watch;
-use tickbus_fieldbus::{Link, LinkState};
+use tickbus_fieldbus::{Link, LinkState, Role};
 use tickbus_image::signal::{Area, Latch, Plan, RawValues, Signal, Slot};
 use tickbus_web::Refused;
 
@@ -208,11 +208,11 @@ impl Shown {
             .view(|view| age_now(&view.stations[signal.station], silence));
         SignalJson {
             name: &signal.name,
-            address: signal.address().to_string(),
+            address: signal.plc_address().to_string(),
             data_type: signal.data_type.name(),
             unit: signal.unit.as_deref().unwrap_or_default(),
             station: signal.station,
-            direction: Some(match signal.area {
+            direction: Some(match signal.plc_address().area {
                 Area::Input => "I",
                 Area::Output => "Q",
             }),
@@ -221,7 +221,7 @@ impl Shown {
                 Latch::Falling => "falling",
                 Latch::Both => "both",
             }),
-            writable: true,
+            writable: self.watch.role() != Role::Observer,
             value: row.value(signal),
             raw: row.raw(signal),
             edges: signal.latch.map(|_| row.edges),

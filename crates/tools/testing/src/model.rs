@@ -81,7 +81,9 @@ impl Model {
         let mut recording = Recording::open(path, Some(table))?;
         let (mut inputs, mut outputs) = (Vec::new(), Vec::new());
         for (index, signal) in table.signals.iter().enumerate() {
-            let found = recording.columns().of_signal(signal)
+            let found = recording
+                .columns()
+                .of_signal(signal)
                 .map_err(|mistake| RecordingError::of_file(path, mistake.what, mistake.right))?;
             match (found, signal.area) {
                 (None, _) => {}

@@ -86,11 +86,8 @@ impl Reader<'_> {
     }
 
     /// The area that the machine writes.
-    pub(super) const fn own(&self) -> Area {
-        match self.role {
-            Role::Device => Area::Input,
-            Role::Controller => Area::Output,
-        }
+    pub(super) fn own(&self) -> Area {
+        self.role.areas().0
     }
 
     fn tape(&self, value: &Value<'_>, compare: Option<&Value<'_>>) -> Option<MachineRecording> {

@@ -243,6 +243,16 @@ pub(super) fn load_config(
 ) -> Option<Config> {
     let name = value.text(right)?;
     match Config::load(&folder.join(name), kinds) {
+        Ok(config) if config.role == Role::Observer => {
+            value.wrong(
+                format!(
+                    "{} is an observer's driver.cfg, which only looks at a PLC",
+                    shown(name)
+                ),
+                right,
+            );
+            None
+        }
         Ok(config) => Some(config),
         Err(mistakes) => {
             match mistakes.iter().next() {

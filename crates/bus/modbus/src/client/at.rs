@@ -2,7 +2,7 @@
 
 use crate::TagAddress;
 use tickbus_fieldbus::At;
-use tickbus_fieldbus::both_ways;
+use tickbus_fieldbus::{Role, both_ways};
 use tickbus_image::signal::{Signal, SignalTable};
 
 use super::area_mapping::nobody_writes;
@@ -12,7 +12,6 @@ impl ClientOptions {
     /// Takes the lines, and reports those that are invalid, do not fit their signals, or would make two signals write
     /// to the same place.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
-        let (writes, _) = self.role.areas();
         let mut placed = Vec::new();
         for line in lines {
             let signal = &table.signals[line.signal];
@@ -28,14 +27,18 @@ impl ClientOptions {
                 continue;
             }
             let of_table = spot.place.table;
-            if signal.area == writes && !of_table.is_writable() {
+            if self.role.writes(signal.area) && !of_table.is_writable() {
                 line.refuse(nobody_writes(of_table));
                 continue;
             }
             self.at.insert(signal.name.clone(), spot);
             placed.push(line);
         }
-        for station in 0..table.stations.len() {
+        let stations = match self.role {
+            Role::Observer => 0,
+            _ => table.stations.len(),
+        };
+        for station in 0..stations {
             self.check_claims(&placed, table, station);
         }
     }

@@ -56,7 +56,7 @@ impl ModbusClient {
         });
         let stations: Vec<Station> = stations.collect();
         let guards = (0..stations.len())
-            .map(|station| WriteGuard::new(options.stations.write_to(station)))
+            .map(|station| WriteGuard::of(role, options.stations.write_to(station)))
             .collect();
         Self {
             options: options.clone(),

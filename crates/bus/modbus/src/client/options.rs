@@ -74,7 +74,7 @@ impl ClientOptions {
         let stations = Stations::read(units, unit.as_ref());
         let write_to = write_to.as_ref().map(read_write_to);
         let (input, output) = (default(role, Area::Input), default(role, Area::Output));
-        let writes = |area| role.areas().0 == area;
+        let writes = |area| role.writes(area);
         let inputs = AreaMapping::read(inputs.as_ref(), at, input, writes(Area::Input));
         let outputs = AreaMapping::read(outputs.as_ref(), at, output, writes(Area::Output));
         let timeout = timeout.map_or(Some(None), |value| value.duration().map(Some));
@@ -97,7 +97,6 @@ impl ClientOptions {
 
     /// Reports conflicts with the sizes of the stations.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
-        let (writes, _) = self.role.areas();
         for area in [Area::Input, Area::Output] {
             for (index, station) in table.stations.iter().enumerate() {
                 let mut signals = table.signals.iter();
@@ -111,7 +110,7 @@ impl ClientOptions {
                 }
                 let fits = self.blocks(area, station.bytes(area));
                 let fits = fits.and_then(|blocks| {
-                    if area == writes {
+                    if self.role.writes(area) {
                         AreaMapping::check_apart(area, &blocks)
                     } else {
                         Ok(())
@@ -134,7 +133,8 @@ impl ClientOptions {
 
     /// True if `inputs` or `outputs` has an effect: if any signal of the area lacks a separate place.
     pub(crate) fn lies_as_a_whole(&self, area: Area, table: &SignalTable) -> bool {
-        let mut signals = table.signals.iter().filter(|signal| signal.area == area);
+        let signals = table.signals.iter();
+        let mut signals = signals.filter(|signal| signal.plc_address().area == area);
         self.at.is_empty() || signals.any(|signal| !self.at.contains_key(&signal.name))
     }
 
@@ -172,8 +172,10 @@ impl ClientOptions {
     /// The pieces of the signals in a station's area.
     pub fn pieces(&self, table: &SignalTable, station: usize, area: Area) -> Vec<Piece> {
         // Errors were reported when the driver.cfg was read.
-        let blocks = self.blocks(area, table.stations[station].bytes(area));
-        let blocks = blocks.unwrap_or_default();
+        let blocks = [Area::Input, Area::Output].map(|area| {
+            let blocks = self.blocks(area, table.stations[station].plc_bytes(area));
+            blocks.unwrap_or_default()
+        });
         let mut pieces = Vec::new();
         for signal in &table.signals {
             if signal.station != station || signal.area != area {
@@ -182,8 +184,14 @@ impl ClientOptions {
             if let Some(spot) = self.at.get(&signal.name) {
                 pieces.extend(Piece::of_tag(signal, *spot));
             } else {
-                let parts = blocks.iter();
-                pieces.extend(parts.filter_map(|block| Piece::of_block(signal, block)));
+                // Placed as the PLC has it; an observer's image may have it elsewhere.
+                let placed = signal.as_in_plc();
+                let parts = blocks[usize::from(placed.area == Area::Output)].iter();
+                let parts = parts.filter_map(|block| Piece::of_block(&placed, block));
+                pieces.extend(parts.map(|piece| Piece {
+                    bit: piece.bit + (signal.byte - placed.byte) * 8,
+                    ..piece
+                }));
             }
         }
         pieces
@@ -210,7 +218,7 @@ impl ClientOptions {
 fn default(role: Role, area: Area) -> ElementAddress {
     let (table, offset) = match (role, area) {
         (_, Area::Output) => (OfTable::HoldingRegisters, 0),
-        (Role::Controller, Area::Input) => (OfTable::InputRegisters, 0),
+        (Role::Controller | Role::Observer, Area::Input) => (OfTable::InputRegisters, 0),
         (Role::Device, Area::Input) => (OfTable::HoldingRegisters, INPUTS),
     };
     ElementAddress { table, offset }

@@ -58,7 +58,7 @@ impl ServerOptions {
                 .and_then(|clients| usize::try_from(clients).ok())
         });
         let input = match role {
-            Role::Device => Side::Sends,
+            Role::Device | Role::Observer => Side::Sends,
             Role::Controller => Side::Holds,
         };
         Some(Self {

@@ -74,7 +74,7 @@ impl Client {
             table: setup.table.clone(),
             role: setup.role,
             cycle: setup.cycle.unwrap_or(CYCLE),
-            guard: WriteGuard::new(options.write_to.as_deref()),
+            guard: WriteGuard::of(setup.role, options.write_to.as_deref()),
         })
     }
 

@@ -86,9 +86,9 @@ impl ClientOptions {
     /// The transfers of one cycle, for people.
     pub fn shown_requests(&self, table: &SignalTable) -> Vec<String> {
         let frames = FrameFields::new(self, table, self.role);
-        let writes = match self.write_to {
-            Some(_) => "writes",
-            None => "would write",
+        let writes = match (self.role, &self.write_to) {
+            (_, Some(_)) | (Role::Observer, _) => "writes",
+            (_, None) => "would write",
         };
         let ways = [writes, "reads"].into_iter();
         ways.zip(frames.summary(self.pdu))

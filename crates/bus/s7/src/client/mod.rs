@@ -81,7 +81,7 @@ impl S7Client {
         Self {
             frames: FrameFields::new(options, table, role),
             names: names.collect(),
-            guard: WriteGuard::new(options.write_to.as_deref()),
+            guard: WriteGuard::of(role, options.write_to.as_deref()),
             cycle: cycle.unwrap_or(CYCLE),
             identity: ListRequest::default(),
             state: ListRequest::default(),

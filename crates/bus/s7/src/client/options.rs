@@ -68,10 +68,11 @@ impl ClientOptions {
         if let Some(variable) = self.variables.get(&signal.name) {
             return Some(*variable);
         }
-        let start = self.place(signal.station, signal.area)?;
+        let place = signal.plc_address();
+        let start = self.place(signal.station, place.area)?;
         Some(Variable {
             object: start.object,
-            byte: start.byte + signal.byte,
+            byte: start.byte + place.byte,
             bit: signal.bit,
             width: signal.data_type.width(),
             data_type: Some(signal.data_type),
@@ -117,10 +118,9 @@ impl ClientOptions {
 
     /// Reports signals that would overwrite one another. Reads may overlap.
     fn report_overlaps(&self, lines: &[At<'_>], table: &SignalTable) {
-        let (sends, _) = self.role.areas();
         let written = table.signals.iter().enumerate();
         let mut written: Vec<_> = written
-            .filter(|(_, signal)| signal.area == sends)
+            .filter(|(_, signal)| self.role.writes(signal.area))
             .filter_map(|(index, signal)| {
                 let variable = self.variable(signal)?;
                 let (first, bits) = variable.bits();

@@ -31,14 +31,14 @@ struct Lane {
 
 fn lane(role: Role) -> usize {
     match role {
-        Role::Device => 0,
+        Role::Device | Role::Observer => 0,
         Role::Controller => 1,
     }
 }
 
 fn other(role: Role) -> Role {
     match role {
-        Role::Device => Role::Controller,
+        Role::Device | Role::Observer => Role::Controller,
         Role::Controller => Role::Device,
     }
 }

@@ -252,6 +252,7 @@ pub fn read(mut table: Table<'_>, addressing: Addressing) -> Option<Section<'_>>
             .and_then(|value| fitting_dead_band(&value, band.flatten()?, data_type))
             .unwrap_or_default(),
         range: None,
+        in_plc: None,
     };
     let hold =
         hold.and_then(|value| fitting_hold(&value, held.flatten()?, &signal, latched.is_some()));

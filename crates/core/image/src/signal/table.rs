@@ -55,6 +55,8 @@ pub struct Signal {
     /// The lowest and the highest value of normal operation, in engineering units: the two values that the scale names.
     /// A hint for displays; values are not limited to it.
     pub range: Option<[f64; 2]>,
+    /// In an [observer's table](SignalTable::observed), where the PLC has a `%I` that the image has behind the `%Q`.
+    pub in_plc: Option<Address>,
 }
 
 impl Signal {
@@ -77,6 +79,7 @@ impl Signal {
             states_fail_safe: false,
             dead_band: 0.0,
             range: None,
+            in_plc: None,
         }
     }
 
@@ -104,6 +107,23 @@ impl Signal {
             bit: self.bit,
         }
     }
+
+    /// The address in the PLC, as people write it: that in the image, except in an observer's table.
+    pub fn plc_address(&self) -> Address {
+        self.in_plc.unwrap_or_else(|| self.address())
+    }
+
+    /// The signal with its place in the PLC for that in the image.
+    #[must_use]
+    pub fn as_in_plc(&self) -> Self {
+        let Address { area, byte, .. } = self.plc_address();
+        Self {
+            area,
+            byte,
+            in_plc: None,
+            ..self.clone()
+        }
+    }
 }
 
 /// One station (slave, unit, node) of a driver, with a frame for each area.
@@ -115,6 +135,9 @@ pub struct Station {
     pub input_bytes: usize,
     /// Size of `%Q` in bytes.
     pub output_bytes: usize,
+    /// How many of these bytes, the last ones, are the `%I` of the PLC: in an [observer's
+    /// table](SignalTable::observed) all bytes of `%I`, and otherwise 0.
+    pub observed_bytes: usize,
 }
 
 /// All signals of a driver, in the order of its driver.cfg.
@@ -155,6 +178,14 @@ impl Station {
             Area::Output => self.output_bytes,
         }
     }
+
+    /// Size of an area in the PLC: that in the image, except in an observer's table.
+    pub const fn plc_bytes(&self, area: Area) -> usize {
+        match area {
+            Area::Input => self.input_bytes + self.observed_bytes,
+            Area::Output => self.output_bytes - self.observed_bytes,
+        }
+    }
 }
 
 impl SignalTable {
@@ -165,14 +196,81 @@ impl SignalTable {
                 name: String::new(),
                 input_bytes,
                 output_bytes,
+                observed_bytes: 0,
             }],
             signals,
             structures: Vec::new(),
         }
     }
 
+    /// The table of an end that only reads: every `%I` is moved behind the `%Q` of its station, so that the image has
+    /// one frame for both, and no byte that this end could write. [`Signal::plc_address`] is where the PLC has it.
+    #[must_use]
+    pub fn observed(mut self) -> Self {
+        for signal in &mut self.signals {
+            if signal.area == Area::Input {
+                signal.in_plc = Some(signal.address());
+                signal.area = Area::Output;
+                signal.byte += self.stations[signal.station].output_bytes;
+                // A pulse is held by the end that writes it.
+                signal.hold = Nanos::ZERO;
+            }
+        }
+        for station in &mut self.stations {
+            station.observed_bytes = std::mem::take(&mut station.input_bytes);
+            station.output_bytes += station.observed_bytes;
+        }
+        self.structures.clear();
+        self
+    }
+
+    /// The table as the PLC has it: that of an observer before it was [`observed`](Self::observed), for people.
+    #[must_use]
+    pub fn as_in_plc(&self) -> Self {
+        let mut table = self.clone();
+        for station in &mut table.stations {
+            station.input_bytes = station.plc_bytes(Area::Input);
+            station.output_bytes = station.plc_bytes(Area::Output);
+            station.observed_bytes = 0;
+        }
+        table.signals = self.signals.iter().map(Signal::as_in_plc).collect();
+        table
+    }
+
     /// Index of the signal with this name.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.signals.iter().position(|signal| signal.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_observer_has_both_areas_in_the_one_frame_that_it_reads() {
+        let table = SignalTable::of_one_station(
+            4,
+            3,
+            vec![
+                Signal::new("level", Area::Input, 2, DataType::Word),
+                Signal {
+                    bit: 5,
+                    ..Signal::new("full", Area::Input, 0, DataType::Bool)
+                },
+                Signal::new("speed", Area::Output, 1, DataType::Word),
+            ],
+        );
+        let before: Vec<Address> = table.signals.iter().map(Signal::address).collect();
+        let seen = table.clone().observed();
+        assert_eq!(
+            (seen.stations[0].input_bytes, seen.stations[0].output_bytes),
+            (0, 7)
+        );
+        let places = seen.signals.iter().map(|signal| (signal.area, signal.byte));
+        assert!(places.eq([(Area::Output, 5), (Area::Output, 3), (Area::Output, 1)]));
+        assert!(seen.signals.iter().map(Signal::plc_address).eq(before));
+        assert_eq!(seen.as_in_plc(), table);
+        assert_eq!(table.as_in_plc(), table);
     }
 }

@@ -82,7 +82,7 @@ impl<R: BufRead> CsvReader<R> {
                     Some(signal) => ValueKind::of(signal.data_type, signal.scale.is_some()),
                     None => ValueKind::Real,
                 },
-                address: signal.map(Signal::address),
+                address: signal.map(Signal::plc_address),
                 data_type: signal.map(|signal| signal.data_type),
                 unit: signal.and_then(|signal| signal.unit.clone()),
                 station: table

@@ -139,6 +139,87 @@ fn exchange(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// 64 bits of the simulation, and the signals of 500 replies that they drive; the replies themselves, if asked for.
+fn machine(has_replies: bool) -> String {
+    let (mut signals, mut replies) = (String::new(), String::new());
+    let mut bits = 0..;
+    let mut bit = |name: &str| {
+        let at = bits.next().unwrap_or(0);
+        let address = format!("%IX{}.{}", at / 8, at % 8);
+        let _ = write!(
+            signals,
+            "[[signal]]\nname = \"{name}\"\naddress = \"{address}\"\n"
+        );
+    };
+    for command in 0..64 {
+        bit(&format!("C {command}"));
+    }
+    for of_ten in 0..50 {
+        for (place, kind) in "ffffmmccbk".chars().enumerate() {
+            let (name, command) = (format!("{of_ten}.{place}"), (of_ten * 10 + place) % 64);
+            let (keys, made) = match kind {
+                'f' => (
+                    format!(
+                        "kind = \"follows\"\nwhen = \"C {command}\"\non_after = \"50ms\"\nsignal"
+                    ),
+                    "",
+                ),
+                'm' => (
+                    format!(
+                        "kind = \"motor\"\ncontactor = \"C {command}\"\nstart_time = \"500ms\"\nrunning"
+                    ),
+                    "at_speed",
+                ),
+                'c' => (
+                    format!(
+                        "kind = \"cylinder\"\nextend = \"C {command}\"\nextend_time = \"400ms\"\nextended"
+                    ),
+                    "retracted",
+                ),
+                'b' => (
+                    "kind = \"blink\"\non_for = \"500ms\"\nsignal".to_owned(),
+                    "",
+                ),
+                _ => ("kind = \"constant\"\nvalue = true\nsignal".to_owned(), ""),
+            };
+            bit(&name);
+            let _ = write!(replies, "[[reply]]\n{keys} = \"{name}\"\n");
+            if !made.is_empty() {
+                bit(&format!("{name} too"));
+                let _ = writeln!(replies, "{made} = \"{name} too\"");
+            }
+        }
+    }
+    if has_replies {
+        signals + replies.as_str()
+    } else {
+        signals
+    }
+}
+
+/// The cost of 500 replies: each command changes every second, so that most parts are under way.
+fn replies(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("replies");
+    for (name, has_replies) in [("none", false), ("500", true)] {
+        let config = config("free", &machine(has_replies));
+        let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
+        let mut slots = driver.initial_slots();
+        let mut tick = 0;
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                tick += 1;
+                if tick % 16 == 0 {
+                    let command = tick / 16 % 64;
+                    slots[command] = Slot::from_real(1.0 - slots[command].real());
+                }
+                let time = Nanos::from_millis(i64::try_from(tick).expect("a short run"));
+                black_box(driver.exchange(time, &mut slots))
+            });
+        });
+    }
+    group.finish();
+}
+
 /// Our triple buffer compared with the crate of that name: publish and read on one thread.
 fn hand_over(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("hand-over");
@@ -174,5 +255,5 @@ fn hand_over(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, exchange, latches, hand_over);
+criterion_group!(benches, exchange, latches, replies, hand_over);
 criterion_main!(benches);

@@ -17,6 +17,7 @@
 //! | [`faults`] | injected faults: wrong values, and trouble on the line |
 //! | [`image`] | the process image: wait-free hand-over, edge counters, age, event ring |
 //! | [`record`] | recordings: the values that every tick saw, written to VCD or CSV and read again |
+//! | [`reply`] | signals that a driver makes where no model of the machine does |
 //! | [`report`] | one HTML page about one run |
 //! | [`compare`] | the recording of a machine beside that of its model, and fitting the model |
 //! | [`plc`] | IEC 61131-3 function blocks, and PLC programs on an injected clock |
@@ -71,6 +72,7 @@ pub use tickbus_plc as plc;
 pub use tickbus_prepare as prepare;
 pub use tickbus_programs as programs;
 pub use tickbus_record as record;
+pub use tickbus_reply as reply;
 pub use tickbus_report as report;
 pub use tickbus_testing as testing;
 pub use tickbus_virtual_time as virtual_time;

@@ -137,6 +137,47 @@ fn a_driver_that_is_watched_and_forced() {
     }
 }
 
+/// Replies of each kind, made from what the mirror sends back.
+const REPLIES: &str = "
+[[reply]]\nkind = \"constant\"\nsignal = \"I bit 0.0\"\nvalue = true\n
+[[reply]]\nkind = \"follows\"\nsignal = \"I bit 0.1\"\nwhen = [\"Q bit 0.0\", \"Q INT == 0\"]\non_after = \"5ms\"\n
+[[reply]]\nkind = \"motor\"\ncontactor = \"Q bit 0.1\"\nrunning = \"I bit 0.2\"\nspeed = \"I INT\"\nstart_time = \"1s\"\n
+[[reply]]\nkind = \"cylinder\"\nextend = \"I bit 1.2\"\nextended = \"I bit 0.3\"\nposition = \"I REAL\"\nextend_time = \"300ms\"\n
+[[reply]]\nkind = \"valve\"\ntarget = \"I REAL\"\nposition = \"I DINT\"\nopen_time = \"2s\"\n
+[[reply]]\nkind = \"lag\"\nsignal = \"I LREAL\"\ninput = \"I REAL\"\ntime = \"1s\"\nnoise = 0.5\n
+[[reply]]\nkind = \"switch\"\nsignal = \"I bit 0.4\"\ninput = \"I LREAL\"\nabove = 50\n
+[[reply]]\nkind = \"counter\"\nsignal = \"I LINT\"\nwhen = \"I bit 1.2\"\n
+[[reply]]\nkind = \"encoder\"\nsignal = \"I LWORD\"\nforward = \"I bit 1.2\"\nrate = 1000\n
+[[reply]]\nkind = \"blink\"\nsignal = \"I bit 1.2\"\non_for = \"400ms\"\n
+[[reply]]\nkind = \"life-sign\"\nsignal = \"I BYTE\"\nevery = \"10ms\"\n
+";
+
+/// The simulation overrules one of the replies in the middle of the run.
+#[test]
+fn a_driver_with_replies() {
+    for fieldbus in [FREE, STEPPED] {
+        let clock = Manual::new();
+        let config = config(fieldbus, REPLIES);
+        let byte = config.table.position("I BYTE").expect("a signal");
+        let mut driver = Driver::open(config, Arc::clone(&clock) as _).expect("opens");
+        let mut slots = driver.initial_slots();
+        let mut count = 0;
+        for tick in 0..5_000_i64 {
+            if tick == 2_500 {
+                slots[byte] = Slot::from_real(201.0);
+            }
+            let before = allocations_of_thread();
+            driver.exchange(Nanos::from_millis(tick), &mut slots);
+            if tick >= 100 && !(2_500..=2_510).contains(&tick) {
+                count += allocations_of_thread() - before;
+            }
+        }
+        assert_eq!(count, 0, "{fieldbus}");
+        let moved = slots.iter().filter(|slot| slot.0 != 0).count();
+        assert!(moved > 5, "{moved} slots have moved");
+    }
+}
+
 #[test]
 fn a_free_bus() {
     assert_eq!(allocations(FREE, ""), 0);

@@ -35,6 +35,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         kinds,
         role,
         program: Box::new(Axes::new(&axes)),
+        has_replies: true,
         interval: arguments.tick,
     };
     host::run(job, &arguments.host)

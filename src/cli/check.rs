@@ -2,6 +2,7 @@
 
 mod axes;
 mod document;
+mod unwritten;
 
 use std::collections::HashSet;
 use std::fmt::Write as _;
@@ -25,6 +26,13 @@ pub(super) struct Arguments {
     /// The driver.cfg to check.
     file: PathBuf,
 
+    /// List the %I signals that the driver does not make itself, and propose `[[reply]]` sections for them.
+    #[arg(long, conflicts_with = "json")]
+    unwritten: bool,
+
+    #[command(flatten)]
+    writers: unwritten::Writers,
+
     #[command(flatten)]
     format: Format,
 }
@@ -34,6 +42,10 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         Ok(config) if arguments.format.is_json() => {
             print_document("check", document::document(&config))
         }
+        Ok(config) if arguments.unwritten => match unwritten::report(&config, &arguments.writers) {
+            Ok(text) => print("check", &text),
+            Err(mistakes) => arguments.format.refuse("check", &mistakes),
+        },
         Ok(config) => print("check", &report(&config)),
         Err(mistakes) => arguments.format.refuse("check", &mistakes),
     }
@@ -110,6 +122,9 @@ fn report(config: &Config) -> String {
                 fault.what(&config.table)
             ),
         );
+    }
+    for reply in &config.replies {
+        line("reply", &reply.what(&config.table));
     }
     out.push('\n');
     if !config.axes.is_empty() {

@@ -127,6 +127,8 @@ pub(super) struct Job<'a> {
     pub(super) kinds: &'static Kinds,
     pub(super) role: Role,
     pub(super) program: Box<dyn Program>,
+    /// True if the replies of the file are made.
+    pub(super) has_replies: bool,
     pub(super) interval: Nanos,
 }
 
@@ -151,6 +153,9 @@ fn configure(job: &Job<'_>, arguments: &Hosting) -> Result<Config, Outcome> {
         && let Err(mistakes) = config.add_faults(file)
     {
         return Err(format.refuse(title, &mistakes));
+    }
+    if !job.has_replies {
+        config.replies.clear();
     }
     // The [record] table belongs to the simulation, which may run at the other end of the same line. An observer has
     // its own.

@@ -47,6 +47,10 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with = "iec")]
     bytes: bool,
 
+    /// Propose `[[reply]]` sections for the inputs, by their names and comments: a first set to read and to correct.
+    #[arg(long)]
+    replies: bool,
+
     /// The client bus to which the addresses belong, if the list does not show it: %MW20 exists in Modbus and in S7.
     #[arg(long, value_name = "KIND", value_parser = clients())]
     bus: Option<Client>,
@@ -77,8 +81,13 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
             for note in &imported.notes {
                 eprintln!("{file}: note: {note}");
             }
+            let replies = if arguments.replies {
+                format!(" replies={}", imported.replies)
+            } else {
+                String::new()
+            };
             let told = format!(
-                "import: ok signals={} assigned={} skipped={}",
+                "import: ok signals={} assigned={} skipped={}{replies}",
                 imported.signals,
                 imported.assigned,
                 imported.skipped.len()
@@ -122,6 +131,7 @@ fn read(arguments: &Arguments, kinds: &'static Kinds) -> Result<Imported, Mistak
             addressing,
             lenient: arguments.lenient,
             client: arguments.bus,
+            replies: arguments.replies,
         },
         kinds,
     )

@@ -27,6 +27,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let job = Job {
+        has_replies: false,
         title: "observe",
         file: &arguments.file,
         kinds,

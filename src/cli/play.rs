@@ -80,6 +80,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     }
     let report = player.report().expect("a player has one");
     let job = Job {
+        has_replies: false,
         title: TITLE,
         file: &arguments.file,
         kinds,

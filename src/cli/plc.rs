@@ -70,6 +70,7 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         kinds,
         role: Role::Controller,
         program,
+        has_replies: false,
         interval,
     };
     host::run(job, &arguments.host)

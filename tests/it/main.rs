@@ -25,6 +25,7 @@ mod own_program;
 mod peeler;
 mod play;
 mod record;
+mod replies;
 mod report;
 mod sessions;
 mod sweep;

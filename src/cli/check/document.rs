@@ -15,6 +15,12 @@ use tickbus_record::When;
 pub(super) fn document(config: &Config) -> Value {
     let table = &config.table.as_in_plc();
     let name = |signal: usize| &table.signals[signal].name;
+    let names = |signals: &[usize]| {
+        signals
+            .iter()
+            .map(|signal| name(*signal))
+            .collect::<Vec<_>>()
+    };
     let taken = words_of_values(&table.signals);
     let signals = table.signals.iter();
     let stations = table.stations.iter().map(|station| {
@@ -56,6 +62,12 @@ pub(super) fn document(config: &Config) -> Value {
         })),
         "stations": stations.collect::<Value>(),
         "faults": faults.collect::<Value>(),
+        "replies": config.replies.iter().map(|reply| json!({
+            "name": reply.name,
+            "kind": reply.kind,
+            "makes": names(&reply.outputs),
+            "reads": names(&reply.inputs),
+        })).collect::<Value>(),
         "axes": config.axes.iter().map(axis).collect::<Value>(),
         "signals": signals.map(|signal| row((signal, table), config, &taken)).collect::<Value>(),
     })

@@ -1,6 +1,7 @@
 //! The work of the machine's side on every tick for its axes, apart from the machine's own model.
 
 use super::{Axis, Command, Field, Mode};
+use tickbus_base::Threshold;
 use tickbus_image::signal::Slot;
 
 /// The value of the word `Error` while the PLC asks for a command that is not in the table.
@@ -48,10 +49,7 @@ struct Numbers {
 struct Trip {
     slot: usize,
     position: usize,
-    at: f64,
-    above: bool,
-    hysteresis: f64,
-    on: bool,
+    threshold: Threshold,
 }
 
 const fn level(on: bool) -> Slot {
@@ -120,10 +118,7 @@ impl Reflex {
         let switches = axis.switches.iter().map(|switch| Trip {
             slot: switch.slot,
             position,
-            at: switch.at,
-            above: switch.above,
-            hysteresis: switch.hysteresis,
-            on: false,
+            threshold: Threshold::new(switch.at, switch.above, switch.hysteresis),
         });
         let reflex = Self {
             execute: slot(Field::Execute)?,
@@ -146,15 +141,7 @@ impl Reflex {
         }
         for switch in &mut self.switches {
             let position = slots[switch.position].real();
-            // The distance beyond the trip point: the switch turns on at 0, and off below minus the hysteresis.
-            let beyond = if switch.above {
-                position - switch.at
-            } else {
-                switch.at - position
-            };
-            let needed = if switch.on { -switch.hysteresis } else { 0.0 };
-            switch.on = beyond >= needed;
-            slots[switch.slot] = level(switch.on);
+            slots[switch.slot] = level(switch.threshold.update(position));
         }
     }
 

@@ -18,9 +18,11 @@ mod percent;
 mod quick_clock;
 pub mod statistics;
 pub mod thread;
+mod threshold;
 pub mod time;
 pub mod toml_text;
 
 pub use mistake::Mistake;
 pub use percent::percent_decoded;
 pub use quick_clock::QuickClock;
+pub use threshold::Threshold;

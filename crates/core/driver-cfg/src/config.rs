@@ -9,12 +9,13 @@ use super::timing::{Line, Timing, TimingKeys};
 use crate::loopback;
 use crate::{Kinds, Options, PageOptions};
 use tickbus_axis as axis;
-use tickbus_axis::Axis;
-use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
+use tickbus_axis::{Axis, Field};
+use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
 use tickbus_fieldbus::faults::{self, Fault};
 use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
-use tickbus_image::signal::{Addressing, SignalTable, Station};
+use tickbus_image::signal::{Addressing, Area, SignalTable, Station};
 use tickbus_record as record;
+use tickbus_reply::{self as reply, Reply};
 
 /// The checked contents of a driver.cfg.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,6 +34,8 @@ pub struct Config {
     pub table: SignalTable,
     /// The driver's axes; their signals are in `table` like all others.
     pub axes: Vec<Axis>,
+    /// The signals that the driver makes where no model does; none at the PLC's end.
+    pub replies: Vec<Reply>,
     /// Cycle times and time-outs.
     pub timing: Timing,
     /// The options of the bus.
@@ -67,6 +70,18 @@ pub struct CommandLineEnd {
 type Given = (Option<CommandLineEnd>, &'static Kinds);
 
 impl Config {
+    /// Returns the reply that makes the signal with this index.
+    pub fn reply_of(&self, signal: usize) -> Option<&Reply> {
+        let mut replies = self.replies.iter();
+        replies.find(|reply| reply.outputs.contains(&signal))
+    }
+
+    /// Returns the signals of the machine that the driver makes by itself apart from replies (heartbeats, and those of
+    /// axes), by index, and what makes them.
+    pub fn made_signals(&self) -> Vec<(usize, String)> {
+        taken_signals(&self.table, &self.axes, &self.life_signs)
+    }
+
     /// Returns the folder to which paths in the driver.cfg are relative.
     pub fn folder(&self) -> &Path {
         self.path.parent().unwrap_or(Path::new(""))
@@ -180,6 +195,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     let stations = root.take("station");
     let signals = root.take("signal");
     let axes = root.take("axis");
+    let replies = root.take("reply");
     let faults = root.take("fault");
     let record = root.take("record");
     let page = root.take("page");
@@ -276,6 +292,20 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     if let Some(table) = &table {
         axis::resolve(&mut axes, table);
     }
+    let replies = replies.map(|value| value.tables("[[reply]]"));
+    let replies = replies.unwrap_or_default();
+    if let (Some(first), Some(fieldbus)) = (replies.first(), &fieldbus)
+        && fieldbus.own_role == Role::Controller
+    {
+        first.wrong(
+            "this end is the PLC, and replies are made by the machine",
+            "remove [[reply]], or write them into the driver.cfg of the machine",
+        );
+    }
+    let replies = match &table {
+        Some(table) => read_replies(replies, table, &axes, &life_signs),
+        None => Vec::new(),
+    };
     let bus = fieldbus.as_ref().and_then(|fieldbus| fieldbus.bus.as_ref());
     let scope = table.as_ref().map(|table| faults::Scope {
         table,
@@ -296,6 +326,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
     // In a file that serves both ends, the faults belong to the machine: injected at both ends, they would happen
     // twice.
     let is_other_end = fieldbus.is_for_both && fieldbus.role != Role::Device;
+    let replies = if is_other_end { Vec::new() } else { replies };
     let (faults, fault_file) = if is_other_end {
         (Vec::new(), None)
     } else {
@@ -310,6 +341,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         addressing,
         table: table?,
         axes,
+        replies,
         timing: fieldbus.timing?,
         bus: fieldbus.bus?,
         kinds: given.1,
@@ -328,6 +360,45 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
             None => None,
         },
     })
+}
+
+/// Reads the replies of a machine, whose other signals of the driver's own they must not make.
+fn read_replies(
+    sections: Vec<Table<'_>>,
+    table: &SignalTable,
+    axes: &[Axis],
+    life_signs: &LifeSigns,
+) -> Vec<Reply> {
+    let taken = taken_signals(table, axes, life_signs);
+    let scope = reply::Scope {
+        table,
+        writes: Area::Input,
+        tick: None,
+        taken: &taken,
+        earlier: &[],
+    };
+    reply::read_sections(sections, scope)
+}
+
+/// The signals of the machine that the driver makes apart from replies, by index, and what makes them.
+fn taken_signals(
+    table: &SignalTable,
+    axes: &[Axis],
+    life_signs: &LifeSigns,
+) -> Vec<(usize, String)> {
+    let beats = life_signs.beats(table, Role::Device);
+    let mut taken: Vec<_> = beats
+        .map(|beat| (beat.signal, "\"heartbeat\"".to_owned()))
+        .collect();
+    for axis in axes {
+        let fields = [Field::Acknowledge, Field::CommandDone];
+        let switches = axis.switches.iter();
+        let switches = switches.filter_map(|switch| table.position(&switch.name));
+        let of_axis = fields.into_iter().filter_map(|field| axis.slot(field));
+        let of_axis = of_axis.chain(switches);
+        taken.extend(of_axis.map(|signal| (signal, format!("the axis \"{}\"", shown(&axis.name)))));
+    }
+    taken
 }
 
 struct FieldbusTable<'a> {

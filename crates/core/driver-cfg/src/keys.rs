@@ -6,6 +6,7 @@ use tickbus_fieldbus::faults::{self, FAULT_KEYS};
 use tickbus_fieldbus::{ADDRESS_LIMIT, Role, Written};
 use tickbus_image::signal::section;
 use tickbus_record as record;
+use tickbus_reply as reply;
 
 use crate::{driver_table, layout, page, timing};
 
@@ -63,6 +64,11 @@ pub const FILE: &[Key] = &[
         "axis",
         Shape::List(&Shape::Table(axis::section::KEYS), 0, layout::AXIS_LIMIT),
         "Drives of the machine, each as some fifteen signals",
+    ),
+    Key::new(
+        "reply",
+        Shape::List(&Shape::Table(reply::REPLY_KEYS), 0, reply::LIMIT),
+        "Signals that the driver makes where no model does",
     ),
     Key::new(
         "fault",

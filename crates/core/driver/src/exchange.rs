@@ -57,7 +57,7 @@ impl Driver {
         let (mut tick, begun) = self.begin::<W>(time);
         let (found, done) = match begun {
             Ok(()) => {
-                self.handed_over::<W>(slots);
+                self.handed_over::<W>(Some(tick.time), slots);
                 self.begin_extras::<W>(&tick, slots);
                 let sent = self.put::<W>(tick.now, slots);
                 let (found, done) = self.take::<W>(&tick, slots);
@@ -142,7 +142,8 @@ impl Driver {
         let mut found = self.last;
         if !W::IS_STEPPED || found.code != Code::BusFailed {
             let now = self.now::<W>();
-            self.handed_over::<W>(slots);
+            let time = self.tick.map(|tick| tick.time);
+            self.handed_over::<W>(time, slots);
             let sent = self.put::<W>(now, slots);
             let taken = self.lap::<W>(now);
             if let Some(tick) = &mut self.tick {
@@ -258,11 +259,12 @@ impl Driver {
         Ok(())
     }
 
-    /// The simulation has handed its values over.
+    /// The simulation has handed its values over, in a tick at this time.
     #[inline(always)]
-    fn handed_over<W: Work>(&mut self, slots: &mut [Slot]) {
+    fn handed_over<W: Work>(&mut self, time: Option<Nanos>, slots: &mut [Slot]) {
         if W::HAS_EXTRAS && self.extras.changes_slots() {
-            self.extras.handed_over(slots);
+            let time = time.map(|time| time - self.first_time);
+            self.extras.handed_over(time, slots);
         }
     }
 

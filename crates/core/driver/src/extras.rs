@@ -7,6 +7,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::{Fault, FaultBoard, Faults, Slots, TickTime};
 use tickbus_image::signal::Slot;
+use tickbus_reply::Replies;
 
 use super::heartbeat::Beat;
 use super::tap::Tap;
@@ -16,6 +17,10 @@ use super::tap::Tap;
 pub(super) struct Extras {
     /// The axes' work on every tick.
     reflexes: Option<Reflexes>,
+    /// The signals that the driver makes where the simulation does not.
+    replies: Option<Replies>,
+    /// The simulation's time at the last tick.
+    time: Nanos,
     /// The heartbeats of this end.
     beats: Box<[Beat]>,
     /// Faults to inject; `None` until one can come.
@@ -27,9 +32,14 @@ pub(super) struct Extras {
 }
 
 impl Extras {
-    pub(super) fn new(reflexes: Option<Reflexes>, beats: Box<[Beat]>) -> Self {
+    pub(super) fn new(
+        reflexes: Option<Reflexes>,
+        replies: Option<Replies>,
+        beats: Box<[Beat]>,
+    ) -> Self {
         let mut extras = Self {
             reflexes,
+            replies,
             beats,
             ..Self::default()
         };
@@ -37,9 +47,10 @@ impl Extras {
         extras
     }
 
-    /// Takes the work of `fresh`, whose reflexes and heartbeats are at their beginning, and ends all faults.
+    /// Takes the work of `fresh`, whose reflexes, replies and heartbeats are at their beginning, and ends all faults.
     pub(super) fn restart(&mut self, fresh: Self) {
         (self.reflexes, self.beats) = (fresh.reflexes, fresh.beats);
+        (self.replies, self.time) = (fresh.replies, fresh.time);
         if let Some(faults) = &mut self.faults {
             faults.restart();
         }
@@ -65,8 +76,9 @@ impl Extras {
         self.note_changes();
     }
 
-    const fn works_on_every_tick(&self) -> bool {
-        self.reflexes.is_some() || !self.beats.is_empty()
+    /// Returns true if there is work in every tick.
+    pub(super) const fn works_on_every_tick(&self) -> bool {
+        self.reflexes.is_some() || self.replies.is_some() || !self.beats.is_empty()
     }
 
     fn note_changes(&mut self) {
@@ -129,11 +141,23 @@ impl Extras {
         self.beats.iter().map(Beat::signal)
     }
 
-    /// Runs first in the sending half, when the simulation hands its values over.
+    /// Runs first in the sending half, when the simulation hands its values over; `time` is the simulation's, or `None`
+    /// if that of the last tick goes on.
     #[inline(never)]
-    pub(super) fn handed_over(&mut self, slots: &mut [Slot]) {
+    pub(super) fn handed_over(&mut self, time: Option<Nanos>, slots: &mut [Slot]) {
         if let Some(reflexes) = &mut self.reflexes {
             reflexes.sending(slots);
+        }
+        if let Some(replies) = &mut self.replies {
+            self.time = time.unwrap_or(self.time);
+            replies.step(self.time, slots);
+        }
+    }
+
+    /// Lets the caller write the signal of a reply for a while; see [`Replies::borrow`].
+    pub(super) fn borrow_reply(&mut self, signal: usize, borrowed: bool) {
+        if let Some(replies) = &mut self.replies {
+            replies.borrow(signal, borrowed);
         }
     }
 

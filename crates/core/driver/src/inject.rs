@@ -90,6 +90,12 @@ impl Driver {
         self.extras.next_model_change()
     }
 
+    /// Lets the caller write the signal of a [reply](tickbus_driver_cfg::Config::replies) with this index for a while, as
+    /// a test does that forces it: no reply writes the signal until the caller gives it back, with `borrowed` false.
+    pub fn borrow_reply(&mut self, signal: usize, borrowed: bool) {
+        self.extras.borrow_reply(signal, borrowed);
+    }
+
     /// Returns the board where the faults publish their state, readable from any thread.
     pub fn board(&self) -> &Arc<FaultBoard> {
         &self.board

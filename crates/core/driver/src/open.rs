@@ -10,6 +10,7 @@ use tickbus_fieldbus::{
     Cause, ChangeEvents, Events, LinkState, LinkStatus, Port, Role, Steps, SwallowedSignals,
 };
 use tickbus_image::{BusEnd, EVENT_CAPACITY, TickEnd, image_counting};
+use tickbus_reply::Replies;
 
 use super::bus;
 use super::bus_handle::{BusHandle, OpenBus};
@@ -84,7 +85,7 @@ impl Driver {
             given: None,
             tick: None,
             last: Exchange::NONE,
-            extras: extras(&config),
+            extras: extras(&config, &board),
             shape: Shape::Extended,
             board,
             swallowed,
@@ -188,13 +189,16 @@ pub(super) fn start(
 }
 
 /// Creates the extra work of a driver without faults.
-pub(super) fn extras(config: &Config) -> Extras {
-    // Reflexes belong to the machine: a PLC has its own.
-    let reflexes = match config.role {
-        Role::Device => Reflexes::new(&config.axes),
-        Role::Controller | Role::Observer => None,
+pub(super) fn extras(config: &Config, board: &Arc<FaultBoard>) -> Extras {
+    // Reflexes and replies belong to the machine: a PLC has its own.
+    let (reflexes, replies) = match config.role {
+        Role::Device => (
+            Reflexes::new(&config.axes),
+            Replies::new(&config.replies, &config.table, board),
+        ),
+        Role::Controller | Role::Observer => (None, None),
     };
-    Extras::new(reflexes, Beat::all(config, config.role))
+    Extras::new(reflexes, replies, Beat::all(config, config.role))
 }
 
 /// Returns the counters of the program at the other end.

@@ -51,7 +51,7 @@ impl Driver {
         (self.first_now, self.first_time) = (Nanos::ZERO, Nanos::ZERO);
         (self.given, self.last) = (None, Exchange::NONE);
         self.recorded.restart();
-        self.extras.restart(extras(&self.config));
+        self.extras.restart(extras(&self.config, &self.board));
         self.inject_configured()?;
         self.shape = self.fitting_shape();
         let initial = self.initial_slots();

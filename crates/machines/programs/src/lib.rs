@@ -9,6 +9,7 @@ use peeler::{Charger, Lathe};
 use tickbus_plc::{Program, ProgramError, Programs};
 
 mod drum;
+mod idle;
 mod mirror;
 mod peeler;
 mod reaction;
@@ -16,6 +17,7 @@ mod reaction;
 pub mod rig;
 
 pub use drum::Drum;
+pub use idle::Idle;
 pub use mirror::Mirror;
 pub use reaction::Reaction;
 pub use rig::{La1Code, Rig};

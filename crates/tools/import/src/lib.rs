@@ -14,6 +14,7 @@ mod device;
 mod layout;
 mod logix;
 mod plc_xml;
+mod propose;
 mod rows;
 mod text;
 mod workbook;
@@ -24,6 +25,7 @@ use std::path::Path;
 
 pub use condensed::condensed;
 pub use device::Client;
+pub use propose::{Point, Proposal, propose};
 
 use cells::Record;
 use columns::Columns;
@@ -33,7 +35,7 @@ use text::FileType;
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake};
 use tickbus_driver_cfg::{Config, Kinds};
-use tickbus_image::signal::Addressing;
+use tickbus_image::signal::{Addressing, Area, DataType};
 
 /// Longer files are refused: no tag list is this large.
 const LONGEST: usize = 64 << 20;
@@ -48,6 +50,8 @@ pub struct ImportOptions {
     pub lenient: bool,
     /// The bus of the device addresses in the list; `None` to detect it.
     pub client: Option<Client>,
+    /// Add [proposed](propose) replies for the inputs.
+    pub replies: bool,
 }
 
 /// The result of reading a table.
@@ -57,6 +61,8 @@ pub struct Imported {
     pub text: String,
     /// The number of signals.
     pub signals: usize,
+    /// The number of proposed replies.
+    pub replies: usize,
     /// The number of signals whose addresses import assigned, because the list has none in the process image.
     pub assigned: usize,
     /// The reading of the addresses, where there is a choice.
@@ -258,14 +264,37 @@ fn tags_of(
     if let Err(mistake) = layout::lay(&mut tags) {
         return Err(Mistakes::of(file, mistake));
     }
-    let text = write::driver_cfg(Path::new(file), &tags, world);
+    let mut text = write::driver_cfg(Path::new(file), &tags, world);
+    let proposals = if reading.replies {
+        proposals(&tags)
+    } else {
+        Vec::new()
+    };
+    let sections = proposals.iter().map(|proposal| &*proposal.section);
+    write::replies(&mut text, &sections.collect::<Vec<_>>());
     Ok(Imported {
         text,
         signals: tags.len(),
+        replies: proposals.len(),
         assigned,
         notes,
         skipped,
     })
+}
+
+/// Replies for the inputs among the tags.
+fn proposals(tags: &[Tag]) -> Vec<Proposal> {
+    fn point(tag: &Tag) -> Point<'_> {
+        Point {
+            name: &tag.name,
+            comment: &tag.comment,
+            is_input: tag.area == Area::Input,
+            is_bool: tag.data_type == DataType::Bool,
+            is_written: false,
+        }
+    }
+    let points: Vec<Point<'_>> = tags.iter().map(point).collect();
+    propose(&points)
 }
 
 /// The kind of addresses in `sheets`.

@@ -57,6 +57,20 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
     out
 }
 
+/// Adds proposed replies.
+pub(super) fn replies(out: &mut String, sections: &[&str]) {
+    if sections.is_empty() {
+        return;
+    }
+    out.push_str(
+        "\n# Proposed by the names of the signals: read them, and write the times of your machine into them (docs/replies.md).\n",
+    );
+    for section in sections {
+        out.push('\n');
+        out.push_str(section);
+    }
+}
+
 /// The remark about addresses that do not exist in the PLC.
 const ASSIGNED: &str = "# Signals with another address in their remark have that one in the PLC, and here one that import assigned, in order:\n\
                         # let the PLC's program or its I/O configuration copy between the two.\n";
@@ -137,7 +151,7 @@ fn signal(out: &mut String, tag: &Tag, world: World) {
 }
 
 /// A text of TOML, in quotes.
-fn text(text: &str) -> String {
+pub(super) fn text(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 

@@ -216,7 +216,7 @@ const list = (() => {
       flag(element, "new", plant.isNew(signal));
       set(element, "chosen", signal === chosen, (it, yes) => it.setAttribute("aria-selected", yes));
       set(element, "label", `Trend of ${signal.name}`, (it, label) => { it.parts.open.setAttribute("aria-label", label); it.parts.open.title = label; });
-      set(element, "title", `${signal.name}, ${signal.type}${signal.address && ` at ${signal.address}`}${signal.latch ? `, latch ${signal.latch}` : ""}`, (it, title) => { it.title = title; });
+      set(element, "title", `${signal.name}, ${signal.type}${signal.address && ` at ${signal.address}`}${signal.latch ? `, latch ${signal.latch}` : ""}${signal.reply ? `, reply: ${signal.reply}` : ""}`, (it, title) => { it.title = title; });
       set(element, "expanded", signal.isOpen, (it, yes) => it.parts.open.setAttribute("aria-expanded", yes));
     },
     trend(element, { signal }) {

@@ -68,6 +68,7 @@
     const ways = { I: "to the PLC", Q: "from the PLC" };
     const facts = [signal.address, signal.type, ways[signal.direction] ?? `written by ${signal.driver.stations[signal.station]}`].filter(Boolean);
     if (signal.latch) facts.push(`latch ${signal.latch}`);
+    if (signal.reply) facts.push(`reply: ${signal.reply}`);
     if (plant.drivers.length > 1) facts.push(signal.driver.name);
     show(get("chosen-facts"), facts.join(" · "));
     get("chosen-tools").hidden = !mayForce || !signal.isWritable;

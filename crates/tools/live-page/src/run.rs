@@ -430,6 +430,7 @@ impl Exhibit for ShownRun {
             station: signal.station,
             direction: None,
             latch: None,
+            reply: None,
             writable: false,
             value: row.value(signal),
             raw: row.raw(signal),

@@ -218,6 +218,9 @@ pub(crate) struct SignalJson<'a> {
     /// From the PLC's view, if there is one.
     pub(crate) direction: Option<&'static str>,
     pub(crate) latch: Option<&'static str>,
+    /// The kind of the reply that makes it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) reply: Option<&'static str>,
     pub(crate) writable: bool,
     pub(crate) value: Number,
     pub(crate) raw: String,

@@ -221,6 +221,7 @@ impl Shown {
                 Latch::Falling => "falling",
                 Latch::Both => "both",
             }),
+            reply: self.watch.config().reply_of(index).map(|reply| reply.kind),
             writable: self.watch.role() != Role::Observer,
             value: row.value(signal),
             raw: row.raw(signal),

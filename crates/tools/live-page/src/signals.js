@@ -31,6 +31,7 @@ const plant = (() => {
       station: given.station,
       direction: given.direction,
       latch: given.latch,
+      reply: given.reply,
       isWritable: given.writable,
       isBool: given.type === "BOOL",
       words: words.join(" ").toLowerCase(),

@@ -11,10 +11,11 @@ mod tests;
 use std::collections::BTreeMap;
 
 use serde_json::{Map, Value, json};
-use tickbus_base::toml_text::{Key, Shape};
+use tickbus_base::toml_text::{Key, Shape, TableKind};
 use tickbus_driver_cfg::Kinds;
 use tickbus_driver_cfg::keys::{FIELDBUS, FILE, KindKeys, STATION, STATION_LIMIT};
-use tickbus_fieldbus::faults::{FAULT_KINDS, FaultKind};
+use tickbus_fieldbus::faults::FAULT_KINDS;
+use tickbus_reply::{REPLY_KINDS, one_of};
 
 use shape::{described, table};
 
@@ -51,7 +52,12 @@ pub fn schema(kinds: &Kinds) -> Value {
         .iter()
         .map(|key| (key.name.to_owned(), described(key)))
         .collect();
-    properties["fault"]["items"]["allOf"] = FAULT_KINDS.iter().map(fault_rule).collect();
+    properties["fault"]["items"]["allOf"] = rules_of(&FAULT_KINDS, |_| Vec::new());
+    let one_of_reply = |kind: &TableKind| {
+        let groups = one_of(kind.name).iter();
+        groups.map(|(keys, _)| keys.to_vec()).collect()
+    };
+    properties["reply"]["items"]["allOf"] = rules_of(&REPLY_KINDS, one_of_reply);
     let mut fieldbus = bus.open_table("The bus, and this end of it");
     fieldbus["properties"]["kind"] = json!({ "description": "The kind of bus", "enum": names });
     fieldbus["required"] = json!(["kind"]);
@@ -169,9 +175,26 @@ fn descriptions(schemas: &[Value]) -> String {
     all.join(" | ")
 }
 
-/// Returns the rule for the keys of one kind of faults.
-fn fault_rule(kind: &FaultKind) -> Value {
-    let others = FAULT_KINDS.iter().flat_map(FaultKind::keys);
+/// Returns the rules for the keys of each kind of tables; `one_of` has groups of keys of which a kind needs one.
+fn rules_of(kinds: &[TableKind], one_of: impl Fn(&TableKind) -> Vec<Vec<&'static str>>) -> Value {
+    let rules = kinds.iter().map(|kind| {
+        let mut rule = kind_rule(kind, kinds);
+        let groups = one_of(kind);
+        if !groups.is_empty() {
+            let groups = groups.into_iter().map(|keys| {
+                let any = keys.into_iter().map(|key| json!({ "required": [key] }));
+                json!({ "anyOf": any.collect::<Value>() })
+            });
+            rule["then"]["allOf"] = groups.collect();
+        }
+        rule
+    });
+    rules.collect()
+}
+
+/// Returns the rule for the keys of one kind of tables, of all these kinds.
+fn kind_rule(kind: &TableKind, kinds: &[TableKind]) -> Value {
+    let others = kinds.iter().flat_map(TableKind::keys);
     let foreign = others.filter(|key| kind.keys().all(|own| own != *key));
     let mut properties: Map<String, Value> =
         foreign.map(|key| (key.to_owned(), json!(false))).collect();

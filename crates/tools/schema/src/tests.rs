@@ -14,6 +14,7 @@ use tickbus_driver_cfg::Config;
 use tickbus_driver_cfg::keys::{FIELDBUS, FILE, STATION};
 use tickbus_fieldbus::faults::FAULT_KINDS;
 use tickbus_kinds::KINDS;
+use tickbus_reply::REPLY_KINDS;
 
 use super::{own_keys, schema};
 
@@ -256,9 +257,9 @@ fn walk(pointer: &str, name: &str, value: &Value, keys: &[Key], found: &mut Vec<
 
 fn enter(pointer: &str, name: &str, value: &Value, shape: &Shape, found: &mut Vec<Table>) {
     match (shape, value) {
-        (Shape::Table(keys), Value::Object(_)) if name == "/fault" => {
+        (Shape::Table(keys), Value::Object(_)) if ["/fault", "/reply"].contains(&name) => {
             let kind = value["kind"].as_str().expect("a kind");
-            walk(pointer, &format!("/fault of {kind}"), value, keys, found);
+            walk(pointer, &format!("{name} of {kind}"), value, keys, found);
         }
         (Shape::Table(keys), Value::Object(_)) => walk(pointer, name, value, keys, found),
         (Shape::List(element, ..), Value::Array(list)) => {
@@ -362,6 +363,10 @@ fn the_readers_take_what_their_keys_declare() {
     }
     names.remove("/fault");
     names.extend(FAULT_KINDS.map(|kind| format!("/fault of {}", kind.name)));
+    names.remove("/reply");
+    names.remove("/reply/ramp");
+    names.insert("/reply of rule/ramp".to_owned());
+    names.extend(REPLY_KINDS.map(|kind| format!("/reply of {}", kind.name)));
     for kind in KINDS.keys() {
         let name = format!("fieldbus of {}", kind.name);
         names.insert(name.clone());

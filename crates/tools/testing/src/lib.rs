@@ -8,7 +8,7 @@
 //! machine and scenario are code in another language.
 
 mod block;
-mod condition;
+mod edges;
 mod failure;
 mod fit_file;
 mod junit;
@@ -30,7 +30,6 @@ mod unswallowed;
 mod watch;
 
 pub use block::{Branch, Coverage};
-pub use condition::{Condition, Demand};
 pub use failure::Failure;
 pub use fit_file::{FitFile, Twin};
 pub use junit::{Case, Group, Verdict, junit_xml};
@@ -43,3 +42,4 @@ pub use sweep::{
 };
 pub use sweeping::{Judged, Refused};
 pub use test::{Test, TextPosition};
+pub use tickbus_reply::{Condition, Demand};

@@ -1,6 +1,7 @@
 //! The machine of a test file alone: a recording's commands drive it, and what it answers becomes a run.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, load_text, read_text};
@@ -9,6 +10,7 @@ use tickbus_fieldbus::Role;
 use tickbus_fmi::foreign::Stepped;
 use tickbus_image::signal::{Area, SignalTable, Slot};
 use tickbus_record::{Columns, Recording, RecordingError, Rows, Tick, ValueKind};
+use tickbus_reply::{Replies, Reply, Rule};
 use tickbus_report::{DEFAULT_BUDGET, Run, SignalKind};
 
 use super::machine::Stub;
@@ -17,7 +19,6 @@ use super::plant::Plant;
 use super::playback::kind;
 use super::sections::Reader;
 use super::suite::load_config;
-use super::test::Rule;
 use super::watch::{Watch, real};
 
 /// The machine of a test file.
@@ -30,6 +31,7 @@ pub struct Model {
     step: Option<Nanos>,
     initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
+    replies: Vec<Reply>,
     pub(super) fmu: Option<Plant>,
 }
 
@@ -143,6 +145,7 @@ impl Model {
             .map(|(slot, signal)| Watch::new(*slot, signal))
             .collect();
         let mut stub = Stub::new(&self.rules, &watches);
+        let mut replies = Replies::new(&self.replies, table, &Arc::default());
         let mut shown = Shown::new(table);
         // The first recorded tick ended one step after the begin.
         let second = commands.times.iter().find(|time| *time > first);
@@ -177,6 +180,9 @@ impl Model {
                 }
             }
             stub.step(next - begin, next - now, &watches, &mut slots);
+            if let Some(replies) = &mut replies {
+                replies.step(next - begin, &mut slots);
+            }
             shown.take(next, table, &slots);
             (now, tick) = (next, tick + 1);
         }
@@ -283,6 +289,7 @@ fn read(
     }
     Some(Model {
         file: file.to_owned(),
+        replies: machine.replies.unwrap_or_else(|| config.replies.clone()),
         config,
         step,
         initial: machine.initial,

@@ -8,8 +8,9 @@ use tickbus_driver_cfg::Config;
 use tickbus_fmi::foreign::{Machine, Stepped};
 use tickbus_image::signal::{Signal, Slot};
 use tickbus_record as record;
+use tickbus_reply::Condition;
 
-use super::condition::{Bookmark, Condition};
+use super::edges::Bookmark;
 use super::failure::{Failure, Halt};
 use super::machine::Stub;
 use super::observer::Observer;
@@ -79,6 +80,7 @@ impl Suite {
         let mut slots = driver.initial_slots();
         for (signal, value) in bench.initial.iter().chain(initial) {
             slots[*signal] = *value;
+            driver.borrow_reply(*signal, true);
         }
         let signals = &bench.config.table.signals;
         let fmu = bench.fmu.as_ref();
@@ -215,12 +217,14 @@ impl Stand<'_> {
         let strict = self.is_strict();
         for (signal, value) in &step.set {
             self.slots[*signal] = *value;
+            self.driver.borrow_reply(*signal, true);
         }
         for (signal, value) in &step.force {
             self.force(*signal, *value);
         }
-        self.forced
-            .retain(|(signal, _)| !step.release.contains(signal));
+        for signal in &step.release {
+            self.release(*signal);
+        }
         for (fault, place) in &step.inject {
             let id = self
                 .driver
@@ -259,7 +263,7 @@ impl Stand<'_> {
             Some(Passage::Press(button, count)) => {
                 self.force(*button, Slot::from_real(1.0));
                 self.pass(*count, step.place)?;
-                self.forced.retain(|(signal, _)| signal != button);
+                self.release(*button);
                 self.slots[*button] = Slot::from_real(0.0);
             }
             Some(Passage::Await(conditions, limit)) => self.wait(conditions, *limit, step.place)?,
@@ -288,6 +292,12 @@ impl Stand<'_> {
         self.forced.retain(|(other, _)| *other != signal);
         self.forced.push((signal, value));
         self.slots[signal] = value;
+        self.driver.borrow_reply(signal, true);
+    }
+
+    fn release(&mut self, signal: usize) {
+        self.forced.retain(|(other, _)| *other != signal);
+        self.driver.borrow_reply(signal, false);
     }
 
     fn pass(&mut self, count: u64, place: TextPosition) -> Result<(), Halt> {
@@ -424,7 +434,7 @@ impl Stand<'_> {
 
     fn holds(&self, one: &Watched) -> bool {
         let watch = &self.watches[one.condition.signal];
-        one.condition.holds(watch, &self.slots, one.since)
+        one.since.finds(&one.condition, watch, &self.slots)
     }
 
     /// Fails with the first condition that does not hold.

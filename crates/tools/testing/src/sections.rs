@@ -7,20 +7,15 @@ use tickbus_base::toml_text::{Mistakes, Table, Value, shown};
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::Role;
 use tickbus_fieldbus::faults::{self, Effect, Fault, unknown};
-use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{Area, SignalTable, Slot};
+use tickbus_reply::{self as reply, Condition, Reply, Rule, Signals, read_rule, texts};
 
 use super::block::Counted;
-use super::condition::{Condition, Demand};
 use super::model_faults::ModelFaults;
 use super::plant::{FmuKeys, Plant};
 use super::playback::MachineRecording;
-use super::test::{Passage, Ramp, Rule, Step, Test, TextPosition, Unswallowed};
+use super::test::{Passage, Step, Test, TextPosition, Unswallowed};
 use super::unswallowed;
-
-/// The advice where conditions are expected.
-const CONDITIONS: &str =
-    "write a condition such as \"Ready lamp\", a list of them, or { \"Phase\" = 3 }";
 
 /// Conditions on signals, and that nothing is swallowed.
 type Expectations = (Vec<(Condition, TextPosition)>, Vec<Unswallowed>);
@@ -52,6 +47,8 @@ pub(super) struct Reader<'a> {
 pub(super) struct Machine {
     pub(super) initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
+    /// All replies of the machine, if the test file adds some to those of the driver.cfg.
+    pub(super) replies: Option<Vec<Reply>>,
     pub(super) tape: Option<MachineRecording>,
     pub(super) fmu: Option<Plant>,
     /// Mistakes in files that the section names.
@@ -65,6 +62,7 @@ impl Reader<'_> {
         let compare = table.take("compare");
         let fmu = FmuKeys::take(&mut table);
         let rules = table.take("rule");
+        let replies = table.take("reply");
         table.finish();
         if let (Some(value), None) = (&compare, &recording) {
             value.wrong(
@@ -76,13 +74,42 @@ impl Reader<'_> {
         let initial = self.assignments(set.as_ref());
         let rules = rules.map(|value| value.tables("[[machine.rule]]"));
         let rules = rules.into_iter().flatten();
+        let condition = |value: &Value<'_>| self.condition(value).map(|(condition, _)| condition);
+        let replies = replies.map(|value| self.replies(value.tables("[[machine.reply]]")));
         Machine {
             initial: initial.unwrap_or_default(),
-            rules: rules.filter_map(|table| self.rule(table)).collect(),
+            rules: rules
+                .filter_map(|table| read_rule(table, self.signals(), condition))
+                .collect(),
+            replies,
             tape: recording.and_then(|value| self.tape(&value, compare.as_ref())),
             fmu,
             elsewhere,
         }
+    }
+
+    /// The replies of the driver.cfg, and those of the test file.
+    fn replies(&self, sections: Vec<Table<'_>>) -> Vec<Reply> {
+        if let (Some(first), Role::Controller) = (sections.first(), self.role) {
+            first.wrong(
+                "the driver.cfg is that of the PLC, and replies are made by the machine",
+                "remove [[machine.reply]], or name the driver.cfg of the machine",
+            );
+            return Vec::new();
+        }
+        let mut taken = self.config.made_signals();
+        for reply in &self.config.replies {
+            let what = format!("the reply \"{}\" of the driver.cfg", shown(&reply.name));
+            taken.extend(reply.outputs.iter().map(|signal| (*signal, what.clone())));
+        }
+        let scope = reply::Scope {
+            table: self.table,
+            writes: self.own(),
+            tick: Some(self.step),
+            taken: &taken,
+            earlier: &self.config.replies,
+        };
+        reply::read_sections(sections, scope)
     }
 
     /// The area that the machine writes.
@@ -114,79 +141,6 @@ impl Reader<'_> {
             }
         }
         Some(tape)
-    }
-
-    fn rule(&self, mut table: Table<'_>) -> Option<Rule> {
-        let name = table.take("name");
-        let when = table.require("when", "write a condition, such as \"LA1 run\"");
-        let after = table.take("after");
-        let set = table.take("set");
-        let otherwise = table.take("else");
-        let ramp = table.take("ramp");
-        table.require_one_of(&["set", "ramp"], "say what the machine does then");
-        table.finish();
-        let when = when.and_then(|value| self.conditions(Some(&value)));
-        let after = after.map_or(Some(Nanos::ZERO), |value| value.duration());
-        let set = self.assignments(set.as_ref());
-        if let (Some(when), Some(value)) = (&when, &otherwise)
-            && when.iter().any(|(condition, _)| condition.is_edge())
-        {
-            value.wrong(
-                "an edge has no \"else\": it is over at once",
-                "write the condition without \"rises\" or \"falls\", or a second rule",
-            );
-        }
-        let otherwise = self.assignments(otherwise.as_ref());
-        let ramp = match ramp {
-            None => Some(None),
-            Some(value) => self.ramp(&value).map(Some),
-        };
-        let name =
-            name.map(|value| value.label(NAME_LIMIT, "name the rule, such as \"lift 1 up\""));
-        Some(Rule {
-            name: name.flatten().map(str::to_owned),
-            when: when?.into_iter().map(|(condition, _)| condition).collect(),
-            after: after?,
-            set: set?,
-            otherwise: otherwise?,
-            ramp: ramp?,
-        })
-    }
-
-    fn ramp(&self, value: &Value<'_>) -> Option<Ramp> {
-        const SHAPE: &str =
-            "write ramp = { signal = \"LA1 position\", to = 180, per_second = 250 }";
-        let mut table = value.table("ramp", SHAPE)?;
-        let signal = table.require("signal", SHAPE);
-        let to = table.require("to", SHAPE);
-        let rate = table.require("per_second", SHAPE);
-        table.finish();
-        let signal = signal.and_then(|value| self.settable(&value, value.text(SHAPE)?));
-        let to = to.and_then(|value| value.number(SHAPE));
-        let rate = rate.and_then(|value| {
-            let rate = value.number(SHAPE)?;
-            if rate <= 0.0 {
-                value.wrong(
-                    format!("\"per_second\" is {}", value.written()),
-                    "write how fast it moves, above 0; \"to\" says whether up or down",
-                );
-                return None;
-            }
-            Some(rate)
-        });
-        let signal = signal?;
-        if self.table.signals[signal].is_integer_slot() {
-            value.wrong(
-                "a 64-bit integer cannot move along a ramp",
-                "use a signal of another type, or give it a scale",
-            );
-            return None;
-        }
-        Some(Ramp {
-            signal,
-            to: to?,
-            per_second: rate?,
-        })
     }
 
     pub(super) fn test(&self, mut table: Table<'_>) -> Option<Test> {
@@ -380,43 +334,22 @@ impl Reader<'_> {
         u64::try_from(ticks).ok()
     }
 
+    /// The signals that conditions and values name.
+    fn signals(&self) -> Signals<'_> {
+        Signals {
+            table: self.table,
+            writes: self.own(),
+        }
+    }
+
     /// A signal that this end writes, by its name.
     fn settable(&self, value: &Value<'_>, name: &str) -> Option<usize> {
-        let Some(index) = self.table.position(name) else {
-            value.refuse(unknown(name, self.table));
-            return None;
-        };
-        let signal = &self.table.signals[index];
-        if signal.area != self.own() {
-            value.wrong(
-                format!(
-                    "\"{}\" ({}) is written by the PLC program",
-                    shown(name),
-                    signal.address()
-                ),
-                "set the signals that it reads; of the others, expect what you want to see",
-            );
-            return None;
-        }
-        Some(index)
+        self.signals().settable(value, name)
     }
 
     /// `{ "Start button" = true }`: signals and their values.
     fn assignments(&self, value: Option<&Value<'_>>) -> Option<Vec<(usize, Slot)>> {
-        let Some(value) = value else {
-            return Some(Vec::new());
-        };
-        let table = value.table(
-            "signals",
-            "write signals and values, such as { \"Start button\" = true }",
-        )?;
-        let assignment = |(name, value): (&str, Value<'_>)| {
-            let index = self.settable(&value, name)?;
-            let slot = slot_of(&value, &self.table.signals[index], "the value")?;
-            Some((index, slot))
-        };
-        let read: Vec<_> = table.all().map(assignment).collect();
-        read.into_iter().collect()
+        self.signals().assignments(value)
     }
 
     /// One name or a list of them.
@@ -458,17 +391,12 @@ impl Reader<'_> {
         let Some(value) = value else {
             return Some(Vec::new());
         };
-        if value.is_table() {
-            let read: Vec<_> = value
-                .table("signals", CONDITIONS)?
-                .all()
-                .map(|(name, value)| self.equality(name, &value))
-                .collect();
-            return read.into_iter().collect();
-        }
-        let texts = texts(value)?;
-        let read: Vec<_> = texts.iter().map(|value| self.condition(value)).collect();
-        read.into_iter().collect()
+        let one = |value: &Value<'_>| self.condition(value).map(|(condition, _)| condition);
+        let read = self.signals().conditions(value, one)?.into_iter();
+        Some(
+            read.map(|(condition, value)| (condition, value.place()))
+                .collect(),
+        )
     }
 
     /// Conditions, among which may be that nothing is swallowed.
@@ -513,30 +441,6 @@ impl Reader<'_> {
             }
         }
     }
-
-    /// Reads `"Phase" = 3` among expectations.
-    fn equality(&self, name: &str, value: &Value<'_>) -> Option<(Condition, TextPosition)> {
-        let Some(signal) = self.table.position(name) else {
-            value.refuse(unknown(name, self.table));
-            return None;
-        };
-        let slot = slot_of(value, &self.table.signals[signal], "the value")?;
-        let demand = Demand::equal(slot, &self.table.signals[signal]);
-        Some((Condition { signal, demand }, value.place()))
-    }
-}
-
-/// A text, or those of a list.
-fn texts<'v>(value: &Value<'v>) -> Option<Vec<Value<'v>>> {
-    if value.as_text().is_some() {
-        return Some(vec![value.clone()]);
-    }
-    let list = value.list(CONDITIONS)?;
-    if list.is_empty() {
-        value.wrong("an empty list demands nothing", CONDITIONS);
-        return None;
-    }
-    Some(list)
 }
 
 /// Names of faults: one, or a list of them.

@@ -11,6 +11,7 @@ use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::{Events, Role};
 use tickbus_image::signal::Slot;
 use tickbus_plc as plc;
+use tickbus_reply::Rule;
 
 use super::block::{self, BlockKeys, Counted, Coverage};
 use super::model_faults::ModelFaults;
@@ -18,7 +19,7 @@ use super::plant::Plant;
 use super::playback::MachineRecording;
 use super::sections::{Machine, Reader};
 use super::sweep::{Scenario, Sweep};
-use super::test::{Rule, Test};
+use super::test::Test;
 
 /// The default step of a test file.
 const STEP: Nanos = Nanos::from_millis(1);
@@ -222,6 +223,10 @@ fn read_sections(
     let (tests, sweep) = (tests?, sweep?);
     if of_config.is_some() {
         return None;
+    }
+    let mut config = config;
+    if let Some(replies) = machine.replies {
+        config.replies = replies;
     }
     let bench = Bench {
         config: Arc::new(config),

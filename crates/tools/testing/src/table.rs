@@ -9,8 +9,8 @@ use tickbus_base::toml_text::{Collector, Value, read_text, shown};
 use tickbus_fieldbus::faults::unknown;
 use tickbus_image::signal::section::slot_of;
 use tickbus_image::signal::{DataType, Signal, Slot};
+use tickbus_reply::{Condition, Demand};
 
-use super::condition::{Condition, Demand};
 use super::sections::Reader;
 use super::test::{Passage, Step, TextPosition};
 

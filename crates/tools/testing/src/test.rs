@@ -1,10 +1,8 @@
-//! Tests as read from a file: their steps, and the rules of the machine.
+//! Tests as read from a file, and their steps.
 
-use tickbus_base::time::Nanos;
 use tickbus_fieldbus::faults::Fault;
 use tickbus_image::signal::Slot;
-
-use super::condition::Condition;
+use tickbus_reply::Condition;
 
 /// Line and column, both from 1.
 pub type TextPosition = (usize, usize);
@@ -71,26 +69,4 @@ pub(super) enum Passage {
     Press(usize, u64),
     /// Until all of these hold, for at most this many ticks.
     Await(Vec<(Condition, TextPosition)>, u64),
-}
-
-/// One rule of the machine's stub.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Rule {
-    /// The name by which a fit changes the rule's times.
-    pub(super) name: Option<String>,
-    /// All of these must hold. Never empty.
-    pub(super) when: Vec<Condition>,
-    pub(super) after: Nanos,
-    pub(super) set: Vec<(usize, Slot)>,
-    pub(super) otherwise: Vec<(usize, Slot)>,
-    pub(super) ramp: Option<Ramp>,
-}
-
-/// A signal that moves towards a value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Ramp {
-    pub(super) signal: usize,
-    pub(super) to: f64,
-    /// Units per second. Positive.
-    pub(super) per_second: f64,
 }

@@ -6,6 +6,8 @@ use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{DataType, Signal, Slot};
 
+pub(super) use tickbus_reply::real;
+
 /// How many changes are kept.
 const KEPT: usize = 8;
 
@@ -19,18 +21,6 @@ pub(super) struct Watch {
     changes: u64,
     rises: u64,
     falls: u64,
-}
-
-/// The value in a slot of `signal`; the nearest double if it is a 64-bit integer.
-#[expect(clippy::cast_precision_loss, reason = "for people and comparisons")]
-pub(super) fn real(slot: Slot, signal: &Signal) -> f64 {
-    if !signal.is_integer_slot() {
-        slot.real()
-    } else if signal.data_type == DataType::Lint {
-        slot.signed() as f64
-    } else {
-        slot.unsigned() as f64
-    }
 }
 
 /// A value of `signal` as readable text: `on`, `12.5 mm`.

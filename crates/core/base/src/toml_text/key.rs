@@ -49,6 +49,63 @@ impl Key {
     }
 }
 
+/// The keys of one kind of tables, where a key `kind` says which keys belong to a table.
+#[derive(Clone, Copy, Debug)]
+pub struct TableKind {
+    /// The kind's name.
+    pub name: &'static str,
+    /// The keys that it needs.
+    pub required: &'static [RequiredKey],
+    /// The keys that it can have.
+    pub optional: &'static [&'static str],
+    /// True if a table of this kind needs a name: elsewhere a name is for messages only.
+    pub needs_name: bool,
+}
+
+/// A key that one kind of tables needs.
+#[derive(Clone, Copy, Debug)]
+pub struct RequiredKey {
+    /// The key.
+    pub name: &'static str,
+    /// The values that it has in tables of this kind.
+    pub shape: Shape,
+    /// The remedy for a table without it.
+    pub right: &'static str,
+}
+
+impl TableKind {
+    /// Returns a kind whose tables need no name.
+    pub const fn new(
+        name: &'static str,
+        required: &'static [RequiredKey],
+        optional: &'static [&'static str],
+    ) -> Self {
+        Self {
+            name,
+            required,
+            optional,
+            needs_name: false,
+        }
+    }
+
+    /// Returns all of its own keys.
+    pub fn keys(&self) -> impl Iterator<Item = &'static str> {
+        let required = self.required.iter().map(|key| key.name);
+        required.chain(self.optional.iter().copied())
+    }
+}
+
+/// Returns the names of kinds of tables.
+pub const fn kind_names<const N: usize>(kinds: &[TableKind; N]) -> [&'static str; N] {
+    let mut names = [""; N];
+    let mut index = 0;
+    while index < N {
+        names[index] = kinds[index].name;
+        index += 1;
+    }
+    names
+}
+
 /// The values that a key can have, as far as they can be checked without the rest of the file.
 #[derive(Clone, Copy, Debug)]
 pub enum Shape {

@@ -12,7 +12,7 @@ mod source;
 mod syntax;
 mod table;
 
-pub use key::{Key, Shape, names};
+pub use key::{Key, RequiredKey, Shape, TableKind, kind_names, names};
 pub use mistakes::{Collector, Mistakes, PlacedMistake, printable, shown};
 pub use nearest::{did_you_mean, nearest};
 pub use number::short_number;

@@ -7,10 +7,11 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::{Effect, FaultBoard, Slots, TickTime};
-use tickbus_fieldbus::is_stale;
+use tickbus_fieldbus::{Role, is_stale};
 use tickbus_image::TickEnd;
 use tickbus_image::signal::{Plan, Slot};
 use tickbus_record::Recorder;
+use tickbus_reply::Replies;
 
 use super::unit::{Unit, take_over};
 use crate::extras::Extras;
@@ -23,6 +24,8 @@ use crate::{Code, SlotMap};
 pub(super) struct OwnEnd {
     config: Arc<Config>,
     extras: Extras,
+    /// The signals that replies make.
+    replied: Vec<usize>,
     recorder: Option<Recorder>,
     /// Lets another thread look at the program.
     tap: Tap,
@@ -63,7 +66,15 @@ impl OwnEnd {
     ) -> Result<Self, Mistake> {
         let table = &config.table;
         let (writes, reads) = config.role.areas();
-        let mut extras = Extras::new(None, Beat::all(&config, config.role));
+        let made = match config.role {
+            Role::Device => &config.replies[..],
+            Role::Controller | Role::Observer => &[],
+        };
+        let replied = made.iter().flat_map(|reply| reply.outputs.iter().copied());
+        let replied = replied.collect();
+        // Values go through frames here, and come back rounded.
+        let replies = Replies::new(made, table, board).map(Replies::over_all);
+        let mut extras = Extras::new(None, replies, Beat::all(&config, config.role));
         extras.make_room(board);
         let map = SlotMap::new(table, config.role);
         for fault in &config.faults {
@@ -91,6 +102,7 @@ impl OwnEnd {
         });
         Ok(Self {
             extras,
+            replied,
             recorder,
             tap,
             slots: map.initial(table),
@@ -156,18 +168,21 @@ impl OwnEnd {
         }
     }
 
-    /// Puts the heartbeats into the outputs, and prepares the values for [`bend_outputs`](Self::bend_outputs).
+    /// Puts the replies and the heartbeats into the outputs, and prepares the values for [`bend_outputs`](Self::bend_outputs).
     pub(super) fn sending(&mut self, now: Nanos, units: &mut [Unit]) {
         let is_bent = self.extras.bent(true).next().is_some();
-        if !is_bent && self.extras.beating().next().is_none() {
+        if !is_bent && !self.extras.works_on_every_tick() {
             return;
         }
         for (station, unit) in self.stations.iter().zip(&*units) {
+            station.reads.decode(unit.inputs(), &mut self.slots);
             station.writes.decode(unit.outputs(), &mut self.slots);
         }
+        self.extras
+            .handed_over(Some(self.moment.time), &mut self.slots);
         self.extras.beat(now, &mut self.slots);
         self.encode_sent();
-        for signal in self.extras.beating() {
+        for signal in self.extras.beating().chain(self.replied.iter().copied()) {
             let signal = &self.config.table.signals[signal];
             if let Some(unit) = units.get_mut(signal.station) {
                 let beat = &self.stations[signal.station].sent;
@@ -279,7 +294,7 @@ mod tests {
     use crate::statistics::{Counters as _, Figures};
     use tickbus_base::statistics::Statistics;
     use tickbus_base::time::Manual;
-    use tickbus_fieldbus::{LinkStatus, Role};
+    use tickbus_fieldbus::LinkStatus;
     use tickbus_image::BusEnd;
     use tickbus_plc::{Program, Scan};
 
@@ -313,7 +328,7 @@ mod tests {
         let swallowed = crate::open::swallowed_of(&config, "x");
         let (mut cpu, bus) = half(
             Box::new(Once(false)),
-            (&config, Role::Controller),
+            (&config, config.role),
             swallowed.counts(),
         );
         let figures = Figures {
@@ -342,6 +357,32 @@ mod tests {
             cpu.scan(now, true);
             bus.attend(now, None);
             assert_eq!(bus.outgoing(0, now), expected);
+        }
+    }
+
+    #[test]
+    fn a_machine_makes_its_replies_from_what_the_plc_sends_whatever_its_program_writes() {
+        let text = "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"x\"\n\
+                    [[signal]]\nname = \"on\"\naddress = \"%QX0.0\"\n\
+                    [[signal]]\nname = \"running\"\naddress = \"%IX0.0\"\n\
+                    [[signal]]\nname = \"oil\"\naddress = \"%IW2\"\n\
+                    [[reply]]\nkind = \"follows\"\nsignal = \"running\"\nwhen = \"on\"\non_after = \"2ms\"\n\
+                    [[reply]]\nkind = \"constant\"\nsignal = \"oil\"\nvalue = 0x1234\n\
+                    [[fault]]\nkind = \"stuck\"\nsignal = \"oil\"\nvalue = 0\nat = \"2ms\"\nfor = \"1ms\"\n";
+        let (mut cpu, mut bus) = with_own_end(text);
+        let oil = [0x12, 0x34];
+        for (millis, first, [high, low]) in [
+            (0, 0xfe, oil),
+            (1, 0xfe, oil),
+            (2, 0xff, [0; 2]),
+            (3, 0xff, oil),
+        ] {
+            let now = Nanos::from_millis(millis);
+            bus.received(0, now, &[1], true);
+            bus.hand_over();
+            cpu.scan(now, true);
+            bus.attend(now, None);
+            assert_eq!(bus.outgoing(0, now), [first, 0xf0, high, low], "{millis}");
         }
     }
 

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::cell::Cell;
 use super::models::undeclared;
+use super::notes::{Note, Notes};
 use super::{FaultStatus, LIMIT, LineFault, Phase, TickTime};
 use tickbus_base::Mistake;
 use tickbus_base::statistics::Statistics;
@@ -14,7 +15,7 @@ use tickbus_base::toml_text::shown;
 /// The state of a driver's faults, shared by the tick, the bus and other threads.
 #[derive(Debug, Default)]
 pub struct FaultBoard {
-    /// Incremented by every change; zero until the first fault.
+    /// Incremented by every change; zero until the first fault or note.
     news: AtomicU64,
     cells: Mutex<Vec<Arc<Cell>>>,
     /// The number of the fault that was injected last.
@@ -25,6 +26,8 @@ pub struct FaultBoard {
     mailbox: Mutex<Vec<LineFault>>,
     /// The faults that the simulation's model has declared.
     declared: Mutex<Arc<[String]>>,
+    /// The notes of the tick about the replies of the machine.
+    notes: Notes,
     /// The number of beginnings of faults that are no longer on the list.
     forgotten: AtomicU64,
     pub(super) dropped: AtomicU64,
@@ -33,7 +36,7 @@ pub struct FaultBoard {
 }
 
 impl FaultBoard {
-    /// A number that every change increments; zero until the first fault.
+    /// A number that every change increments; zero until the first fault or note.
     #[inline]
     pub fn news(&self) -> u64 {
         self.news.load(Ordering::Acquire)
@@ -96,7 +99,7 @@ impl FaultBoard {
         std::mem::take(&mut *self.mailbox())
     }
 
-    /// Logs the faults that have begun or ended since the last call.
+    /// Logs the faults that have begun or ended since the last call, and the notes that were marked.
     pub fn tell(&self, driver: &str) {
         // The messages are logged after the lock is released, so that no thread waits for a slow reader of the log.
         let cells = self.cells();
@@ -110,10 +113,23 @@ impl FaultBoard {
                 _ => news,
             })
         });
-        let news: Vec<String> = news.collect();
+        let mut news: Vec<String> = news.collect();
         drop(cells);
+        news.extend(self.notes.news(driver));
         for line in news {
             log::warn!("{line}");
+        }
+    }
+
+    /// Takes the number of replies, and the notes about them that a tick can mark.
+    pub fn prepare_notes(&self, replies: usize, notes: Vec<Note>) {
+        self.notes.prepare(replies, notes);
+    }
+
+    /// Marks the note at `place`, which is logged once.
+    pub fn mark(&self, place: usize) {
+        if self.notes.mark(place) {
+            self.news.fetch_add(1, Ordering::Release);
         }
     }
 
@@ -171,10 +187,11 @@ impl FaultBoard {
 
     /// Adds the state of all faults; adds nothing if there was never a fault.
     pub fn write(&self, statistics: &mut Statistics) {
-        if self.news() == 0 {
+        self.notes.write(statistics);
+        let faults = self.list();
+        if faults.is_empty() {
             return;
         }
-        let faults = self.list();
         let active = faults.iter().filter(|fault| fault.phase == Phase::Active);
         let active: Vec<&str> = active.map(|fault| fault.name.as_str()).collect();
         let begun: u64 = faults.iter().map(|fault| fault.begun).sum();

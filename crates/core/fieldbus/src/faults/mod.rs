@@ -15,6 +15,7 @@ mod line_faults;
 mod list;
 mod measure;
 mod models;
+mod notes;
 mod random;
 mod ring;
 mod schedule;
@@ -30,9 +31,10 @@ pub use fault::{Begin, Direction, Effect, Fault, Lasts, LineEffect, SignalEffect
 pub use line_fault::LineFault;
 pub use line_faults::{Fate, LineFaults, Shape, Taken};
 pub use list::{Faults, Prepared, Retired, Slots};
+pub use notes::Note;
+pub use random::Random;
 pub use section::{
-    FAULT_KEYS, FAULT_KINDS, FaultKind, LIMIT, RequiredKey, Scope, model_value, read_file,
-    read_one, read_sections,
+    FAULT_KEYS, FAULT_KINDS, LIMIT, Scope, model_value, read_file, read_one, read_sections,
 };
 pub use tick_time::TickTime;
 

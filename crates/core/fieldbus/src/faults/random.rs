@@ -2,12 +2,12 @@
 //! in every version of tickbus, and a crate may change its generator.
 
 /// Pseudo-random numbers from a seed: `SplitMix64` of Steele, Lea and Flood.
-#[derive(Clone, Debug)]
-pub(super) struct Random(u64);
+#[derive(Clone, Debug, PartialEq)]
+pub struct Random(u64);
 
 impl Random {
-    /// The numbers for the fault with number `id`, so that faults with the same seed draw different ones.
-    pub(super) fn new(seed: u64, id: u32) -> Self {
+    /// The numbers for the fault with number `id`, so that faults, or replies, with the same seed draw different ones.
+    pub fn new(seed: u64, id: u32) -> Self {
         let mut random = Self(seed ^ u64::from(id).wrapping_mul(0xA24B_AED4_963E_E407));
         random.next();
         random
@@ -28,12 +28,12 @@ impl Random {
     }
 
     /// Uniform in [-1, 1).
-    pub(super) fn around_zero(&mut self) -> f64 {
+    pub fn around_zero(&mut self) -> f64 {
         self.unit().mul_add(2.0, -1.0)
     }
 
     /// True with probability `chance`.
-    pub(super) fn happens(&mut self, chance: f64) -> bool {
+    pub fn happens(&mut self, chance: f64) -> bool {
         self.unit() < chance
     }
 }

@@ -5,9 +5,9 @@ mod keys;
 
 pub use self::effect::model_value;
 use self::effect::read_effect;
-pub use self::keys::{FAULT_KEYS, FAULT_KINDS, FaultKind, RequiredKey};
+pub use self::keys::{FAULT_KEYS, FAULT_KINDS};
 use super::{Begin, Condition, Effect, Fault, Lasts};
-use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, read_text, shown};
+use tickbus_base::toml_text::{Collector, Mistakes, Table, TableKind, Value, read_text, shown};
 use tickbus_image::signal::SignalTable;
 use tickbus_image::signal::section::NAME_LIMIT;
 
@@ -263,7 +263,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
     Some(fault)
 }
 
-fn kind_of(value: &Value<'_>) -> Option<FaultKind> {
+fn kind_of(value: &Value<'_>) -> Option<TableKind> {
     let kinds = FAULT_KINDS.map(|kind| (kind.name, kind));
     value.choice("kinds of faults", &kinds)
 }

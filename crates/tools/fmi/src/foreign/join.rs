@@ -63,6 +63,9 @@ impl Join {
                 })
             };
             let Some(joined) = by_map.copied().or_else(by_name) else {
+                if is_from_fmu && config.reply_of(index).is_some() {
+                    continue;
+                }
                 let (what, kind) = if is_from_fmu {
                     ("keeps its fail-safe value", "output")
                 } else {

@@ -84,11 +84,14 @@ fn check_names(validator: &Validator, document: &Value, table: &Table) {
     assert_eq!(known, declared, "the keys of {}", table.name);
 }
 
-/// A key that the table cannot have, because of its kind.
+/// A key that the table cannot have, because of its kind or without another key.
 fn is_foreign(mistakes: &Mistakes) -> bool {
-    mistakes
-        .iter()
-        .all(|found| found.mistake.what.starts_with("a fault of kind "))
+    mistakes.iter().all(|found| {
+        let what = &found.mistake.what;
+        let is_of_kind = ["a fault of kind ", "a reply of kind "];
+        is_of_kind.iter().any(|head| what.starts_with(head))
+            || what.contains("\" stands without \"")
+    })
 }
 
 /// A table with the default is read as one without the key.

@@ -1,9 +1,10 @@
 //! Conditions with a name, of which all must hold at the same tick.
 
-use crate::condition::{Bookmark, Condition};
+use crate::edges::Bookmark;
 use crate::test::TextPosition;
 use crate::watch::Watch;
 use tickbus_image::signal::Slot;
+use tickbus_reply::Condition;
 
 /// A condition, or several that must hold at the same tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +37,7 @@ impl Watcher {
     /// Returns true if the watched conditions hold at this tick. Call this at every tick.
     pub(crate) fn holds(&mut self, named: &Named, watches: &[Watch], slots: &[Slot]) -> bool {
         let mut pairs = named.all.iter().zip(&self.since);
-        let holds = pairs.all(|(one, since)| one.holds(&watches[one.signal], slots, *since));
+        let holds = pairs.all(|(one, since)| since.finds(one, &watches[one.signal], slots));
         for (one, since) in named.all.iter().zip(&mut self.since) {
             *since = Bookmark::of(&watches[one.signal]);
         }

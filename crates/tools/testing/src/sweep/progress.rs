@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
-use crate::condition::{Bookmark, Condition};
+use crate::edges::Bookmark;
 use crate::watch::{Watch, real, text_of};
 use tickbus_image::signal::{Area, DataType, Signal, SignalTable, Slot};
+use tickbus_reply::Condition;
 
 /// A value whose changes are progress.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,7 +34,7 @@ impl Mark {
             Self::Value(signal) => slots[*signal],
             Self::Holds(condition, _) => {
                 let watch = &watches[condition.signal];
-                let holds = condition.holds(watch, slots, Bookmark::default());
+                let holds = Bookmark::default().finds(condition, watch, slots);
                 Slot::from_real(f64::from(u8::from(holds)))
             }
         }

@@ -1,55 +1,18 @@
 //! The keys of a `[[fault]]` section, and the kinds of faults that have them.
 
-use tickbus_base::toml_text::{Key, Shape, names};
+use tickbus_base::toml_text::{Key, RequiredKey, Shape, TableKind, kind_names, names};
 use tickbus_image::signal::section::NAME_LIMIT;
 
 use super::super::Direction;
 use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
 use super::super::fault::MODEL;
 
-/// The keys of one kind of faults, beside those that all kinds have.
-#[derive(Clone, Copy, Debug)]
-pub struct FaultKind {
-    /// The kind's name.
-    pub name: &'static str,
-    /// The keys that it needs.
-    pub required: &'static [RequiredKey],
-    /// The keys that it can have.
-    pub optional: &'static [&'static str],
-    /// True if a fault of this kind needs a name: elsewhere a name is for messages only.
-    pub needs_name: bool,
-}
-
-/// A key that one kind of faults needs.
-#[derive(Clone, Copy, Debug)]
-pub struct RequiredKey {
-    /// The key.
-    pub name: &'static str,
-    /// The values that it has in faults of this kind.
-    pub shape: Shape,
-    /// The remedy for a section without it.
-    pub right: &'static str,
-}
-
-impl FaultKind {
-    /// Returns all of its own keys.
-    pub fn keys(&self) -> impl Iterator<Item = &'static str> {
-        let required = self.required.iter().map(|key| key.name);
-        required.chain(self.optional.iter().copied())
-    }
-}
-
 const fn kind(
     name: &'static str,
     required: &'static [RequiredKey],
     optional: &'static [&'static str],
-) -> FaultKind {
-    FaultKind {
-        name,
-        required,
-        optional,
-        needs_name: false,
-    }
+) -> TableKind {
+    TableKind::new(name, required, optional)
 }
 
 /// The remedy where a signal should be named.
@@ -67,7 +30,7 @@ const BY_TIME: RequiredKey = key(
 );
 
 /// The kinds of faults.
-pub const FAULT_KINDS: [FaultKind; 12] = [
+pub const FAULT_KINDS: [TableKind; 12] = [
     kind("stuck", &[OF_SIGNAL], &["value"]),
     kind("invert", &[OF_SIGNAL], &[]),
     kind(
@@ -102,21 +65,13 @@ pub const FAULT_KINDS: [FaultKind; 12] = [
         &[],
         &["station", "slot", "channel", "error", "octets", "static"],
     ),
-    FaultKind {
+    TableKind {
         needs_name: true,
         ..kind(MODEL, &[], &["value"])
     },
 ];
 
-const KIND_NAMES: [&str; FAULT_KINDS.len()] = {
-    let mut names = [""; FAULT_KINDS.len()];
-    let mut index = 0;
-    while index < names.len() {
-        names[index] = FAULT_KINDS[index].name;
-        index += 1;
-    }
-    names
-};
+const KIND_NAMES: [&str; FAULT_KINDS.len()] = kind_names(&FAULT_KINDS);
 
 /// The directions of lost and repeated frames.
 pub(super) const DIRECTIONS: [(&str, Direction); 3] = [

@@ -1,4 +1,4 @@
-//! Conditions on signals in test files.
+//! Conditions on signals: of replies, and of test files.
 
 use std::fmt;
 
@@ -7,9 +7,9 @@ use tickbus_base::toml_text::{short_number, shown};
 use tickbus_fieldbus::faults::{self, unknown};
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
 
-use super::watch::{Watch, real};
+use super::signal::real;
 
-/// A condition on one signal: any condition that a fault can have, or one that only tests have.
+/// A condition on one signal: any condition that a fault can have, or one that faults do not have.
 ///
 /// | text | holds when |
 /// |---|---|
@@ -96,29 +96,28 @@ impl Condition {
         Ok(Self { signal, demand })
     }
 
-    /// Returns true if the condition holds for a signal with this history and these slots; edges count from the
-    /// bookmark on.
-    pub(super) fn holds(&self, watch: &Watch, slots: &[Slot], since: Bookmark) -> bool {
+    /// Returns true if the condition holds for a signal with this value, which is one of the slots. A condition on an
+    /// edge never holds for a value.
+    pub fn holds_for(&self, value: f64, slots: &[Slot]) -> bool {
         match &self.demand {
-            Demand::On => watch.value() != 0.0,
-            Demand::Off => watch.value() == 0.0,
-            Demand::Near(number, tolerance) => (watch.value() - number).abs() <= *tolerance,
+            Demand::On => value != 0.0,
+            Demand::Off => value == 0.0,
+            Demand::Near(number, tolerance) => (value - number).abs() <= *tolerance,
             Demand::Is(slot, _) => slots[self.signal] == *slot,
             Demand::Compares(condition, _) => condition.holds(slots),
-            Demand::Rises => watch.rises() > since.rises,
-            Demand::Falls => watch.falls() > since.falls,
+            Demand::Rises | Demand::Falls => false,
         }
     }
 
     /// Returns true if the condition is about an edge, not a level.
-    pub(super) const fn is_edge(&self) -> bool {
+    pub const fn is_edge(&self) -> bool {
         matches!(self.demand, Demand::Rises | Demand::Falls)
     }
 }
 
 impl Demand {
     /// The condition that the signal has the value of this slot, within the resolution of its type.
-    pub(super) fn equal(slot: Slot, signal: &Signal) -> Self {
+    pub fn equal(slot: Slot, signal: &Signal) -> Self {
         let number = real(slot, signal);
         match signal.data_type {
             DataType::Bool if number == 0.0 => Self::Off,
@@ -128,22 +127,6 @@ impl Demand {
                 number,
                 signal.scale.map_or(0.0, |scale| scale.gain.abs() / 2.0),
             ),
-        }
-    }
-}
-
-/// The edge counts at the beginning of a wait.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Bookmark {
-    rises: u64,
-    falls: u64,
-}
-
-impl Bookmark {
-    pub(super) fn of(watch: &Watch) -> Self {
-        Self {
-            rises: watch.rises(),
-            falls: watch.falls(),
         }
     }
 }
@@ -216,16 +199,18 @@ fn near(comparison: &str, tolerance: &str, table: &SignalTable) -> Result<Condit
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tickbus_driver_cfg::{Config, Kinds};
+    use tickbus_image::signal::Area;
 
     fn table() -> SignalTable {
-        let text = "[driver]\nid = 1\nname = \"T\"\n[fieldbus]\nkind = \"loopback\"\nlink = \"l\"\n\
-                    [[signal]]\nname = \"Not OK\"\naddress = \"%IX0.0\"\n\
-                    [[signal]]\nname = \"Level >= 3\"\naddress = \"%IX0.1\"\n\
-                    [[signal]]\nname = \"Height\"\naddress = \"%QW2\"\ntype = \"INT\"\nunit = \"mm\"\n";
-        Config::parse("t", text, &Kinds::LOOPBACK)
-            .unwrap_or_else(|mistakes| panic!("{mistakes}"))
-            .table
+        let on = |name: &str, bit| Signal {
+            bit,
+            ..Signal::new(name, Area::Input, 0, DataType::Bool)
+        };
+        let height = Signal {
+            unit: Some("mm".to_owned()),
+            ..Signal::new("Height", Area::Output, 2, DataType::Int)
+        };
+        SignalTable::of_one_station(1, 4, vec![on("Not OK", 0), on("Level >= 3", 1), height])
     }
 
     #[test]

@@ -1,0 +1,101 @@
+//! One reply: its signals, and what it does.
+
+use std::fmt::Write as _;
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::shown;
+use tickbus_image::signal::{SignalTable, Slot};
+
+use super::delay::Follows;
+use super::io::Io;
+use super::lag::Lag;
+use super::motor::Motor;
+use super::numbers::{Counter, Encoder, Switch};
+use super::pulses::{Blink, LifeSign};
+use super::rule::Ruled;
+use super::signal::Output;
+use super::travel::Travel;
+
+/// The kind whose replies are rules.
+pub(crate) const RULE: &str = "rule";
+
+/// One `[[reply]]` of a driver.cfg, or `[[machine.reply]]` of a test file, at its beginning.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reply {
+    /// The name, for messages.
+    pub name: String,
+    /// The kind, one of [`REPLY_KINDS`](super::REPLY_KINDS).
+    pub kind: &'static str,
+    /// The signals that it reads, by index.
+    pub inputs: Vec<usize>,
+    /// The signals that it makes, by index.
+    pub outputs: Vec<usize>,
+    /// The shortest time that it states.
+    pub(crate) shortest: Option<Nanos>,
+    pub(crate) behaviour: Behaviour,
+}
+
+/// The behaviour of a reply, with its state.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Behaviour {
+    Constant(Output, Slot),
+    Follows(Follows),
+    Motor(Box<Motor>),
+    Travel(Box<Travel>),
+    Lag(Box<Lag>),
+    Switch(Switch),
+    Counter(Box<Counter>),
+    Encoder(Box<Encoder>),
+    Blink(Blink),
+    LifeSign(LifeSign),
+    Rule(Box<Ruled>),
+}
+
+impl Behaviour {
+    /// Makes the signals of a tick. Returns true if the next tick can change them although nothing else changes.
+    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
+        match self {
+            Self::Constant(output, value) => {
+                io.put_slot(output.signal(), *value);
+                false
+            }
+            Self::Follows(it) => it.step(passed, io),
+            Self::Motor(it) => it.step(passed, io),
+            Self::Travel(it) => it.step(io),
+            Self::Lag(it) => it.step(passed, io),
+            Self::Switch(it) => it.step(io),
+            Self::Counter(it) => it.step(io),
+            Self::Encoder(it) => it.step(io),
+            Self::Blink(it) => it.step(passed, io),
+            Self::LifeSign(it) => it.step(passed, io),
+            Self::Rule(it) => it.step(passed, io),
+        }
+    }
+}
+
+impl Reply {
+    /// Describes the reply in one line: `"Pump 1" (motor): "Pump 1 running" from "Pump 1 on"`.
+    pub fn what(&self, table: &SignalTable) -> String {
+        let names = |signals: &[usize]| {
+            let mut text = String::new();
+            for (place, signal) in signals.iter().enumerate() {
+                let comma = if place == 0 { "" } else { ", " };
+                let name = shown(&table.signals[*signal].name);
+                // Writing to a string cannot fail.
+                let _ = write!(text, "{comma}\"{name}\"");
+            }
+            text
+        };
+        let made = format!(
+            "\"{}\" ({}): {}",
+            self.name,
+            self.kind,
+            names(&self.outputs)
+        );
+        if self.inputs.is_empty() {
+            made
+        } else {
+            format!("{made} from {}", names(&self.inputs))
+        }
+    }
+}

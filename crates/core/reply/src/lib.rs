@@ -1,0 +1,35 @@
+//! Replies of a machine: signals that the driver makes itself, because no model does.
+//!
+//! A PLC program waits for feedback that a model of motion does not have: a motor runs, oil is warm, a cylinder is out.
+//! A `[[reply]]` table of a driver.cfg, or a `[[machine.reply]]` of a test file, describes such feedback by its
+//! [kind](REPLY_KINDS). [`Replies`] makes the signals at every tick. Nothing here does any I/O or reads a clock: time
+//! and values come in, values go out. Random numbers come from a seed, so the same values in give the same ones out.
+
+mod awake;
+mod behaviour;
+mod condition;
+mod delay;
+mod io;
+mod lag;
+mod levels;
+mod motor;
+mod numbers;
+mod order;
+mod pulses;
+mod replies;
+mod rule;
+mod section;
+mod signal;
+mod travel;
+
+pub use behaviour::Reply;
+pub use condition::{Condition, Demand};
+pub use replies::Replies;
+pub use rule::{Course, Ramp, Rule, Values};
+pub use section::{
+    LIMIT, OneOf, REPLY_KEYS, REPLY_KINDS, Scope, Signals, one_of, read_rule, read_sections, texts,
+};
+pub use signal::real;
+
+#[cfg(test)]
+mod tests;

@@ -523,7 +523,7 @@ def test_what_is_wrong_with_a_sweep_is_told(tests, old, new, told):
 
 
 def test_the_tests_of_the_manual_pass(pytester):
-    blocks = root("docs", "python.md").read_text().split("```python\n")
+    blocks = [block for page in ("python.md", "sweeps.md") for block in root("docs", page).read_text().split("```python\n")]
     (tests,) = (block.split("```")[0] for block in blocks if "import pytest" in block)
     (sweep,) = (block.split("```")[0] for block in blocks if "import sweep" in block)
     pytester.path.joinpath("driver.cfg").write_text(root("driver.cfg").read_text())

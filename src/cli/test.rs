@@ -26,7 +26,7 @@ use tickbus_testing::{
 /// Run tests of PLC programs from TOML files, on simulation time.
 ///
 /// Each *.toml in DIR and its subfolders with a config or a [[test]] is a test file; docs/testing.md describes them.
-/// A file with a [sweep] also runs its scenario with each fault at each moment. Exit code 0 when all tests pass, 1 when one fails or a file is wrong.
+/// A file with a [sweep] also runs its scenario with each fault at each moment; docs/sweeps.md describes that. Exit code 0 when all tests pass, 1 when one fails or a file is wrong.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// Folders with test files, or test files.

@@ -466,7 +466,7 @@ fn a_sweep_before_a_recording_sees_what_the_machine_would_not_answer() {
 #[test]
 fn the_sweep_of_the_docs_is_that_of_the_rig() {
     let read = |path: &str| fs::read_to_string(repository().join(path)).expect("a text");
-    let docs = read("docs/testing.md");
+    let docs = read("docs/sweeps.md");
     let blocks = |first: &str| {
         let (_, block) = docs.split_once(&format!("```toml\n{first}")).expect(first);
         let (block, _) = block.split_once("```").expect("its end");

@@ -8,7 +8,7 @@ import java.nio.file.Path;
 import org.junit.jupiter.params.ParameterizedTest;
 import org.junit.jupiter.params.provider.ValueSource;
 
-/** The examples of docs/testing.md must be the tests that run here, word for word. */
+/** The examples of docs/testing.md and docs/sweeps.md must be the tests that run here, word for word. */
 class DocumentationTest {
     @ParameterizedTest
     @ValueSource(strings = {"CellTest", "CellSweepTest"})
@@ -17,6 +17,7 @@ class DocumentationTest {
         String source = Files.readString(root.resolve("java/junit/src/test/java/example/" + example + ".java"))
             .replace("package example;\n\n", "").replace("import org.junit.jupiter.api.Tag;\n", "")
             .replace("@Tag(\"native\")\n", "").replace("../../driver.cfg", "driver.cfg");
-        assertTrue(Files.readString(root.resolve("docs/testing.md")).contains("```java\n" + source + "```\n"), source);
+        String docs = Files.readString(root.resolve("docs/testing.md")) + Files.readString(root.resolve("docs/sweeps.md"));
+        assertTrue(docs.contains("```java\n" + source + "```\n"), source);
     }
 }

@@ -182,14 +182,26 @@ fn pymodbus_meets_units() -> Result<(), Absent> {
          assert client.read_holding_registers(0, device_id=3).registers == [33]\n\
          for unit in (0, 1, 255):\n\
          \x20   assert client.read_holding_registers(0, device_id=unit).exception_code == 0x0B\n\
-         print('ok')\n",
+         if sys.platform == 'linux':\n\
+         \x20   import socket, struct\n\
+         \x20   info = client.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, 208)\n\
+         \x20   for kind, at in ('Q', 200), ('I', 156), ('Q', 128), ('I', 152):\n\
+         \x20       print(*struct.unpack_from(kind, info, at))\n",
         &address.port().to_string(),
     ]);
-    machine.mirror_until_the_end_of(python);
+    let told = machine.mirror_until_the_end_of(python);
     machine.until("both have theirs", |machine| {
         machine.get("oven out") == 77.0
     });
     assert_eq!(machine.get("press out"), 33.0);
+    // The system's own counts of the client's connection: tcpi_bytes_sent, tcpi_data_segs_out, tcpi_bytes_received,
+    // tcpi_data_segs_in.
+    let keys = ["octets_in", "frames_in", "octets_out", "frames_out"];
+    let counted: Vec<&str> = told.lines().collect();
+    assert!(!cfg!(target_os = "linux") || counted.len() == keys.len());
+    for (key, counted) in keys.iter().zip(counted) {
+        assert_eq!(machine.statistic(&format!("line.{key}")), counted, "{key}");
+    }
     Ok(())
 }
 
@@ -530,6 +542,14 @@ fn tshark_finds_nothing() -> Result<(), Absent> {
     let bad = "tcp.srcport == 502 && (_ws.malformed || _ws.expert.severity >= 0x600000)";
     let complaints = ask(bad, "_ws.expert.message")?;
     assert_eq!(complaints, "");
+    for (port, key) in [("dstport", "octets_in"), ("srcport", "octets_out")] {
+        let lengths = ask(&format!("tcp.{port} == 502"), "tcp.len")?;
+        let sum: u64 = lengths
+            .lines()
+            .filter_map(|length| length.parse::<u64>().ok())
+            .sum();
+        assert_eq!(machine.statistic(&format!("line.{key}")), sum.to_string());
+    }
     let names = ask("modbus.object_str_value", "modbus.object_str_value")?;
     assert!(
         names.contains("tickbus") && names.contains("Cell 4"),

@@ -367,6 +367,23 @@ fn tshark_finds_nothing_malformed() -> Result<(), Absent> {
     assert_eq!(count("COTP"), conversations.len(), "each was confirmed");
     assert_eq!(count("COTP") + count("S7COMM"), said.lines().count());
     assert!(count("S7COMM") > 50, "{said}");
+    // The server counts the same.
+    assert_eq!(
+        end.statistic("line.frames_out"),
+        said.lines().count().to_string()
+    );
+    for (port, key) in [
+        ("dstport", "line.octets_in"),
+        ("srcport", "line.octets_out"),
+    ] {
+        let filter = format!("tcp.{port} == 1102");
+        let lengths = pcap::tshark(tshark()?, &file, decode, &filter, &["tcp.len"]);
+        let sum: u64 = lengths
+            .lines()
+            .filter_map(|length| length.parse::<u64>().ok())
+            .sum();
+        assert_eq!(end.statistic(key), sum.to_string(), "{key}");
+    }
     let wrong = "tcp.srcport == 1102 && (_ws.malformed || _ws.expert.severity == error)";
     let wrong = pcap::tshark(
         tshark()?,

@@ -21,6 +21,8 @@ pub(crate) struct Line {
     ends: Vec<PathBuf>,
     over: Arc<AtomicBool>,
     harm: Arc<Harm>,
+    /// The octets that came from each end.
+    octets: Arc<[AtomicUsize]>,
     thread: Option<JoinHandle<()>>,
     /// Kept open, so that the line does not hang up between two programs.
     _kept: Vec<OwnedFd>,
@@ -64,6 +66,7 @@ impl Line {
         let all: Vec<End> = std::iter::repeat_with(end).take(count).collect();
         let over = Arc::new(AtomicBool::new(false));
         let harm = Arc::new(Harm::default());
+        let octets: Arc<[AtomicUsize]> = all.iter().map(|_| AtomicUsize::new(0)).collect();
         let (mut ends, mut masters, mut kept) = (Vec::new(), Vec::new(), Vec::new());
         for end in all {
             ends.push(end.name);
@@ -71,10 +74,10 @@ impl Line {
             kept.push(end.kept);
         }
         let thread = std::thread::spawn({
-            let (over, harm) = (Arc::clone(&over), Arc::clone(&harm));
+            let (over, harm, octets) = (Arc::clone(&over), Arc::clone(&harm), Arc::clone(&octets));
             move || {
                 while !over.load(Ordering::Relaxed) {
-                    carry(&mut masters, &harm);
+                    carry(&mut masters, &harm, &octets);
                 }
             }
         });
@@ -82,6 +85,7 @@ impl Line {
             ends,
             over,
             harm,
+            octets,
             thread: Some(thread),
             _kept: kept,
         }
@@ -94,6 +98,11 @@ impl Line {
 
     pub(crate) fn end(&self, index: usize) -> &Path {
         &self.ends[index]
+    }
+
+    /// How many octets this end has sent.
+    pub(crate) fn octets(&self, index: usize) -> usize {
+        self.octets[index].load(Ordering::Relaxed)
     }
 }
 
@@ -132,7 +141,7 @@ fn end() -> End {
     }
 }
 
-fn carry(masters: &mut [File], harm: &Harm) {
+fn carry(masters: &mut [File], harm: &Harm, octets: &[AtomicUsize]) {
     let patience = Timespec {
         tv_sec: 0,
         tv_nsec: 20_000_000,
@@ -149,6 +158,7 @@ fn carry(masters: &mut [File], harm: &Harm) {
         let Ok(count) = masters[from].read(&mut bytes) else {
             continue;
         };
+        octets[from].fetch_add(count, Ordering::Relaxed);
         let mut piece = bytes[..count].to_vec();
         harm.befall(&mut piece);
         for (to, master) in masters.iter_mut().enumerate() {

@@ -29,6 +29,8 @@ enum Listening {
 /// The result of a piece of the line's traffic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Heard {
+    /// How many telegrams have passed.
+    pub telegrams: u64,
     /// How often bytes were skipped that are no telegram.
     pub damaged: usize,
     /// The station that answers, if any, and its wait before the answer.
@@ -120,6 +122,7 @@ impl Segment {
                     }
                 }
                 Found::Telegram(telegram, _) => {
+                    heard.telegrams += 1;
                     reply.clear();
                     listen(stations, &telegram)?;
                     let answer = serve(stations, now, &telegram, process, reply);

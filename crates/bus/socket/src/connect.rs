@@ -2,7 +2,7 @@
 
 use tickbus_base::time::Stop;
 use tickbus_fieldbus::tcp;
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Medium, Port};
 use tickbus_net::Address;
 
 use super::connection::{Connection, Transfer};
@@ -25,6 +25,7 @@ pub(super) fn connect(
     let Some((mut call, peer)) = tcp::dial(address, patience, port, stop)? else {
         return Ok(());
     };
+    port.carried_by(Medium::Tcp);
     let mut lines = ConnectionStates::new([(String::new(), frames.stations())].into_iter());
     let reason = format!("connected with {peer}; waiting for its first record");
     lines.opening(0, &reason, port);

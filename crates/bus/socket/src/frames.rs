@@ -74,8 +74,8 @@ impl ConnectionFrames {
         port: &mut Port,
     ) -> Result<(), String> {
         if let Some(messages) = &mut self.messages {
-            let frame = messages.received(record)?;
-            port.received(self.stations.start, now, frame);
+            let (frame, sent) = messages.received(record)?;
+            port.received_with(self.stations.start, now, frame, sent);
             return Ok(());
         }
         port.together(|port| {

@@ -7,7 +7,7 @@ use tickbus_base::net::TcpStream;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, Call, no_wait, not_accepted};
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Medium, Port};
 use tickbus_net::{Acceptor, Address, close_gracefully, prepare};
 
 use super::connection::{Connection, Transfer};
@@ -38,6 +38,7 @@ pub(super) fn listen(
     let line = |place: &Endpoint<'_>| (place.name.clone(), place.frames.stations());
     let mut lines = ConnectionStates::new(places.iter().map(line));
     let mut servers = Vec::new();
+    port.carried_by(Medium::Tcp);
     // A client may connect as soon as the system listens, before this thread continues.
     let since = port.clock().now();
     for (line, place) in places.into_iter().enumerate() {
@@ -235,7 +236,8 @@ impl Server<'_> {
         let reason = format!("{peer} has connected; waiting for its first record");
         lines.opening(self.line, &reason, port);
         self.frames.begin();
-        self.served = Some((Call::new(stream), connection));
+        let call = Call::new(stream).of_station(self.frames.stations().start);
+        self.served = Some((call, connection));
     }
 }
 

@@ -78,8 +78,8 @@ impl Parts {
         bytes.fill(0);
     }
 
-    /// Copies the part in a message into `frame`.
-    fn read(&self, message: &[u8], frame: &mut [u8]) -> Result<(), String> {
+    /// Copies the part in a message into `frame`; returns its number of bytes.
+    fn read(&self, message: &[u8], frame: &mut [u8]) -> Result<usize, String> {
         let (selector, mut bytes) = message.split_at(SELECTOR);
         let number = usize::from(u16::from_be_bytes([selector[0], selector[1]]));
         if number >= self.count() || self.is_empty(number) {
@@ -99,7 +99,7 @@ impl Parts {
             frame[piece.clone()].copy_from_slice(from);
             bytes = rest;
         }
-        Ok(())
+        Ok(self.pieces[number].iter().map(Range::len).sum())
     }
 }
 
@@ -144,10 +144,10 @@ impl Messages {
         self.part = 0;
     }
 
-    /// The whole frame after this message's part was received.
-    pub(super) fn received(&mut self, message: &[u8]) -> Result<&[u8], String> {
-        self.receives.read(message, &mut self.come)?;
-        Ok(&self.come)
+    /// The whole frame after this message's part was received, and the number of bytes in that part.
+    pub(super) fn received(&mut self, message: &[u8]) -> Result<(&[u8], usize), String> {
+        let bytes = self.receives.read(message, &mut self.come)?;
+        Ok((&self.come, bytes))
     }
 
     /// Makes a message of the part that is due: the next changed one, or otherwise simply the next one.

@@ -28,6 +28,12 @@ impl Key {
         }
         Self(key.into())
     }
+
+    /// The same key with one more word at its end.
+    #[must_use]
+    pub fn and(self, word: &str) -> Self {
+        Self(format!("{}.{word}", self.0).into())
+    }
 }
 
 impl From<&'static str> for Key {

@@ -16,6 +16,7 @@ mod rarely;
 mod renewal;
 mod role;
 mod swallowed;
+mod traffic;
 mod validity;
 mod write_guard;
 
@@ -40,5 +41,6 @@ pub use renewal::Renewal;
 pub use role::{OBSERVES, Role};
 pub use swallowed::{Steps, SwallowedSignals};
 pub use tickbus_image::is_stale;
+pub use traffic::Medium;
 pub use validity::{PlcState, Validity};
 pub use write_guard::WriteGuard;

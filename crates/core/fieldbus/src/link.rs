@@ -11,6 +11,7 @@ use tickbus_base::time::{Nanos, SharedHistogram};
 
 use super::BusError;
 use super::rarely::Rarely;
+use super::traffic::{Rates, Traffic};
 use tickbus_image::is_stale;
 
 /// The state of a line.
@@ -165,6 +166,7 @@ struct Shared {
     cycle: SharedHistogram,
     /// How old the values of this end were when the bus took them.
     sent_age: SharedHistogram,
+    traffic: Traffic,
     record: Mutex<Record>,
 }
 
@@ -185,6 +187,7 @@ struct Record {
     caused: [u64; Cause::ALL.len()],
     facts: BTreeMap<Key, String>,
     counts: BTreeMap<&'static str, u64>,
+    rates: Rates,
     /// The counts of logged messages.
     log: Rarely,
 }
@@ -225,6 +228,7 @@ impl LinkStatus {
         Self(Arc::new(Shared {
             driver: driver.to_owned(),
             max_age,
+            traffic: Traffic::new(stations.len()),
             stations,
             state: AtomicU8::new(0),
             stale: AtomicUsize::new(0),
@@ -241,6 +245,7 @@ impl LinkStatus {
                 caused: [0; Cause::ALL.len()],
                 facts: BTreeMap::new(),
                 counts: BTreeMap::new(),
+                rates: Rates::default(),
                 log: Rarely::default(),
             }),
         }))
@@ -511,9 +516,16 @@ impl LinkStatus {
         self.0.sent_age.record(age);
     }
 
+    /// The octets, frames and process data that pass.
+    #[inline]
+    pub(crate) fn traffic(&self) -> &Traffic {
+        &self.0.traffic
+    }
+
     /// Adds the state of the line.
     pub fn write(&self, now: Nanos, statistics: &mut Statistics) {
-        let record = self.lock();
+        let mut record = self.lock();
+        let record = &mut *record;
         let link = &record.link;
         statistics.text("state", link.state.name());
         statistics.count("state.code", link.state as u64);
@@ -539,6 +551,8 @@ impl LinkStatus {
         statistics.count("log.untold", record.log.untold());
         statistics.distribution("bus_cycle", &self.0.cycle.read());
         statistics.distribution("sent_age", &self.0.sent_age.read());
+        let (traffic, stations) = (self.traffic(), &self.0.stations);
+        traffic.write(now, &mut record.rates, stations, statistics);
     }
 
     fn lock(&self) -> MutexGuard<'_, Record> {
@@ -597,6 +611,9 @@ impl Shared {
         }
         record.entered[state as usize] += 1;
         record.caused[cause as usize] += 1;
+        if state == LinkState::Running {
+            record.rates.begin(now);
+        }
         self.state.store(state as u8, Ordering::Relaxed);
         // The count of an earlier silence does not apply to the next one.
         self.stale.store(0, Ordering::Relaxed);

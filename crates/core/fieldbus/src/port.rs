@@ -24,9 +24,11 @@ use tickbus_image::{BusEnd, Event};
 
 use super::validity::Validity;
 use super::{
-    BusError, Cause, ChangeEvents, LinkState, LinkStatus, PlcState, Role, SwallowedSignals, Watch,
+    BusError, Cause, ChangeEvents, LinkState, LinkStatus, Medium, PlcState, Role, SwallowedSignals,
+    Watch,
 };
 use crate::faults::{Diagnosis, FaultBoard};
+use crate::traffic::{Traffic, Way};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
 use looks::Looks;
@@ -217,6 +219,9 @@ impl Port {
         self.had(receipt);
         for station in receipt.stations.clone() {
             let bits = receipt.bits.as_ref();
+            let whole = self.image.image.tx_len(station);
+            let octets = bits.map_or(whole, |bits| bits.len().div_ceil(8));
+            self.traffic().data(station, Way::Out, octets);
             self.faults.sent(station, bits, &mut self.image);
         }
     }
@@ -277,6 +282,17 @@ impl Port {
     /// If the frame does not have the station's size.
     #[inline]
     pub fn received(&mut self, station: usize, now: Nanos, bytes: &[u8]) {
+        self.received_with(station, now, bytes, bytes.len());
+    }
+
+    /// As [`received`](Self::received), for a frame of which the peer sent only as many octets as `sent`.
+    ///
+    /// # Panics
+    ///
+    /// If the frame does not have the station's size.
+    #[inline]
+    pub fn received_with(&mut self, station: usize, now: Nanos, bytes: &[u8], sent: usize) {
+        self.traffic().data(station, Way::In, sent);
         self.faults.attend(now, &mut self.image);
         let arrival = self.looks.arrival(now);
         self.faults
@@ -298,8 +314,11 @@ impl Port {
     ) {
         // Frames held back earlier are handed in first, since these writes do not belong to them.
         self.faults.attend(now, &mut self.image);
-        self.image.written(station, written);
-        self.received(station, now, bytes);
+        let mut octets = 0;
+        let written = written.into_iter();
+        let counted = written.inspect(|bits| octets += bits.len().div_ceil(8));
+        self.image.written(station, counted);
+        self.received_with(station, now, bytes, octets);
     }
 
     /// Reports that the peer was alive at `now`. After a STOP has ended, the station's data are valid again
@@ -445,6 +464,40 @@ impl Port {
         };
         let now = self.clock.now();
         self.faults.enter(now, report, &mut self.image);
+    }
+
+    #[inline]
+    fn traffic(&self) -> &Traffic {
+        self.image.status.traffic()
+    }
+
+    /// States the medium of the line, for a bus whose frames carry the process data that it hands in and reports as
+    /// [sent](Self::sent). Without a medium the statistics have octets, and neither frames nor an efficiency.
+    pub fn carried_by(&self, medium: Medium) {
+        self.traffic().carried_by(medium);
+    }
+
+    /// The bus has written these octets to the line of a station, or to its only line (0). `completes`: they are a
+    /// telegram, or the end of one.
+    #[inline]
+    pub fn wrote(&self, line: usize, octets: usize, completes: bool) {
+        self.traffic().moved(line, Way::Out, octets, completes);
+    }
+
+    /// The bus has read these octets from the line of a station, or from its only line (0).
+    #[inline]
+    pub fn read(&self, line: usize, octets: usize) {
+        self.traffic().moved(line, Way::In, octets, false);
+    }
+
+    /// This many telegrams have arrived on a serial line, where reads end anywhere.
+    pub fn read_telegrams(&self, count: u64) {
+        self.traffic().frames_in(count);
+    }
+
+    /// This many of the octets read from a serial line are this end's own echo, or marks of the serial port.
+    pub fn not_from_peer(&self, octets: usize) {
+        self.traffic().not_from_peer(octets);
     }
 
     /// Sets a fact for the statistics, such as the bound address.

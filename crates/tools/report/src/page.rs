@@ -266,7 +266,7 @@ fn sections(contents: &Contents<'_>, bands: &[Band], scale: Scale) -> Markup {
             }
         }))
         (section("link", "State of the line", &html! {
-            @if let Some(statistics) = contents.statistics { (line(statistics)) }
+            @if let Some(statistics) = contents.statistics { (line(statistics)) (traffic(statistics)) }
             @if !states.is_empty() { (tables::states(&states, scale)) }
         }))
         (section("timing", "Time", &html! {
@@ -314,6 +314,34 @@ fn line(statistics: &RunStatistics) -> Markup {
             @if let Some(address) = statistics.get("address") { " (" (address) ")" }
         }
         @if !entered.is_empty() { p { "How often each state was entered: " (entered.join(", ")) "." } }
+    }
+}
+
+/// The load of the cable in both directions, if the bus counts its octets.
+fn traffic(statistics: &RunStatistics) -> Markup {
+    let part = |way: &str| {
+        let of = |key: &str| statistics.get(&format!("line.{key}"));
+        let octets = of(&format!("octets_{way}"))?;
+        let mut text = format!("{octets} octets {way}");
+        for (key, words) in [
+            (format!("kbit_{way}_per_s"), "kbit/s on the cable"),
+            (format!("efficiency_{way}_percent"), "% of it process data"),
+        ] {
+            if let Some(number) = of(&key) {
+                text = format!("{text}, {number} {words}");
+            }
+        }
+        Some(text)
+    };
+    let parts: Vec<String> = ["out", "in"].into_iter().filter_map(part).collect();
+    html! {
+        @if !parts.is_empty() {
+            p {
+                "Traffic: " (parts.join("; "))
+                @if let Some(share) = statistics.get("line.share_percent") { "; " (share) " % of the line's time" }
+                "."
+            }
+        }
     }
 }
 
@@ -453,6 +481,23 @@ fn activity(run: &Run) -> Vec<u64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn traffic_is_told_as_far_as_the_bus_counts_it() {
+        let page = |text| traffic(&RunStatistics::read(text)).into_string();
+        assert_eq!(page("ticks=9\n"), "");
+        let found = page("line.octets_out=36\nline.octets_in=0\n");
+        assert!(
+            found.contains("Traffic: 36 octets out; 0 octets in."),
+            "{found}"
+        );
+        let found = page(
+            "line.octets_out=36\nline.kbit_out_per_s=1.5\nline.efficiency_out_percent=80.0\n\
+             line.octets_in=0\nline.share_percent=2.5\n",
+        );
+        let told = "36 octets out, 1.5 kbit/s on the cable, 80.0 % of it process data; 0 octets in; 2.5 % of the line's time.";
+        assert!(found.contains(told), "{found}");
+    }
 
     #[test]
     fn swallowed_signals_are_named_and_nothing_is_said_without_any() {

@@ -11,7 +11,7 @@ mod session;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::WriteGuard;
 use tickbus_fieldbus::tcp::{Call, dial};
-use tickbus_fieldbus::{BusError, CYCLE, Free, Port, Role};
+use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, Port, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_net::serial;
 
@@ -98,6 +98,7 @@ impl Free for ModbusClient {
                 port.opening(&format!(
                     "connected with {peer}; waiting for its first answer"
                 ));
+                port.carried_by(Medium::Tcp);
                 let inbox = Vec::new();
                 let framing = match line {
                     Line::RtuOverTcp(_) => Framing::RtuOverTcp { inbox },
@@ -111,6 +112,9 @@ impl Free for ModbusClient {
             }
             Line::Serial(line) => {
                 let mut call = Call::new(serial::open(&line.device, line.settings)?);
+                port.carried_by(Medium::Serial {
+                    character: line.settings.character(),
+                });
                 port.tell("device", &line.device);
                 port.opening(&format!("asking on {}", line.device));
                 let now = port.clock().now();

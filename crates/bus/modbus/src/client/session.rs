@@ -196,7 +196,11 @@ impl Caller for ClientSession<'_> {
             } => {
                 *quiet_until = now + *silence;
                 let bytes = match echo {
-                    Some(echo) => &bytes[echo.strip(now, bytes)..],
+                    Some(echo) => {
+                        let own = echo.strip(now, bytes);
+                        port.not_from_peer(own);
+                        &bytes[own..]
+                    }
                     None => bytes,
                 };
                 if bytes.is_empty() {
@@ -216,6 +220,7 @@ impl Caller for ClientSession<'_> {
                 match expected.map(|pdu| 1 + pdu + rtu::CHECKSUM) {
                     Some(expected) if inbox.len() >= expected => {
                         let telegram = inbox[..expected].to_vec();
+                        port.read_telegrams(1);
                         self.telegram(&telegram, now, port)
                     }
                     _ => Ok(()),

@@ -6,7 +6,7 @@ mod tcp;
 mod units;
 
 use tickbus_base::time::Stop;
-use tickbus_fieldbus::{BusError, BusSetup, Free, Port, tcp as many};
+use tickbus_fieldbus::{BusError, BusSetup, Free, Medium, Port, tcp as many};
 
 use super::Line;
 pub use options::ServerOptions;
@@ -40,6 +40,7 @@ impl Free for ModbusServer {
                     clients: self.options.clients,
                     patience: port.max_age(),
                 };
+                port.carried_by(Medium::Tcp);
                 many::serve(address, &mut service, port, stop)
             }
             Line::Serial(line) => serial::serve(line, &mut self.units, port, stop),

@@ -7,7 +7,7 @@ use crate::line::Serial;
 use crate::rtu::{self, Echo, Framer};
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{Call, Caller};
-use tickbus_fieldbus::{BusError, Port, Renewal};
+use tickbus_fieldbus::{BusError, Medium, Port, Renewal};
 use tickbus_net::serial::{gone, open};
 
 use super::units::{BROADCAST, Carried, ServedUnits, Source};
@@ -28,6 +28,9 @@ pub(super) fn serve(
     stop: &Stop,
 ) -> Result<(), BusError> {
     let mut call = Call::new(open(&line.device, line.settings)?);
+    port.carried_by(Medium::Serial {
+        character: line.settings.character(),
+    });
     port.tell("device", &line.device);
     port.opening(&format!("listening on {}", line.device));
     let mut server = Server {
@@ -77,6 +80,7 @@ impl Server<'_> {
             ..
         } = self;
         framer.take(now, |telegram| {
+            port.read_telegrams(1);
             let Some((number, pdu)) = telegram.and_then(rtu::parse) else {
                 port.count("modbus-server.damaged");
                 return;
@@ -130,6 +134,7 @@ impl Caller for Server<'_> {
         self.attend(now, port);
         let own = self.echo.as_mut();
         let own = own.map_or(0, |echo| echo.strip(now, bytes));
+        port.not_from_peer(own);
         self.framer.arrived(now, &bytes[own..]);
         Ok(())
     }

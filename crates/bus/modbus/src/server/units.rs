@@ -178,7 +178,7 @@ impl ServedUnits {
                 if self.every_write {
                     port.received_parts(station, now, frame, [bits]);
                 } else {
-                    port.received(station, now, frame);
+                    port.received_with(station, now, frame, bits.len().div_ceil(8));
                 }
             }
             // A client that only reads must not make the values of one that writes look recent.

@@ -120,6 +120,31 @@ fn each_write_is_one_commit_and_reading_back_gives_it() {
 }
 
 #[test]
+fn the_statistics_have_the_octets_on_the_line_and_the_process_data_in_them() {
+    let (mut device, mut stream) = device("");
+    let write = [6, 0, 1, 0, 5];
+    assert_eq!(ask(&mut stream, 1, &write), write);
+    device.until_speed(5);
+    assert_eq!(ask(&mut stream, 2, &[4, 0, 1, 0, 1]).len(), 4);
+    // The client may have the answer before the server counts it.
+    device.until("it is counted", |end| {
+        end.driver.statistics().contains("\nline.data_out=2\n")
+    });
+    for (key, value) in [
+        ("octets_in", "24"),
+        ("octets_out", "23"),
+        ("frames_in", "2"),
+        ("frames_out", "2"),
+        ("data_in", "2"),
+        // Of 24 and 23 octets, and twice 66 of TCP, IP and Ethernet.
+        ("efficiency_in_percent", "1.3"),
+        ("efficiency_out_percent", "1.3"),
+    ] {
+        assert_eq!(device.end.statistic(&format!("line.{key}")), value, "{key}");
+    }
+}
+
+#[test]
 fn a_write_to_a_unit_that_is_cut_off_is_lost_and_is_not_read_back() {
     let text = format!(
         "[driver]\nid = 1\nname = \"cell\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n{TWO_UNITS}"

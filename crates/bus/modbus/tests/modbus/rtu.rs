@@ -127,5 +127,14 @@ fn a_server_on_a_line_that_echoes_answers_each_request_once() {
         pass(&device.clock, 1);
     }
     assert_eq!(device.end.statistic("bus_cycles"), "4");
+    // The own echo is not of the peer.
+    for (key, value) in [
+        ("octets_in", "32"),
+        ("octets_out", "32"),
+        ("frames_in", "4"),
+        ("frames_out", "4"),
+    ] {
+        assert_eq!(device.end.statistic(&format!("line.{key}")), value, "{key}");
+    }
     assert!(!device.end.driver.statistics().contains("illegal"));
 }

@@ -5,7 +5,7 @@ use std::io;
 use tickbus_base::os::Marks;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_fieldbus::tcp::{Call, Caller};
-use tickbus_fieldbus::{BusError, Port};
+use tickbus_fieldbus::{BusError, Medium, Port};
 use tickbus_net::serial::{gone, open_marking};
 
 use super::diagnosis::diagnosed;
@@ -37,6 +37,9 @@ pub(super) fn serve(
         options.settings,
         &**port.clock(),
     )?);
+    port.carried_by(Medium::Serial {
+        character: options.settings.character(),
+    });
     port.tell("device", &options.device);
     port.opening(&format!("listening on {}", options.device));
     let stations = setups
@@ -104,6 +107,7 @@ impl Line<'_> {
 impl Caller for Line<'_> {
     fn hear(&mut self, now: Nanos, bytes: &[u8], port: &mut Port) -> Result<(), BusError> {
         let characters = self.marks.read(bytes);
+        port.not_from_peer(bytes.len().saturating_sub(characters.bytes.len()));
         // An injected fault has taken the line down; nothing passes.
         if !port.is_up(now) {
             return Ok(());
@@ -133,6 +137,7 @@ impl Caller for Line<'_> {
                 self.options.device
             ))
         })?;
+        port.read_telegrams(heard.telegrams);
         for _ in 0..heard.damaged {
             port.count("profibus-device.damaged");
         }

@@ -87,6 +87,27 @@ fn pulses_of_one_tick_and_of_one_exchange_arrive() {
 }
 
 #[test]
+fn the_statistics_have_the_octets_that_the_line_has_carried() {
+    let line = pty::Line::new();
+    let mut device = device(&line);
+    let master = Master::run(line.end(1), project());
+    until_exchanging(&mut device, &master);
+    exchange(&mut device, &master, 1);
+    let exchanges = master.first(|seen| seen.exchanges);
+    drop(master);
+    until(&mut device, "all octets are counted", |device| {
+        let carried = |key: &str, end| device.statistic(key) == line.octets(end).to_string();
+        carried("line.octets_out", 0) && carried("line.octets_in", 1)
+    });
+    // Six octets each way in each exchange; the next one confirms the inputs of the last.
+    for key in ["line.data_in", "line.data_out"] {
+        let data: usize = device.statistic(key).parse().expect("a count");
+        let are_all = data.is_multiple_of(6) && data / 6 + 1 >= exchanges;
+        assert!(are_all, "{key}: {data} in {exchanges}");
+    }
+}
+
+#[test]
 fn a_slave_that_is_lost_comes_back_at_every_rate() {
     for rate in RATES {
         let line = pty::Line::new();

@@ -13,7 +13,7 @@ mod traffic;
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::Rarely;
 use tickbus_fieldbus::tcp;
-use tickbus_fieldbus::{BusError, CYCLE, Free, PlcState, Port, Role, WriteGuard};
+use tickbus_fieldbus::{BusError, CYCLE, Free, Medium, PlcState, Port, Role, WriteGuard};
 use tickbus_image::signal::SignalTable;
 
 use connection::Connection;
@@ -103,6 +103,7 @@ impl Free for S7Client {
         let Some((mut call, peer)) = reached else {
             return Ok(());
         };
+        port.carried_by(Medium::Tcp);
         port.opening(&format!("connected with {peer}; waiting for its answer"));
         let terms = ConnectionParameters {
             calling: self.options.calling,

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use tickbus_base::time::{Nanos, Stop};
 use tickbus_fieldbus::tcp::{self, Limits, Writer, Writers};
-use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Port, Receipt, Renewal, Role};
+use tickbus_fieldbus::{BusError, BusSetup, Events, Free, Medium, Port, Receipt, Renewal, Role};
 use tickbus_image::signal::fail_safe_frame;
 use tickbus_net::Address;
 
@@ -75,6 +75,7 @@ impl Free for S7Server {
         if let Some(epoch) = port.clock().epoch() {
             self.service.facts.epoch = epoch;
         }
+        port.carried_by(Medium::Tcp);
         tcp::serve(&self.address, &mut self.service, port, stop)
     }
 }
@@ -350,8 +351,8 @@ impl Memory for Jobs<'_> {
                     if shared.every_write {
                         port.received_parts(index, now, &station.written, written);
                     } else {
-                        drop(written);
-                        port.received(index, now, &station.written);
+                        let octets = written.map(|bits| bits.len().div_ceil(8)).sum();
+                        port.received_with(index, now, &station.written, octets);
                     }
                 } else if addressed || alone {
                     // A client that only reads must not make the values of one that writes look recent.

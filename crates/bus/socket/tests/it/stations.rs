@@ -92,6 +92,33 @@ fn a_fault_that_is_over_leaves_nothing_behind_on_a_station_whose_neighbour_is_aw
     assert_eq!(device.end.statistic("station.a.bus_cycles"), "0");
 }
 
+#[test]
+fn each_station_has_the_octets_of_its_own_line() {
+    let (mut device, addresses) = device();
+    let [mut a, mut b] = addresses.map(client);
+    a.write_all(&[1]).expect("the device reads");
+    b.write_all(&[1, 2]).expect("the device reads");
+    device.until("all records have come", |end| {
+        end.driver.statistics().contains("\nline.data_in=3\n")
+    });
+    for (key, value) in [
+        ("line.octets_in", "3"),
+        ("station.a.line.octets_in", "1"),
+        ("station.b.line.octets_in", "2"),
+        ("station.b.line.data_in", "2"),
+    ] {
+        assert_eq!(device.end.statistic(key), value, "{key}");
+    }
+    // A new connection continues the counts.
+    leave(a);
+    let mut a = client(addresses[0]);
+    a.write_all(&[3]).expect("the device reads");
+    device.until("it is counted", |end| {
+        end.statistic("station.a.line.octets_in") == "2"
+    });
+    assert_eq!(device.end.statistic("line.octets_in"), "4");
+}
+
 /// The records that have arrived since the last call.
 fn records(mut peer: &TcpStream) -> usize {
     peer.set_nonblocking(true).expect("a TCP option");

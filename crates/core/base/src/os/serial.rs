@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use crate::time::Nanos;
+
 /// The parity bit of each character.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Parity {
@@ -24,6 +26,14 @@ pub struct SerialSettings {
     pub two_stop_bits: bool,
     /// RTS switches the transceiver of an RS-485 line to sending while the port sends.
     pub rs485: bool,
+}
+
+impl SerialSettings {
+    /// The time of one character on the line: a start bit, eight data bits, the parity bit if there is one, the stop bits.
+    pub fn character(&self) -> Nanos {
+        let bits = 10 + i64::from(self.parity != Parity::None) + i64::from(self.two_stop_bits);
+        Nanos(bits * 1_000_000_000 / i64::from(self.baud.max(1)))
+    }
 }
 
 impl fmt::Display for SerialSettings {

@@ -102,8 +102,11 @@ impl ImagePort {
 
     /// The peer wrote these ranges of bits in the next frame of the station.
     pub(super) fn written(&mut self, station: usize, bits: impl IntoIterator<Item = Range<usize>>) {
-        if let Some(changes) = self.changes.get_mut(station) {
-            bits.into_iter().for_each(|bits| changes.written(bits));
+        let mut changes = self.changes.get_mut(station);
+        for bits in bits {
+            if let Some(changes) = &mut changes {
+                changes.written(bits);
+            }
         }
     }
 

@@ -103,6 +103,8 @@ pub struct Call<S: Stream> {
     since: Option<Nanos>,
     /// True if bytes that the peer has not received yet must no longer reach it.
     ends_by_reset: bool,
+    /// The station whose line this is, for the statistics; 0 for a bus with one line.
+    line: usize,
 }
 
 impl<S: Stream> Call<S> {
@@ -114,7 +116,15 @@ impl<S: Stream> Call<S> {
             blocked: false,
             since: None,
             ends_by_reset: false,
+            line: 0,
         }
+    }
+
+    /// The same call on the line of this station, for a bus with several lines.
+    #[must_use]
+    pub fn of_station(mut self, station: usize) -> Self {
+        self.line = station;
+        self
     }
 
     /// Transfers bytes until the connection ends or `stop` comes.
@@ -225,6 +235,7 @@ impl<S: Stream> Call<S> {
         match self.stream.read(&mut self.buffer) {
             Ok(0) => Err(caller.left()),
             Ok(count) => {
+                port.read(self.line, count);
                 if count == self.buffer.len() {
                     port.look_leaves_some();
                 }
@@ -250,7 +261,10 @@ impl<S: Stream> Call<S> {
             }
             match self.stream.write(rest) {
                 Ok(0) => self.blocked = true,
-                Ok(count) => caller.wrote(now, count, port),
+                Ok(count) => {
+                    port.wrote(self.line, count, count == rest.len());
+                    caller.wrote(now, count, port);
+                }
                 Err(error) if is_for_later(&error) => self.blocked = true,
                 Err(error) => {
                     // A peer that has closed may have sent its last values first.

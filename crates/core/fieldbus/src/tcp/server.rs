@@ -274,7 +274,7 @@ impl<S: Service> Server<'_, S> {
             return Ok(());
         };
         if !client.unsent.is_empty() {
-            if is_writable && client.write_on()? {
+            if is_writable && client.write_on(port)? {
                 // The incomplete telegram is timed from now on, since the server did not read from the client before.
                 let since = (!client.begun.is_empty()).then_some(now);
                 client.owes_since(since, place, &mut self.clients.awaited);
@@ -291,6 +291,7 @@ impl<S: Service> Server<'_, S> {
             Err(error) if is_for_later(&error) => return Ok(()),
             Err(error) => return Err(client.broke(&error)),
         };
+        port.read(0, count);
         if count == self.buffer.len() {
             port.look_leaves_some();
         }
@@ -343,12 +344,16 @@ impl<S: Service> Server<'_, S> {
             return Ok(());
         };
         if !self.reply.is_empty() {
+            let whole = self.reply.len();
             let taken = match client.stream.write(&self.reply) {
                 Ok(count) => count,
                 Err(error) if is_for_later(&error) => 0,
                 Err(error) => return Err(client.broke(&error)),
             };
-            if taken == self.reply.len() {
+            if taken > 0 {
+                port.wrote(0, taken, taken == whole);
+            }
+            if taken == whole {
                 self.service.replied(&mut client.state, port);
             } else {
                 client.unsent.extend_from_slice(&self.reply[taken..]);
@@ -549,9 +554,10 @@ impl<C> Client<C> {
     }
 
     /// Continues an answer; returns true if all of it was sent.
-    fn write_on(&mut self) -> Result<bool, BusError> {
+    fn write_on(&mut self, port: &Port) -> Result<bool, BusError> {
         match self.stream.write(&self.unsent) {
             Ok(count) => {
+                port.wrote(0, count, count == self.unsent.len());
                 self.unsent.drain(..count);
                 Ok(self.unsent.is_empty())
             }

@@ -8,16 +8,20 @@ use tickbus::plc::Report;
 use tickbus::statistics::Statistics;
 use tickbus_test_log as logged;
 
-/// The number after `key=` in a report.
-fn told(report: &dyn Report, key: &str) -> f64 {
+/// The text after `key=` in a report, if there is one.
+fn text_of(report: &dyn Report, key: &str) -> Option<String> {
     let mut statistics = Statistics::default();
     report.write(&mut statistics);
     let text = statistics.to_string();
-    let line = text
-        .lines()
-        .find_map(|line| line.strip_prefix(&format!("{key}=")));
-    let line = line.unwrap_or_else(|| panic!("{key} in\n{text}"));
-    line.parse().expect("a number")
+    let mut lines = text.lines();
+    let found = lines.find_map(|line| line.strip_prefix(&format!("{key}=")));
+    found.map(str::to_owned)
+}
+
+/// The same, as a number that must be there.
+fn told(report: &dyn Report, key: &str) -> f64 {
+    let text = text_of(report, key).unwrap_or_else(|| panic!("no {key}"));
+    text.parse().expect("a number")
 }
 
 /// The same, as a count.
@@ -69,8 +73,14 @@ fn an_acknowledge_gives_many_commands_a_second_where_holding_gives_two() {
 
 #[test]
 fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
-    logged::expect("an axis is not healthy; all axes stop, and the sequence begins anew");
-    for (number, axis) in [(1, 3), (0, 8), (0, 2), (1, 0)] {
+    let failures = [
+        (1, 3, "knife carriage"),
+        (0, 8, "transfer arm"),
+        (0, 2, "centring spindle left"),
+        (1, 0, "spindle left"),
+    ];
+    for (number, axis, name) in failures {
+        logged::expect("\" is not healthy; all axes stop, and the sequence begins anew");
         let mut line = Line::new(&[], &[]);
         line.until("a core", 150.0, |line| line.plant.cores == 1);
         line.seconds(4.0);
@@ -78,6 +88,9 @@ fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
         line.seconds(0.1);
         let enabled = |line: &Line| line.enabled(number);
         assert_eq!(enabled(&line), 0, "axis {axis} of side {number}");
+        let report = line.report(number);
+        let told = |key| text_of(&*report, key);
+        assert_eq!(told("peeler.not_healthy").as_deref(), Some(name));
         line.seconds(1.0);
         line.plant.sides[number].drives[axis].healthy = true;
         line.seconds(0.5);
@@ -87,6 +100,15 @@ fn an_axis_that_fails_stops_all_axes_and_the_line_goes_on_when_it_is_well() {
             "not before it has been well for a second"
         );
         line.until("another core", 150.0, |line| line.plant.cores == 3);
+        let report = line.report(number);
+        assert_eq!(text_of(&*report, "peeler.not_healthy"), None);
+        assert_eq!(
+            text_of(&*report, "peeler.failed_axes").as_deref(),
+            Some(name)
+        );
+        let summary = report.summary();
+        let named = format!("axes that were not healthy: {name}\n");
+        assert!(summary.contains(&named), "{summary}");
         assert_eq!(counted(&*line.report(number), "peeler.faults"), 1);
     }
 }

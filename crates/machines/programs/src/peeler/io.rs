@@ -188,9 +188,11 @@ impl Io {
         self.slots[place.0] = Slot::from_real(f64::from(u8::from(on)));
     }
 
-    /// True if no axis has a fault.
-    pub(super) fn all_healthy(&self) -> bool {
-        self.axes.iter().all(|axis| axis.inputs.healthy)
+    /// The axes with a fault, a bit for each in the program's own order.
+    pub(super) fn unhealthy(&self) -> u64 {
+        let axes = self.axes.iter().enumerate();
+        let ill = axes.filter(|(_, axis)| !axis.inputs.healthy);
+        ill.fold(0, |all, (index, _)| all | 1 << index)
     }
 
     /// Discards all commands.

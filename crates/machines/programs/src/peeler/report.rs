@@ -19,6 +19,9 @@ pub(crate) struct PeelerCounters {
     pub(super) asked: AtomicU64,
     /// How often a fault made the sequence start over.
     pub(super) faults: AtomicU64,
+    /// The axes that are not healthy now, a bit for each, and those that have stopped the sequence so far.
+    pub(super) unhealthy: AtomicU64,
+    pub(super) failed: AtomicU64,
     /// How often the simulation was restarted.
     pub(super) restarts: AtomicU64,
     /// The deviations from the speed, if the program controls one.
@@ -107,6 +110,8 @@ impl PeelerCounters {
             blocks: AtomicU64::new(0),
             asked: AtomicU64::new(0),
             faults: AtomicU64::new(0),
+            unhealthy: AtomicU64::new(0),
+            failed: AtomicU64::new(0),
             restarts: AtomicU64::new(0),
             kept: Kept::default(),
         }
@@ -115,6 +120,13 @@ impl PeelerCounters {
     /// The axes, in the program's own order.
     pub(super) fn axes(&self) -> impl Iterator<Item = &AxisTally> {
         self.axes.iter()
+    }
+
+    /// The names of these axes, of which each is a bit.
+    pub(super) fn names(&self, axes: u64) -> Vec<&'static str> {
+        let named = self.axes.iter().enumerate();
+        let named = named.filter(|(index, _)| axes >> index & 1 == 1);
+        named.map(|(_, axis)| axis.name).collect()
     }
 
     /// The busiest axis: its name, its most commands within a second, and the shortest time between two.
@@ -142,6 +154,15 @@ impl Report for PeelerCounters {
     fn write(&self, statistics: &mut Statistics) {
         statistics.count("peeler.blocks", self.blocks.load(Relaxed));
         statistics.count("peeler.faults", self.faults.load(Relaxed));
+        for (key, axes) in [
+            ("peeler.not_healthy", &self.unhealthy),
+            ("peeler.failed_axes", &self.failed),
+        ] {
+            let names = self.names(axes.load(Relaxed));
+            if !names.is_empty() {
+                statistics.text(key, &names.join(", "));
+            }
+        }
         statistics.count("peeler.restarts", self.restarts.load(Relaxed));
         statistics.count("peeler.commands", self.commands());
         for axis in &self.axes {
@@ -169,6 +190,10 @@ impl Report for PeelerCounters {
             self.restarts.load(Relaxed),
             self.commands(),
         );
+        let failed = self.names(self.failed.load(Relaxed));
+        if !failed.is_empty() {
+            let _ = writeln!(text, "axes that were not healthy: {}", failed.join(", "));
+        }
         if let Some((name, count, least)) = self.busiest().filter(|(_, count, _)| *count > 0) {
             let _ = writeln!(
                 text,

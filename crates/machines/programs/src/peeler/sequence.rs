@@ -132,7 +132,10 @@ impl<S: Sequence> Sequenced<S> {
     /// One scan of the sequence; returns whether the axes are enabled.
     fn solve(&mut self, io: &mut Io, now: Nanos, alive: bool) -> bool {
         let anew = self.sequence.begins_anew(io, now, alive, &self.counters);
-        let well = self.well.call(now, alive && io.all_healthy(), WELL);
+        // Without data nothing is known about the axes.
+        let unhealthy = if alive { io.unhealthy() } else { 0 };
+        self.counters.unhealthy.store(unhealthy, Relaxed);
+        let well = self.well.call(now, alive && unhealthy == 0, WELL);
         if !alive || self.failed || anew {
             self.failed = !well || anew;
             if !self.failed {
@@ -140,10 +143,11 @@ impl<S: Sequence> Sequenced<S> {
             }
             return false;
         }
-        let done = if io.all_healthy() {
+        let done = if unhealthy == 0 {
             self.sequence.step(io, now, &self.counters)
         } else {
-            Err("an axis is not healthy".to_owned())
+            self.counters.failed.fetch_or(unhealthy, Relaxed);
+            Err(not_healthy(&self.counters.names(unhealthy)))
         };
         if let Err(wrong) = &done {
             log::warn!(
@@ -155,6 +159,14 @@ impl<S: Sequence> Sequenced<S> {
             self.counters.faults.fetch_add(1, Relaxed);
         }
         done.is_ok()
+    }
+}
+
+/// The fault of these axes.
+fn not_healthy(axes: &[&str]) -> String {
+    match axes {
+        [axis] => format!("the axis \"{axis}\" is not healthy"),
+        _ => format!("the axes \"{}\" are not healthy", axes.join("\", \"")),
     }
 }
 

@@ -4,6 +4,7 @@ import java.io.PrintStream;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Locale;
+import java.util.stream.Collectors;
 import tickbus.machines.demo.Screen;
 import tickbus.machines.demo.Timeline;
 import tickbus.simulator.TimeSource;
@@ -71,6 +72,9 @@ final class LineDisplay {
                 line.position(AxisName.PITCH_ANGLE)));
         lines.add(text("wood      ribbon %.1f m, %.1f dm3; torn %.1f, chipped %.1f, cores %.1f dm3", wood.ribbon(),
                 DM3 * wood.veneer(), DM3 * wood.torn(), DM3 * wood.chipped(), DM3 * wood.cores()));
+        if (!line.failed().isEmpty()) {
+            lines.add("axes      not healthy: " + line.failed().stream().map(AxisName::label).collect(Collectors.joining(", ")));
+        }
         AxisName busiest = rate.busiest();
         lines.add(text("commands  %d, busiest axis %s: %d, at most %d in a second", rate.commands(), busiest.label(),
                 rate.commands(busiest), rate.most(busiest)));

@@ -27,6 +27,7 @@ final class LineWatcher {
     private int held;
     private boolean round;
     private int cores;
+    private List<AxisName> failed = List.of();
     private double ribbonBefore;
 
     LineWatcher(Simulator simulator, Peeler line, Timeline timeline) {
@@ -75,6 +76,7 @@ final class LineWatcher {
         clamped = moved(now, Place.CLAMPS, clamped, "charger", "the transfer arm has block %d, %s");
         lookAtWood(now);
         held = moved(now, Place.LATHE, held, "lathe", "the spindles hold block %d, %s");
+        lookAtAxes(now);
         if (!line.mishaps().isEmpty()) {
             throw new DemoFailure("on the line: " + line.mishaps().get(0));
         }
@@ -91,6 +93,17 @@ final class LineWatcher {
             }
         }
         return block;
+    }
+
+    private void lookAtAxes(long now) {
+        List<AxisName> before = failed;
+        failed = line.failed();
+        for (AxisName axis : AxisName.values()) {
+            if (failed.contains(axis) != before.contains(axis)) {
+                timeline.add(now, axis.ofCharger() ? "charger" : "lathe",
+                        "the axis " + axis.label() + (failed.contains(axis) ? " is not healthy" : " is healthy again"));
+            }
+        }
     }
 
     private void lookAtWood(long now) {

@@ -2,6 +2,7 @@ package tickbus.machines.peeler;
 
 import java.util.ArrayList;
 import java.util.List;
+import java.util.stream.Stream;
 import tickbus.simulator.Machine;
 import tickbus.simulator.ModelFault;
 import tickbus.simulator.ModelFaults;
@@ -132,6 +133,15 @@ public final class Peeler implements Machine {
      */
     public void fail(AxisName name, boolean failed) {
         axes.get(name).fail(failed);
+    }
+
+    /**
+     * The axes with a fault.
+     *
+     * @return in the order of the names; empty in a good run
+     */
+    public List<AxisName> failed() {
+        return Stream.of(AxisName.values()).filter(name -> !axes.get(name).healthy()).toList();
     }
 
     /**

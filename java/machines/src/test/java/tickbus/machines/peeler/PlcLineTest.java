@@ -78,9 +78,11 @@ class PlcLineTest {
     void anAxisThatFailsStopsItsPlcAndTheLineGoesOnWhenItIsMended(AxisName axis, double when, int givenUp) {
         seconds(when);
         line.fail(axis, true);
+        assertEquals(List.of(axis), line.failed());
         seconds(2);
         assertEquals(0, line.speed(axis));
         line.fail(axis, false);
+        assertEquals(List.of(), line.failed());
         untilCores(3, 120);
         assertEquals(List.of(), line.mishaps());
         assertEquals(givenUp, line.wood().unpeeledCount());

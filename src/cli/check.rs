@@ -80,6 +80,9 @@ fn report(config: &Config) -> String {
         );
     }
     line("timing", &timing(&config.timing));
+    if let Some(real_time) = config.real_time {
+        line("threads", &real_time.to_string());
+    }
     for contradiction in config.contradictions() {
         line("warning", &contradiction.to_string());
     }

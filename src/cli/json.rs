@@ -6,7 +6,7 @@ use super::{Outcome, print};
 use tickbus_base::toml_text::Mistakes;
 
 /// How a command prints its result.
-#[derive(Debug, clap::Args)]
+#[derive(Debug, Default, clap::Args)]
 pub(super) struct Format {
     /// Print the result as one JSON document; docs/json.md describes its keys.
     #[arg(long)]

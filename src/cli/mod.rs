@@ -25,6 +25,7 @@ mod import;
 mod in_library;
 mod json;
 mod lab;
+mod latency;
 mod logo;
 mod man;
 mod mirror;
@@ -76,6 +77,7 @@ enum Command {
     Export(export::Arguments),
     Gsd(gsd::Arguments),
     Import(import::Arguments),
+    Latency(latency::Arguments),
     Logo(logo::Arguments),
     Man(man::Arguments),
     Mirror(mirror::Arguments),
@@ -158,6 +160,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
         Command::Export(arguments) => export::run(&arguments, kinds),
         Command::Gsd(arguments) => gsd::run(&arguments, kinds),
         Command::Import(arguments) => import::run(&arguments, kinds),
+        Command::Latency(arguments) => latency::run(&arguments),
         Command::Logo(arguments) => logo::run(&arguments),
         Command::Man(arguments) => man::run(&arguments),
         Command::Mirror(arguments) => mirror::run(&arguments, kinds),

@@ -55,6 +55,12 @@ pub(super) fn document(config: &Config) -> Value {
         "warnings": config.contradictions().iter().map(ToString::to_string).collect::<Value>(),
         "alive": watches.collect::<Value>(),
         "heartbeat": beats.collect::<Value>(),
+        "real_time": config.real_time.map(|real_time| json!({
+            "priority": real_time.priority,
+            "cpu": real_time.cpu,
+            "lock_memory": real_time.lock_memory,
+            "required": real_time.required,
+        })),
         "record": config.record.as_ref().map(|record| json!({
             "file": record.file.display().to_string(),
             "ring": record.ring,

@@ -10,6 +10,7 @@ use crate::loopback;
 use crate::{Kinds, Options, PageOptions};
 use tickbus_axis as axis;
 use tickbus_axis::{Axis, Field};
+use tickbus_base::RealTime;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
 use tickbus_fieldbus::faults::{self, Fault};
 use tickbus_fieldbus::{At, Events, LifeSigns, Role, Written};
@@ -28,6 +29,8 @@ pub struct Config {
     pub name: String,
     /// The end of the bus that the driver serves.
     pub role: Role,
+    /// The real-time settings for the threads of the bus and of a hosted program.
+    pub real_time: Option<RealTime>,
     /// The unit that the addresses in the file count in; the addresses in `table` count bytes.
     pub addressing: Addressing,
     /// The driver's stations and signals.
@@ -337,6 +340,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         path: path.to_owned(),
         id: driver.id?,
         name: driver.name?,
+        real_time: driver.real_time,
         role: fieldbus.role,
         addressing,
         table: table?,

@@ -1,7 +1,10 @@
 //! The table `[driver]` of a driver.cfg.
 
+use tickbus_base::RealTime;
 use tickbus_base::toml_text::{Key, Shape, Table, names};
 use tickbus_image::signal::Addressing;
+
+use crate::real_time::{self, read_real_time};
 
 /// The longest name of a driver, in characters.
 const NAME_LIMIT: usize = 120;
@@ -28,6 +31,11 @@ pub(crate) const KEYS: &[Key] = &[
         Shape::Label(PATH_LIMIT),
         "A file with [[fault]] sections, relative to the folder of this file",
     ),
+    Key::new(
+        "real_time",
+        Shape::Table(real_time::KEYS),
+        "Priority, processor and locked memory for the threads of the bus and of a hosted program",
+    ),
 ];
 
 const ADDRESSINGS: [(&str, Addressing); 2] =
@@ -39,6 +47,7 @@ pub(crate) struct DriverTable {
     pub(crate) name: Option<String>,
     pub(crate) addressing: Addressing,
     pub(crate) faults: Option<String>,
+    pub(crate) real_time: Option<RealTime>,
 }
 
 /// Reads the table.
@@ -50,6 +59,7 @@ pub(crate) fn read_driver(mut table: Table<'_>) -> DriverTable {
     let name = table.require("name", "give the driver a name for people");
     let addressing = table.take("addressing");
     let faults = table.take("faults");
+    let real_time = table.take("real_time");
     table.finish();
     DriverTable {
         id: id
@@ -67,5 +77,6 @@ pub(crate) fn read_driver(mut table: Table<'_>) -> DriverTable {
                 value.label(PATH_LIMIT, right)
             })
             .map(str::to_owned),
+        real_time: real_time.and_then(|value| read_real_time(&value)),
     }
 }

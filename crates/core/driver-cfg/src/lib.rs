@@ -14,6 +14,7 @@ mod observer;
 mod options;
 mod overlay;
 mod page;
+mod real_time;
 mod timing;
 
 /// The kinds that this crate's tests use.

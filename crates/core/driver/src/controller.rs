@@ -13,7 +13,7 @@ use super::host::{HostThread, ScanSetup, check_fit};
 use super::open::swallowed_of;
 use super::recording::recorder;
 use super::watch::Watch;
-use super::{DriverError, SlotMap, bus};
+use super::{DriverError, SlotMap, bus, real_time};
 use tickbus_driver_cfg::Config;
 
 /// A PLC program at one end of a bus, scanned at a fixed interval: a PLC without its hardware.
@@ -72,6 +72,7 @@ impl Host {
                 "use one driver.cfg per station for that",
             ));
         }
+        real_time::check(config, &*clock)?;
         let stop = Stop::new();
         let hosted = Hosted {
             interval,

@@ -52,6 +52,9 @@ pub enum DriverError {
     /// A fault cannot be injected.
     #[error("{0}")]
     Fault(Mistake),
+    /// The system refuses real-time settings that are required.
+    #[error("{0}")]
+    RealTime(String),
     /// The driver.cfg is correct, but asks for something that this build or platform does not have.
     #[error("{0}")]
     Unsupported(String),
@@ -83,7 +86,7 @@ impl DriverError {
     /// Returns the status code of this error.
     pub fn code(&self) -> Code {
         match self {
-            Self::System { .. } => Code::BusFailed,
+            Self::System { .. } | Self::RealTime(_) => Code::BusFailed,
             Self::Unsupported(_) => Code::Unsupported,
             Self::Program { .. }
             | Self::Fit { .. }

@@ -14,6 +14,7 @@ mod inject;
 #[cfg(test)]
 mod model_faults_tests;
 mod open;
+mod real_time;
 mod recording;
 mod replay;
 mod reset;

@@ -18,6 +18,7 @@ use super::extras::Extras;
 use super::frames::directions;
 use super::heartbeat::Beat;
 use super::host::OtherEnd;
+use super::real_time;
 use super::recording::{Recorded, recorder};
 use super::shape::Shape;
 use super::station::Station;
@@ -35,6 +36,7 @@ impl Driver {
     ///
     /// See [`DriverError`].
     pub fn open(mut config: Config, clock: Arc<dyn Clock>) -> Result<Self, DriverError> {
+        real_time::check(&config, &*clock)?;
         let areas = config.role.areas();
         let swallowed = swallowed_of(&config, &config.name);
         let (tick, bus_end) = image_of(&config, &swallowed);
@@ -177,7 +179,8 @@ pub(super) fn start(
     }
     Ok(match bus {
         OpenBus::Free(bus) => {
-            let thread = BusThread::start(bus, port, timing, status.clone(), &config.name);
+            let own = (&*config.name, config.real_time);
+            let thread = BusThread::start(bus, port, timing, status.clone(), own);
             BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
         }
         OpenBus::Stepped(bus) => BusHandle::Stepped {

@@ -5,11 +5,13 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use log::Level;
-use tickbus_base::os::wake_on_time;
+use tickbus_base::RealTime;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
 use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};
+
+use super::real_time::begin;
 
 /// The longest time to wait for the peer to take the last values.
 const LONGEST_FAREWELL: Nanos = Nanos::from_secs(2);
@@ -33,13 +35,13 @@ pub(super) struct BusThread {
 
 impl BusThread {
     /// Starts a thread that serves `bus`. `timing` has the pauses between attempts (the last one repeats), and the
-    /// settings for the outputs.
+    /// settings for the outputs. `real_time` are the settings of the thread.
     pub(super) fn start(
         bus: Box<dyn Free>,
         mut port: Port,
         timing: &Timing,
         status: LinkStatus,
-        name: &str,
+        (name, real_time): (&str, Option<RealTime>),
     ) -> std::io::Result<Self> {
         let cycles = bus.last_cycles();
         if cycles > 0 {
@@ -57,7 +59,7 @@ impl BusThread {
             move || {
                 // Freeing the bus's resources, such as unloading a library, may take time: the thread ends after that.
                 let (mut bus, mut port) = (bus, port);
-                wake_on_time();
+                begin(real_time, "the bus", &status, &*clock);
                 serve(&mut *bus, &mut port, &*clock, &reconnect, &status, &stop);
             }
         })?;

@@ -20,6 +20,7 @@ mod pollable;
 mod process_watch;
 #[cfg(unix)]
 mod pseudo_terminal;
+mod real_time;
 mod serial;
 mod serial_line;
 mod shared_memory;
@@ -48,6 +49,7 @@ pub use pollable::{Pollable, Source};
 pub use process_watch::ProcessWatch;
 #[cfg(unix)]
 pub use pseudo_terminal::PseudoTerminal;
+pub(crate) use real_time::{Os, RealTimeSystem};
 pub use serial::{Parity, SerialPort, SerialSettings};
 pub use serial_line::SerialLine;
 pub use shared_memory::{MemoryFile, SharedMemory};

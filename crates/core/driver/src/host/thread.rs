@@ -5,10 +5,10 @@ use std::sync::atomic::{AtomicI64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::DriverError;
+use crate::real_time;
 use crate::statistics::{Counters, Figures, ProgramCounters};
 use crate::supervise::{BusThread, panic_text};
 use crate::watch::Watch;
-use tickbus_base::os::wake_on_time;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Manual, Nanos, Pace, Stop};
@@ -103,8 +103,7 @@ impl HostThread {
         let name = &format!("plc {}", hosted.program.name());
         let (max_age, interval) = (config.timing.max_age, hosted.interval);
         let (report, can_hang) = (hosted.program.report(), hosted.program.can_hang());
-        let record = hosted.recorder.as_ref();
-        let record = record.map(|recorder| Arc::clone(recorder.counters()));
+        let record = hosted.recorder.as_ref().map(|it| Arc::clone(it.counters()));
         let (mut cpu, bus_end) = half(hosted.program, (config, role), hosted.swallowed.counts());
         let status = LinkStatus::new(name, max_age);
         // The faults in a driver.cfg apply to its own end, not to a program behind its bus. The same is true of a
@@ -152,10 +151,11 @@ impl HostThread {
         let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
             Bus::Free(bus) => {
                 let timing = timing(config, is_own);
-                let bus = BusThread::start(bus, port, &timing, status, name);
+                let (real_time, scanning) = (config.real_time, status.clone());
+                let bus = BusThread::start(bus, port, &timing, status, (name, real_time));
                 let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                 let scans = move || {
-                    wake_on_time();
+                    real_time::begin(real_time, "the PLC program", &scanning, &*scanned.wall);
                     scan_until_stopped(&mut cpu, (interval, watchdog), &stopped, &scanned);
                     Ok(())
                 };

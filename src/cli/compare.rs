@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     )]
     with: Option<PathBuf>,
 
-    /// A test file whose [machine] (an FMU, or rules) is the model.
+    /// A test file whose machine (an FMU, rules or replies) is the model.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
 

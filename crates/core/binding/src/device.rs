@@ -163,7 +163,7 @@ impl<K> Device<K> {
         declare_model_faults(&mut self.driver, names)
     }
 
-    /// Whether there may be a change of a fault of the model: see [`Driver::has_model_change`].
+    /// Returns whether there may be a change of a fault of the model: see [`Driver::has_model_change`].
     #[inline]
     pub fn has_model_change(&self) -> bool {
         self.driver.has_model_change()

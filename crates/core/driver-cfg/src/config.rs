@@ -305,7 +305,12 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
             "remove [[reply]], or write them into the driver.cfg of the machine",
         );
     }
+    if is_observers && let Some(first) = replies.first() {
+        observer::refuse_replies(first);
+    }
     let replies = match &table {
+        // All signals of an observer are received.
+        Some(_) if observes => Vec::new(),
         Some(table) => read_replies(replies, table, &axes, &life_signs),
         None => Vec::new(),
     };

@@ -26,6 +26,11 @@ pub(super) fn refuse_keys(table: &Table<'_>, keys: &[&str]) {
     }
 }
 
+/// Reports replies, at the first of them.
+pub(super) fn refuse_replies(first: &Table<'_>) {
+    first.wrong("an observer makes no replies", ENDS);
+}
+
 /// Reports faults, in the file or in the file that it names.
 pub(super) fn refuse_faults(faults: &Value<'_>) {
     faults.wrong("an observer injects no faults", ENDS);

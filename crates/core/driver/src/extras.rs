@@ -113,7 +113,7 @@ impl Extras {
     #[inline]
     pub(super) fn has_model_change(&self) -> bool {
         let faults = self.faults.as_ref();
-        faults.is_some_and(|faults| faults.has_model_change())
+        faults.is_some_and(Faults::has_model_change)
     }
 
     /// Returns the next change of a fault of the simulation's model that the model has not been told.

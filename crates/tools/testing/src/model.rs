@@ -254,7 +254,7 @@ fn read(
     let right = "write the path of the driver.cfg, as seen from this file";
     let config = root.require("config", format!("add config = \"driver.cfg\": {right}"));
     let step = root.take("step");
-    let machine = root.require("machine", "describe the machine: an FMU, or rules");
+    let machine = root.require("machine", "describe the machine: an FMU, rules or replies");
     // What a test needs beside the machine is no mistake, and of no use here.
     root.finish_open();
     let step = match step {

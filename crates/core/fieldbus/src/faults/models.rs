@@ -60,7 +60,7 @@ impl Models {
         }
     }
 
-    /// Whether there may be a change that the model has not been told.
+    /// Returns whether there may be a change that the model has not been told.
     pub(super) const fn has_change(&self) -> bool {
         self.has_news
     }

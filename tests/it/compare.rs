@@ -430,6 +430,64 @@ fn four_times_of_rules_are_fitted_within_a_percent() {
     );
 }
 
+/// A clamp and a pump that replies make, with these times and speed, and what the PLC's mirror does with them.
+fn replied(extend: &str, retract: &str, running: &str, full_speed: f64) -> String {
+    format!(
+        "config = \"lift.cfg\"\nstep = \"10ms\"\n\
+         [[machine.reply]]\nkind = \"cylinder\"\nname = \"lift\"\nextend = \"Run\"\nextended = \"Top\"\n\
+         retracted = \"Bottom\"\nextend_time = \"{extend}\"\nretract_time = \"{retract}\"\n\
+         [[machine.reply]]\nkind = \"motor\"\nname = \"drive\"\ncontactor = \"Run\"\nspeed = \"Height\"\n\
+         on_after = \"{running}\"\nfull_speed = {full_speed:?}\nstart_time = \"500ms\"\n\
+         [[test]]\nname = \"up and down\"\nsteps = [{{ run = \"1s\" }}, {{ set = {{ Start = true }}, run = \"3s\" }}, \
+         {{ set = {{ Start = false }}, run = \"4s\" }}, {{ set = {{ Start = true }}, run = \"3s\" }}, \
+         {{ set = {{ Start = false }}, run = \"4s\", expect = \"Bottom\" }}]\n"
+    )
+}
+
+#[test]
+fn keys_of_replies_are_fitted_within_a_percent() {
+    let bench = Bench::new();
+    bench.file("lift.cfg", LIFT);
+    bench.file("right.toml", &replied("1200ms", "2300ms", "300ms", 160.0));
+    record(&bench, "right.toml", "real.vcd");
+    bench.file("guess.toml", &replied("600ms", "1s", "50ms", 90.0));
+    bench.file(
+        "fit.toml",
+        "seed = 3\nruns = 200\n\
+         [[parameter]]\nreply = \"lift\"\nkey = \"extend_time\"\nfrom = \"100ms\"\nto = \"2900ms\"\n\
+         [[parameter]]\nreply = \"lift\"\nkey = \"retract_time\"\nfrom = \"100ms\"\nto = \"3900ms\"\n\
+         [[parameter]]\nreply = \"drive\"\nkey = \"on_after\"\nfrom = \"10ms\"\nto = \"900ms\"\n\
+         [[parameter]]\nreply = \"drive\"\nkey = \"full_speed\"\nfrom = 20\nto = 400\n",
+    );
+    let with = ["real.vcd", "--model", "guess.toml", "--ignore", "Start"];
+    let found = bench.json(&[&with[..], &["--fit", "fit.toml"]].concat());
+    let parameters = found["fit"]["parameters"].as_array().expect("a list");
+    for (parameter, right) in parameters.iter().zip([1.2, 2.3, 0.3, 160.0]) {
+        let value = parameter["value"].as_f64().expect("a number");
+        // A time is found no finer than a tick.
+        let permitted = (0.01_f64 * right).max(0.01);
+        assert!((value - right).abs() <= permitted, "{found:#}");
+    }
+    bench.file(
+        "wrong.toml",
+        "[[parameter]]\nreply = \"lfit\"\nfrom = \"1s\"\nto = \"2s\"\n\
+         [[parameter]]\nreply = \"lift\"\nfrom = \"1s\"\nto = \"2s\"\n\
+         [[parameter]]\nreply = \"lift\"\nkey = \"open_time\"\nfrom = \"1s\"\nto = \"2s\"\n\
+         [[parameter]]\nreply = \"lift\"\nrule = \"up\"\nfrom = 1\nto = 2\n",
+    );
+    let wrong = [&with[..], &["--fit", "wrong.toml"]].concat();
+    let (code, _, told) = bench.compare(&wrong);
+    assert_eq!(code, Some(1));
+    for part in [
+        "wrong.toml:2:9: guess.toml has no reply \"lfit\"; did you mean \"lift\"?",
+        "wrong.toml:6:9: no key of the reply \"lift\"; add key = \"…\", one of extend_time, retract_time",
+        "wrong.toml:11:7: ",
+        "wrong.toml:15:9: a parameter is of one thing; ",
+    ] {
+        assert!(told.contains(part), "{part}\n{told}");
+    }
+}
+
 #[test]
 fn mistakes_in_a_file_of_parameters_have_their_places() {
     let bench = Bench::new();

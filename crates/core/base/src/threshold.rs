@@ -21,6 +21,11 @@ impl Threshold {
         }
     }
 
+    /// The trip point, to be changed, of a switch that is on above it, or below it.
+    pub fn trip_point(&mut self, above: bool) -> Option<&mut f64> {
+        (self.above == above).then_some(&mut self.at)
+    }
+
     /// Returns whether the switch is on at this number.
     pub fn update(&mut self, number: f64) -> bool {
         // The distance beyond the trip point: the switch turns on at 0, and off below minus the hysteresis.

@@ -19,6 +19,7 @@ mod pulses;
 mod replies;
 mod rule;
 mod section;
+mod setting;
 mod signal;
 mod travel;
 
@@ -29,6 +30,7 @@ pub use rule::{Course, Ramp, Rule, Values};
 pub use section::{
     LIMIT, OneOf, REPLY_KEYS, REPLY_KINDS, Scope, Signals, one_of, read_rule, read_sections, texts,
 };
+pub use setting::Setting;
 pub use signal::real;
 
 #[cfg(test)]

@@ -75,7 +75,8 @@ impl BoolResult {
         let window = self.window.0.max(1) as f64;
         let good = self.pairs.iter();
         let good = good.map(|(a, b)| 2.0 * (1.0 - (b.at - a.at).0.abs() as f64 / window));
-        good.sum::<f64>() / count as f64
+        // The sum of no numbers would be -0.
+        good.fold(0.0, |sum, one| sum + one) / count as f64
     }
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{
-    Collector, Mistakes, Table, Value, load_text, nearest, read_text, shown,
+    Collector, Mistakes, Table, Value, did_you_mean, load_text, nearest, read_text, shown,
 };
 use tickbus_compare::{self as compare, Budget, Parameter, Side};
 use tickbus_image::signal::Area;
@@ -18,7 +18,8 @@ const RUNS: usize = 400;
 /// The most runs of a fit.
 const MOST_RUNS: i128 = 1_000_000;
 
-const SHAPE: &str = "write rule = \"…\" with key = \"after\", or fmu = \"…\", with from and to";
+const SHAPE: &str =
+    "write rule = \"…\" or reply = \"…\" with a key, or fmu = \"…\", with from and to";
 
 /// A place in the machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,6 +28,12 @@ enum Target {
     After(usize),
     /// The speed of a rule's ramp.
     PerSecond(usize),
+    /// A key of a reply: a time in seconds, or a number.
+    Reply {
+        index: usize,
+        key: &'static str,
+        is_time: bool,
+    },
     /// A variable of the FMU.
     Fmu(usize),
 }
@@ -90,6 +97,7 @@ impl compare::Model for Twin<'_> {
                         ramp.per_second = *value;
                     }
                 }
+                Target::Reply { index, key, .. } => model.replies[index].set(key, *value),
                 Target::Fmu(variable) => of_fmu.push((variable, *value)),
             }
         }
@@ -143,24 +151,27 @@ fn read(mut root: Table<'_>, model: &Model) -> Option<FitFile> {
 }
 
 fn parameter(mut table: Table<'_>, model: &Model) -> Option<(Parameter, Target)> {
-    let (rule, key, fmu) = (table.take("rule"), table.take("key"), table.take("fmu"));
+    let [rule, reply, fmu, key] = ["rule", "reply", "fmu", "key"].map(|key| table.take(key));
     let from = table.require("from", "write the least value");
     let to = table.require("to", "write the greatest value");
     let was = table.take("start");
-    if rule.is_none() && fmu.is_none() {
-        table.wrong("a parameter of neither a rule nor an FMU", SHAPE);
-    }
+    table.require_one_of(&["rule", "reply", "fmu"], SHAPE);
     table.finish();
-    let (name, unit, target, known) = match (&rule, &fmu) {
-        (Some(rule), None) => of_rule(rule, key.as_ref(), model)?,
-        (None, Some(fmu)) => of_fmu(fmu, key.as_ref(), model)?,
-        (Some(_), Some(fmu)) => {
-            fmu.wrong("\"fmu\" stands beside \"rule\"", SHAPE);
+    let (name, unit, target, known) = match (&rule, &reply, &fmu) {
+        (Some(rule), None, None) => of_rule(rule, key.as_ref(), model)?,
+        (None, Some(reply), None) => of_reply(reply, key.as_ref(), model)?,
+        (None, None, Some(fmu)) => of_fmu(fmu, key.as_ref(), model)?,
+        (None, None, None) => return None,
+        _ => {
+            let several = [&rule, &reply, &fmu].into_iter().flatten().next_back();
+            several?.wrong("a parameter is of one thing", SHAPE);
             return None;
         }
-        (None, None) => return None,
     };
-    let is_time = matches!(target, Target::After(_));
+    let is_time = matches!(
+        target,
+        Target::After(_) | Target::Reply { is_time: true, .. }
+    );
     let number = |value: &Value<'_>| {
         if is_time {
             value.duration().map(|time| time.as_micros() / 1e6)
@@ -244,6 +255,40 @@ fn of_rule(rule: &Value<'_>, key: Option<&Value<'_>>, model: &Model) -> Option<K
     let unit = format!("{}/s", signal.unit.as_deref().unwrap_or("1"));
     let name = format!("{name}: per_second");
     Some((name, unit, Target::PerSecond(index), Some(ramp.per_second)))
+}
+
+fn of_reply(reply: &Value<'_>, key: Option<&Value<'_>>, model: &Model) -> Option<Known> {
+    let name = reply.text("write the name of a [[reply]] in quotes")?;
+    let names: Vec<&str> = model.replies.iter().map(|one| one.name.as_str()).collect();
+    let Some(index) = names.iter().position(|known| *known == name) else {
+        let right = if names.is_empty() {
+            "name a rule, or write a [[machine.reply]]".to_owned()
+        } else {
+            did_you_mean(name, "the replies", &names)
+        };
+        let what = format!("{} has no reply \"{}\"", model.file, shown(name));
+        reply.wrong(what, right);
+        return None;
+    };
+    let settings = model.replies[index].settings();
+    let choices: Vec<_> = settings.iter().map(|one| (one.key, *one)).collect();
+    let Some(key) = key else {
+        let keys: Vec<&str> = settings.iter().map(|one| one.key).collect();
+        reply.wrong(
+            format!("no key of the reply \"{}\"", shown(name)),
+            format!("add key = \"…\", one of {}", keys.join(", ")),
+        );
+        return None;
+    };
+    let known = key.choice("keys of this reply that can be fitted", &choices)?;
+    let unit = if known.is_time { "s" } else { "" };
+    let target = Target::Reply {
+        index,
+        key: known.key,
+        is_time: known.is_time,
+    };
+    let name = format!("{name}: {}", known.key);
+    Some((name, unit.to_owned(), target, Some(known.value)))
 }
 
 fn of_fmu(fmu: &Value<'_>, key: Option<&Value<'_>>, model: &Model) -> Option<Known> {

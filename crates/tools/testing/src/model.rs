@@ -31,7 +31,7 @@ pub struct Model {
     step: Option<Nanos>,
     initial: Vec<(usize, Slot)>,
     pub(super) rules: Vec<Rule>,
-    replies: Vec<Reply>,
+    pub(super) replies: Vec<Reply>,
     pub(super) fmu: Option<Plant>,
 }
 
@@ -132,7 +132,10 @@ impl Model {
         let table = self.table();
         let signals = &table.signals;
         let mut slots: Vec<Slot> = signals.iter().map(|signal| signal.fail_safe).collect();
-        for (signal, value) in commands.first.iter().chain(&self.initial) {
+        // A reply makes its signals from the beginning; another value would be one that the machine writes over it.
+        let is_made = |signal: &usize| self.replies.iter().any(|one| one.outputs.contains(signal));
+        let recorded = commands.first.iter().filter(|(signal, _)| !is_made(signal));
+        for (signal, value) in recorded.chain(&self.initial) {
             slots[*signal] = *value;
         }
         let fmu = self.fmu.as_ref();

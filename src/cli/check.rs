@@ -56,7 +56,6 @@ fn report(config: &Config) -> String {
     let mut out = String::new();
     let table = config.table.as_in_plc();
     let stations = &table.stations;
-    let taken = words_of_values(&table.signals);
     let mut line = |head: &str, text: &str| {
         writeln!(out, "{head:9} {text}").expect("a String takes all");
     };
@@ -130,19 +129,7 @@ fn report(config: &Config) -> String {
         line("reply", &reply.what(&config.table));
     }
     out.push('\n');
-    if !config.axes.is_empty() {
-        let rows = config.axes.iter().map(|axis| axes::row(axis).to_vec());
-        out.push_str(&aligned(&axes::HEADINGS, &rows.collect::<Vec<_>>()));
-        out.push('\n');
-    }
-    let signals = table.signals.iter();
-    let rows = signals.map(|signal| row(signal, &table, &taken, config).to_vec());
-    let rows: Vec<Vec<String>> = rows.collect();
-    if rows.is_empty() {
-        out.push_str("no signals\n");
-    } else {
-        out.push_str(&aligned(&HEADINGS, &rows));
-    }
+    out.push_str(&tables(config, &table));
     let total = |area| {
         stations
             .iter()
@@ -157,6 +144,26 @@ fn report(config: &Config) -> String {
         total(Area::Output)
     )
     .expect("a String takes all");
+    out
+}
+
+/// The axes and the signals.
+fn tables(config: &Config, table: &SignalTable) -> String {
+    let mut out = String::new();
+    let taken = words_of_values(&table.signals);
+    if !config.axes.is_empty() {
+        let rows = config.axes.iter().map(|axis| axes::row(axis).to_vec());
+        out.push_str(&aligned(&axes::HEADINGS, &rows.collect::<Vec<_>>()));
+        out.push('\n');
+    }
+    let signals = table.signals.iter();
+    let rows = signals.map(|signal| row(signal, table, &taken, config).to_vec());
+    let rows: Vec<Vec<String>> = rows.collect();
+    if rows.is_empty() {
+        out.push_str("no signals\n");
+    } else {
+        out.push_str(&aligned(&HEADINGS, &rows));
+    }
     out
 }
 

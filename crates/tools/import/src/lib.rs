@@ -50,7 +50,7 @@ pub struct ImportOptions {
     pub lenient: bool,
     /// The bus of the device addresses in the list; `None` to detect it.
     pub client: Option<Client>,
-    /// Add [proposed](propose) replies for the inputs.
+    /// Add [proposed](propose()) replies for the inputs.
     pub replies: bool,
 }
 

@@ -22,6 +22,7 @@ fuzz_target!(|data: &[u8]| {
         addressing: (choice & 1 != 0).then_some(Addressing::Elements),
         lenient: choice & 2 != 0,
         client: None,
+        replies: choice & 16 != 0,
     };
     match import("project.xml", bytes, reading, &KINDS) {
         Ok(imported) => {

@@ -17,6 +17,7 @@ fuzz_target!(|data: &[u8]| {
     let reading = ImportOptions {
         addressing: (choice & 1 != 0).then_some(Addressing::Elements),
         lenient: choice & 2 != 0,
+        replies: choice & 16 != 0,
         client: match choice >> 2 & 3 {
             1 => Some(Client::Modbus),
             2 => Some(Client::S7),

@@ -11,12 +11,14 @@ public final class SwallowedChanges {
 
     /**
      * The number of swallowed changes of all signals, for a look after each tick: only when it has grown does {@link #of}
-     * find something new.
+     * find something new. Called by the ticking thread.
      *
      * @param bus an open driver
-     * @return -1 while another thread has the driver, or if it is closed
+     * @return -1 while another thread reads or closes the driver, or if it is closed
+     * @throws FieldbusException {@link Status#BUSY} if another thread ticks this driver
      */
     public static long count(Tickbus bus) {
+        bus.mustBeTicker();
         return countNative(bus.handle());
     }
 

@@ -596,7 +596,7 @@ public final class Tickbus implements AutoCloseable {
         return words.get(word);
     }
 
-    private void mustBeTicker() {
+    void mustBeTicker() {
         if (ticker != Thread.currentThread()) {
             becomeTicker();
         }

@@ -26,6 +26,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         pymodbus_drives_our_server_with_rtu,
     ),
     ("pymodbus_meets_units_and_gateways", pymodbus_meets_units),
+    (
+        "pymodbus_finds_a_device_where_its_maker_put_it",
+        pymodbus_finds_places,
+    ),
     ("our_client_drives_pymodbus", our_client_drives_pymodbus),
     (
         "our_client_drives_pymodbus_with_rtu_over_tcp",
@@ -202,6 +206,54 @@ fn pymodbus_meets_units() -> Result<(), Absent> {
     for (key, counted) in keys.iter().zip(counted) {
         assert_eq!(machine.statistic(&format!("line.{key}")), counted, "{key}");
     }
+    Ok(())
+}
+
+/// A drive at the registers that its manual names, with its maker's name, asked by a program that knows only those.
+fn pymodbus_finds_places() -> Result<(), Absent> {
+    let mut python = harness::python_with("main", &["pymodbus"])?;
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
+                  reserved = [{ at = \"408503\", count = 2 }]\n\
+                  identity = { vendor = \"ACME\", product = \"FD-7\", revision = \"V2.1\", server_id = \"FD7\" }\n\
+                  at = { \"q 0\" = \"408502\", \"i 0\" = \"303202\", \"q 1\" = \"coil:65536\", \"i 1\" = \"100008\" }";
+    let mut text = String::new();
+    for (area, way) in [("I", "i"), ("Q", "q")] {
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"{way} 0\"\naddress = \"%{area}W0\"\ntype = \"INT\"\n\
+             [[signal]]\nname = \"{way} 1\"\naddress = \"%{area}X2.0\"\n"
+        );
+    }
+    let mut machine = open(server, &text);
+    let address = machine.address_for("pymodbus-places", &pymodbus_version());
+    python.args([
+        "-c",
+        "import sys, time\n\
+         from pymodbus.client import ModbusTcpClient\n\
+         client = ModbusTcpClient('127.0.0.1', port=int(sys.argv[1]), retries=0)\n\
+         client.connect()\n\
+         def code(answer): return answer.exception_code\n\
+         assert not client.write_registers(8501, [1500, 1, 2]).isError()\n\
+         assert client.read_holding_registers(8501, count=3).registers == [1500, 0, 0]\n\
+         assert not client.write_coil(65535, True).isError()\n\
+         limit = time.monotonic() + 10\n\
+         while client.read_input_registers(3201, count=1).registers != [1500]:\n\
+         \x20   assert time.monotonic() < limit\n\
+         while not client.read_discrete_inputs(7, count=1).bits[0]:\n\
+         \x20   assert time.monotonic() < limit\n\
+         assert code(client.read_holding_registers(8501, count=4)) == 2\n\
+         assert code(client.read_holding_registers(0, count=1)) == 2\n\
+         assert code(client.read_holding_registers(3201, count=1)) == 2\n\
+         assert code(client.read_coils(65534, count=2)) == 2\n\
+         assert code(client.write_register(8504, 1)) == 2\n\
+         who = client.read_device_information(read_code=1).information\n\
+         assert who == {0: b'ACME', 1: b'FD-7', 2: b'V2.1'}, who\n\
+         who = client.report_device_id()\n\
+         assert (who.identifier, who.status) == (b'FD7', True), who\n",
+        &address.port().to_string(),
+    ]);
+    machine.mirror_until_the_end_of(python);
+    assert_eq!(machine.get("q 0"), 1500.0);
     Ok(())
 }
 

@@ -4,8 +4,6 @@
 //! The checks and their order follow the state diagrams of the Modbus Application Protocol V1.1b3: function,
 //! quantity and value, address.
 
-use std::ops::Range;
-
 use super::function::{
     EXCEPTION_BIT, READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS, WRITE_REGISTERS,
 };
@@ -14,10 +12,10 @@ use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
 /// The effect of a request.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Done {
-    /// The bits written, in the frame that clients write.
-    pub wrote: Option<Range<usize>>,
-    /// The bits in the answer, of the frame that this end writes.
-    pub read: Option<Range<usize>>,
+    /// The elements that the client wrote.
+    pub wrote: Option<(Table, Span)>,
+    /// The elements in the answer.
+    pub read: Option<(Table, Span)>,
     /// Why the request was refused, if so; it then had no effect.
     pub refused: Option<Exception>,
 }
@@ -132,19 +130,19 @@ fn act(
             let [first, ..] = words::<3>(data)?;
             let (and, or) = ([data[2], data[3]], [data[4], data[5]]);
             let span = Span { first, count: 1 };
-            let wrote = tables.write(Table::HoldingRegisters, span, |frame, bit| {
-                let register = &mut frame[bit / 8..bit / 8 + 2];
+            let wrote = wrote(Table::HoldingRegisters, span, tables, |register| {
                 for (byte, (and, or)) in register.iter_mut().zip(and.into_iter().zip(or)) {
                     *byte = (*byte & and) | (or & !and);
                 }
             })?;
             reply.extend_from_slice(data);
-            Ok(Done {
-                wrote: Some(wrote),
-                ..Done::default()
-            })
+            Ok(wrote)
         }
         Function::ReadWriteRegisters => read_write(data, tables, reply),
+        Function::ReportServerId => {
+            identification.answer_server_id(data, reply)?;
+            Ok(Done::default())
+        }
         Function::DeviceIdentification => {
             identification.answer(data, reply)?;
             Ok(Done::default())
@@ -187,11 +185,7 @@ fn read(
     if !(1..=most).contains(&count) {
         return Err(Exception::ILLEGAL_DATA_VALUE);
     }
-    let read = read_counted(table, Span { first, count }, tables, reply)?;
-    Ok(Done {
-        read,
-        ..Done::default()
-    })
+    read_counted(table, Span { first, count }, tables, reply)
 }
 
 /// Appends elements, preceded by their byte count.
@@ -200,28 +194,38 @@ fn read_counted(
     span: Span,
     tables: &Tables<'_>,
     reply: &mut Vec<u8>,
-) -> Result<Option<Range<usize>>, Exception> {
+) -> Result<Done, Exception> {
     let bytes = (span.count * table.width()).div_ceil(8);
     reply.push(u8::try_from(bytes).expect("the limits keep it below"));
-    tables.read(table, span, reply)
-}
-
-fn write_bits(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
-    let wrote = tables.write(Table::Coils, span, |frame, bit| {
-        put_bits(values, span.count, frame, bit);
-    })?;
+    tables.read(table, span, reply)?;
     Ok(Done {
-        wrote: Some(wrote),
+        read: Some((table, span)),
         ..Done::default()
     })
 }
 
+fn write_bits(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
+    wrote(Table::Coils, span, tables, |coils| {
+        put_bits(values, span.count, coils, 0);
+    })
+}
+
 fn write_registers(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
-    let wrote = tables.write(Table::HoldingRegisters, span, |frame, bit| {
-        frame[bit / 8..][..values.len()].copy_from_slice(values);
-    })?;
+    wrote(Table::HoldingRegisters, span, tables, |registers| {
+        registers.copy_from_slice(values);
+    })
+}
+
+/// Lets `write` change elements.
+fn wrote(
+    table: Table,
+    span: Span,
+    tables: &mut Tables<'_>,
+    write: impl FnOnce(&mut [u8]),
+) -> Result<Done, Exception> {
+    tables.write(table, span, write)?;
     Ok(Done {
-        wrote: Some(wrote),
+        wrote: Some((table, span)),
         ..Done::default()
     })
 }
@@ -252,7 +256,10 @@ fn read_write(
     tables.check_read(Table::HoldingRegisters, reads)?;
     let wrote = write_registers(writes, values, tables)?;
     let read = read_counted(Table::HoldingRegisters, reads, tables, reply)?;
-    Ok(Done { read, ..wrote })
+    Ok(Done {
+        read: read.read,
+        ..wrote
+    })
 }
 
 #[cfg(test)]

@@ -19,7 +19,7 @@ pub(super) const WRITE_REGISTERS: usize = 123;
 /// Most registers that a request writes which also reads.
 pub(super) const READ_WRITE_REGISTERS: usize = 121;
 
-/// A function that is implemented at both ends.
+/// A function that is implemented.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum Function {
@@ -39,6 +39,8 @@ pub enum Function {
     WriteCoils = 15,
     /// Write registers in a row.
     WriteRegisters = 16,
+    /// Read the identification of the server, which only the server's end has.
+    ReportServerId = 17,
     /// Set and clear single bits of a register.
     MaskWriteRegister = 22,
     /// Write registers, then read registers.
@@ -49,7 +51,7 @@ pub enum Function {
 
 impl Function {
     /// All functions.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::ReadCoils,
         Self::ReadDiscreteInputs,
         Self::ReadHoldingRegisters,
@@ -58,6 +60,7 @@ impl Function {
         Self::WriteRegister,
         Self::WriteCoils,
         Self::WriteRegisters,
+        Self::ReportServerId,
         Self::MaskWriteRegister,
         Self::ReadWriteRegisters,
         Self::DeviceIdentification,

@@ -5,14 +5,19 @@ use super::{Exception, PDU_LIMIT};
 /// The kind of encapsulated interface that reads the device identification.
 pub(super) const READ_DEVICE_IDENTIFICATION: u8 = 14;
 
-/// Basic identification, as a stream and object by object.
-const CONFORMITY: u8 = 0x81;
+/// Basic identification, as a stream and object by object; [`REGULAR`] with regular identification, too.
+const BASIC: u8 = 0x81;
+const REGULAR: u8 = 0x82;
+
+/// The objects of the basic identification, and all that the standard names.
+const BASIC_OBJECTS: usize = 3;
+pub(super) const OBJECTS: usize = 7;
 
 /// The header of an answer: function, kind, access, conformity, more follows, next object, number of objects.
 const HEADER: usize = 7;
 
 /// The longest text of an object that fits into an answer.
-const TEXT_LIMIT: usize = PDU_LIMIT - HEADER - 2;
+pub(super) const TEXT_LIMIT: usize = PDU_LIMIT - HEADER - 2;
 
 /// The result of taking an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,8 +31,11 @@ pub(super) enum Taken {
 /// The identification of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identification {
-    /// Vendor's name, product code, and major and minor revision.
-    pub objects: [String; 3],
+    /// Vendor's name, product code, major and minor revision; then vendor's URL, names of product, model and
+    /// application, which do not exist if empty.
+    pub objects: [String; OBJECTS],
+    /// The answer to function 17, before the run indicator; `None` if the device does not have that function.
+    pub server_id: Option<String>,
 }
 
 impl Identification {
@@ -37,19 +45,45 @@ impl Identification {
     pub fn of_driver(name: &str) -> Self {
         let ascii = |c: char| if matches!(c, ' '..='~') { c } else { '?' };
         let name = name.chars().map(ascii).take(TEXT_LIMIT).collect();
+        let mut objects: [String; OBJECTS] = Default::default();
+        objects[..2].clone_from_slice(&["tickbus".to_owned(), name]);
         Self {
-            objects: ["tickbus".to_owned(), name, String::new()],
+            objects,
+            server_id: None,
         }
     }
 
     /// The identification in one line: vendor, product, revision.
     pub fn line(&self) -> String {
-        let texts = self.objects.iter().map(|text| text.trim());
+        let basic = self.objects[..BASIC_OBJECTS].iter();
+        let texts = basic.map(|text| text.trim());
         let texts: Vec<&str> = texts.filter(|text| !text.is_empty()).collect();
         texts.join(" ")
     }
 
-    /// Answers a request; `data` follows its function code.
+    /// Answers a request of function 17; `data` follows its function code.
+    ///
+    /// # Errors
+    ///
+    /// The device does not have the function, or the request has data.
+    pub(super) fn answer_server_id(
+        &self,
+        data: &[u8],
+        reply: &mut Vec<u8>,
+    ) -> Result<(), Exception> {
+        const RUNS: u8 = 0xFF;
+        let id = self.server_id.as_ref().ok_or(Exception::ILLEGAL_FUNCTION)?;
+        if !data.is_empty() {
+            return Err(Exception::ILLEGAL_DATA_VALUE);
+        }
+        let id = &id.as_bytes()[..id.len().min(TEXT_LIMIT)];
+        reply.push(u8::try_from(id.len() + 1).expect("shorter than a PDU"));
+        reply.extend_from_slice(id);
+        reply.push(RUNS);
+        Ok(())
+    }
+
+    /// Answers a request of function 43; `data` follows its function code.
     ///
     /// # Errors
     ///
@@ -62,36 +96,35 @@ impl Identification {
         let &[access, object] = data else {
             return Err(Exception::ILLEGAL_DATA_VALUE);
         };
+        let exists = |id: usize| id < BASIC_OBJECTS || !self.objects[id].is_empty();
+        let has_regular = (BASIC_OBJECTS..OBJECTS).any(exists);
         let first = usize::from(object);
-        let single = match access {
-            // A request for more than the basic objects gets these.
-            1..=3 => false,
-            4 => true,
+        let last = match access {
+            1 => BASIC_OBJECTS,
+            // A request for more objects than there are gets these.
+            2 | 3 => OBJECTS,
+            4 => first + 1,
             _ => return Err(Exception::ILLEGAL_DATA_VALUE),
         };
-        let first = match (first < self.objects.len(), single) {
+        let first = match (first < OBJECTS.min(last) && exists(first), access) {
             (true, _) => first,
-            (false, true) => return Err(Exception::ILLEGAL_DATA_ADDRESS),
+            (false, 4) => return Err(Exception::ILLEGAL_DATA_ADDRESS),
             // A stream from an object that does not exist starts at the first one.
-            (false, false) => 0,
-        };
-        let wanted = if single {
-            1
-        } else {
-            self.objects.len() - first
+            (false, _) => 0,
         };
         let begin = reply.len();
         reply.extend_from_slice(&[
             super::Function::DeviceIdentification.code(),
             kind,
             access,
-            CONFORMITY,
+            if has_regular { REGULAR } else { BASIC },
             0,
             0,
             0,
         ]);
         let mut count = 0;
-        for (id, text) in (0_u8..).zip(&self.objects).skip(first).take(wanted) {
+        let objects = (0_u8..).zip(&self.objects).take(last).skip(first);
+        for (id, text) in objects.filter(|(id, _)| exists(usize::from(*id))) {
             let text = &text.as_bytes()[..text.len().min(TEXT_LIMIT)];
             if reply.len() - begin + 2 + text.len() > PDU_LIMIT {
                 // More follows, starting with this one.

@@ -5,6 +5,7 @@ use tickbus_net::serial;
 
 use crate::client::{PART_KEYS, PARTS};
 use crate::line::{BAUDS, FRAMINGS, PARITIES};
+use crate::server::{IDENTITY_KEYS, RANGE_KEYS, RANGES};
 use crate::stations::IDENTITY_LIMIT;
 
 /// The line of both ends.
@@ -67,9 +68,16 @@ const WRITE_TO: Key = Key::new(
     "The identity of the device that may be written to; without it nothing is written",
 );
 
+const IDENTITY: Key = Key::new(
+    "identity",
+    Shape::Table(IDENTITY_KEYS),
+    "How the device names itself; vendor \"tickbus\" and the driver's name by default",
+);
+
 /// The server's own.
 pub(crate) const SERVER: &[Key] = &[
     UNIT,
+    IDENTITY,
     Key::new(
         "inputs",
         Shape::Text,
@@ -81,6 +89,11 @@ pub(crate) const SERVER: &[Key] = &[
         "The most clients at the same time",
     )
     .or("1024"),
+    Key::new(
+        "reserved",
+        Shape::List(&Shape::Table(RANGE_KEYS), 1, RANGES),
+        "Elements that exist beside those of [fieldbus.at] and carry nothing",
+    ),
 ];
 
 /// The client's own.
@@ -105,7 +118,7 @@ pub(crate) const CLIENT: &[Key] = &[
 const AREA: Shape = Shape::Any(&[Shape::Text, Shape::List(&Shape::Table(PART_KEYS), 1, PARTS)]);
 
 /// A server's station.
-pub(crate) const SERVED_STATION: &[Key] = &[UNIT];
+pub(crate) const SERVED_STATION: &[Key] = &[UNIT, IDENTITY];
 
 /// A client's station.
 pub(crate) const POLLED_STATION: &[Key] = &[UNIT, WRITE_TO];

@@ -47,6 +47,14 @@ impl BusOptions for ServerOptions {
         self.stations.read_station(count, false, table);
     }
 
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
     fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
     }

@@ -13,10 +13,9 @@
 //! let inputs = [0x12, 0x34];
 //! let mut outputs = [0, 0];
 //! let mut tables = Tables {
-//!     map: Map { input: Side::Sends, window: None },
+//!     map: &Map::of_areas(Side::Sends, None, 2, 2),
 //!     sends: &inputs,
 //!     holds: &mut outputs,
-//!     holds_len: 2,
 //! };
 //! let who = Identification::of_driver("press");
 //! // Read one input register: what came over TCP, in pieces of any size.

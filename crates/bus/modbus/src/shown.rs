@@ -19,8 +19,18 @@ impl ServerOptions {
         };
         let outputs = bytes(Area::Output).unwrap_or_default();
         let table = Table::HoldingRegisters;
+        if !self.at.is_empty() {
+            parts.push("has the elements of [fieldbus.at], and refuses all others".to_owned());
+        }
+        let stations = 0..signals.stations.len();
+        if stations
+            .into_iter()
+            .all(|station| self.is_placed(signals, station))
+        {
+            return parts;
+        }
         if bytes(Area::Input) > Some(0)
-            && let Some(offset) = self.map(outputs).window
+            && let Some(offset) = self.window(outputs)
         {
             parts.push(format!(
                 "%I also from {} on",
@@ -40,6 +50,9 @@ impl ServerOptions {
 
     /// The place of a signal.
     pub fn place(&self, signal: &Signal) -> String {
+        if let Some(spot) = self.at.get(&signal.name) {
+            return spot.to_string();
+        }
         let is_bit = signal.data_type == DataType::Bool;
         let table = match (signal.area, is_bit) {
             (Area::Input, true) => Table::DiscreteInputs,

@@ -1,5 +1,7 @@
 //! The units of the stations, from `[fieldbus]` and the `[[station]]` tables.
 
+use crate::Identification;
+use crate::server::read_identity;
 use tickbus_base::toml_text::{Table, Value};
 
 /// The longest identity, in characters.
@@ -23,6 +25,8 @@ pub(super) struct Keys {
     pub unit: Option<u8>,
     /// The identity of the device that may be written to.
     pub write_to: Option<String>,
+    /// The identity of the device that this end is.
+    pub identity: Option<Identification>,
 }
 
 /// The units of a driver.
@@ -49,7 +53,7 @@ impl Stations {
             units,
             common: Keys {
                 unit,
-                write_to: None,
+                ..Keys::default()
             },
             own: Vec::new(),
         })
@@ -60,7 +64,13 @@ impl Stations {
         self.common.write_to = write_to;
     }
 
-    /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` only if this end may write.
+    /// Sets the identity of this end stated in `[fieldbus]`.
+    pub(super) fn name(&mut self, identity: Option<Identification>) {
+        self.common.identity = identity;
+    }
+
+    /// Reads the keys of the next of `count` `[[station]]` tables; `write_to` only if this end may write, and `identity`
+    /// otherwise.
     pub fn read_station(&mut self, count: usize, guarded: bool, table: &mut Table<'_>) {
         let unit = if count > 1 {
             table.require(
@@ -71,8 +81,10 @@ impl Stations {
             table.take("unit")
         };
         let write_to = guarded.then(|| table.take("write_to")).flatten();
+        let identity = (!guarded).then(|| table.take("identity")).flatten();
         let mut keys = Keys {
             unit: None,
+            identity: identity.as_ref().and_then(read_identity),
             write_to: write_to.as_ref().and_then(read_write_to),
         };
         let mut line = 0;
@@ -106,6 +118,13 @@ impl Stations {
         let units: Vec<String> = units.collect::<Option<_>>()?;
         let word = if units.len() == 1 { "unit" } else { "units" };
         Some(format!("{word} {}", units.join(" ")))
+    }
+
+    /// The identity of the device that a station is, if stated.
+    pub fn identity(&self, station: usize) -> Option<&Identification> {
+        let own = self.own.get(station);
+        let own = own.and_then(|(keys, _)| keys.identity.as_ref());
+        own.or(self.common.identity.as_ref())
     }
 
     /// The identity of the device that a station may write to.

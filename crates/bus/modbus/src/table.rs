@@ -151,7 +151,16 @@ pub(super) fn copy_bits(source: &[u8], from: usize, count: usize, target: &mut [
         target[to / 8..(to + count) / 8].copy_from_slice(&source[from / 8..(from + count) / 8]);
         return;
     }
-    for index in 0..count {
+    // Whole bytes of the target at once, and the bits behind them one by one.
+    let whole = if to.is_multiple_of(8) {
+        count / 8 * 8
+    } else {
+        0
+    };
+    if whole > 0 {
+        take_bits(source, from, whole, &mut target[to / 8..]);
+    }
+    for index in whole..count {
         let (from, to) = (from + index, to + index);
         let bit = source[from / 8] >> (from % 8) & 1;
         let mask = 1 << (to % 8);

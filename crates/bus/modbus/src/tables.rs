@@ -1,9 +1,12 @@
-//! The four tables of one unit, mapped to the two areas of its process image.
+//! The four tables of one unit, and the bits of its two frames that their elements carry.
 
 use std::ops::Range;
 
-use super::table::{ADDRESSES, Span, Table};
-use super::{Exception, take_bits};
+use super::table::{ADDRESSES, Span, Table, copy_bits};
+use super::{Exception, Piece};
+
+/// The most bytes of a request's values.
+const VALUES: usize = 256;
 
 /// One of the two frames of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -14,146 +17,292 @@ pub enum Side {
     Holds,
 }
 
-/// The mapping of the two frames to the tables.
-///
-/// Discrete inputs and input registers are `%I`, coils and holding registers `%Q`, each starting at 0. In
-/// addition `%I` may be repeated in the writable tables: from the register `window` on, and from the coil
-/// that is the first bit of that register.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// The elements of each table that exist, and what they carry.
+#[derive(Clone, Debug, Default)]
 pub struct Map {
-    /// The frame of `%I`; `%Q` is the other one.
-    pub input: Side,
-    /// The holding register at which `%I` is repeated.
-    pub window: Option<usize>,
+    tables: [Layout; Table::ALL.len()],
+    /// True if an element of one table is never one of another table as well.
+    is_placed: bool,
 }
 
-/// Bits of a frame.
+/// The same for one table.
+#[derive(Clone, Debug, Default)]
+struct Layout {
+    /// The offsets of the elements that exist, in order; no two ranges meet.
+    exist: Vec<Range<usize>>,
+    /// In the order of their first bits in the table.
+    parts: Vec<Part>,
+    /// For each part, where it and those before it end in the table.
+    ends: Vec<usize>,
+}
+
+/// Bits of a frame, and the bits of a table that carry them in the same order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct FrameBits {
+struct Part {
     side: Side,
+    /// The first bit in the table, counted as in [`Piece::wire`].
+    wire: usize,
+    /// The first bit in the frame.
     bit: usize,
+    bits: usize,
+}
+
+impl Part {
+    fn end(self) -> usize {
+        self.wire + self.bits
+    }
+}
+
+impl Layout {
+    fn add(&mut self, elements: Range<usize>) {
+        let elements = elements.start.min(ADDRESSES)..elements.end.min(ADDRESSES);
+        if !elements.is_empty() {
+            self.exist.push(elements);
+        }
+    }
+
+    /// Orders what was added.
+    fn finish(&mut self) {
+        self.exist.sort_by_key(|range| range.start);
+        self.exist.dedup_by(|next, range| {
+            let meet = next.start <= range.end;
+            if meet {
+                range.end = range.end.max(next.end);
+            }
+            meet
+        });
+        self.parts.sort_by_key(|part| part.wire);
+        self.parts.dedup_by(|next, part| {
+            let continues = next.side == part.side
+                && next.wire == part.end()
+                && next.bit == part.bit + part.bits;
+            if continues {
+                part.bits += next.bits;
+            }
+            continues
+        });
+        let ends = self.parts.iter().scan(0, |end, part| {
+            *end = part.end().max(*end);
+            Some(*end)
+        });
+        self.ends = ends.collect();
+    }
+
+    /// Checks that consecutive elements exist.
+    fn check(&self, span: Span) -> Result<(), Exception> {
+        let place = (self.exist).partition_point(|range| range.end <= span.first);
+        let holds = |range: &Range<usize>| range.start <= span.first && span.end() <= range.end;
+        if self.exist.get(place).is_some_and(holds) {
+            Ok(())
+        } else {
+            Err(Exception::ILLEGAL_DATA_ADDRESS)
+        }
+    }
+
+    /// What these bits of the table carry.
+    fn parts(&self, wires: Range<usize>) -> impl Iterator<Item = Part> {
+        let first = self.ends.partition_point(|end| *end <= wires.start);
+        let parts = self.parts[first..].iter();
+        let parts = parts.take_while({
+            let end = wires.end;
+            move |part| part.wire < end
+        });
+        parts.filter_map(move |part| {
+            let wire = part.wire.max(wires.start);
+            let end = part.end().min(wires.end);
+            (wire < end).then(|| Part {
+                wire,
+                bit: part.bit + wire - part.wire,
+                bits: end - wire,
+                ..*part
+            })
+        })
+    }
+}
+
+impl Map {
+    /// Both areas as wholes: discrete inputs and input registers are `%I`, coils and holding registers `%Q`, each
+    /// from 0 on. In addition `%I` may be repeated in the writable tables: from the register `window` on, and
+    /// from the coil that is the first bit of that register.
+    ///
+    /// `input` is the side of `%I`, and the frames have `sends` and `holds` bytes. If `holds` is odd, the frame has an
+    /// additional byte that completes the last register.
+    pub fn of_areas(input: Side, window: Option<usize>, sends: usize, holds: usize) -> Self {
+        let output = match input {
+            Side::Sends => Side::Holds,
+            Side::Holds => Side::Sends,
+        };
+        let mut map = Self::default();
+        for table in Table::ALL {
+            let layout = &mut map.tables[table as usize];
+            let areas = if table.is_writable() {
+                [Some((0, output)), window.map(|window| (window, input))]
+            } else {
+                [Some((0, input)), None]
+            };
+            for (register, side) in areas.into_iter().flatten() {
+                let bytes = match side {
+                    Side::Sends => sends,
+                    Side::Holds => holds,
+                };
+                let first = register * 16 / table.width();
+                layout.add(first..first + table.elements(bytes));
+                let bytes = match side {
+                    Side::Holds if !table.is_bits() => bytes.next_multiple_of(2),
+                    _ => bytes,
+                };
+                layout.parts.push(Part {
+                    side,
+                    wire: register * 16,
+                    bit: 0,
+                    bits: bytes * 8,
+                });
+            }
+            layout.finish();
+        }
+        map
+    }
+
+    /// The elements that `pieces` touch, and those that are `reserved`, which carry nothing. No two pieces share bits
+    /// unless clients write both.
+    pub fn of_places(pieces: &[(Side, Piece)], reserved: &[(Table, Span)]) -> Self {
+        let mut map = Self {
+            is_placed: true,
+            ..Self::default()
+        };
+        for (table, span) in reserved {
+            map.tables[*table as usize].add(span.first..span.end());
+        }
+        for (side, piece) in pieces {
+            let layout = &mut map.tables[piece.table as usize];
+            let span = piece.span();
+            layout.add(span.first..span.end());
+            layout.parts.push(Part {
+                side: *side,
+                wire: piece.wire,
+                bit: piece.bit,
+                bits: piece.bits,
+            });
+        }
+        map.tables.iter_mut().for_each(Layout::finish);
+        map
+    }
+
+    /// The bits of the frame on `side` that consecutive elements carry.
+    pub fn bits(
+        &self,
+        side: Side,
+        (table, span): (Table, Span),
+    ) -> impl Iterator<Item = Range<usize>> {
+        let parts = self
+            .parts(table, span)
+            .filter(move |part| part.side == side);
+        parts.map(|part| part.bit..part.bit + part.bits)
+    }
+
+    /// Numbers for the bits of consecutive elements: two elements have a number in common if they are the same bits.
+    pub(super) fn numbers(&self, (table, span): (Table, Span)) -> Range<usize> {
+        let width = table.width();
+        if self.is_placed {
+            let base = table as usize * ADDRESSES * 16;
+            return base + span.first * width..base + span.end() * width;
+        }
+        let mut bits = self.bits(Side::Holds, (table, span));
+        bits.next().unwrap_or_default()
+    }
+
+    fn parts(&self, table: Table, span: Span) -> impl Iterator<Item = Part> {
+        let width = table.width();
+        self.tables[table as usize].parts(span.first * width..span.end() * width)
+    }
 }
 
 /// The tables of one unit at one moment.
 #[derive(Debug)]
 pub struct Tables<'a> {
     /// The mapping of the frames.
-    pub map: Map,
+    pub map: &'a Map,
     /// The frame that this end writes.
     pub sends: &'a [u8],
     /// The frame that clients write; if its size is odd, with an additional byte that completes the last
     /// register.
     pub holds: &'a mut [u8],
-    /// The size of that frame.
-    pub holds_len: usize,
 }
 
 impl Tables<'_> {
-    fn len(&self, side: Side) -> usize {
-        match side {
-            Side::Sends => self.sends.len(),
-            Side::Holds => self.holds_len,
-        }
-    }
-
-    /// The bits of consecutive elements.
-    fn place(&self, table: Table, span: Span) -> Result<FrameBits, Exception> {
-        let input = self.map.input;
-        let output = match input {
-            Side::Sends => Side::Holds,
-            Side::Holds => Side::Sends,
-        };
-        // No address reaches further, however long the frame is.
-        if span.end() > ADDRESSES {
-            return Err(Exception::ILLEGAL_DATA_ADDRESS);
-        }
-        // Without a window, one that no address reaches.
-        let window = self.map.window.unwrap_or(ADDRESSES);
-        let windows = if table.is_writable() {
-            [(0, output), (window, input)]
-        } else {
-            [(0, input), (ADDRESSES, input)]
-        };
-        for (register, side) in windows {
-            let first = register * 16 / table.width();
-            let behind = first + table.elements(self.len(side));
-            if span.first >= first && span.end() <= behind {
-                let bit = (span.first - first) * table.width();
-                return Ok(FrameBits { side, bit });
-            }
-        }
-        Err(Exception::ILLEGAL_DATA_ADDRESS)
-    }
-
     /// Checks that consecutive elements can be read.
     ///
     /// # Errors
     ///
     /// The elements do not exist.
     pub fn check_read(&self, table: Table, span: Span) -> Result<(), Exception> {
-        self.place(table, span).map(|_| ())
+        self.map.tables[table as usize].check(span)
     }
 
     /// Checks that consecutive elements can be written.
     ///
     /// # Errors
     ///
-    /// The elements do not exist, or are in the frame that this end writes.
+    /// The elements do not exist, or some are in the frame that this end writes.
     pub fn check_write(&self, table: Table, span: Span) -> Result<(), Exception> {
-        match self.place(table, span)?.side {
-            Side::Holds => Ok(()),
-            Side::Sends => Err(Exception::ILLEGAL_DATA_ADDRESS),
+        self.check_read(table, span)?;
+        if self.map.bits(Side::Sends, (table, span)).next().is_some() {
+            return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
+        Ok(())
     }
 
-    /// Appends consecutive elements to `reply`: bits from the lowest on, registers with the high byte first.
-    /// If they are in the frame that this end writes, returns their bits in it.
+    /// Appends consecutive elements to `reply`: bits from the lowest on, registers with the high byte first. Bits that
+    /// carry nothing are 0.
     ///
     /// # Errors
     ///
     /// The elements do not exist.
-    pub fn read(
-        &self,
-        table: Table,
-        span: Span,
-        reply: &mut Vec<u8>,
-    ) -> Result<Option<Range<usize>>, Exception> {
-        let FrameBits { side, bit } = self.place(table, span)?;
-        let frame = match side {
-            Side::Sends => self.sends,
-            Side::Holds => &*self.holds,
-        };
-        let bits = span.count * table.width();
-        if table.is_bits() {
-            let begin = reply.len();
-            reply.resize(begin + bits.div_ceil(8), 0);
-            take_bits(frame, bit, bits, &mut reply[begin..]);
-        } else {
-            let (begin, end) = (bit / 8, (bit + bits) / 8);
-            reply.extend_from_slice(&frame[begin..end.min(frame.len())]);
-            if end > frame.len() {
-                reply.push(0);
-            }
-        }
-        let read = bit..(bit + bits).min(frame.len() * 8);
-        Ok((side == Side::Sends).then_some(read))
+    pub fn read(&self, table: Table, span: Span, reply: &mut Vec<u8>) -> Result<(), Exception> {
+        self.check_read(table, span)?;
+        let width = table.width();
+        let begin = reply.len();
+        reply.resize(begin + (span.count * width).div_ceil(8), 0);
+        self.gather(table, span, &mut reply[begin..]);
+        Ok(())
     }
 
-    /// Lets `write` change the frame, given the bit at which consecutive elements begin; returns all their
-    /// bits.
+    /// Lets `write` change consecutive elements, arranged as [`read`](Self::read) appends them.
     ///
     /// # Errors
     ///
-    /// The elements do not exist, or are in the frame that this end writes.
+    /// As for [`check_write`](Self::check_write).
+    ///
+    /// # Panics
+    ///
+    /// If the elements have more than 256 bytes, which no request writes.
     pub fn write(
         &mut self,
         table: Table,
         span: Span,
-        write: impl FnOnce(&mut [u8], usize),
-    ) -> Result<Range<usize>, Exception> {
+        write: impl FnOnce(&mut [u8]),
+    ) -> Result<(), Exception> {
         self.check_write(table, span)?;
-        let bit = self.place(table, span)?.bit;
-        write(self.holds, bit);
-        Ok(bit..bit + span.count * table.width())
+        let width = table.width();
+        let mut values = [0; VALUES];
+        let values = &mut values[..(span.count * width).div_ceil(8)];
+        self.gather(table, span, values);
+        write(values);
+        for part in self.map.parts(table, span) {
+            let from = part.wire - span.first * width;
+            copy_bits(values, from, part.bits, self.holds, part.bit);
+        }
+        Ok(())
+    }
+
+    fn gather(&self, table: Table, span: Span, values: &mut [u8]) {
+        let from = span.first * table.width();
+        for part in self.map.parts(table, span) {
+            let frame = match part.side {
+                Side::Sends => self.sends,
+                Side::Holds => &*self.holds,
+            };
+            copy_bits(frame, part.bit, part.bits, values, part.wire - from);
+        }
     }
 }

@@ -40,7 +40,12 @@ impl<'a> Exported<'a> {
             .map(|_| Self::Loopback);
         found
             .or_else(|| options.downcast_ref().map(Self::Socket))
-            .or_else(|| options.downcast_ref().map(Self::ModbusServer))
+            .or_else(|| {
+                // The PLC's project addresses the places of a real device already.
+                let server = options.downcast_ref::<modbus::ServerOptions>();
+                let server = server.filter(|options| options.at.is_empty());
+                server.map(Self::ModbusServer)
+            })
             .or_else(|| options.downcast_ref().map(Self::ModbusClient))
             .or_else(|| options.downcast_ref().map(Self::S7Server))
             .or_else(|| options.downcast_ref().map(Self::S7Client))

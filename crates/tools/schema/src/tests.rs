@@ -190,7 +190,7 @@ const BUSES: [&str; 6] = [
     "kind = \"profibus-device\"\ndevice = \"/dev/ttyS0\"\naddress = 3\nident = 0x80E0\n\
      [[fault]]\nkind = \"diagnosis\"\nslot = 1\nchannel = 0\n",
     // Over TCP: with RTU a unit has a smaller range.
-    "kind = \"modbus-server\"\n",
+    "kind = \"modbus-server\"\nidentity = {}\nreserved = [{ at = \"400001\" }]\nat = { A = \"400009\" }\n",
     "kind = \"modbus-client\"\ninputs = [{ at = \"offset:0\" }]\noutputs = [{ at = \"offset:500\" }]\n",
     "kind = \"opcua-server\"\nanonymous = true\n",
     "kind = \"plugin\"\nlibrary = \"x.so\"\n",

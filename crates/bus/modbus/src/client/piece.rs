@@ -79,7 +79,7 @@ impl Piece {
     /// # Errors
     ///
     /// The signal does not fit there; the message has the remedy.
-    pub(super) fn of_tag(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
+    pub(crate) fn of_tag(signal: &Signal, spot: TagAddress) -> Result<Self, Mistake> {
         let ElementAddress { table, offset } = spot.place;
         let data_type = signal.data_type;
         if let Some(stated) = spot.data_type

@@ -314,7 +314,8 @@ pub(super) fn length(beginning: &[u8]) -> Option<usize> {
         | Function::ReadDiscreteInputs
         | Function::ReadHoldingRegisters
         | Function::ReadInputRegisters
-        | Function::ReadWriteRegisters => Some(2 + usize::from(*data.first()?)),
+        | Function::ReadWriteRegisters
+        | Function::ReportServerId => Some(2 + usize::from(*data.first()?)),
         Function::WriteCoil
         | Function::WriteRegister
         | Function::WriteCoils

@@ -1,5 +1,7 @@
 //! The bus `modbus-server`: clients read and write the image.
 
+mod at;
+mod identity;
 mod options;
 mod serial;
 mod tcp;
@@ -9,6 +11,8 @@ use tickbus_base::time::Stop;
 use tickbus_fieldbus::{BusError, BusSetup, Free, Medium, Port, tcp as many};
 
 use super::Line;
+pub(crate) use at::{RANGE_KEYS, RANGES};
+pub(crate) use identity::{IDENTITY_KEYS, read_identity};
 pub use options::ServerOptions;
 use tcp::TcpService;
 use units::ServedUnits;

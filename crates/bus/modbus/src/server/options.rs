@@ -1,8 +1,11 @@
 //! The options of the bus `modbus-server` in a driver.cfg.
 
+use std::collections::BTreeMap;
+
 use crate::line::Line;
 use crate::stations::{Stations, UnitRange};
-use crate::{ElementAddress, INPUTS, Map, Side, table};
+use crate::table::Span;
+use crate::{ElementAddress, INPUTS, Side, TagAddress, table};
 use tickbus_base::toml_text::{Collector, Table, Value};
 use tickbus_fieldbus::Role;
 use tickbus_fieldbus::tcp::Writers;
@@ -10,6 +13,8 @@ use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
 
 use super::super::element_address::SHAPE;
+use super::at::read_reserved;
+use super::read_identity;
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1502);
@@ -26,6 +31,12 @@ pub struct ServerOptions {
     pub input: Side,
     /// The holding register at which `%I` is repeated, if stated, and the offset of that key.
     pub window: Option<(usize, usize)>,
+    /// Signals with their own place, by name: `[fieldbus.at]`. A station with such signals has no other elements.
+    pub at: BTreeMap<String, TagAddress>,
+    /// Elements of those stations that exist and carry nothing.
+    pub reserved: Vec<(table::Table, Span)>,
+    /// The offset of the key `reserved`, if stated.
+    reserved_at: Option<usize>,
     /// The unit of each station.
     pub stations: Stations,
     /// The most clients at the same time.
@@ -41,6 +52,8 @@ impl ServerOptions {
         let unit = table.take("unit");
         let inputs = table.take("inputs");
         let clients = table.take("clients");
+        let reserved = table.take("reserved");
+        let identity = table.take("identity");
         let is_single_writer = Writers::read(table);
 
         let units = match &line {
@@ -48,10 +61,13 @@ impl ServerOptions {
             _ => UnitRange::Tcp,
         };
         let stations = Stations::read(units, unit.as_ref());
+        let identity = identity.as_ref().map(read_identity);
         let window = match &inputs {
             None => Some(None),
             Some(value) => read_window(value).map(|window| Some((window, value.at()))),
         };
+        let reserved_at = reserved.as_ref().map(Value::at);
+        let reserved = reserved.as_ref().map_or(Some(Vec::new()), read_reserved);
         let clients = clients.as_ref().map_or(Some(CLIENTS), |value| {
             value
                 .whole(1..=10_000)
@@ -61,11 +77,18 @@ impl ServerOptions {
             Role::Device | Role::Observer => Side::Sends,
             Role::Controller => Side::Holds,
         };
+        let mut stations = stations?;
+        if let Some(identity) = identity {
+            stations.name(Some(identity?));
+        }
         Some(Self {
             line: line?,
             input,
             window: window?,
-            stations: stations?,
+            at: BTreeMap::new(),
+            reserved: reserved?,
+            reserved_at,
+            stations,
             clients: clients?,
             is_single_writer: is_single_writer?,
         })
@@ -73,22 +96,38 @@ impl ServerOptions {
 }
 
 impl ServerOptions {
-    /// The tables of a station whose `%Q` has this many bytes.
-    pub fn map(&self, output_bytes: usize) -> Map {
+    /// The holding register at which `%I` is repeated in a station whose `%Q` has this many bytes.
+    pub(crate) fn window(&self, output_bytes: usize) -> Option<usize> {
         let outputs = table::Table::HoldingRegisters.elements(output_bytes);
         // If %Q reaches that far, the default window has no room and is omitted.
         let usual = (outputs <= INPUTS).then_some(INPUTS);
-        Map {
-            input: self.input,
-            window: self.window.map_or(usual, |(first, _)| Some(first)),
-        }
+        self.window.map_or(usual, |(first, _)| Some(first))
     }
 
-    /// Reports an `inputs` that lies among the registers of `%Q`.
+    /// Reports an `inputs` that lies among the registers of `%Q`, and keys without effect.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        let mut stations = 0..table.stations.len();
+        let placed = stations
+            .clone()
+            .any(|station| self.is_placed(table, station));
+        if let (false, Some(at)) = (placed, self.reserved_at) {
+            collector.report(
+                at,
+                "\"reserved\" stands without [fieldbus.at]",
+                "remove it: all elements of the image exist",
+            );
+        }
         let Some((first, at)) = self.window else {
             return;
         };
+        if stations.all(|station| self.is_placed(table, station)) {
+            collector.report(
+                at,
+                "\"inputs\" stands beside [fieldbus.at], which places every signal",
+                "remove it",
+            );
+            return;
+        }
         let outputs = table.stations.iter().map(|station| station.output_bytes);
         let outputs = table::Table::HoldingRegisters.elements(outputs.max().unwrap_or_default());
         if first < outputs {

@@ -6,7 +6,8 @@ use tickbus_fieldbus::{BusSetup, Events, Port, Receipt, Renewal};
 use tickbus_image::signal::fail_safe_frame;
 
 use super::ServerOptions;
-use crate::{Done, Exception, Function, Identification, Map, Tables, answer, refuse};
+use crate::table::{Span, Table};
+use crate::{Done, Exception, Function, Identification, Map, Side, Tables, answer, refuse};
 
 /// The unit number that addresses all units, with RTU.
 pub(super) const BROADCAST: u8 = 0;
@@ -14,7 +15,6 @@ pub(super) const BROADCAST: u8 = 0;
 /// The units of a server, and the values that clients have written to them.
 #[derive(Debug)]
 pub(super) struct ServedUnits {
-    identification: Identification,
     /// True if a write is an event even without a change.
     every_write: bool,
     all: Box<[Unit]>,
@@ -24,6 +24,7 @@ pub(super) struct ServedUnits {
 struct Unit {
     /// The number; `None` for any.
     number: Option<u8>,
+    identification: Identification,
     map: Map,
     /// The values written by clients, initially the fail-safe values; with an additional byte if the size is
     /// odd, to complete the last register.
@@ -52,6 +53,7 @@ pub(super) struct Carried {
     station: usize,
     generation: u64,
     receipt: Receipt,
+    elements: (Table, Span),
 }
 
 impl ServedUnits {
@@ -64,7 +66,9 @@ impl ServedUnits {
             holds.resize(holds_len.next_multiple_of(2), 0);
             Unit {
                 number: options.stations.unit(station),
-                map: options.map(table.stations[station].output_bytes),
+                identification: (options.stations.identity(station).cloned())
+                    .unwrap_or_else(|| Identification::of_driver(setup.name)),
+                map: options.map(table, station),
                 holds: holds.into(),
                 holds_len,
                 shown: vec![0; table.stations[station].bytes(sent)].into(),
@@ -74,7 +78,6 @@ impl ServedUnits {
             }
         };
         Self {
-            identification: Identification::of_driver(setup.name),
             every_write: setup.events == Events::Writes,
             all: (0..table.stations.len()).map(unit).collect(),
         }
@@ -140,16 +143,15 @@ impl ServedUnits {
         // Only refused writes are undone.
         let held = unit.writers.is_single().then(|| unit.holds.clone());
         let mut tables = Tables {
-            map: unit.map,
+            map: &unit.map,
             sends: &unit.shown,
             holds: &mut unit.holds,
-            holds_len: unit.holds_len,
         };
         let Done {
             wrote,
             read,
             refused,
-        } = answer(pdu, &mut tables, &self.identification, reply);
+        } = answer(pdu, &mut tables, &unit.identification, reply);
         if is_lost {
             reply.truncate(before);
         }
@@ -158,12 +160,12 @@ impl ServedUnits {
                 port.count(counted(exception));
                 return None;
             }
-            (None, Some(bits)) => {
+            (None, Some(elements)) => {
                 let found = (&*port, "modbus-server.second_writer");
-                let may_write = source
-                    .writer
-                    .as_ref()
-                    .is_none_or(|writer| unit.writers.may_write(writer, bits.clone(), now, found));
+                let may_write = source.writer.as_ref().is_none_or(|writer| {
+                    let bits = unit.map.numbers(elements);
+                    unit.writers.may_write(writer, bits, now, found)
+                });
                 if let (false, Some(held)) = (may_write, held) {
                     unit.holds = held;
                     if !is_lost {
@@ -176,9 +178,12 @@ impl ServedUnits {
                 source.renewals[station].wrote(now);
                 let frame = &unit.holds[..unit.holds_len];
                 if self.every_write {
-                    port.received_parts(station, now, frame, [bits]);
+                    let bits = unit.map.bits(Side::Holds, elements);
+                    port.received_parts(station, now, frame, bits);
                 } else {
-                    port.received_with(station, now, frame, bits.len().div_ceil(8));
+                    let (table, span) = elements;
+                    let octets = (span.count * table.width()).div_ceil(8);
+                    port.received_with(station, now, frame, octets);
                 }
             }
             // A client that only reads must not make the values of one that writes look recent.
@@ -189,10 +194,13 @@ impl ServedUnits {
                 }
             }
         }
-        Some(Carried {
+        let elements = read?;
+        let carries = unit.map.bits(Side::Sends, elements).next().is_some();
+        carries.then_some(Carried {
             station,
             generation: unit.generation,
-            receipt: receipt?.bits(station, read?),
+            receipt: receipt?,
+            elements,
         })
     }
 
@@ -220,8 +228,11 @@ impl ServedUnits {
     /// A client has received an answer with these values.
     pub(super) fn carried(&self, carried: &Carried, port: &mut Port) {
         // If another frame has been answered since, the new bits of this one are unknown; they are sent again.
-        if self.all[carried.station].generation == carried.generation {
-            port.sent(&carried.receipt);
+        let unit = &self.all[carried.station];
+        if unit.generation == carried.generation {
+            for bits in unit.map.bits(Side::Sends, carried.elements) {
+                port.sent(&carried.receipt.bits(carried.station, bits));
+            }
         }
     }
 }

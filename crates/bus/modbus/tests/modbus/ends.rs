@@ -16,7 +16,19 @@ pub struct Tcp {
     /// The role of the end that serves.
     server: &'static str,
     framing: &'static str,
+    at: &'static str,
 }
+
+/// The signals of the suite, scattered over the tables; neighbours are what one request has to carry.
+const SCATTERED: &str = "
+[fieldbus.at]
+run      = \"coil:65536\"
+speed    = \"408502\"
+echo     = \"408503\"
+sensor   = \"100008\"
+position = \"408500\"
+copy     = \"408501\"
+";
 
 impl Tcp {
     /// A machine that is remote I/O, and a PLC that polls it.
@@ -25,6 +37,15 @@ impl Tcp {
             address: own_address(),
             server: "device",
             framing: "tcp",
+            at: "",
+        }
+    }
+
+    /// The same, with a place of its own for each signal.
+    pub fn device_serves_places() -> Self {
+        Self {
+            at: SCATTERED,
+            ..Self::device_serves()
         }
     }
 
@@ -42,6 +63,7 @@ impl Tcp {
             address: own_address(),
             server: "controller",
             framing: "tcp",
+            at: "",
         }
     }
 }
@@ -63,6 +85,10 @@ impl Bus for Tcp {
              timeout = \"1h\"",
             self.server
         )
+    }
+
+    fn faults(&self) -> &'static str {
+        self.at
     }
 
     /// Half a telegram from a client, or half an answer from a server, and nothing more.

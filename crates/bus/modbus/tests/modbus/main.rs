@@ -8,6 +8,7 @@
 
 mod client;
 mod ends;
+mod places;
 mod plc;
 #[cfg(unix)]
 #[path = "../../../../../tests/peers/pty.rs"]
@@ -36,6 +37,7 @@ use tickbus_fieldbus::LinkState;
 static KINDS: Kinds = Kinds::new(&[Kind::of::<ServerOptions>(), Kind::of::<ClientOptions>()]);
 
 conformance!(device_serves, crate::Tcp::device_serves());
+conformance!(device_serves_places, crate::Tcp::device_serves_places());
 conformance!(controller_serves, crate::Tcp::controller_serves());
 conformance!(device_serves_rtu, crate::Tcp::device_serves_rtu());
 

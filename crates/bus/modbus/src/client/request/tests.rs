@@ -41,13 +41,9 @@ fn a_server_answers_what_a_client_asks() {
             let (mut held, mut read) = (vec![0; 512], vec![0; 511]);
             for query in queries(&image(table, 0, 511), &image(table, at, 511), &able) {
                 let mut tables = Tables {
-                    map: Map {
-                        input: Side::Holds,
-                        window: Some(1024),
-                    },
+                    map: &Map::of_areas(Side::Holds, Some(1024), 511, 511),
                     sends: &image_bytes,
                     holds: &mut held,
-                    holds_len: 511,
                 };
                 let (mut request, mut reply) = (Vec::new(), Vec::new());
                 query.append(&image_bytes, &mut request);
@@ -91,13 +87,9 @@ fn a_mask_writes_the_bits_of_its_pieces_and_leaves_the_others() {
     assert_eq!(request, [22, 0, 1, 0xFD, 0xFE, 0, 1]);
     let mut held = [0, 0, 0xAA, 0xAA];
     let mut tables = Tables {
-        map: Map {
-            input: Side::Sends,
-            window: None,
-        },
+        map: &Map::of_areas(Side::Sends, None, 0, 4),
         sends: &[],
         holds: &mut held,
-        holds_len: 4,
     };
     let mut reply = Vec::new();
     answer(

@@ -1,0 +1,125 @@
+//! A server with the places of a device's manual, and a client that knows only those.
+
+use super::*;
+
+/// Two devices behind one address: a drive at unit 3, and remote I/O at unit 7 that has its image as a whole.
+const DEVICES: &str = r#"
+[driver]
+id = 1
+name = "line"
+
+[fieldbus]
+kind     = "modbus-server"
+address  = "127.0.0.1:0"
+max_age  = "300ms"
+reserved = [{ at = "408503", count = 2 }]
+
+[fieldbus.at]
+"speed"  = "408502"
+"status" = "408501"
+"ready"  = "100008"
+"fault"  = "100010"
+
+[[station]]
+name     = "drive"
+unit     = 3
+identity = { vendor = "ACME", product = "FD-7", revision = "V2.1", name = "Frequency drive", server_id = "FD7" }
+
+[[station]]
+name = "rack"
+unit = 7
+
+[[signal]]
+name    = "speed"
+station = "drive"
+address = "%QW0"
+type    = "INT"
+
+[[signal]]
+name    = "status"
+station = "drive"
+address = "%IW0"
+type    = "INT"
+
+[[signal]]
+name    = "ready"
+station = "drive"
+address = "%IX2.0"
+latch   = "rising"
+
+[[signal]]
+name    = "fault"
+station = "drive"
+address = "%IX2.1"
+latch   = "rising"
+
+[[signal]]
+name    = "press"
+station = "rack"
+address = "%QW0"
+type    = "INT"
+"#;
+
+/// Asks a unit.
+#[track_caller]
+fn of_unit(stream: &mut TcpStream, unit: u8, pdu: &[u8]) -> Vec<u8> {
+    let sent = stream.write_all(&request(1, unit, pdu));
+    sent.expect("the server reads");
+    answer(stream, 1)
+}
+
+#[test]
+fn two_devices_have_their_own_places_and_names_behind_one_address() {
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    device.end.set("status", 0x1234.into());
+    device.end.tick();
+    let write = [16, 0x21, 0x35, 0, 2, 4, 0, 5, 9, 9];
+    assert_eq!(of_unit(&mut stream, 3, &write), write[..5]);
+    device.until("it is there", |end| end.get("speed") == 5.0);
+    let all = [3, 0x21, 0x34, 0, 4];
+    assert_eq!(
+        of_unit(&mut stream, 3, &all),
+        [3, 8, 0x12, 0x34, 0, 5, 0, 0, 0, 0]
+    );
+    // The drive has nothing at 0 and the rack nothing at 8500.
+    assert_eq!(of_unit(&mut stream, 3, &[3, 0, 0, 0, 1]), [0x83, 2]);
+    assert_eq!(of_unit(&mut stream, 7, &all), [0x83, 2]);
+    assert_eq!(of_unit(&mut stream, 7, &[6, 0, 0, 0, 8]), [6, 0, 0, 0, 8]);
+    device.until("it is there", |end| end.get("press") == 8.0);
+    // What the device itself writes is refused, and with it the whole request.
+    assert_eq!(
+        of_unit(&mut stream, 3, &[16, 0x21, 0x34, 0, 2, 4, 0, 1, 0, 1]),
+        [0x90, 2]
+    );
+    assert_eq!(of_unit(&mut stream, 3, &all)[4..6], [0, 5]);
+
+    assert_eq!(
+        of_unit(&mut stream, 3, &[17]),
+        [17, 4, b'F', b'D', b'7', 0xFF]
+    );
+    assert_eq!(of_unit(&mut stream, 7, &[17]), [0x91, 1]);
+    let who = of_unit(&mut stream, 3, &[43, 14, 4, 4]);
+    assert!(who.ends_with(b"Frequency drive"), "{who:?}");
+    let who = of_unit(&mut stream, 7, &[43, 14, 4, 0]);
+    assert!(who.ends_with(b"tickbus"), "{who:?}");
+}
+
+#[test]
+fn a_pulse_waits_until_its_own_place_was_read() {
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    for value in [1.0, 0.0] {
+        device.end.set("ready", value);
+        device.end.tick();
+    }
+    // Neighbours in the image, and not in the table.
+    for _ in 0..3 {
+        assert_eq!(of_unit(&mut stream, 3, &[2, 0, 9, 0, 1]), [2, 1, 0]);
+    }
+    assert_eq!(of_unit(&mut stream, 3, &[2, 0, 7, 0, 1]), [2, 1, 1]);
+    // The server hears of the answer's arrival with the next request.
+    device.until("the pulse is over", |_| {
+        of_unit(&mut stream, 3, &[2, 0, 7, 0, 1]) == [2, 1, 0]
+    });
+}

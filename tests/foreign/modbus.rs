@@ -30,6 +30,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "pymodbus_finds_a_device_where_its_maker_put_it",
         pymodbus_finds_places,
     ),
+    (
+        "pymodbus_waits_is_refused_and_recovers",
+        pymodbus_meets_wrong_answers,
+    ),
     ("our_client_drives_pymodbus", our_client_drives_pymodbus),
     (
         "our_client_drives_pymodbus_with_rtu_over_tcp",
@@ -254,6 +258,65 @@ fn pymodbus_finds_places() -> Result<(), Absent> {
     ]);
     machine.mirror_until_the_end_of(python);
     assert_eq!(machine.get("q 0"), 1500.0);
+    Ok(())
+}
+
+/// Answers that are late, refused and malformed, each after the other, as pymodbus sees them.
+fn pymodbus_meets_wrong_answers() -> Result<(), Absent> {
+    let mut python = harness::python_with("main", &["pymodbus"])?;
+    let server = "kind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"";
+    let faults = "\
+        [[fault]]\nkind = \"answer-late\"\nby = \"300ms\"\nwhile = \"case == 1\"\n\
+        [[fault]]\nkind = \"answer-late\"\nname = \"too late\"\nby = \"3s\"\nfunction = 3\nwhile = \"case == 2\"\n\
+        [[fault]]\nkind = \"answer-error\"\ncode = 6\nfunction = 3\nwhile = \"case == 3\"\n\
+        [[fault]]\nkind = \"answer-wrong\"\nhow = \"transaction\"\nfunction = 3\nwhile = \"case == 4\"\n";
+    let signals = "[[signal]]\nname = \"case\"\naddress = \"%QW0\"\ntype = \"INT\"\n\
+                   [[signal]]\nname = \"now\"\naddress = \"%IW0\"\ntype = \"INT\"\n";
+    logged::expect("injected fault ");
+    let mut machine = open(server, &format!("{signals}{faults}"));
+    let address = machine.address_for("pymodbus-answers", &pymodbus_version());
+    python.args([
+        "-c",
+        "import sys, time\n\
+         from pymodbus.client import ModbusTcpClient\n\
+         from pymodbus.exceptions import ModbusIOException\n\
+         client = ModbusTcpClient('127.0.0.1', port=int(sys.argv[1]), retries=0, timeout=1)\n\
+         client.connect()\n\
+         def case(number):\n\
+         \x20   assert not client.write_register(0, number).isError()\n\
+         \x20   limit = time.monotonic() + 20\n\
+         \x20   while client.read_input_registers(0, count=1).registers != [number]:\n\
+         \x20       assert time.monotonic() < limit\n\
+         def read(): return client.read_holding_registers(0, count=1)\n\
+         case(1)\n\
+         began = time.monotonic()\n\
+         assert read().registers == [1]\n\
+         assert time.monotonic() - began >= 0.3\n\
+         case(2)\n\
+         try:\n\
+         \x20   read()\n\
+         \x20   sys.exit('it did not wait')\n\
+         except ModbusIOException:\n\
+         \x20   client.close()\n\
+         client.connect()\n\
+         case(3)\n\
+         assert read().exception_code == 6\n\
+         case(4)\n\
+         try:\n\
+         \x20   read()\n\
+         \x20   sys.exit('it took the answer to something else')\n\
+         except ModbusIOException:\n\
+         \x20   client.close()\n\
+         client.connect()\n\
+         case(0)\n\
+         assert read().registers == [0]\n",
+        &address.port().to_string(),
+    ]);
+    machine.until_the_end_of(python, |machine| {
+        machine.tick();
+        let case = machine.get("case");
+        machine.set("now", case);
+    });
     Ok(())
 }
 

@@ -41,6 +41,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         rust7_reads_and_writes_the_server,
     ),
     (
+        "python_snap7_waits_and_is_refused",
+        python_snap7_waits_and_is_refused,
+    ),
+    (
         "tshark_finds_nothing_malformed",
         tshark_finds_nothing_malformed,
     ),
@@ -326,6 +330,45 @@ fn rust7_reads_and_writes_the_server() -> Result<(), Absent> {
     client.join().expect("all as it should be");
     end.tick();
     assert_eq!((end.get("run"), end.get("speed")), (1.0, 7.0));
+    Ok(())
+}
+
+/// A job that is answered late and an item that is refused, as python-snap7 sees them.
+fn python_snap7_waits_and_is_refused() -> Result<(), Absent> {
+    let mut python = harness::python_with("main", &["snap7"])?;
+    logged::expect("injected fault ");
+    let mut end = open(&format!(
+        "{SERVER}\n[[fault]]\nkind = \"answer-late\"\nby = \"300ms\"\nfunction = 4\nwhile = \"speed == 1\"\n\
+         [[fault]]\nkind = \"answer-error\"\ncode = 1\nfunction = 4\nwhile = \"speed == 2\"\n"
+    ));
+    let port = end.address().port().to_string();
+    python.args([
+        "-c",
+        "import struct, sys, time\n\
+         import snap7\n\
+         client = snap7.client.Client()\n\
+         client.connect('127.0.0.1', 0, 1, int(sys.argv[1]))\n\
+         def case(number, done):\n\
+         \x20   client.db_write(1, 2, bytearray(struct.pack('>h', number)))\n\
+         \x20   limit = time.monotonic() + 20\n\
+         \x20   while not done():\n\
+         \x20       assert time.monotonic() < limit\n\
+         def is_late():\n\
+         \x20   began = time.monotonic()\n\
+         \x20   client.db_read(1, 2, 2)\n\
+         \x20   return time.monotonic() - began >= 0.3\n\
+         def is_refused():\n\
+         \x20   try:\n\
+         \x20       client.db_read(1, 2, 2)\n\
+         \x20   except Exception:\n\
+         \x20       return True\n\
+         case(1, is_late)\n\
+         case(2, is_refused)\n\
+         case(0, lambda: not is_refused())\n\
+         assert bytes(client.db_read(1, 2, 2)) == bytes(2)\n",
+        &port,
+    ]);
+    end.until_the_end_of(python, Machine::tick);
     Ok(())
 }
 

@@ -240,6 +240,7 @@ fn the_faults_of_the_documentation_are_right() {
     let scope = tickbus::faults::Scope {
         table: &rig.table,
         has_diagnosis: true,
+        has_answers: true,
     };
     for block in blocks {
         let faults = tickbus::faults::read_file("faults.md", block, scope);

@@ -51,6 +51,10 @@ impl BusOptions for ServerOptions {
         true
     }
 
+    fn has_answers(&self) -> bool {
+        true
+    }
+
     fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
         self.place_signals(lines, table);
     }

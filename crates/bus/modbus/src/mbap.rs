@@ -1,6 +1,7 @@
 //! The header of Modbus TCP, in front of a PDU.
 
 use super::PDU_LIMIT;
+use tickbus_fieldbus::faults::WrongAnswer;
 
 /// Transaction, protocol, length, unit.
 pub const HEADER: usize = 7;
@@ -85,6 +86,22 @@ pub fn append<R>(
     let length = u16::try_from(bytes.len() - begin - 6).expect("a PDU is short");
     bytes[begin + 4..begin + 6].copy_from_slice(&length.to_be_bytes());
     result
+}
+
+/// Spoils the last answer in `bytes`, which [`append`] wrote from `begin` on.
+pub(crate) fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
+    if bytes.len() <= begin + HEADER {
+        return;
+    }
+    match wrong {
+        WrongAnswer::Truncated => {
+            bytes.pop();
+            let length = u16::try_from(bytes.len() - begin - 6).expect("a PDU is short");
+            bytes[begin + 4..begin + 6].copy_from_slice(&length.to_be_bytes());
+        }
+        WrongAnswer::Transaction => bytes[begin + 1] = bytes[begin + 1].wrapping_add(1),
+        WrongAnswer::Unit => bytes[begin + 6] = bytes[begin + 6].wrapping_add(1),
+    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use super::{Function, PDU_LIMIT};
 use tickbus_base::time::Nanos;
+use tickbus_fieldbus::faults::WrongAnswer;
 
 /// Bytes of the checksum.
 pub const CHECKSUM: usize = 2;
@@ -63,6 +64,21 @@ pub fn append<R>(unit: u8, bytes: &mut Vec<u8>, write: impl FnOnce(&mut Vec<u8>)
     let checksum = checksum(&bytes[begin..]);
     bytes.extend_from_slice(&checksum);
     result
+}
+
+/// Spoils the last answer in `bytes`, which [`append`] wrote from `begin` on. Its checksum is right: damaged telegrams are
+/// for the line to make. An answer has no number here, so it comes from another unit in that case, too.
+pub(crate) fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
+    if bytes.len() < begin + SHORTEST {
+        return;
+    }
+    bytes.truncate(bytes.len() - CHECKSUM);
+    match wrong {
+        WrongAnswer::Truncated => drop(bytes.pop()),
+        WrongAnswer::Transaction | WrongAnswer::Unit => bytes[begin] = bytes[begin].wrapping_add(1),
+    }
+    let checksum = checksum(&bytes[begin..]);
+    bytes.extend_from_slice(&checksum);
 }
 
 /// Unit and PDU of a complete telegram; `None` if its length or its checksum is wrong.

@@ -47,6 +47,10 @@ impl BusOptions for ServerOptions {
         Ok(Bus::Free(Box::new(server)))
     }
 
+    fn has_answers(&self) -> bool {
+        true
+    }
+
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
     }

@@ -4,6 +4,7 @@
 //! transport protocol data unit (TPDU).
 
 use super::ProtocolError;
+use tickbus_fieldbus::faults::WrongAnswer;
 
 /// The port of ISO on TCP, on which every S7 CPU listens.
 pub const PORT: u16 = 102;
@@ -247,6 +248,26 @@ pub fn end_data(begin: usize, size: u8, out: &mut Vec<u8>) {
 
 fn short(length: usize) -> u16 {
     u16::try_from(length).expect("packets are much shorter than 64 KiB")
+}
+
+/// Spoils the last packet in `bytes`, which begins at `begin`, if it has data: the answer to a job. Units do not exist here,
+/// so such an answer has the reference of another job in that case, too.
+pub fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
+    /// The low byte of the job's reference, behind protocol, kind and two bytes that are 0.
+    const REFERENCE: usize = DATA_HEADER + 5;
+    if bytes.len() <= begin + REFERENCE || bytes[begin + TPKT + 1] != DATA {
+        return;
+    }
+    match wrong {
+        WrongAnswer::Truncated => {
+            bytes.pop();
+            let length = u16::try_from(bytes.len() - begin).expect("a packet is short");
+            bytes[begin + 2..begin + 4].copy_from_slice(&length.to_be_bytes());
+        }
+        WrongAnswer::Transaction | WrongAnswer::Unit => {
+            bytes[begin + REFERENCE] = bytes[begin + REFERENCE].wrapping_add(1);
+        }
+    }
 }
 
 #[cfg(test)]

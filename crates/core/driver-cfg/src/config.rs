@@ -131,6 +131,7 @@ impl Config {
         faults::Scope {
             table: &self.table,
             has_diagnosis: self.bus.has_diagnosis(),
+            has_answers: self.bus.has_answers(),
         }
     }
 
@@ -319,6 +320,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         table,
         // Mistakes in the bus table have been reported already.
         has_diagnosis: bus.is_none_or(|bus| bus.has_diagnosis()),
+        has_answers: bus.is_none_or(|bus| bus.has_answers()),
     });
     if is_observers {
         for value in faults.iter().chain(&fault_file) {

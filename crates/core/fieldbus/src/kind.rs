@@ -164,6 +164,11 @@ pub trait BusOptions: AnyOptions {
         false
     }
 
+    /// Returns true if the bus answers requests of its peer; injected faults can change these answers.
+    fn has_answers(&self) -> bool {
+        false
+    }
+
     /// Takes the lines of `[fieldbus.at]`, and reports invalid addresses; for buses that [have
     /// them](Self::has_addresses).
     fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {

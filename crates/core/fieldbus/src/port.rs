@@ -27,7 +27,7 @@ use super::{
     BusError, Cause, ChangeEvents, LinkState, LinkStatus, Medium, PlcState, Role, SwallowedSignals,
     Watch,
 };
-use crate::faults::{Diagnosis, FaultBoard};
+use crate::faults::{Diagnosis, FaultBoard, Spoilt, WrongAnswer};
 use crate::traffic::{Traffic, Way};
 use faults::FaultLayer;
 use image::{ImagePort, Report};
@@ -39,6 +39,8 @@ pub struct Port {
     image: ImagePort,
     looks: Looks,
     faults: FaultLayer,
+    /// How faults spoil the answer that the bus is making.
+    spoilt: Spoilt,
     clock: Arc<dyn Clock>,
     role: Role,
 }
@@ -56,6 +58,7 @@ impl Port {
     ) -> Self {
         Self {
             faults: FaultLayer::new(Arc::default(), image.stations()),
+            spoilt: Spoilt::default(),
             looks: Looks::new(status.max_age()),
             image: ImagePort {
                 validity: Validity::new(image.stations()),
@@ -359,6 +362,28 @@ impl Port {
     pub fn is_station_up(&mut self, station: usize, now: Nanos) -> bool {
         self.faults.attend(now, &mut self.image);
         !self.faults.is_cut(station)
+    }
+
+    /// A station answers a request with this function code. Returns the error with which it has to refuse the request by
+    /// an injected fault; for buses that [have answers](super::BusOptions::has_answers). Whoever makes the answer's
+    /// telegram then [takes](Self::take_wrong) what is wrong with it, and who sends it [holds it
+    /// back](Self::take_lateness).
+    pub fn answer(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
+        self.faults.attend(now, &mut self.image);
+        let spoilt = self.faults.answer(station, function);
+        self.spoilt.late = self.spoilt.late.max(spoilt.late);
+        self.spoilt.wrong = self.spoilt.wrong.or(spoilt.wrong);
+        spoilt.error
+    }
+
+    /// What is wrong with the answer that was made last; only the first call returns it.
+    pub fn take_wrong(&mut self) -> Option<WrongAnswer> {
+        self.spoilt.wrong.take()
+    }
+
+    /// How much later the answer that was made last goes out; only the first call returns it.
+    pub fn take_lateness(&mut self) -> Nanos {
+        std::mem::take(&mut self.spoilt.late)
     }
 
     /// Makes the next [`take_diagnoses`](Self::take_diagnoses) repeat its last report, for stations that restart.

@@ -186,10 +186,14 @@ kind = "duplicate"
 "#;
 
 /// Tables `[fieldbus]`, and what follows them, that the right files do not have.
-const BUSES: [&str; 6] = [
+const BUSES: [&str; 7] = [
     "kind = \"profibus-device\"\ndevice = \"/dev/ttyS0\"\naddress = 3\nident = 0x80E0\n\
      [[fault]]\nkind = \"diagnosis\"\nslot = 1\nchannel = 0\n",
     // Over TCP: with RTU a unit has a smaller range.
+    "kind = \"s7-server\"\n\
+     [[fault]]\nkind = \"answer-late\"\nby = \"1s\"\n\
+     [[fault]]\nkind = \"answer-error\"\ncode = 5\n\
+     [[fault]]\nkind = \"answer-wrong\"\nhow = \"unit\"\n",
     "kind = \"modbus-server\"\nidentity = {}\nreserved = [{ at = \"400001\" }]\nat = { A = \"400009\" }\n",
     "kind = \"modbus-client\"\ninputs = [{ at = \"offset:0\" }]\noutputs = [{ at = \"offset:500\" }]\n",
     "kind = \"opcua-server\"\nanonymous = true\n",

@@ -47,6 +47,7 @@ pub(super) fn serve(
         reply: Vec::new(),
         written: 0,
         carried: None,
+        held_until: Nanos(i64::MIN),
     };
     call.run(&mut server, port, stop)
 }
@@ -63,6 +64,8 @@ struct Server<'a> {
     reply: Vec<u8>,
     written: usize,
     carried: Option<Carried>,
+    /// Until when a fault holds the answer back.
+    held_until: Nanos,
 }
 
 impl Server<'_> {
@@ -77,6 +80,7 @@ impl Server<'_> {
             reply,
             written,
             carried,
+            held_until,
             ..
         } = self;
         framer.take(now, |telegram| {
@@ -123,6 +127,11 @@ impl Server<'_> {
             *carried = rtu::append(number, reply, |reply| {
                 units.answer(station, now, pdu, source, reply, port)
             });
+            if let Some(wrong) = port.take_wrong() {
+                rtu::spoil(reply, 0, wrong);
+                *carried = None;
+            }
+            *held_until = now + port.take_lateness();
             port.running("a client is talking");
         });
     }
@@ -144,7 +153,10 @@ impl Caller for Server<'_> {
         Ok(())
     }
 
-    fn to_write(&self, _now: Nanos) -> &[u8] {
+    fn to_write(&self, now: Nanos) -> &[u8] {
+        if now < self.held_until {
+            return &[];
+        }
         &self.reply[self.written..]
     }
 
@@ -162,7 +174,9 @@ impl Caller for Server<'_> {
 
     fn deadline(&self, port: &Port) -> Nanos {
         let stale = port.stale_at(port.clock().now());
-        self.framer.deadline().min(stale)
+        let waits = self.written < self.reply.len();
+        let held = if waits { self.held_until } else { Nanos::MAX };
+        self.framer.deadline().min(stale).min(held)
     }
 
     fn left(&mut self) -> BusError {

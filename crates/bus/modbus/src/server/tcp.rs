@@ -60,10 +60,14 @@ impl TcpService<'_> {
         if unit == BROADCAST {
             self.units.broadcast(now, pdu, source, port);
         } else if let Some(station) = self.units.station(unit) {
+            let begin = reply.len();
             let carried = rtu::append(unit, reply, |reply| {
                 self.units.answer(station, now, pdu, source, reply, port)
             });
-            client.remember(carried);
+            match port.take_wrong() {
+                Some(wrong) => rtu::spoil(reply, begin, wrong),
+                None => client.remember(carried),
+            }
         } else {
             // The unit may belong to another device on the same serial line.
             port.count("modbus-server.unknown_unit");
@@ -118,6 +122,7 @@ impl Service for TcpService<'_> {
             unit,
             pdu,
         } = telegram;
+        let begin = reply.len();
         let carried = mbap::append(transaction, unit, reply, |reply| {
             if let Some(station) = self.units.station(unit) {
                 let source = &mut client.source;
@@ -127,7 +132,11 @@ impl Service for TcpService<'_> {
             refuse(pdu[0], Exception::GATEWAY_TARGET_FAILED, reply);
             None
         });
-        client.remember(carried);
+        // What the client cannot understand it has not received.
+        match port.take_wrong() {
+            Some(wrong) => mbap::spoil(reply, begin, wrong),
+            None => client.remember(carried),
+        }
         Ok(length)
     }
 

@@ -106,7 +106,17 @@ impl ServedUnits {
         port: &mut Port,
     ) -> Option<Carried> {
         // A fault that begins meanwhile meets the whole request or nothing of it.
-        port.together(|port| self.carry_out(station, now, pdu, source, reply, port))
+        port.together(|port| {
+            if let Some(code) = port.answer(station, pdu[0], now)
+                && port.is_station_up(station, now)
+            {
+                let exception = Exception(code);
+                refuse(pdu[0], exception, reply);
+                port.count(counted(exception));
+                return None;
+            }
+            self.carry_out(station, now, pdu, source, reply, port)
+        })
     }
 
     fn carry_out(

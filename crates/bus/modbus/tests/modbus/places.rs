@@ -123,3 +123,71 @@ fn a_pulse_waits_until_its_own_place_was_read() {
         of_unit(&mut stream, 3, &[2, 0, 7, 0, 1]) == [2, 1, 0]
     });
 }
+
+/// Injects a fault into the devices, for as long as `during` runs.
+#[track_caller]
+fn with_fault(device: &mut Alone, fault: &str, during: impl FnOnce(&mut Alone)) {
+    let fault = device.end.driver.inject_text(fault).expect("a right fault");
+    device.end.tick();
+    during(device);
+    assert!(device.end.driver.end_fault(fault));
+    device.end.tick();
+}
+
+#[test]
+fn a_busy_device_refuses_and_does_nothing_and_its_neighbour_is_not_busy() {
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    let write = [6, 0x21, 0x35, 0, 5];
+    with_fault(
+        &mut device,
+        "kind = \"answer-error\"\ncode = 6\nstation = \"drive\"\nfunction = 6",
+        |device| {
+            assert_eq!(of_unit(&mut stream, 3, &write), [0x86, 6]);
+            assert_eq!(
+                of_unit(&mut stream, 3, &[3, 0x21, 0x35, 0, 1]),
+                [3, 2, 0, 0]
+            );
+            assert_eq!(of_unit(&mut stream, 7, &[6, 0, 0, 0, 8]), [6, 0, 0, 0, 8]);
+            assert_eq!(device.end.statistic("fault.answers"), "1");
+        },
+    );
+    assert_eq!(of_unit(&mut stream, 3, &write), write);
+    device.until("it is there", |end| end.get("speed") == 5.0);
+}
+
+#[test]
+fn a_wrong_answer_is_no_receipt_and_what_was_asked_is_done() {
+    let mut device = Alone::open(DEVICES, &KINDS);
+    let mut stream = client(device.address());
+    for value in [1.0, 0.0] {
+        device.end.set("ready", value);
+        device.end.tick();
+    }
+    let read = [2, 0, 7, 0, 1];
+    for (how, answer) in [
+        ("truncated", [0, 1, 0, 0, 0, 3, 3, 2, 1].as_slice()),
+        ("transaction", &[0, 2, 0, 0, 0, 4, 3, 2, 1, 1]),
+        ("unit", &[0, 1, 0, 0, 0, 4, 4, 2, 1, 1]),
+    ] {
+        let fault = format!("kind = \"answer-wrong\"\nhow = \"{how}\"");
+        with_fault(&mut device, &fault, |_| {
+            let sent = stream.write_all(&request(1, 3, &read));
+            sent.expect("the server reads");
+            let mut came = vec![0; answer.len()];
+            stream.read_exact(&mut came).expect("an answer");
+            assert_eq!(came, answer, "{how}");
+        });
+    }
+    // The pulse was in all three answers, and nobody has it yet.
+    assert_eq!(of_unit(&mut stream, 3, &read), [2, 1, 1]);
+    with_fault(
+        &mut device,
+        "kind = \"answer-wrong\"\nhow = \"truncated\"",
+        |device| {
+            let sent = stream.write_all(&request(1, 3, &[6, 0x21, 0x35, 0, 9]));
+            sent.expect("the server reads");
+            device.until("it is there", |end| end.get("speed") == 9.0);
+        },
+    );
+}

@@ -14,6 +14,7 @@ use tickbus_image::signal::fail_safe_frame;
 use tickbus_net::Address;
 
 use super::item::{Object, ReturnCode};
+use super::pdu::function;
 use super::szl::{Facts, Identity};
 use super::{Memory, ProtocolError, ServerSession, transport};
 
@@ -185,6 +186,10 @@ impl tcp::Service for Service {
             if jobs.lost {
                 reply.truncate(begin);
             }
+            if let Some(wrong) = port.take_wrong() {
+                transport::spoil(reply, begin, wrong);
+                client.receipts.clear();
+            }
             Ok(taken)
         })
     }
@@ -234,8 +239,12 @@ impl Jobs<'_> {
         &mut self,
         object: Object,
         range: &Range<usize>,
+        function: u8,
     ) -> Result<(AreaRange, Range<usize>), ReturnCode> {
         let place = self.shared.map.place(object, self.station)?;
+        if let Some(code) = self.port.answer(place.station, function, self.now) {
+            return Err(ReturnCode(code));
+        }
         if range.end > place.length {
             return Err(ReturnCode::ADDRESS);
         }
@@ -254,7 +263,7 @@ impl Jobs<'_> {
         if object == Object::Flags {
             return self.shared.flags.get_mut(range).ok_or(ReturnCode::ADDRESS);
         }
-        let (place, range) = self.place(object, &range)?;
+        let (place, range) = self.place(object, &range, function::WRITE)?;
         let (sends, _) = self.shared.role.areas();
         if place.area == sends {
             return Err(ReturnCode::ACCESS);
@@ -286,7 +295,7 @@ impl Jobs<'_> {
         if object == Object::Flags {
             return self.shared.flags.get(range).ok_or(ReturnCode::ADDRESS);
         }
-        let (place, range) = self.place(object, &range)?;
+        let (place, range) = self.place(object, &range, function::READ)?;
         let (sends, _) = self.shared.role.areas();
         let station = &mut self.shared.stations[place.station];
         if place.area != sends {

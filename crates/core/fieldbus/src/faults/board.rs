@@ -33,6 +33,7 @@ pub struct FaultBoard {
     pub(super) dropped: AtomicU64,
     pub(super) duplicated: AtomicU64,
     pub(super) hurried: AtomicU64,
+    pub(super) spoilt: AtomicU64,
 }
 
 impl FaultBoard {
@@ -201,6 +202,7 @@ impl FaultBoard {
         statistics.count("fault.dropped", count(&self.dropped));
         statistics.count("fault.duplicated", count(&self.duplicated));
         statistics.count("fault.hurried", count(&self.hurried));
+        statistics.count("fault.answers", count(&self.spoilt));
         for fault in &faults {
             let key = |what: &str| format!("fault.{}.{what}", fault.id);
             statistics.text(key("name"), &fault.name);

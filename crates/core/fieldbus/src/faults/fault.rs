@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use super::{Condition, Diagnosis};
+use super::{AnswerEffect, AnswerTrouble, Condition, Diagnosis, WrongAnswer};
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::short_number;
 use tickbus_image::signal::{DataType, Signal, SignalTable, Slot};
@@ -70,6 +70,8 @@ pub enum LineEffect {
     StationDown(usize),
     /// A station reports a problem to its master.
     Diagnosis(Diagnosis),
+    /// A server's answers are wrong.
+    Answer(AnswerEffect),
 }
 
 /// The affected frames, as seen from this end.
@@ -137,6 +139,11 @@ impl Fault {
             Effect::Line(LineEffect::LinkDown) => "link-down",
             Effect::Line(LineEffect::StationDown(_)) => "station-down",
             Effect::Line(LineEffect::Diagnosis(_)) => "diagnosis",
+            Effect::Line(LineEffect::Answer(answer)) => match answer.trouble {
+                AnswerTrouble::Late(_) => "answer-late",
+                AnswerTrouble::Error(_) => "answer-error",
+                AnswerTrouble::Wrong(_) => "answer-wrong",
+            },
             Effect::Model(_) => MODEL,
         }
     }
@@ -211,7 +218,31 @@ fn troubled(trouble: LineEffect, table: &SignalTable) -> String {
             "" => format!("the station reports {}", diagnosis.finding),
             name => format!("the station \"{name}\" reports {}", diagnosis.finding),
         },
+        LineEffect::Answer(answer) => answered(answer, table),
     }
+}
+
+fn answered(answer: AnswerEffect, table: &SignalTable) -> String {
+    let function = answer.function;
+    let function = function.map_or_else(String::new, |code| format!(" to function {code}"));
+    let station = answer.station.map_or_else(String::new, |station| {
+        format!(" of the station \"{}\"", table.stations[station].name)
+    });
+    let trouble = match answer.trouble {
+        AnswerTrouble::Late(by) => format!("are {by} late"),
+        AnswerTrouble::Error(code) => format!("are the error {code}"),
+        AnswerTrouble::Wrong(WrongAnswer::Truncated) => "lack their last byte".to_owned(),
+        AnswerTrouble::Wrong(WrongAnswer::Transaction) => {
+            "have the number of another request".to_owned()
+        }
+        AnswerTrouble::Wrong(WrongAnswer::Unit) => "come from another unit".to_owned(),
+    };
+    let chance = if answer.chance < 1.0 {
+        format!(" with a chance of {}", short_number(answer.chance))
+    } else {
+        String::new()
+    };
+    format!("answers{function}{station} {trouble}{chance}")
 }
 
 /// `at 1200ms for 300ms`.

@@ -8,7 +8,7 @@ use std::sync::atomic::Ordering;
 
 use self::outgoing::{Given, Outgoing};
 use super::ring::Ring;
-use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase};
+use super::{Diagnosis, FaultBoard, LineEffect, LineFault, Phase, Spoilt};
 use tickbus_base::time::Nanos;
 
 /// The combined effect of the active faults.
@@ -20,6 +20,8 @@ struct Sum {
     delay: Nanos,
     /// How long outgoing frames are held back.
     slow: Nanos,
+    /// Answers are wrong.
+    spoils: bool,
 }
 
 /// The fate of an incoming frame.
@@ -203,6 +205,7 @@ impl LineFaults {
                         self.is_diagnosis_new |= report(own, &mut self.diagnoses);
                     }
                     LineEffect::Drop(_, direction) => loses |= direction.comes_in(),
+                    LineEffect::Answer(_) => sum.spoils = true,
                     LineEffect::Duplicate(..) => {}
                 }
             }
@@ -255,6 +258,26 @@ impl LineFaults {
             }
         }
         happens
+    }
+
+    /// How the answer of `station` to a request with this function code is spoilt.
+    pub fn answer(&mut self, station: usize, function: u8) -> Spoilt {
+        let mut spoilt = Spoilt::default();
+        if !self.sum.spoils {
+            return spoilt;
+        }
+        for fault in &mut self.faults {
+            if fault.cell.phase() == Phase::Active
+                && let Some((chance, trouble)) = fault.trouble.on_answer(station, function)
+                && fault.random.happens(chance)
+            {
+                spoilt.add(trouble);
+            }
+        }
+        if spoilt != Spoilt::default() {
+            self.board.spoilt.fetch_add(1, Ordering::Relaxed);
+        }
+        spoilt
     }
 
     /// Returns true if the frames of the next outgoing cycle get lost.

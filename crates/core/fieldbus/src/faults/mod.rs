@@ -5,6 +5,7 @@
 //! frames. Both share a [`FaultBoard`], on which the tick publishes the active faults, so that neither waits for the
 //! other. Random numbers come from a seed: the same seed gives the same run.
 
+mod answer;
 mod board;
 mod cell;
 mod condition;
@@ -23,6 +24,7 @@ mod section;
 mod signal_fault;
 mod tick_time;
 
+pub use answer::{AnswerEffect, AnswerTrouble, Spoilt, WrongAnswer};
 pub use board::FaultBoard;
 pub use cell::{FaultStatus, Phase};
 pub use condition::{Condition, unknown};

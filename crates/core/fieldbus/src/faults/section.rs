@@ -21,14 +21,17 @@ pub struct Scope<'a> {
     pub table: &'a SignalTable,
     /// True if the driver's bus [has a diagnosis](crate::BusOptions::has_diagnosis).
     pub has_diagnosis: bool,
+    /// True if the driver's bus [has answers](crate::BusOptions::has_answers).
+    pub has_answers: bool,
 }
 
-/// The scope of a driver whose bus has no diagnosis.
+/// The scope of a driver whose bus has no diagnosis and gives no answers.
 impl<'a> From<&'a SignalTable> for Scope<'a> {
     fn from(table: &'a SignalTable) -> Self {
         Self {
             table,
             has_diagnosis: false,
+            has_answers: false,
         }
     }
 }
@@ -141,6 +144,9 @@ struct Keys<'a> {
     slot: Option<Value<'a>>,
     channel: Option<Value<'a>>,
     error: Option<Value<'a>>,
+    function: Option<Value<'a>>,
+    code: Option<Value<'a>>,
+    how: Option<Value<'a>>,
     octets: Option<Value<'a>>,
     static_: Option<Value<'a>>,
     seed: Option<Value<'a>>,
@@ -168,6 +174,9 @@ impl<'a> Keys<'a> {
             slot: table.take("slot"),
             channel: table.take("channel"),
             error: table.take("error"),
+            function: table.take("function"),
+            code: table.take("code"),
+            how: table.take("how"),
             octets: table.take("octets"),
             static_: table.take("static"),
             seed: table.take("seed"),
@@ -182,7 +191,7 @@ impl<'a> Keys<'a> {
     }
 
     /// The keys that only some kinds have.
-    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 13] {
+    fn of_kinds(&self) -> [(&'static str, Option<&Value<'a>>); 16] {
         [
             ("signal", self.signal.as_ref()),
             ("value", self.value.as_ref()),
@@ -194,6 +203,9 @@ impl<'a> Keys<'a> {
             ("slot", self.slot.as_ref()),
             ("channel", self.channel.as_ref()),
             ("error", self.error.as_ref()),
+            ("function", self.function.as_ref()),
+            ("code", self.code.as_ref()),
+            ("how", self.how.as_ref()),
             ("octets", self.octets.as_ref()),
             ("static", self.static_.as_ref()),
             ("seed", self.seed.as_ref()),
@@ -227,6 +239,15 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
         value.wrong(
             "a station of this bus has no diagnosis",
             "remove the fault; \"profibus-device\" has one",
+        );
+    }
+    if let (Some(kind), Some(value), Some(scope)) = (known, &keys.kind, scope)
+        && kind.name.starts_with("answer-")
+        && !scope.has_answers
+    {
+        value.wrong(
+            "this bus answers no requests that tickbus can answer wrongly",
+            "remove the fault; \"modbus-server\" and \"s7-server\" do",
         );
     }
     let begin = read_begin(&keys, table);

@@ -346,7 +346,7 @@ fn the_board_tells_what_is_active_and_how_often_it_began() {
     assert_eq!(
         statistics.to_string(),
         "fault.active=jam, link-down\nfault.begun=3\nfault.dropped=0\nfault.duplicated=0\n\
-         fault.hurried=0\nfault.1.name=jam\nfault.1.kind=invert\nfault.1.what=\"run\" is inverted\n\
+         fault.hurried=0\nfault.answers=0\nfault.1.name=jam\nfault.1.kind=invert\nfault.1.what=\"run\" is inverted\n\
          fault.1.state=active\nfault.1.begun=2\nfault.1.since=30ms\nfault.1.tick=4\n\
          fault.2.name=link-down\nfault.2.kind=link-down\nfault.2.what=the link is down\n\
          fault.2.state=active\nfault.2.begun=1\nfault.2.since=10ms\nfault.2.tick=2\n"

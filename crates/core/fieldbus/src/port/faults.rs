@@ -7,7 +7,7 @@ use tickbus_base::time::Nanos;
 use tickbus_image::{BusEnd, Event};
 
 use super::image::{ImagePort, Report};
-use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape, Taken};
+use crate::faults::{Diagnosis, Fate, FaultBoard, LineFaults, Shape, Spoilt, Taken};
 use crate::{Cause, LinkState, LinkStatus};
 
 /// Passes all calls to an [`ImagePort`], and distorts the data while line faults are active. Until the first fault is
@@ -225,6 +225,13 @@ impl FaultLayer {
     #[inline]
     pub(super) fn is_cut(&self, station: usize) -> bool {
         self.line.as_ref().is_some_and(|line| line.is_cut(station))
+    }
+
+    /// How the answer of a station is spoilt.
+    #[inline]
+    pub(super) fn answer(&mut self, station: usize, function: u8) -> Spoilt {
+        let line = self.line.as_mut();
+        line.map_or_else(Spoilt::default, |line| line.answer(station, function))
     }
 
     pub(super) fn report_diagnoses_anew(&mut self) {

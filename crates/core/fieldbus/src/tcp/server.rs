@@ -1,6 +1,6 @@
 //! A server for many clients, for any protocol that implements [`Service`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, VecDeque};
 use std::io::{self, Read as _, Write as _};
 use std::net::SocketAddr;
 
@@ -109,6 +109,9 @@ pub fn serve<S: Service>(
     Ok(())
 }
 
+/// At most this many answers to a client are held back.
+const HELD: usize = 1000;
+
 /// At most this many bytes are read from a client per turn, before others are served.
 const BUFFER: usize = 4096;
 
@@ -141,6 +144,8 @@ struct Clients<C> {
     /// The number of clients that have sent a valid telegram.
     speakers: usize,
     awaited: Awaited,
+    /// The clients with answers that a fault holds back: when the first of them is due, and their places.
+    held: Awaited,
 }
 
 /// The clients that owe something, the rest of a telegram or the reading of an answer: since when, and their places. A
@@ -160,6 +165,10 @@ struct Client<C> {
     unsent: Vec<u8>,
     /// The time since which either of them has been waiting.
     waits_since: Option<Nanos>,
+    /// Answers that a fault holds back, in the order of their requests, each with its time.
+    held: VecDeque<(Nanos, Vec<u8>)>,
+    /// The entry in [`Clients::held`].
+    held_until: Option<Nanos>,
 }
 
 impl<C> Default for Clients<C> {
@@ -170,6 +179,7 @@ impl<C> Default for Clients<C> {
             count: 0,
             speakers: 0,
             awaited: Awaited::new(),
+            held: Awaited::new(),
         }
     }
 }
@@ -193,7 +203,28 @@ impl<C> Clients<C> {
         if let Some(since) = client.waits_since {
             self.awaited.remove(&(since, place));
         }
+        if let Some(due) = client.held_until {
+            self.held.remove(&(due, place));
+        }
         Some(client)
+    }
+
+    /// Notes when the next answer of a client is due.
+    fn note_held(&mut self, place: usize) {
+        let Some(client) = self.places.get_mut(place).and_then(Option::as_mut) else {
+            return;
+        };
+        let due = client.held.front().map(|(due, _)| *due);
+        let before = std::mem::replace(&mut client.held_until, due);
+        if before == due {
+            return;
+        }
+        if let Some(before) = before {
+            self.held.remove(&(before, place));
+        }
+        if let Some(due) = due {
+            self.held.insert((due, place));
+        }
     }
 
     fn iter(&self) -> impl Iterator<Item = (usize, &Client<C>)> {
@@ -234,6 +265,7 @@ impl<S: Service> Server<'_, S> {
                 self.drop_client(key, &error, port);
             }
         }
+        self.send_held(now, port);
         self.check_timeouts(now, port);
         self.watch(now)?;
         let max_age = port.max_age();
@@ -255,6 +287,9 @@ impl<S: Service> Server<'_, S> {
         }
         if let Some((since, _)) = self.gone {
             deadline = deadline.min(since + port.max_age());
+        }
+        if let Some((due, _)) = self.clients.held.first() {
+            deadline = deadline.min(*due);
         }
         if let Some((since, _)) = self.clients.awaited.first() {
             deadline = deadline.min(*since + self.limits.patience);
@@ -311,6 +346,10 @@ impl<S: Service> Server<'_, S> {
             &mut self.reply,
             port,
         );
+        self.clients.note_held(place);
+        let Some(client) = self.clients.places[place].as_mut() else {
+            return Ok(());
+        };
         let (telegrams, error) = match heard {
             Ok(telegrams) => (telegrams, None),
             Err((telegrams, error)) => (telegrams, Some(error)),
@@ -354,7 +393,10 @@ impl<S: Service> Server<'_, S> {
                 port.wrote(0, taken, taken == whole);
             }
             if taken == whole {
-                self.service.replied(&mut client.state, port);
+                // The service does not distinguish the answers that wait.
+                if client.held.is_empty() {
+                    self.service.replied(&mut client.state, port);
+                }
             } else {
                 client.unsent.extend_from_slice(&self.reply[taken..]);
                 let change = self.set.change(place, &client.stream, Interest::Write);
@@ -366,6 +408,32 @@ impl<S: Service> Server<'_, S> {
             client.owes_since(waits.then_some(now), place, &mut self.clients.awaited);
         }
         Ok(())
+    }
+
+    /// Sends the answers that were held back and are due.
+    fn send_held(&mut self, now: Nanos, port: &mut Port) {
+        while let Some((due, place)) = self.clients.held.first().copied() {
+            if due > now {
+                break;
+            }
+            self.reply.clear();
+            let client = self.clients.places[place].as_mut();
+            let client = client.expect("its answers are held back");
+            while client.held.front().is_some_and(|(due, _)| *due <= now) {
+                let (_, answer) = client.held.pop_front().expect("it was just there");
+                self.reply.extend_from_slice(&answer);
+            }
+            if !client.unsent.is_empty() {
+                client.unsent.append(&mut self.reply);
+            }
+            self.clients.note_held(place);
+            // What would go out over a line that is down is lost.
+            if port.is_up(now)
+                && let Err(error) = self.send(place, now, port)
+            {
+                self.drop_client(place, &error, port);
+            }
+        }
     }
 
     /// Disconnects clients that have kept the server waiting too long.
@@ -419,6 +487,8 @@ impl<S: Service> Server<'_, S> {
             begun: Vec::new(),
             unsent: Vec::new(),
             waits_since: None,
+            held: VecDeque::new(),
+            held_until: None,
         });
         let client = self.clients.places[place]
             .as_ref()
@@ -534,12 +604,26 @@ impl<C> Client<C> {
         let mut rest = bytes;
         let mut telegrams = 0;
         while !rest.is_empty() {
+            let begin = reply.len();
             match service.telegram(&mut self.state, now, rest, reply, port) {
                 Ok(0) => break,
                 Ok(count) => rest = &rest[count..],
                 Err(error) => return Err((telegrams, of_peer(self.peer, &error))),
             }
             telegrams += 1;
+            let late = port.take_lateness();
+            if (late > Nanos::ZERO || !self.held.is_empty()) && reply.len() > begin {
+                if self.held.len() == HELD {
+                    let error = BusError::Protocol(format!(
+                        "{} has asked {HELD} times without waiting for an answer",
+                        self.peer
+                    ));
+                    return Err((telegrams, error));
+                }
+                let before = self.held.back().map_or(now, |(due, _)| *due);
+                let due = before.max(now + late);
+                self.held.push_back((due, reply.split_off(begin)));
+            }
         }
         if rest.len() > longest {
             let error = BusError::Protocol(format!(

@@ -6,7 +6,8 @@ use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::fault::MODEL;
 use crate::faults::{
-    ChannelError, Diagnosis, Direction, Effect, Finding, LineEffect, Octets, SignalEffect, measure,
+    AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Finding, LineEffect,
+    Octets, SignalEffect, WrongAnswer, measure,
 };
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
@@ -36,6 +37,18 @@ pub(super) fn read_effect(
             let (chance, direction) = (read_chance(keys, Some(1.0)), read_direction(keys));
             line(LineEffect::Duplicate(chance?, direction?))
         }
+        "answer-late" => read_answer(keys, table, || read_hold(keys).map(AnswerTrouble::Late)),
+        "answer-error" => read_answer(keys, table, || {
+            let code = keys.code.as_ref()?.whole(1..=255)?;
+            u8::try_from(code).ok().map(AnswerTrouble::Error)
+        }),
+        "answer-wrong" => read_answer(keys, table, || {
+            let how = keys
+                .how
+                .as_ref()?
+                .choice("faults of answers", &WrongAnswer::NAMES)?;
+            Some(AnswerTrouble::Wrong(how))
+        }),
         "link-down" => line(LineEffect::LinkDown),
         "station-down" => {
             let station = keys.station.as_ref()?;
@@ -48,6 +61,35 @@ pub(super) fn read_effect(
         "diagnosis" => line(LineEffect::Diagnosis(read_diagnosis(keys, table?, whole)?)),
         _ => read_change(kind, keys, table, whole),
     }
+}
+
+/// Reads which answers are wrong, and what is wrong by `trouble`.
+fn read_answer(
+    keys: &Keys<'_>,
+    table: Option<&SignalTable>,
+    trouble: impl FnOnce() -> Option<AnswerTrouble>,
+) -> Option<Effect> {
+    let chance = read_chance(keys, Some(1.0));
+    let station = match &keys.station {
+        None => Some(None),
+        Some(value) => {
+            table.and_then(|table| read_station(value, table, "remove \"station\"").map(Some))
+        }
+    };
+    let function = match &keys.function {
+        None => Some(None),
+        Some(value) => value
+            .whole(1..=255)
+            .and_then(|code| u8::try_from(code).ok())
+            .map(Some),
+    };
+    let trouble = trouble();
+    Some(Effect::Line(LineEffect::Answer(AnswerEffect {
+        station: station?,
+        function: function?,
+        chance: chance?,
+        trouble: trouble?,
+    })))
 }
 
 /// Reads the value of a fault of the model; 1 if none is stated. Reports a mistake.

@@ -4,6 +4,7 @@ use tickbus_base::toml_text::{Key, RequiredKey, Shape, TableKind, kind_names, na
 use tickbus_image::signal::section::NAME_LIMIT;
 
 use super::super::Direction;
+use super::super::answer::WrongAnswer;
 use super::super::diagnosis::{ChannelError, OCTET_LIMIT};
 use super::super::fault::MODEL;
 
@@ -29,8 +30,15 @@ const BY_TIME: RequiredKey = key(
     "say by how much, such as by = \"20ms\"",
 );
 
+/// The remedy where the code of an error should be.
+pub(super) const CODE: &str =
+    "write the error of the protocol, such as code = 6 for a busy Modbus device";
+
+/// Which answers are wrong.
+const OF_ANSWERS: &[&str] = &["chance", "station", "function", "seed"];
+
 /// The kinds of faults.
-pub const FAULT_KINDS: [TableKind; 12] = [
+pub const FAULT_KINDS: [TableKind; 15] = [
     kind("stuck", &[OF_SIGNAL], &["value"]),
     kind("invert", &[OF_SIGNAL], &[]),
     kind(
@@ -54,6 +62,21 @@ pub const FAULT_KINDS: [TableKind; 12] = [
         &["direction", "seed"],
     ),
     kind("duplicate", &[], &["chance", "direction", "seed"]),
+    kind("answer-late", &[BY_TIME], OF_ANSWERS),
+    kind(
+        "answer-error",
+        &[key("code", Shape::Whole(1, 255), CODE)],
+        OF_ANSWERS,
+    ),
+    kind(
+        "answer-wrong",
+        &[key(
+            "how",
+            Shape::Choice(&names(&WrongAnswer::NAMES)),
+            "say what is wrong, such as how = \"truncated\"",
+        )],
+        OF_ANSWERS,
+    ),
     kind("link-down", &[], &[]),
     kind(
         "station-down",
@@ -111,7 +134,7 @@ pub const FAULT_KEYS: &[Key] = &[
     Key::new(
         "by",
         QUANTITY,
-        "offset: what is added; delay and slow-answers: a duration, at most 60s",
+        "offset: what is added; delay, slow-answers and answer-late: a duration, at most 60s",
     ),
     Key::new(
         "amplitude",
@@ -130,6 +153,21 @@ pub const FAULT_KEYS: &[Key] = &[
     )
     .or("\"both\""),
     Key::new("station", Shape::Text, "The name of the station"),
+    Key::new(
+        "function",
+        Shape::Whole(1, 255),
+        "The function code of the requests whose answers are wrong; all without this key",
+    ),
+    Key::new(
+        "code",
+        Shape::Whole(1, 255),
+        "answer-error: the exception of Modbus; the return code of an item of S7",
+    ),
+    Key::new(
+        "how",
+        Shape::Choice(&names(&WrongAnswer::NAMES)),
+        "answer-wrong: what is wrong",
+    ),
     Key::new(
         "slot",
         Shape::Whole(1, DIAGNOSIS_LIMIT),

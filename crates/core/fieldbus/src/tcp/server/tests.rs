@@ -5,7 +5,10 @@ use std::thread::{JoinHandle, yield_now};
 use std::time::Duration;
 
 use super::*;
-use crate::faults::{Begin, Effect, Fault, FaultBoard, Faults, Lasts, LineEffect, Slots, TickTime};
+use crate::faults::{
+    AnswerEffect, AnswerTrouble, Begin, Effect, Fault, FaultBoard, Faults, Lasts, LineEffect,
+    Slots, TickTime,
+};
 use crate::{LinkState, LinkStatus, Role};
 use tickbus_base::time::{Clock, Manual, Monotonic};
 use tickbus_image::image;
@@ -36,10 +39,10 @@ impl Service for Echo {
     fn telegram(
         &mut self,
         count: &mut usize,
-        _now: Nanos,
+        now: Nanos,
         bytes: &[u8],
         reply: &mut Vec<u8>,
-        _port: &mut Port,
+        port: &mut Port,
     ) -> Result<usize, BusError> {
         let length = usize::from(bytes[0]);
         if length == 255 {
@@ -49,6 +52,9 @@ impl Service for Echo {
             return Ok(0);
         }
         *count += 1;
+        if let Some(function) = bytes[..=length].get(1) {
+            assert_eq!(port.answer(0, *function, now), None);
+        }
         reply.extend_from_slice(&bytes[..=length]);
         if length == 199 {
             reply.resize(reply.len() + 100_000, 7);
@@ -161,9 +167,13 @@ impl Running {
 
     /// Takes the line down. Returns the fault.
     fn take_down(&mut self) -> u32 {
+        self.inject(LineEffect::LinkDown)
+    }
+
+    fn inject(&mut self, effect: LineEffect) -> u32 {
         let fault = Fault {
             name: "cable".to_owned(),
-            effect: Effect::Line(LineEffect::LinkDown),
+            effect: Effect::Line(effect),
             begin: Begin::AtOnce,
             lasts: Lasts::UntilEnded,
             times: 1,
@@ -416,4 +426,43 @@ fn a_port_in_use_is_told_with_its_cure() {
             .contains("end the program that has this port"),
         "{error}"
     );
+}
+
+#[test]
+fn answers_that_a_fault_holds_back_go_out_in_order_at_their_time() {
+    let mut server = Running::new();
+    let mut client = server.client();
+    ask(&mut client, &[1, 1]);
+    let fault = server.inject(LineEffect::Answer(AnswerEffect {
+        station: None,
+        function: Some(7),
+        chance: 1.0,
+        trouble: AnswerTrouble::Late(Nanos::from_millis(50)),
+    }));
+    // The middle one is late, and the last one waits behind it.
+    client
+        .write_all(&[1, 1, 1, 7, 1, 2])
+        .expect("the server reads");
+    let mut reply = [0; 2];
+    client.read_exact(&mut reply).expect("an answer");
+    assert_eq!(reply, [1, 1]);
+    client.set_nonblocking(true).expect("an option");
+    server.pass(Nanos::from_millis(49));
+    server.until(|server| server.clock.is_settled(1));
+    let early = client.read(&mut reply).expect_err("nothing has come yet");
+    assert_eq!(early.kind(), ErrorKind::WouldBlock);
+    client.set_nonblocking(false).expect("an option");
+    server.clock.advance(Nanos::from_millis(1));
+    let mut rest = [0; 4];
+    client.read_exact(&mut rest).expect("both answers");
+    assert_eq!(rest, [1, 7, 1, 2]);
+    // What is held back when the line goes down is lost.
+    client.write_all(&[1, 7]).expect("the server reads");
+    server.until(|server| server.clock.is_settled(1));
+    let down = server.take_down();
+    server.pass(Nanos::from_millis(60));
+    server.until(|server| server.clock.is_settled(1));
+    server.bring_up(down);
+    server.bring_up(fault);
+    ask(&mut client, &[2, 5, 6]);
 }

@@ -1,0 +1,82 @@
+//! Faults of answers: a server answers a request late, with an error, or wrongly.
+
+use super::LineEffect;
+use tickbus_base::time::Nanos;
+
+/// What is wrong with the answers of a server.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AnswerEffect {
+    /// The station that answers so; `None` for all.
+    pub station: Option<usize>,
+    /// The function code of the requests that are answered so; `None` for all.
+    pub function: Option<u8>,
+    /// How likely it is, from above 0 to 1.
+    pub chance: f64,
+    /// What is wrong.
+    pub trouble: AnswerTrouble,
+}
+
+/// One thing that can be wrong with an answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnswerTrouble {
+    /// The request is carried out, and its answer goes out this much later.
+    Late(Nanos),
+    /// The request is not carried out, and refused with this code of the protocol.
+    Error(u8),
+    /// The request is carried out, and its answer is malformed.
+    Wrong(WrongAnswer),
+}
+
+/// A malformed answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WrongAnswer {
+    /// Its last byte is missing.
+    Truncated,
+    /// It has the number of another request.
+    Transaction,
+    /// It comes from another unit.
+    Unit,
+}
+
+impl WrongAnswer {
+    /// All of them, as a driver.cfg names them.
+    pub const NAMES: [(&str, Self); 3] = [
+        ("truncated", Self::Truncated),
+        ("transaction", Self::Transaction),
+        ("unit", Self::Unit),
+    ];
+}
+
+/// How the answer to one request is spoilt.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spoilt {
+    /// How much later it goes out.
+    pub late: Nanos,
+    /// The code with which the request is refused.
+    pub error: Option<u8>,
+    /// How it is malformed.
+    pub wrong: Option<WrongAnswer>,
+}
+
+impl Spoilt {
+    /// Adds what one more fault does. Delays add up; of errors and of malformed answers the first counts.
+    pub(super) fn add(&mut self, trouble: AnswerTrouble) {
+        match trouble {
+            AnswerTrouble::Late(by) => self.late += by,
+            AnswerTrouble::Error(code) => self.error = self.error.or(Some(code)),
+            AnswerTrouble::Wrong(wrong) => self.wrong = self.wrong.or(Some(wrong)),
+        }
+    }
+}
+
+impl LineEffect {
+    /// What the effect does to an answer of `station` to a request with this function code, and how likely.
+    pub(super) fn on_answer(self, station: usize, function: u8) -> Option<(f64, AnswerTrouble)> {
+        let Self::Answer(effect) = self else {
+            return None;
+        };
+        let is_meant = effect.station.is_none_or(|meant| meant == station)
+            && effect.function.is_none_or(|meant| meant == function);
+        is_meant.then_some((effect.chance, effect.trouble))
+    }
+}

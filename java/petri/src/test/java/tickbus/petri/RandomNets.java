@@ -2,6 +2,8 @@ package tickbus.petri;
 
 import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.PlaceStep;
+import tickbus.petri.net.TransitionStep;
 import tickbus.petri.run.Draws;
 
 /** Seeded nets for tests against an oracle. */
@@ -22,27 +24,27 @@ public final class RandomNets {
     private static PetriNet net(Draws random, int places, int transitions, boolean special) {
         NetBuilder builder = PetriNet.named("random");
         for (int p = 0; p < places; p++) {
-            builder.place("p" + p, random.below(3));
+            PlaceStep place = builder.place("p" + p, random.below(3));
             if (special && random.below(3) == 0) {
-                builder.capacity(2 + random.below(2));
+                place.capacity(2 + random.below(2));
             }
         }
         for (int t = 0; t < transitions; t++) {
-            builder.transition("t" + t);
+            TransitionStep transition = builder.transition("t" + t);
             for (int p = 0; p < places; p++) {
                 int kind = random.below(12);
                 int weight = 1 + random.below(4) / 3;
                 if (kind < 2) {
-                    builder.input("p" + p, weight);
+                    transition.input("p" + p, weight);
                 }
                 if (kind == 1 || kind == 2 || kind == 3) {
-                    builder.output("p" + p, weight);
+                    transition.output("p" + p, weight);
                 }
                 if (special && kind == 4) {
-                    builder.test("p" + p, weight);
+                    transition.test("p" + p, weight);
                 }
                 if (special && kind == 5) {
-                    builder.inhibitor("p" + p, weight + 1);
+                    transition.inhibitor("p" + p, weight + 1);
                 }
             }
         }

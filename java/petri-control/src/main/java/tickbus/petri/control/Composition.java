@@ -3,11 +3,13 @@ package tickbus.petri.control;
 import java.util.HashSet;
 import java.util.List;
 import java.util.Set;
-import tickbus.petri.net.Arc;
+import tickbus.petri.net.ArcKind;
 import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
 import tickbus.petri.net.Place;
+import tickbus.petri.net.PlaceStep;
 import tickbus.petri.net.Transition;
+import tickbus.petri.net.TransitionStep;
 
 /**
  * Makes one net of several, for analysis: nodes are named {@code net.node}, and each {@link BoundNet#marked} and {@link
@@ -33,17 +35,20 @@ public final class Composition {
         }
         for (BoundNet one : nets) {
             for (Transition transition : one.net.transitions()) {
-                whole.transition(in(one.net, transition.name())).priority(transition.priority()).delay(transition.delay());
+                TransitionStep made = whole.transition(in(one.net, transition.name()))
+                    .priority(transition.priority()).delay(transition.delay());
                 one.net.arcs().stream().filter(arc -> arc.transition() == transition.index())
-                    .forEach(arc -> arc(whole, one.net, arc));
+                    .forEach(arc -> whole.arc(arc.kind(), in(one.net, one.net.place(arc.place()).name()),
+                        in(one.net, transition.name()), arc.weight()));
                 Set<String> seen = new HashSet<>();
                 for (Term term : one.conditions.getOrDefault(transition.name(), List.of())) {
                     String place = term.name() + "." + term.place();
-                    if (term.kind().isOfPlace() && seen.add(term.kind() + place)) {
-                        if (term.kind() == Term.Kind.MARKED) {
-                            whole.test(place, 1);
+                    boolean isUnmarked = term.kind() == Term.Kind.UNMARKED;
+                    if (term.kind().isOfPlace() && !needs(one.net, transition, term) && seen.add(isUnmarked + place)) {
+                        if (isUnmarked) {
+                            made.inhibitor(place, 1);
                         } else {
-                            whole.inhibitor(place, 1);
+                            made.test(place, 1);
                         }
                     }
                 }
@@ -52,26 +57,22 @@ public final class Composition {
         return whole.build();
     }
 
+    /** True if an arc of the net itself needs the place. */
+    private static boolean needs(PetriNet net, Transition transition, Term term) {
+        return term.name().equals(net.name()) && net.arcs().stream().anyMatch(arc -> arc.transition() == transition.index()
+            && arc.place() == net.place(term.place()).index() && (arc.kind() == ArcKind.INPUT || arc.kind() == ArcKind.TEST));
+    }
+
     private static String in(PetriNet net, String node) {
         return net.name() + "." + node;
     }
 
     private static void places(NetBuilder whole, PetriNet net) {
         for (Place place : net.places()) {
-            whole.place(in(net, place.name()), place.initial()).delay(place.delay());
+            PlaceStep made = whole.place(in(net, place.name()), place.initial()).delay(place.delay());
             if (place.isLimited()) {
-                whole.capacity(place.capacity());
+                made.capacity(place.capacity());
             }
-        }
-    }
-
-    private static void arc(NetBuilder whole, PetriNet net, Arc arc) {
-        String place = in(net, net.place(arc.place()).name());
-        switch (arc.kind()) {
-            case INPUT -> whole.input(place, arc.weight());
-            case OUTPUT -> whole.output(place, arc.weight());
-            case TEST -> whole.test(place, arc.weight());
-            case INHIBITOR -> whole.inhibitor(place, arc.weight());
         }
     }
 }

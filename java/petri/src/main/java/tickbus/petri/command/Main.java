@@ -10,9 +10,13 @@ import java.nio.file.NoSuchFileException;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Locale;
 import tickbus.petri.draw.Dot;
 import tickbus.petri.draw.NetSvg;
+import tickbus.petri.format.Dialect;
+import tickbus.petri.format.Lola;
 import tickbus.petri.format.Pnml;
+import tickbus.petri.format.Tina;
 import tickbus.petri.net.NetException;
 import tickbus.petri.net.PetriNet;
 
@@ -21,12 +25,14 @@ public final class Main {
     private static final int OK = 0;
     private static final int WRONG = 1;
     private static final int USAGE = 2;
+    private static final List<String> FORMATS = List.of("svg", "dot", "pnml", "tapaal", "prom", "woped", "pipe", "lola", "tina");
     private static final String HELP = """
         usage: java -jar tickbus-petri.jar step NET [options]      go through a net step by step
                java -jar tickbus-petri.jar analyse NET [options]   what can be proven about it
                java -jar tickbus-petri.jar draw NET [options]      as a drawing, or in another format
 
-        NET is a file in PNML, a .hpx file of HPSim, or the text that HPSim exports.
+        NET is a file in PNML (also that of TAPAAL, ProM, pm4py, WoPeD and PIPE), a .lola file of LoLA, a .net file
+        of TINA, a .hpx file of HPSim, or the text that HPSim exports.
 
         step:
           --seed N           of chance and of random delays (default 0)
@@ -37,10 +43,10 @@ public final class Main {
           --limit N          the most markings to explore (default 1000000)
           --require LIST     exit code 1 unless all of these are proven: bounded, safe, live, deadlock-free, reversible
         draw:
-          --as FORMAT        svg (default), dot, or pnml
+          --as FORMAT        svg (default), dot, pnml, or for a tool: tapaal, prom, woped, pipe, lola, tina
           --out FILE         into this file (default: standard output)
         all:
-          --unit TIME        HPSim's unit of time in a .hpx file (default 1ms)
+          --unit TIME        the unit of time in a .hpx or .net file, read or written (default 1ms)
           --delay NAME=TIME  a delay for HPSim's text, which has none: NAME=2s, NAME=exp 2s, NAME=1s..3s
 
         Times are numbers with a unit: 500us, 2ms, 1.5s. Exit codes: 0 done, 1 the input was wrong, 2 the
@@ -125,11 +131,18 @@ public final class Main {
 
     private static int draw(CommandLine line, PrintStream out, PrintStream err) throws IOException {
         String as = line.one("--as", "svg");
-        if (!List.of("svg", "dot", "pnml").contains(as)) {
-            throw new UsageException("--as " + as + ": expected svg, dot or pnml");
+        if (!FORMATS.contains(as)) {
+            throw new UsageException("--as " + as + ": expected one of " + String.join(", ", FORMATS));
         }
-        PetriNet net = NetFile.read(line, err);
-        String text = as.equals("svg") ? NetSvg.write(net) : as.equals("dot") ? Dot.write(net) : Pnml.write(net);
+        PetriNet net = NetFile.read(line, as.equals("tina"), err);
+        String text = switch (as) {
+            case "svg" -> NetSvg.write(net);
+            case "dot" -> Dot.write(net);
+            case "pnml" -> Pnml.write(net);
+            case "lola" -> Lola.write(net);
+            case "tina" -> Tina.write(net, NetFile.unit(line));
+            default -> Pnml.write(net, Dialect.valueOf(as.toUpperCase(Locale.ROOT)));
+        };
         String file = line.one("--out", null);
         if (file == null) {
             out.print(text);

@@ -15,7 +15,9 @@ import tickbus.petri.format.Dialect;
 import tickbus.petri.format.HpsimText;
 import tickbus.petri.format.Hpx;
 import tickbus.petri.format.Imported;
+import tickbus.petri.format.Lola;
 import tickbus.petri.format.Pnml;
+import tickbus.petri.format.Tina;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.PetriNet;
 
@@ -29,16 +31,28 @@ final class NetFile {
 
     /** Reads the net; assumptions go to {@code err}. */
     static PetriNet read(CommandLine line, PrintStream err) throws IOException {
-        Path file = Path.of(line.file());
+        return read(line, false, err);
+    }
+
+    /** The unit of time of the formats that have none. */
+    static long unit(CommandLine line) {
         String unit = line.one("--unit", null);
-        Map<String, Delay> delays = delays(line);
         long nanos = unit == null ? 1_000_000 : time("--unit", unit);
         if (nanos < 1) {
             throw new UsageException("--unit " + unit + ": expected more than 0");
         }
+        return nanos;
+    }
+
+    /** Reads the net; with {@code unitIsUsed}, {@code --unit} is for the format in which the net will be written. */
+    static PetriNet read(CommandLine line, boolean unitIsUsed, PrintStream err) throws IOException {
+        Path file = Path.of(line.file());
+        String unit = line.one("--unit", null);
+        Map<String, Delay> delays = delays(line);
+        long nanos = unit(line);
         String format = format(file);
-        if (unit != null && !format.equals("hpx")) {
-            throw new UsageException("--unit is for .hpx files; " + file + " is not one");
+        if (unit != null && !unitIsUsed && !format.equals("hpx") && !format.equals("tina")) {
+            throw new UsageException("--unit is for .hpx files and TINA's .net files; " + file + " is not one");
         }
         if (!delays.isEmpty() && !format.equals("text")) {
             throw new UsageException("--delay is for HPSim's text; " + file + " has its delays itself");
@@ -46,10 +60,12 @@ final class NetFile {
         Imported imported = switch (format) {
             case "pnml" -> Pnml.read(file, Dialect.ANY);
             case "hpx" -> Hpx.read(file, nanos);
+            case "tina" -> Tina.read(file, nanos);
+            case "lola" -> Lola.read(file);
             default -> HpsimText.read(file, delays);
         };
         imported.warnings().forEach(warning -> err.println("warning: " + warning));
-        if (format.equals("hpx") && unit == null
+        if ((format.equals("hpx") || format.equals("tina")) && unit == null
                 && imported.net().transitions().stream().anyMatch(one -> one.delay().kind() != Delay.Kind.NONE)) {
             err.println("note: the delays of " + file + " have no unit; they are taken as milliseconds, --unit says otherwise");
         }
@@ -100,6 +116,9 @@ final class NetFile {
         try (InputStream bytes = Files.newInputStream(file)) {
             text = new String(bytes.readNBytes(BEGINNING), StandardCharsets.UTF_8).replaceFirst("^\\uFEFF?\\s*", "");
         }
-        return text.startsWith("<") ? "pnml" : text.startsWith("[") ? "hpx" : "text";
+        if (name.endsWith(".lola") || text.startsWith("PLACE")) {
+            return "lola";
+        }
+        return name.endsWith(".net") ? "tina" : text.startsWith("<") ? "pnml" : text.startsWith("[") ? "hpx" : "text";
     }
 }

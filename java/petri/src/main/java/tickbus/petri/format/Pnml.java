@@ -50,6 +50,15 @@ public final class Pnml {
 
     /** The net as a PNML document. */
     public static String write(PetriNet net) {
-        return PnmlWriter.write(net);
+        return write(net, Dialect.STANDARD);
+    }
+
+    /**
+     * The net as a PNML document for a tool, which has the same markings and firings there. Where the tool lacks them, a test
+     * arc becomes a loop and a capacity an inhibitor arc; a {@link NetException} names everything that the tool cannot hold.
+     * Delays and priorities that it lacks are in {@code toolspecific} elements, which it ignores.
+     */
+    public static String write(PetriNet net, Dialect dialect) {
+        return new PnmlWriter(net, dialect).write();
     }
 }

@@ -5,6 +5,7 @@ import java.util.HashMap;
 import java.util.HashSet;
 import java.util.List;
 import java.util.Map;
+import java.util.Objects;
 import java.util.Set;
 import javax.xml.stream.XMLInputFactory;
 import javax.xml.stream.XMLStreamConstants;
@@ -20,15 +21,22 @@ import tickbus.petri.net.NetException;
 final class PnmlReader {
     /** The most levels of pages in pages. */
     private static final int MOST_DEPTH = 100;
+    /** Attributes of TAPAAL's project files that say where something is drawn. */
+    private static final Set<String> DRAWN = Set.of("positionX", "positionY", "nameOffsetX", "nameOffsetY", "markingOffsetX",
+        "markingOffsetY", "angle", "displayName");
+    /** Other attributes of these files; {@link #node} and {@link #readNet} check those with a meaning. */
+    private static final Set<String> TAPAAL = Set.of("active", "name", "invariant", "infiniteServer", "urgent", "timed");
 
     private final SourceText source;
     private final Dialect dialect;
-    private final PnmlGraph graph;
+    private final NetGraph graph;
     private final Set<String> ids = new HashSet<>();
     private final List<String> warnings = new ArrayList<>();
     private final Opening opening;
     private XMLStreamReader xml;
     private int nets;
+    /** The ends of each arc, by its id. */
+    private final Map<String, String> arcs = new HashMap<>();
     /** The colour of PIPE's tokens; a second colour would make a coloured net. */
     private String token;
 
@@ -39,9 +47,9 @@ final class PnmlReader {
 
     PnmlReader(String source, Dialect dialect, Opening opening) {
         this.source = new SourceText(source, "");
-        this.dialect = dialect;
+        this.dialect = dialect == Dialect.STANDARD ? Dialect.STANDARD : Dialect.ANY;
         this.opening = opening;
-        graph = new PnmlGraph(this.source);
+        graph = new NetGraph(this.source);
     }
 
     Imported net() {
@@ -76,16 +84,29 @@ final class PnmlReader {
                 if (!xml.getLocalName().equals("pnml")) {
                     throw mistake("", "<" + xml.getLocalName() + ">; expected <pnml>");
                 }
-                children("pnml", tag -> {
-                    if (!tag.equals("net")) {
-                        throw unexpected("pnml", tag);
-                    }
-                    readNet();
-                });
+                children("pnml", this::part);
             }
         }
         if (nets == 0) {
             throw source.mistake(1, "", "there is no <net>");
+        }
+    }
+
+    private void part(String tag) throws XMLStreamException {
+        if (tag.equals("net")) {
+            if (dialect == Dialect.ANY && "false".equals(xml.getAttributeValue(null, "active"))) {
+                warn("net " + id(), "inactive, and left out");
+                skip();
+            } else {
+                readNet();
+            }
+        } else if (dialect == Dialect.ANY && List.of("constant", "query", "k-bound", "feature").contains(tag)) {
+            skip();
+        } else if (dialect == Dialect.ANY && tag.startsWith("shared-")) {
+            throw mistake("pnml", "<" + tag + ">: components that share nodes; expected one net. Compose them in TAPAAL, and export "
+                + "the result as PNML");
+        } else {
+            throw unexpected("pnml", tag);
         }
     }
 
@@ -114,20 +135,22 @@ final class PnmlReader {
     }
 
     private void readNet() throws XMLStreamException {
-        if (++nets > 1) {
-            throw mistake("net " + id(), "a second net; expected one in a file");
-        }
         String type = xml.getAttributeValue(null, "type");
-        String element = "net " + id();
+        String id = dialect == Dialect.STANDARD ? id() : Objects.requireNonNullElse(xml.getAttributeValue(null, "id"), "net");
+        String element = "net " + id;
+        if (++nets > 1) {
+            throw mistake(element, "a second net; expected one in a file");
+        }
         attributes(element, "id", "type");
         if (!Pnml.TYPE.equals(type)) {
             if (dialect == Dialect.STANDARD || !isOfPlacesAndTransitions(type)) {
                 throw mistake(element, "type '" + type + "'; expected " + Pnml.TYPE
                     + (isOfPlacesAndTransitions(type) ? "; Dialect.ANY reads this one" : ""));
             }
-            warn(element, "type '" + type + "' is read as that of a place/transition net");
+            warn(element, (type == null ? "without a type, and" : "type '" + type + "' is") + " read as "
+                + (type == null ? "" : "that of ") + "a place/transition net");
         }
-        graph.name = id();
+        graph.name = id;
         children(element, tag -> {
             if (tag.equals("name")) {
                 graph.name = label(element, tag);
@@ -144,9 +167,12 @@ final class PnmlReader {
         });
     }
 
-    /** The standard's core model, which ProM and pm4py name; the type of 2003, which WoPeD and LoLA name; PIPE's. */
+    /**
+     * The standard's core model, which ProM and pm4py name; the types of 2003, which WoPeD, LoLA and ProM 5 name; Yasper's;
+     * that of PIPE and TAPAAL. Some tools write no type.
+     */
     private static boolean isOfPlacesAndTransitions(String type) {
-        return type != null && (type.equals("P/T net") || type.matches("(.*/)?(?i:pnmlcoremodel|ptnetb)"));
+        return type == null || type.matches("P/T net|Petri ?net|(.*/)?(?i:pnmlcoremodel|ptnetb?|basicPNML(\\.rng)?|epnml-1\\.1)");
     }
 
     private void token(String element) throws XMLStreamException {
@@ -175,6 +201,13 @@ final class PnmlReader {
             case "referencePlace", "referenceTransition" -> node(tag, attribute(tag + " " + id(), "ref"));
             case "arc" -> arc(null);
             case "inhibitorArc" -> arc(ArcKind.INHIBITOR);
+            case "inputArc", "outputArc" -> {
+                // TAPAAL's composed nets.
+                if (dialect == Dialect.STANDARD) {
+                    throw unexpected(within, tag);
+                }
+                arc(ArcKind.INPUT);
+            }
             case "name", "graphics", "toolspecific" -> skip();
             default -> throw unexpected(within, tag);
         }
@@ -185,7 +218,10 @@ final class PnmlReader {
         boolean place = tag.equals("place");
         claim(element);
         attributes(element, "id", place ? "initialMarking" : tag.equals("transition") ? "priority" : "ref");
-        PnmlGraph.Node node = new PnmlGraph.Node(id(), tag, line(), refers);
+        NetGraph.Node node = new NetGraph.Node(id(), tag, line(), refers);
+        if (dialect == Dialect.ANY) {
+            tapaal(element, node);
+        }
         graph.nodes.put(node.id, node);
         Figure initial = new Figure(element, "initial marking", 0, xml.getAttributeValue(null, "initialMarking"));
         String priority = xml.getAttributeValue(null, "priority");
@@ -221,11 +257,31 @@ final class PnmlReader {
         node.initial = initial.value(0);
     }
 
+    /** Reads the attributes that a node has in TAPAAL's project files. */
+    private void tapaal(String element, NetGraph.Node node) {
+        String invariant = xml.getAttributeValue(null, "invariant");
+        if (invariant != null && !invariant.replace(" ", "").equals("<inf")) {
+            throw mistake(element, "invariant '" + SourceText.shortened(invariant) + "': a net with ages; expected '< inf'");
+        }
+        node.name = Objects.requireNonNullElse(xml.getAttributeValue(null, "name"), "").strip();
+        node.isTimedByRate = "true".equals(xml.getAttributeValue(null, "timed"));
+        String x = xml.getAttributeValue(null, "positionX");
+        String y = xml.getAttributeValue(null, "positionY");
+        try {
+            node.at = x == null || y == null ? null : new double[] {Double.parseDouble(x), Double.parseDouble(y)};
+        } catch (NumberFormatException unreadable) {
+            // Drawn elsewhere: the net does not need positions.
+        }
+    }
+
     /** Reads PIPE's own elements of a node; false if this element is not one of them. */
-    private boolean pipe(String element, String tag, PnmlGraph.Node node) throws XMLStreamException {
+    private boolean pipe(String element, String tag, NetGraph.Node node) throws XMLStreamException {
         boolean place = node.tag.equals("place");
         boolean transition = node.tag.equals("transition");
-        if (place && tag.equals("capacity")) {
+        if (place && tag.equals("tagged")) {
+            // A token that PIPE follows, and that fires like others.
+            skip();
+        } else if (place && tag.equals("capacity")) {
             int capacity = source.number(line(), element, tag, label(element, tag), 0);
             // PIPE writes 0 for no capacity.
             if (capacity > 0) {
@@ -243,7 +299,7 @@ final class PnmlReader {
         return true;
     }
 
-    private void own(String element, PnmlGraph.Node node, String tag, String value) {
+    private void own(String element, NetGraph.Node node, String tag, String value) {
         String other = node.own.put(tag, value);
         if (other != null && !other.equals(value)) {
             throw mistake(element, tag + " '" + SourceText.shortened(value) + "' and '" + SourceText.shortened(other)
@@ -280,7 +336,7 @@ final class PnmlReader {
         }
     }
 
-    private void toolspecific(String element, PnmlGraph.Node node) throws XMLStreamException {
+    private void toolspecific(String element, NetGraph.Node node) throws XMLStreamException {
         if (!Pnml.TOOL.equals(xml.getAttributeValue(null, "tool"))) {
             skip();
             return;
@@ -289,17 +345,16 @@ final class PnmlReader {
     }
 
     private void arc(ArcKind given) throws XMLStreamException {
-        String element = "arc " + id();
-        claim(element);
+        NetGraph.Link link = link();
+        String element = "arc " + link.id;
         attributes(element, "id", "source", "target", "type", "inscription", "weight");
-        PnmlGraph.Link link = new PnmlGraph.Link(id(), line(), attribute(element, "source"), attribute(element, "target"));
         graph.links.add(link);
         link.kind = given;
         String type = xml.getAttributeValue(null, "type");
         if (type != null) {
             kind(element, link, type);
         }
-        Figure weight = new Figure(element, "weight", 1, xml.getAttributeValue(null, "inscription"));
+        Figure weight = new Figure(element, "weight", 1, inscription(element));
         String further = xml.getAttributeValue(null, "weight");
         if (further != null) {
             weight.read(line(), further);
@@ -308,8 +363,13 @@ final class PnmlReader {
             switch (tag) {
                 case "inscription" -> weight.read(line(), count(element, tag));
                 case "type" -> {
-                    kind(element, link, attribute(element, "value"));
-                    skip();
+                    String value = xml.getAttributeValue(null, "value");
+                    if (value == null) {
+                        kind(element, link, label(element, tag).strip());
+                    } else {
+                        kind(element, link, value);
+                        skip();
+                    }
                 }
                 case "arctype" -> kind(element, link, label(element, tag).strip());
                 case "graphics" -> link.bends = points();
@@ -327,9 +387,48 @@ final class PnmlReader {
         link.kind = link.kind == null ? ArcKind.INPUT : link.kind;
     }
 
+    /**
+     * The arc that begins here. Nothing refers to arcs, so two between different nodes may have one id; between the same nodes
+     * they could be one arc or two.
+     */
+    private NetGraph.Link link() {
+        String from = attribute(xml.getLocalName(), "source");
+        String to = attribute(xml.getLocalName(), "target");
+        if (dialect == Dialect.STANDARD) {
+            claim("arc " + id());
+            return new NetGraph.Link(id(), line(), from, to);
+        }
+        String id = Objects.requireNonNullElse(xml.getAttributeValue(null, "id"), from + " to " + to);
+        String other = arcs.put(id, from + " to " + to);
+        if (other != null && xml.getAttributeValue(null, "id") != null) {
+            if (other.equals(from + " to " + to)) {
+                throw mistake("arc " + id, "given twice, " + other + "; expected an id of its own for each arc");
+            }
+            warn("arc " + id, "its id is given twice");
+        }
+        return new NetGraph.Link(id, line(), from, to);
+    }
+
+    /** The weight in the attribute of an arc, or null. In TAPAAL's project files an interval of ages is there. */
+    private String inscription(String element) {
+        String text = xml.getAttributeValue(null, "inscription");
+        if (text == null || dialect == Dialect.STANDARD) {
+            return text;
+        }
+        if (text.startsWith("[") || text.startsWith("(")) {
+            if (!text.replace(" ", "").matches("\\[0,inf\\)(:\\d+)?")) {
+                throw mistake(element, "interval '" + SourceText.shortened(text) + "': a net with ages; expected '[0,inf)'");
+            }
+            return null;
+        }
+        boolean counts = xml.getAttributeValue(null, "weight") == null || xml.getAttributeValue(null, "type") == null;
+        return text.isBlank() || !counts && text.equals("1") ? null : text;
+    }
+
     /** Takes the kind of an arc from one of the places where tools write it. */
-    private void kind(String element, PnmlGraph.Link link, String value) {
-        ArcKind kind = switch (value) {
+    private void kind(String element, NetGraph.Link link, String value) {
+        boolean isOfAges = dialect == Dialect.ANY && List.of("timed", "transport", "tapnInhibitor").contains(value);
+        ArcKind kind = switch (isOfAges ? value.equals("tapnInhibitor") ? "inhibitor" : "normal" : value) {
             case "normal" -> ArcKind.INPUT;
             case "inhibitor" -> ArcKind.INHIBITOR;
             case "test", "read" -> ArcKind.TEST;
@@ -420,8 +519,10 @@ final class PnmlReader {
     private void attributes(String element, String... known) {
         for (int i = 0; i < xml.getAttributeCount(); i++) {
             String namespace = xml.getAttributeNamespace(i);
-            if ((namespace == null || namespace.isEmpty()) && !List.of(known).contains(xml.getAttributeLocalName(i))) {
-                throw mistake(element, "attribute " + xml.getAttributeLocalName(i) + "=\""
+            String name = xml.getAttributeLocalName(i);
+            boolean isTapaal = dialect == Dialect.ANY && (DRAWN.contains(name) || TAPAAL.contains(name));
+            if ((namespace == null || namespace.isEmpty()) && !isTapaal && !List.of(known).contains(name)) {
+                throw mistake(element, "attribute " + name + "=\""
                     + SourceText.shortened(xml.getAttributeValue(i)) + "\"; expected " + String.join(", ", known)
                     + " and no other");
             }

@@ -15,13 +15,13 @@ final class Matrices {
             builder.place("P" + p, marking[p]);
         }
         for (int t = 0; t < transitions; t++) {
-            builder.transition("T" + t);
+            TransitionStep transition = builder.transition("T" + t);
             for (int p = 0; p < places; p++) {
                 if (pre[p][t] != 0) {
-                    builder.input("P" + p, pre[p][t]);
+                    transition.input("P" + p, pre[p][t]);
                 }
                 if (post[p][t] != 0) {
-                    builder.output("P" + p, post[p][t]);
+                    transition.output("P" + p, post[p][t]);
                 }
             }
         }

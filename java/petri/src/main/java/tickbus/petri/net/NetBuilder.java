@@ -8,22 +8,19 @@ import java.util.List;
 import java.util.Map;
 
 /**
- * Builds a net step by step. {@link #capacity} and the delays belong to the last named place or transition, {@link
- * #priority} and the arcs to the last named transition. Arcs can name places that come later. {@link #build} reports all
- * mistakes at once.
+ * Builds a net step by step. What {@link #place(String)} and {@link #transition} return has the properties of that place or
+ * transition, and continues with the next one. Arcs can name places that come later. {@link #build} reports all mistakes at
+ * once.
  */
-public final class NetBuilder {
+public sealed class NetBuilder permits PlaceStep, TransitionStep {
     private final String name;
-    private final Map<String, Place> places = new LinkedHashMap<>();
-    private final Map<String, Transition> transitions = new LinkedHashMap<>();
-    private final List<Pending> arcs = new ArrayList<>();
-    private final List<String> mistakes = new ArrayList<>();
-    private final Map<String, double[]> placesAt = new HashMap<>();
-    private final Map<String, double[]> transitionsAt = new HashMap<>();
-    private final Map<String, double[][]> bends = new HashMap<>();
-    private String place;
-    private String transition;
-    private boolean placeIsLast;
+    final Map<String, Place> places;
+    final Map<String, Transition> transitions;
+    private final List<Pending> arcs;
+    final List<String> mistakes;
+    private final Map<String, double[]> placesAt;
+    private final Map<String, double[]> transitionsAt;
+    private final Map<String, double[][]> bends;
 
     private record Pending(ArcKind kind, String place, String transition, int weight) {
         String text() {
@@ -38,139 +35,50 @@ public final class NetBuilder {
 
     NetBuilder(String name) {
         this.name = name;
+        places = new LinkedHashMap<>();
+        transitions = new LinkedHashMap<>();
+        arcs = new ArrayList<>();
+        mistakes = new ArrayList<>();
+        placesAt = new HashMap<>();
+        transitionsAt = new HashMap<>();
+        bends = new HashMap<>();
+    }
+
+    /** Continues the net of another builder. */
+    NetBuilder(NetBuilder of) {
+        name = of.name;
+        places = of.places;
+        transitions = of.transitions;
+        arcs = of.arcs;
+        mistakes = of.mistakes;
+        placesAt = of.placesAt;
+        transitionsAt = of.transitionsAt;
+        bends = of.bends;
     }
 
     /** A place without tokens. */
-    public NetBuilder place(String name) {
+    public PlaceStep place(String name) {
         return place(name, 0);
     }
 
     /** A place with tokens in the initial marking. */
-    public NetBuilder place(String name, int initial) {
+    public PlaceStep place(String name, int initial) {
         if (initial < 0) {
             mistakes.add("place " + name + ": " + initial + " tokens; expected 0 or more");
         }
         checkName("place", name, places);
         places.put(name, new Place(places.size(), name, initial, Place.UNLIMITED, 0));
-        place = name;
-        placeIsLast = true;
-        return this;
-    }
-
-    /** The most tokens that the last place may hold, 1 or more. A transition has no capacity. */
-    public NetBuilder capacity(int most) {
-        if (!placeIsLast) {
-            mistakes.add("capacity " + most + (transition == null ? ": there is no place yet" : " of transition " + transition)
-                + "; call place(...) before capacity(...)");
-            return this;
-        }
-        if (most < 1) {
-            mistakes.add("place " + place + ": capacity " + most + "; expected 1 or more");
-        }
-        places.computeIfPresent(place, (key, old) ->
-            new Place(old.index(), key, old.initial(), most, old.delay()));
-        return this;
-    }
-
-    /**
-     * A fixed delay in nanoseconds, 0 or more, of the last place or transition: how long a token that arrives in that place
-     * is unavailable, or how long that transition must be enabled before it fires.
-     */
-    public NetBuilder delay(long nanos) {
-        if (place == null && transition == null) {
-            mistakes.add("delay " + nanos + ": there is no place or transition yet; call place(...) or transition(...) before delay");
-            return this;
-        }
-        if (nanos < 0) {
-            mistakes.add((placeIsLast ? "place " + place : "transition " + transition) + ": delay " + nanos + " ns; expected 0 or more");
-            return this;
-        }
-        if (!placeIsLast) {
-            return delay(Delay.fixed(nanos));
-        }
-        places.computeIfPresent(place, (key, old) ->
-            new Place(old.index(), key, old.initial(), old.capacity(), nanos));
-        return this;
+        return new PlaceStep(this, name);
     }
 
     /** An immediate transition of priority 0. */
-    public NetBuilder transition(String name) {
+    public TransitionStep transition(String name) {
         checkName("transition", name, transitions);
         transitions.put(name, new Transition(transitions.size(), name, 0, Delay.NONE));
-        transition = name;
-        placeIsLast = false;
-        return this;
+        return new TransitionStep(this, name);
     }
 
-    /** The priority of the last transition; the greatest fires first. */
-    public NetBuilder priority(int priority) {
-        if (isTransition("priority(int)")) {
-            transitions.computeIfPresent(transition, (key, old) ->
-                new Transition(old.index(), key, priority, old.delay()));
-        }
-        return this;
-    }
-
-    /** The delay of the last place or transition, as {@link #delay(long)}; that of a place is fixed or {@link Delay#NONE}. */
-    public NetBuilder delay(Delay delay) {
-        if (placeIsLast) {
-            if (delay.kind() == Delay.Kind.FIXED || delay.kind() == Delay.Kind.NONE) {
-                return delay(delay.first());
-            }
-            mistakes.add("place " + place + ": a delay of kind " + delay.kind() + "; expected a fixed one");
-            return this;
-        }
-        if (isTransition("delay(Delay)")) {
-            transitions.computeIfPresent(transition, (key, old) ->
-                new Transition(old.index(), key, old.priority(), delay));
-        }
-        return this;
-    }
-
-    /** The last transition takes one token from each of these places. */
-    public NetBuilder input(String... from) {
-        for (String one : from) {
-            input(one, 1);
-        }
-        return this;
-    }
-
-    /** The last transition takes {@code weight} tokens from a place. */
-    public NetBuilder input(String from, int weight) {
-        return arc(ArcKind.INPUT, from, weight);
-    }
-
-    /** The last transition puts one token into each of these places. */
-    public NetBuilder output(String... to) {
-        for (String one : to) {
-            output(one, 1);
-        }
-        return this;
-    }
-
-    /** The last transition puts {@code weight} tokens into a place. */
-    public NetBuilder output(String to, int weight) {
-        return arc(ArcKind.OUTPUT, to, weight);
-    }
-
-    /** The last transition needs {@code weight} tokens in a place, and leaves them there. */
-    public NetBuilder test(String of, int weight) {
-        return arc(ArcKind.TEST, of, weight);
-    }
-
-    /** The last transition needs fewer than {@code weight} tokens in a place. */
-    public NetBuilder inhibitor(String of, int weight) {
-        return arc(ArcKind.INHIBITOR, of, weight);
-    }
-
-    private NetBuilder arc(ArcKind kind, String with, int weight) {
-        if (isTransition("an arc")) {
-            arc(kind, with, transition, weight);
-        }
-        return this;
-    }
-
-    /** An arc of any kind between nodes by name, for readers of files: a place, and a transition that need not be the last one. */
+    /** An arc of any kind between nodes by name, for readers of files: a place, and a transition. */
     public NetBuilder arc(ArcKind kind, String with, String by, int weight) {
         arcs.add(new Pending(kind, with, by, weight));
         return this;
@@ -192,13 +100,6 @@ public final class NetBuilder {
     public NetBuilder bends(ArcKind kind, String with, String by, double[][] at) {
         bends.put(new Pending(kind, with, by, 0).text(), Arrays.stream(at).map(double[]::clone).toArray(double[][]::new));
         return this;
-    }
-
-    private boolean isTransition(String what) {
-        if (transition == null) {
-            mistakes.add(what + ": there is no transition yet; call transition(...) before it");
-        }
-        return transition != null;
     }
 
     private void checkName(String kind, String given, Map<String, ?> others) {

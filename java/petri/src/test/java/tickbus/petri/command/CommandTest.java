@@ -158,6 +158,35 @@ class CommandTest {
     }
 
     @Test
+    void aNetIsWrittenForOtherToolsAndReadBack() throws IOException {
+        for (String tool : List.of("tapaal", "prom", "pipe")) {
+            Path file = folder.resolve(tool + ".pnml");
+            assertEquals(0, run("", "draw", net.toString(), "--as", tool, "--out", file.toString()), () -> err);
+            assertEquals(0, run("", "draw", file.toString(), "--as", "pnml"), () -> err);
+            assertTrue(Pnml.parse("n", out).isSameAs(Pnml.read(net)), out);
+        }
+        assertEquals(1, run("", "draw", net.toString(), "--as", "woped"));
+        assertTrue(err.contains("an inhibitor arc of weight 1; WoPeD has none"), err);
+        assertEquals(1, run("", "draw", net.toString(), "--as", "tina"));
+        assertTrue(err.contains("transition open: priority 1; it is not written for TINA"), err);
+        Path plain = Files.writeString(folder.resolve("plain.pnml"), Pnml.write(PetriNet.named("plain").place("a", 1).place("b")
+            .transition("t").delay(Delay.fixed(3_000_000)).input("a").output("b", 2).build()));
+        Path lola = folder.resolve("plain.lola");
+        assertEquals(0, run("", "draw", plain.toString(), "--as", "lola", "--out", lola.toString()), () -> err);
+        assertEquals(0, run("", "analyse", lola.toString()));
+        assertTrue(out.contains("markings     2, with 1 firing"), out);
+        Path tina = folder.resolve("plain.net");
+        assertEquals(0, run("", "draw", plain.toString(), "--as", "tina", "--unit", "500us", "--out", tina.toString()), () -> err);
+        assertTrue(Files.readString(tina).contains("tr {t} [6,6] {a}*1 -> {b}*2"), Files.readString(tina));
+        assertEquals(0, run("", "draw", tina.toString(), "--as", "pnml", "--unit", "500us"), () -> err);
+        assertTrue(Pnml.parse("n", out).isSameAs(Pnml.read(plain)), out);
+        assertEquals(0, run("", "draw", tina.toString()));
+        assertTrue(err.contains("have no unit; they are taken as milliseconds"), err);
+        assertEquals(2, run("", "draw", plain.toString(), "--unit", "1ms"));
+        assertEquals(2, run("", "draw", plain.toString(), "--as", "apt"));
+    }
+
+    @Test
     void hpsimsTextGetsItsDelaysByName() throws IOException {
         Path text = Files.writeString(folder.resolve("net.txt"), """
             // Transition Name Vector:

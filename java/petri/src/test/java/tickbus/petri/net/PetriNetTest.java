@@ -76,11 +76,11 @@ class PetriNetTest {
 
     @Test
     void allMistakesOfABuilderAreReportedAtOnce() {
-        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("w").capacity(3).place("a", -1).place("a")
-            .place("b", 5).capacity(2).input("a").transition("t").input("nowhere").input("a", 0).output("b").output("b")
+        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("w").place("a", -1).place("a")
+            .place("b", 5).capacity(2).transition("t").input("nowhere").input("a", 0).output("b").output("b")
             .transition(" ").place("a\u0007").place("\u202egnp.exe").build());
-        for (String one : new String[] {"call place(...) before capacity", "place a: -1 tokens", "place a: given twice",
-            "place b: 5 tokens; expected at most its capacity of 2", "there is no transition yet",
+        for (String one : new String[] {"place a: -1 tokens", "place a: given twice",
+            "place b: 5 tokens; expected at most its capacity of 2",
             "there is no place 'nowhere'", "weight 0; expected 1 or more", "arc t -> b: given twice", "no name", "a control character",
             "place number 4: its name turns the direction of the text"}) {
             assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
@@ -88,18 +88,29 @@ class PetriNetTest {
     }
 
     @Test
-    void aDelayBelongsToWhatWasNamedLast() {
-        PetriNet net = PetriNet.named("x").place("p", 1).delay(5).place("q").delay(Delay.fixed(6))
-            .transition("t").delay(500_000_000L).input("p").output("q").build();
-        assertEquals(5, net.place("p").delay());
+    void aDelayBelongsToItsPlaceOrTransition() {
+        NetBuilder builder = PetriNet.named("x");
+        PlaceStep first = builder.place("p", 1);
+        TransitionStep transition = builder.place("q").delay(6).transition("t").delay(500_000_000L).input("p");
+        first.delay(5).capacity(3);
+        transition.output("q").priority(2);
+        PetriNet net = builder.build();
+        assertEquals(new Place(0, "p", 1, 3, 5), net.place("p"));
         assertEquals(6, net.place("q").delay());
-        assertEquals(Delay.fixed(500_000_000L), net.transition("t").delay());
-        NetException wrong = assertThrows(NetException.class, () -> PetriNet.named("x").delay(1).place("p").delay(Delay.exponential(5))
-            .transition("t").delay(-1).capacity(1).build());
-        for (String one : new String[] {"delay 1: there is no place or transition yet", "place p: a delay of kind EXPONENTIAL; expected a fixed one",
-            "transition t: delay -1 ns; expected 0 or more", "capacity 1 of transition t; call place(...) before capacity(...)"}) {
-            assertTrue(wrong.getMessage().contains(one), one + " in " + wrong.getMessage());
-        }
+        assertEquals(new Transition(0, "t", 2, Delay.fixed(500_000_000L)), net.transition("t"));
+        assertEquals(2, net.arcs().size());
+        String wrong = assertThrows(NetException.class,
+            () -> PetriNet.named("x").place("p").delay(-2).transition("t").delay(-1).build()).getMessage();
+        assertTrue(wrong.contains("place p: delay -2 ns; expected 0 or more"), wrong);
+        assertTrue(wrong.contains("transition t: delay -1 ns; expected 0 or more"), wrong);
+    }
+
+    @Test
+    void theCompilerRefusesAPropertyOfTheOtherKindOfNode() {
+        assertThrows(NoSuchMethodException.class, () -> TransitionStep.class.getMethod("capacity", int.class));
+        assertThrows(NoSuchMethodException.class, () -> PlaceStep.class.getMethod("delay", Delay.class));
+        assertThrows(NoSuchMethodException.class, () -> PlaceStep.class.getMethod("input", String[].class));
+        assertThrows(NoSuchMethodException.class, () -> NetBuilder.class.getMethod("delay", long.class));
     }
 
     @Test

@@ -14,6 +14,8 @@ import tickbus.petri.draw.Dot;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.PlaceStep;
+import tickbus.petri.net.TransitionStep;
 
 /**
  * Compares the coordinator with the rules of docs/petri.md, which {@link Reference} implements: random nets with all
@@ -175,40 +177,40 @@ class ReferenceTest {
         int places = 2 + random.below(5);
         int transitions = 1 + random.below(6);
         for (int p = 0; p < places; p++) {
-            builder.place("p" + p, random.below(has(features, Feature.TOKENS) ? 4 : 2));
+            PlaceStep place = builder.place("p" + p, random.below(has(features, Feature.TOKENS) ? 4 : 2));
             if (random.below(3) == 0 && has(features, Feature.CAPACITIES)) {
-                builder.capacity(3 + random.below(2));
+                place.capacity(3 + random.below(2));
             }
             long delay = 10L * (1 + random.below(4));
             if (random.below(3) == 0 && has(features, Feature.TIMED_PLACES)) {
-                builder.delay(delay);
+                place.delay(delay);
             }
         }
         for (int t = 0; t < transitions; t++) {
-            builder.transition("t" + t);
+            TransitionStep transition = builder.transition("t" + t);
             int priority = random.below(3);
             if (has(features, Feature.PRIORITIES)) {
-                builder.priority(priority);
+                transition.priority(priority);
             }
             long delay = 10L * random.below(4);
             if (random.below(2) == 0 && has(features, Feature.TIMED_TRANSITIONS)) {
-                builder.delay(Delay.fixed(delay));
+                transition.delay(Delay.fixed(delay));
             }
             for (int p = 0; p < places; p++) {
                 int kind = random.below(10);
                 int drawn = 1 + random.below(5) / 3;
                 int weight = has(features, Feature.WEIGHTS) ? drawn : 1;
                 if (kind < 2) {
-                    builder.input("p" + p, weight);
+                    transition.input("p" + p, weight);
                 }
                 if (kind == 1 || kind == 2 || kind == 3) {
-                    builder.output("p" + p, has(features, Feature.WEIGHTS) ? 1 + drawn / 2 : 1);
+                    transition.output("p" + p, has(features, Feature.WEIGHTS) ? 1 + drawn / 2 : 1);
                 }
                 if (kind == 4 && has(features, Feature.TESTS)) {
-                    builder.test("p" + p, weight);
+                    transition.test("p" + p, weight);
                 }
                 if (kind == 5 && has(features, Feature.INHIBITORS)) {
-                    builder.inhibitor("p" + p, weight + 1);
+                    transition.inhibitor("p" + p, weight + 1);
                 }
             }
         }

@@ -13,12 +13,14 @@ import tickbus.petri.net.ArcKind;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
+import tickbus.petri.net.PlaceStep;
+import tickbus.petri.net.TransitionStep;
 
-/** The nodes and arcs of a PNML document as read; makes the net from them. */
-final class PnmlGraph {
+/** The nodes and arcs of a file as read; makes the net from them. */
+final class NetGraph {
     final Map<String, Node> nodes = new LinkedHashMap<>();
     final List<Link> links = new ArrayList<>();
-    /** Pages with nodes; each page has its own coordinates. */
+    /** The pages of PNML with nodes; each page has its own coordinates. */
     final Set<String> drawnOn = new HashSet<>();
     String name = "";
     private final SourceText source;
@@ -64,7 +66,7 @@ final class PnmlGraph {
         }
     }
 
-    PnmlGraph(SourceText source) {
+    NetGraph(SourceText source) {
         this.source = source;
     }
 
@@ -141,7 +143,7 @@ final class PnmlGraph {
 
     private void place(NetBuilder builder, Node node, String name) {
         String element = "place " + node.id;
-        builder.place(name, node.initial);
+        PlaceStep place = builder.place(name, node.initial);
         node.own.forEach((tag, value) -> {
             switch (tag) {
                 case "capacity" -> {
@@ -150,9 +152,9 @@ final class PnmlGraph {
                         throw source.mistake(node.line, element, node.initial + " tokens; expected at most its capacity of "
                             + capacity);
                     }
-                    builder.capacity(capacity);
+                    place.capacity(capacity);
                 }
-                case "delay" -> builder.delay(nanos(node, element, value));
+                case "delay" -> place.delay(nanos(node, element, value));
                 default -> throw source.mistake(node.line, element, "<" + tag + ">; expected <capacity> or <delay>");
             }
         });
@@ -172,14 +174,14 @@ final class PnmlGraph {
 
     private void transition(NetBuilder builder, Node node, String name) {
         String element = "transition " + node.id;
-        builder.transition(name);
+        TransitionStep transition = builder.transition(name);
         node.own.forEach((tag, value) -> {
             switch (tag) {
-                case "priority" -> builder.priority(source.number(node.line, element, tag, value, Integer.MIN_VALUE));
+                case "priority" -> transition.priority(source.number(node.line, element, tag, value, Integer.MIN_VALUE));
                 case "delay" -> {
                     String[] parts = value.split("\\s+");
                     try {
-                        builder.delay(new Delay(Delay.Kind.valueOf(parts[0]), Long.parseLong(parts[1]), Long.parseLong(parts[2])));
+                        transition.delay(new Delay(Delay.Kind.valueOf(parts[0]), Long.parseLong(parts[1]), Long.parseLong(parts[2])));
                     } catch (IllegalArgumentException | ArrayIndexOutOfBoundsException wrong) {
                         throw source.mistake(node.line, element, "delay '" + SourceText.shortened(value)
                             + "'; expected FIXED, EXPONENTIAL or UNIFORM and two figures in nanoseconds");

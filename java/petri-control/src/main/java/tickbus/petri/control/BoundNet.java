@@ -1,5 +1,6 @@
 package tickbus.petri.control;
 
+import java.time.Duration;
 import java.util.ArrayList;
 import java.util.LinkedHashMap;
 import java.util.LinkedHashSet;
@@ -34,6 +35,7 @@ public final class BoundNet {
     FiringListener listener = (scan, nanos, transition, choices) -> { };
     long seed;
     boolean keepsEdges;
+    boolean exactDelays;
     private List<Term> terms;
     private Step.Moment moment;
     private String node;
@@ -64,6 +66,12 @@ public final class BoundNet {
      */
     public BoundNet keepEdges() {
         keepsEdges = true;
+        return this;
+    }
+
+    /** Lets delays follow each other without the gaps between scans: see {@link tickbus.petri.run.CoordinatorBuilder#exactDelays}. */
+    public BoundNet exactDelays() {
+        exactDelays = true;
         return this;
     }
 
@@ -115,6 +123,24 @@ public final class BoundNet {
     /** The signal has exactly this value. */
     public BoundNet is(String signal, double value) {
         return term(Term.of(Term.Kind.EQUAL, signal, value));
+    }
+
+    /** A place of this net is marked, for as long as the following {@link #atLeast(Duration)} says: Grafcet's X3.T. */
+    public BoundNet marked(String place) {
+        return marked(net.name(), place);
+    }
+
+    /** The place of the last {@code marked} has been marked for this long; more than 0. */
+    public BoundNet atLeast(Duration time) {
+        int last = terms == null ? -1 : terms.size() - 1;
+        if (last < 0 || terms.get(last).kind() != Term.Kind.MARKED) {
+            mistakes.add("atLeast(" + time + ") belongs to no place; write it behind marked(...)");
+        } else if (time.isNegative() || time.isZero() || time.compareTo(Duration.ofNanos(Long.MAX_VALUE)) > 0) {
+            mistakes.add("place " + terms.get(last).place() + " marked for at least " + time + "; expected more than 0, and at most 292 years");
+        } else {
+            terms.set(last, terms.get(last).since(time));
+        }
+        return this;
     }
 
     /** A place of another net of the same controller is marked. */

@@ -63,9 +63,9 @@ final class Check {
                     if (other == null) {
                         add(one, "transition " + transition + ": there is no net '" + term.name() + "'; there are "
                             + nets.keySet().stream().sorted().toList());
-                    } else if (other == one) {
+                    } else if (other == one && term.kind() != Term.Kind.MARKED_FOR) {
                         add(one, "transition " + transition + ": place " + term.place() + " is of this net; draw a test or "
-                            + "an inhibitor arc");
+                            + "an inhibitor arc, or say for how long by atLeast(...)");
                     } else {
                         find(() -> other.net.place(term.place()));
                     }

@@ -18,16 +18,20 @@ final class Conditions implements Conjunction {
     private final Map<String, Coordinator> coordinators;
     private final String[] nets;
     private final Coordinator[] others;
+    private final String net;
+    private Coordinator own;
     private final List<Part> parts;
     private int failed = -1;
 
     /**
      * Binds terms.
      *
+     * @param net the name of the transition's own net
      * @param nets finds a net whose coordinator is built later
      * @param coordinators has the coordinators from then on
      */
-    Conditions(List<Term> terms, Latch latch, Function<String, BoundNet> nets, Map<String, Coordinator> coordinators) {
+    Conditions(String net, List<Term> terms, Latch latch, Function<String, BoundNet> nets, Map<String, Coordinator> coordinators) {
+        this.net = net;
         this.latch = latch;
         this.coordinators = coordinators;
         parts = terms.stream().map(Term::part).toList();
@@ -54,6 +58,7 @@ final class Conditions implements Conjunction {
 
     /** Called when all coordinators are built. */
     void connect() {
+        own = coordinators.get(net);
         for (int i = 0; i < nets.length; i++) {
             others[i] = nets[i] == null ? null : coordinators.get(nets[i]);
         }
@@ -92,6 +97,8 @@ final class Conditions implements Conjunction {
             case BELOW -> latch.now[at] < value[i];
             case EQUAL -> latch.now[at] == value[i];
             case MARKED -> others[i].tokens(at) > 0;
+            case MARKED_FOR -> others[i].tokens(at) > 0 && others[i].scans() > 0
+                && own.nanos() - others[i].markedSince(at) >= value[i];
             case UNMARKED -> others[i].tokens(at) == 0;
             case CODE -> code[i].test(inputs);
         };

@@ -3,6 +3,7 @@ package tickbus.petri.control;
 import java.io.IOException;
 import java.io.UncheckedIOException;
 import java.nio.file.Path;
+import java.time.Duration;
 import java.util.ArrayList;
 import java.util.Arrays;
 import java.util.LinkedHashMap;
@@ -67,14 +68,19 @@ public final class NetController {
                 .inputs(latch.names.toArray(String[]::new))
                 .reader(values -> System.arraycopy(latch.now, 0, values, 0, values.length));
             one.conditions.forEach((transition, terms) -> {
-                Conditions condition = new Conditions(terms, latch, byName::get, coordinators);
+                Conditions condition = new Conditions(one.net.name(), terms, latch, byName::get, coordinators);
                 conditions.add(condition);
+                terms.stream().filter(term -> term.kind() == Term.Kind.MARKED_FOR && term.name().equals(one.net.name()))
+                    .forEach(term -> builder.whenMarked(transition, term.place(), Duration.ofNanos((long) term.value())));
                 if (!one.keepsEdges && terms.stream().anyMatch(term -> term.kind().isEdge())) {
                     builder.whenEdge(transition, condition);
                 } else {
                     builder.when(transition, condition);
                 }
             });
+            if (one.exactDelays) {
+                builder.exactDelays();
+            }
             List<String> outputs = List.copyOf(one.outputs());
             Signal[] signals = outputs.stream().map(bus::signal).toArray(Signal[]::new);
             for (Signal signal : signals) {

@@ -9,6 +9,7 @@ import static org.junit.jupiter.api.Assumptions.assumeTrue;
 import com.sun.management.ThreadMXBean;
 import java.lang.management.ManagementFactory;
 import java.nio.file.Path;
+import java.time.Duration;
 import java.util.List;
 import java.util.function.BooleanSupplier;
 import org.junit.jupiter.api.AfterEach;
@@ -19,6 +20,7 @@ import org.junit.jupiter.api.io.TempDir;
 import tickbus.Tickbus;
 import tickbus.petri.analysis.Reachability;
 import tickbus.petri.analysis.Verdict;
+import tickbus.petri.net.ArcKind;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.PetriNet;
 import tickbus.petri.run.Conjunction;
@@ -296,7 +298,7 @@ class NetControllerTest {
                     + "do it in one way",
                 "net gripper: place gripping: output 'Pieces' is set to NaN; a finite number is needed",
                 "net other: rising() belongs to no signal; write it behind on(...)",
-                "net other: transition t: place p is of this net; draw a test or an inhibitor arc",
+                "net other: transition t: place p is of this net; draw a test or an inhibitor arc, or say for how long by atLeast(...)",
                 "output 'Gripper' is written by the nets gripper and other; let one write it, and the other tell that one by a place")) {
             assertTrue(wrong.mistakes().contains(expected), expected + " in\n" + wrong.getMessage());
         }
@@ -379,5 +381,68 @@ class NetControllerTest {
             allocated = Math.min(allocated, threads.getCurrentThreadAllocatedBytes() - before);
         }
         return allocated;
+    }
+
+    private static BoundNet timed() {
+        PetriNet watch = PetriNet.named("watch").place("quiet", 1).place("slow")
+            .transition("too long").input("quiet").output("slow").build();
+        return BoundNet.of(watch).when("too long").marked("gripper", "gripping").atLeast(Duration.ofMillis(3)).during("slow").set("Pieces", 7);
+    }
+
+    @Test
+    void aTransitionWaitsUntilAPlaceHasBeenMarkedForATime() {
+        BoundNet own = BoundNet.of(gripper()).when("grip").on("Piece at stop")
+            .when("held").marked("gripping").atLeast(Duration.ofMillis(5)).when("release").off("Piece at stop");
+        // The watch is scanned first, and sees the gripper as of the scan before.
+        bind(timed(), own);
+        machine.signal("Piece at stop").set(1);
+        assertEquals(1, scan());
+        for (int i = 1; i < 3; i++) {
+            assertEquals(0, scan());
+        }
+        assertEquals(1, scan());
+        assertEquals(7, machine.signal("Pieces").get());
+        assertEquals(0, scan());
+        assertEquals(1, scan());
+        assertEquals("{holding}", nets.coordinator("gripper").marking().toString());
+        List<Conjunction.Part> parts = ((Conjunction) nets.coordinator("gripper").condition(1)).parts();
+        assertEquals("gripper: gripping marked for 0.005 s", parts.get(0).text());
+    }
+
+    @Test
+    void theTimeOfANetThatIsScannedLaterBeginsWithItsFirstScan() {
+        BoundNet first = BoundNet.of(PetriNet.named("first").place("a", 1).place("b").transition("t").input("a").output("b").build())
+            .when("t").marked("gripper", "waiting").atLeast(Duration.ofMillis(2));
+        bind(first, BoundNet.of(gripper()).when("grip").on("Piece at stop"));
+        nanos = 1_000_000_000;
+        assertEquals(0, scan());
+        assertEquals(0, scan());
+        assertEquals(1, scan());
+    }
+
+    @Test
+    void aMarkedTimeBelongsToAPlaceAndIsATestArcForTheAnalysis() {
+        BindingException wrong = assertThrows(BindingException.class, () -> NetController.of(plc, BoundNet.of(gripper())
+            .when("grip").atLeast(Duration.ofMillis(1)).marked("waiting").when("held").marked("gripping").atLeast(Duration.ZERO)));
+        assertTrue(wrong.getMessage().contains("atLeast(PT0.001S) belongs to no place; write it behind marked(...)"), wrong.getMessage());
+        assertTrue(wrong.getMessage().contains("place waiting is of this net; draw a test or an inhibitor arc, or say for how long by "
+            + "atLeast(...)"), wrong.getMessage());
+        assertTrue(wrong.getMessage().contains("place gripping marked for at least PT0S; expected more than 0"), wrong.getMessage());
+        BoundNet own = BoundNet.of(gripper()).when("held").marked("gripping").atLeast(Duration.ofMillis(5))
+            .when("grip").marked("holding").atLeast(Duration.ofMillis(5));
+        PetriNet whole = Composition.of("all", own, timed());
+        assertEquals(1, whole.arcs().stream().filter(arc -> arc.kind() == ArcKind.TEST
+            && arc.place() == whole.place("gripper.gripping").index()).count());
+        assertEquals(1, whole.arcs().stream().filter(arc -> arc.kind() == ArcKind.TEST
+            && arc.place() == whole.place("gripper.holding").index()).count());
+    }
+
+    @Test
+    void exactDelaysFollowEachOtherBetweenScans() {
+        PetriNet chain = PetriNet.named("chain").place("a", 1).place("b").place("c")
+            .transition("t").delay(500_000).input("a").output("b").transition("u").delay(400_000).input("b").output("c").build();
+        bind(BoundNet.of(chain).exactDelays());
+        scan();
+        assertEquals(2, scan());
     }
 }

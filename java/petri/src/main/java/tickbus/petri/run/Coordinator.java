@@ -49,7 +49,15 @@ public final class Coordinator implements RunningNet {
     private final long[] enabledIn;
     /** The due time that caused the current firing; {@link Ready#UNTIMED} if inputs caused it. */
     private long moment = Ready.UNTIMED;
+    /** When the delays begin that begin now. */
+    private long origin;
     private boolean firing;
+    /** When tokens came into each empty place; only for a marked place. */
+    private final long[] markedAt;
+    /** The times for which places must be marked: all, those of each transition, and the transitions of each place; null for none. */
+    private final CoordinatorBuilder.Age[] allAges;
+    private final CoordinatorBuilder.Age[][] ages;
+    private final int[][] agesOf;
     /** The scan in which the condition was last tested. */
     private final long[] testedIn;
     private final boolean[] holds;
@@ -91,6 +99,16 @@ public final class Coordinator implements RunningNet {
         enabledIn = new long[transitions];
         testedIn = new long[transitions];
         holds = new boolean[transitions];
+        markedAt = new long[net.places().size()];
+        allAges = bound.ages.toArray(CoordinatorBuilder.Age[]::new);
+        ages = new CoordinatorBuilder.Age[transitions][];
+        agesOf = new int[net.places().size()][];
+        for (CoordinatorBuilder.Age age : allAges) {
+            int t = age.transition();
+            int p = age.place();
+            ages[t] = bound.ages.stream().filter(one -> one.transition() == t).toArray(CoordinatorBuilder.Age[]::new);
+            agesOf[p] = bound.ages.stream().filter(one -> one.place() == p).mapToInt(CoordinatorBuilder.Age::transition).toArray();
+        }
         active = new long[(net.places().size() + 63) / 64];
         fired = new long[transitions];
         lastFired = new long[transitions];
@@ -186,9 +204,29 @@ public final class Coordinator implements RunningNet {
         return Optional.ofNullable(stop);
     }
 
-    /** When the next delay is over; {@link Long#MAX_VALUE} if nothing waits for the time. */
+    /**
+     * When the next delay is over, or a place has been marked for as long as a transition waits for; {@link Long#MAX_VALUE} if
+     * nothing waits for the time.
+     */
     public long nextDue() {
-        return enabling.due.next();
+        long next = enabling.due.next();
+        for (CoordinatorBuilder.Age age : allAges) {
+            if (scans > 0 && enabling.tokens[age.place()] > 0) {
+                long due = Enabling.after(markedAt[age.place()], age.nanos());
+                next = due > now ? Math.min(next, due) : next;
+            }
+        }
+        return next;
+    }
+
+    /** The time of the last scan in nanoseconds; {@link Long#MIN_VALUE} before the first. */
+    public long nanos() {
+        return now;
+    }
+
+    /** When tokens came into the place with this index while it was empty, in nanoseconds; only for a marked place. */
+    public long markedSince(int place) {
+        return markedAt[place];
     }
 
     /**
@@ -233,30 +271,32 @@ public final class Coordinator implements RunningNet {
         step = Step.READER;
         bound.reader.read(inputs.signals.values);
         ready.clear();
+        origin = now;
         if (scans == 1) {
             enabling.start(beginning, now);
             for (int p = 0; p < enabling.tokens.length; p++) {
                 if (enabling.tokens[p] > 0) {
+                    markedAt[p] = now;
                     act(bound.entry, Step.ENTRY, p);
                     mark(p);
                 }
             }
         }
-        release();
-        firing = true;
+        if (!bound.exactDelays) {
+            release(now);
+        }
         for (int i = 0; i < enabling.enabled.size(); i++) {
             consider(enabling.enabled.get(i));
         }
-        int count = 0;
-        while (ready.size() > 0) {
-            if (count == bound.limit) {
-                livelock();
-                return 0;
-            }
-            int choices = ready.choices();
-            int t = ready.choice(choices == 1 ? 0 : random.below(choices));
-            recent[count++ % RECENT] = t;
-            fire(t, choices);
+        int count = fireAll();
+        while (count >= 0 && enabling.due.isDue(now)) {
+            release(enabling.due.next());
+            int more = fireAll();
+            count = more < 0 ? more : count + more;
+        }
+        if (count < 0) {
+            livelock();
+            return 0;
         }
         for (int word = 0; word < active.length; word++) {
             for (long bits = active[word]; bits != 0; bits &= bits - 1) {
@@ -268,20 +308,40 @@ public final class Coordinator implements RunningNet {
         return count;
     }
 
-    /** Releases everything that is due, each with its own time: the earliest due time fires first. */
-    private void release() {
-        while (enabling.due.isDue(now)) {
+    /** Fires until nothing is ready, and returns how often; -1 if that has no end. */
+    private int fireAll() {
+        firing = true;
+        int count = 0;
+        while (ready.size() > 0) {
+            if (count == bound.limit) {
+                return -1;
+            }
+            int choices = ready.choices();
+            int t = ready.choice(choices == 1 ? 0 : random.below(choices));
+            recent[count++ % RECENT] = t;
+            fire(t, choices);
+        }
+        firing = false;
+        return count;
+    }
+
+    /** Releases everything that is due until a time, each with its own time: the earliest due time fires first. */
+    private void release(long until) {
+        while (enabling.due.isDue(until)) {
             moment = enabling.due.next();
+            origin = bound.exactDelays ? moment : now;
             int index = enabling.due.pop();
             if (index < timed.length) {
                 ripe[index] = true;
                 releasedAt[index] = moment;
                 releasedIn[index] = scans;
+                consider(index);
             } else {
                 enabling.release(index - timed.length, moment);
             }
         }
         moment = Ready.UNTIMED;
+        origin = now;
     }
 
     private void act(Action[] actions, Step of, int index) {
@@ -298,7 +358,7 @@ public final class Coordinator implements RunningNet {
             long delay = random.draw(net.transition(t).delay());
             ripe[t] = delay == 0;
             if (delay > 0) {
-                enabling.due.put(t, Enabling.after(now, delay));
+                enabling.due.put(t, Enabling.after(origin, delay));
                 ready.remove(t);
             }
         } else {
@@ -317,7 +377,7 @@ public final class Coordinator implements RunningNet {
             Condition condition = bound.conditions[t];
             step = Step.CONDITION;
             at = t;
-            holds[t] = condition == null || condition.test(inputs);
+            holds[t] = isOldEnough(t) && (condition == null || condition.test(inputs));
             testedIn[t] = scans;
         }
         if (holds[t]) {
@@ -330,12 +390,44 @@ public final class Coordinator implements RunningNet {
         return bound.edge[t] && enabledIn[t] == scans;
     }
 
+    private boolean isOldEnough(int t) {
+        if (ages[t] != null) {
+            for (CoordinatorBuilder.Age age : ages[t]) {
+                if (enabling.tokens[age.place()] == 0 || now < Enabling.after(markedAt[age.place()], age.nanos())) {
+                    return false;
+                }
+            }
+        }
+        return true;
+    }
+
+    /** Begins the time of a place that a firing empties. Until the next scan, the place is not old enough for any transition. */
+    private void renew(int p) {
+        markedAt[p] = origin;
+        if (agesOf[p] != null) {
+            for (int t : agesOf[p]) {
+                testedIn[t] = scans;
+                holds[t] = false;
+                ready.remove(t);
+            }
+        }
+    }
+
     private void fire(int t, int choices) {
         Effects effects = net.effects();
         step = Step.FIRING;
         at = t;
         moment = ready.since(t);
-        enabling.fire(t, now);
+        // What needs an input happens at the scan, whatever came before it.
+        boolean isByTimeAlone = moment != Ready.UNTIMED && bound.conditions[t] == null && ages[t] == null;
+        origin = bound.exactDelays && isByTimeAlone ? moment : now;
+        for (int i = effects.firstChange(t); i < effects.firstChange(t + 1); i++) {
+            int p = effects.changePlace(i);
+            if (enabling.tokens[p] == effects.takes(i)) {
+                renew(p);
+            }
+        }
+        enabling.fire(t, origin);
         fired[t]++;
         lastFired[t] = now;
         if (bound.edge[t]) {

@@ -1,5 +1,6 @@
 package tickbus.petri.run;
 
+import java.time.Duration;
 import java.util.ArrayList;
 import java.util.List;
 import tickbus.petri.net.PetriNet;
@@ -10,6 +11,8 @@ public final class CoordinatorBuilder {
     final Condition[] conditions;
     /** True if the condition is an edge. */
     final boolean[] edge;
+    final List<Age> ages = new ArrayList<>();
+    boolean exactDelays;
     final Action[] firing;
     final Action[] entry;
     final Action[] exit;
@@ -23,11 +26,17 @@ public final class CoordinatorBuilder {
     long seed;
     int limit = 10_000;
 
+    /** A transition waits until a place has been marked for a time. */
+    record Age(int transition, int place, long nanos) {
+    }
+
     /** A copy, which later calls do not change. */
     private CoordinatorBuilder(CoordinatorBuilder of) {
         net = of.net;
         conditions = of.conditions.clone();
         edge = of.edge.clone();
+        ages.addAll(of.ages);
+        exactDelays = of.exactDelays;
         firing = of.firing.clone();
         entry = of.entry.clone();
         exit = of.exit.clone();
@@ -107,6 +116,29 @@ public final class CoordinatorBuilder {
     public CoordinatorBuilder whenEdge(String transition, Condition condition) {
         when(transition, condition);
         edge[net.transition(transition).index()] = true;
+        return this;
+    }
+
+    /**
+     * The transition also waits until a place of its net has been marked for this long, as with Grafcet's X3.T; more than 0. The
+     * time begins when tokens come into the empty place, also if the transition that took the last token puts one back.
+     */
+    public CoordinatorBuilder whenMarked(String transition, String place, Duration atLeast) {
+        if (atLeast.isNegative() || atLeast.isZero() || atLeast.compareTo(Duration.ofNanos(Long.MAX_VALUE)) > 0) {
+            throw new IllegalArgumentException("place " + place + " marked for " + atLeast + "; expected more than 0, and at most 292 years");
+        }
+        ages.add(new Age(net.transition(transition).index(), net.place(place).index(), atLeast.toNanos()));
+        return this;
+    }
+
+    /**
+     * Lets delays follow each other without the gaps between scans, as in a simulation: what falls due between two scans happens
+     * in the order of the due times, each moment with all that it causes before the next, and a delay that begins there begins
+     * at that moment. What needs an input happens at the scan. A place may then be marked and left within one scan: its
+     * outputs are never seen. The limit counts for each moment.
+     */
+    public CoordinatorBuilder exactDelays() {
+        exactDelays = true;
         return this;
     }
 

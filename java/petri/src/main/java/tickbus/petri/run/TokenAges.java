@@ -19,9 +19,14 @@ final class TokenAges {
             count = more;
             first = 0;
         }
-        int last = (first + size++) % due.length;
-        due[last] = at;
-        count[last] = tokens;
+        int last = size++;
+        // A time before the last ones is rare.
+        for (int before; last > 0 && due[before = (first + last - 1) % due.length] > at; last--) {
+            due[(first + last) % due.length] = due[before];
+            count[(first + last) % due.length] = count[before];
+        }
+        due[(first + last) % due.length] = at;
+        count[(first + last) % due.length] = tokens;
     }
 
     /** When the next tokens become available; {@link Long#MAX_VALUE} if all are. */

@@ -29,6 +29,9 @@ public final class Coverability {
     /** For each marking, in addition to its tokens: array, key, entry and slot of the map. */
     private static final long BYTES_BESIDE = 120;
 
+    /** Comparisons of tokens with those of ancestors: some seconds. */
+    private static final long MOST_COMPARISONS = 5_000_000_000L;
+
     private final PetriNet net;
     private final PetriNet plain;
     private final int limit;
@@ -36,6 +39,7 @@ public final class Coverability {
     private final Ints parents = new Ints();
     private final int[] bounds;
     private final BitSet fired = new BitSet();
+    private long comparisons;
     private boolean complete;
 
     private Coverability(PetriNet net, int limit) {
@@ -45,13 +49,17 @@ public final class Coverability {
         bounds = new int[net.places().size()];
     }
 
-    /** Explores at most {@code limit} markings with or without omega, 1 or more, and fewer if the heap has no room for them. */
+    /** Explores at most {@code limit} markings with or without omega, 1 or more; fewer if that takes too much memory or time. */
     public static Coverability explore(PetriNet net, int limit) {
         if (limit < 1) {
             throw new IllegalArgumentException("a limit of " + limit + " markings; expected 1 or more");
         }
         Coverability graph = new Coverability(net, limit);
-        graph.run();
+        try {
+            graph.run();
+        } catch (OutOfMemoryError full) {
+            graph.complete = false;
+        }
         return graph;
     }
 
@@ -112,7 +120,8 @@ public final class Coverability {
                 int[] next = fire(tokens, t);
                 accelerate(next, number);
                 if (!numbers.containsKey(new Key(next))) {
-                    if (markings.size() == limit || !Memory.has(markings.size() * (4L * next.length + BYTES_BESIDE))) {
+                    if (markings.size() == limit || comparisons > MOST_COMPARISONS
+                            || !Memory.has(markings.size() * (4L * next.length + BYTES_BESIDE))) {
                         return;
                     }
                     add(next, number, numbers);
@@ -167,7 +176,9 @@ public final class Coverability {
             grown = false;
             for (int a = parent; a >= 0; a = parents.get(a)) {
                 int[] ancestor = markings.get(a);
-                if (isCoveredBy(ancestor, tokens)) {
+                int higher = firstAbove(ancestor, tokens);
+                comparisons += higher;
+                if (higher == tokens.length) {
                     for (int p = 0; p < tokens.length; p++) {
                         if (ancestor[p] < tokens[p] && tokens[p] != OMEGA) {
                             tokens[p] = OMEGA;
@@ -179,13 +190,13 @@ public final class Coverability {
         }
     }
 
-    private static boolean isCoveredBy(int[] less, int[] more) {
-        for (int p = 0; p < less.length; p++) {
-            if (less[p] > more[p]) {
-                return false;
-            }
+    /** The first place with more tokens than in the other marking; the number of places if no place has. */
+    private static int firstAbove(int[] tokens, int[] other) {
+        int p = 0;
+        while (p < tokens.length && tokens[p] <= other[p]) {
+            p++;
         }
-        return true;
+        return p;
     }
 
     /** True if the exploration was finished. */
@@ -225,7 +236,7 @@ public final class Coverability {
     /** YES if a reachable marking has at least these tokens everywhere. */
     public Verdict isCoverable(Marking marking) {
         for (int number = 0; number < markings.size(); number++) {
-            if (isCoveredBy(marking.toArray(), tokens(number))) {
+            if (firstAbove(marking.toArray(), tokens(number)) == net.places().size()) {
                 return Verdict.YES;
             }
         }

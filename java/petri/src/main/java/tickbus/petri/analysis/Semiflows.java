@@ -16,6 +16,10 @@ import tickbus.petri.net.PetriNet;
  * divisor. Test and inhibitor arcs do not matter to either.
  */
 public final class Semiflows {
+    private static final long BYTES_PER_ENTRY = 12;
+    /** Comparisons of rows with others: some seconds. */
+    private static final long MOST_COMPARISONS = 500_000_000;
+
     private Semiflows() {
     }
 
@@ -82,10 +86,12 @@ public final class Semiflows {
         }
     }
 
-    /** The number of rows above and below 0 in each column. */
+    /** The number of rows above and below 0 in each column, and the size and the work of the elimination. */
     private static final class Columns {
         final int[] above;
         final int[] below;
+        long entries;
+        long comparisons;
 
         Columns(int columns) {
             above = new int[columns];
@@ -93,6 +99,7 @@ public final class Semiflows {
         }
 
         void count(Row row, int by) {
+            entries += (long) by * (row.rest.at.length + row.weights.at.length);
             for (int i = 0; i < row.rest.at.length; i++) {
                 (row.rest.value[i] > 0 ? above : below)[row.rest.at[i]] += by;
             }
@@ -148,7 +155,7 @@ public final class Semiflows {
             int column = counts.cheapest(left);
             left.clear(column);
             try {
-                rows = eliminate(rows, column, limit, counts);
+                rows = eliminate(net, what, rows, column, limit, counts);
             } catch (ArithmeticException overflow) {
                 throw new GaveUpException("net " + net.name() + ": " + what + ": gave up, as a weight is greater than "
                     + Long.MAX_VALUE);
@@ -157,6 +164,10 @@ public final class Semiflows {
                 throw new GaveUpException("net " + net.name() + ": " + what + ": gave up at " + limit + " rows, with "
                     + (left.cardinality() + 1) + " of " + columns + " columns left");
             }
+        }
+        if (!Memory.has(BYTES_PER_ENTRY * counts.entries + 4L * width * rows.size())) {
+            throw new GaveUpException("net " + net.name() + ": " + what + ": gave up at " + rows.size() + " flows of " + width
+                + " figures, which do not fit into the memory");
         }
         List<int[]> flows = new ArrayList<>();
         for (Row row : rows) {
@@ -176,7 +187,7 @@ public final class Semiflows {
     }
 
     /** The rows that are 0 in the column, and all positive combinations that become 0 there; null above the limit. */
-    private static List<Row> eliminate(List<Row> rows, int column, int limit, Columns counts) {
+    private static List<Row> eliminate(PetriNet net, String what, List<Row> rows, int column, int limit, Columns counts) {
         List<Row> kept = new ArrayList<>();
         List<Row> above = new ArrayList<>();
         List<Row> below = new ArrayList<>();
@@ -187,6 +198,11 @@ public final class Semiflows {
         for (Row plus : above) {
             for (Row minus : below) {
                 Row sum = sum(plus, minus, column);
+                counts.comparisons += kept.size() + sum.rest.at.length + sum.weights.at.length;
+                if (counts.comparisons > MOST_COMPARISONS || !Memory.has(BYTES_PER_ENTRY * counts.entries)) {
+                    throw new GaveUpException("net " + net.name() + ": " + what + ": gave up at " + kept.size() + " rows with "
+                        + counts.entries + " entries, after " + counts.comparisons + " comparisons");
+                }
                 if (kept.stream().noneMatch(row -> row.supports(sum))) {
                     kept.removeIf(row -> {
                         boolean larger = sum.supports(row);

@@ -16,6 +16,7 @@ import tickbus.petri.net.PetriNet;
 public final class Siphons {
     private static final int NONE = -1;
     private static final int SEVERAL = -2;
+    private static final int COMPARISONS = 100;
 
     private final int places;
     private final int[][] puttersOf;
@@ -74,8 +75,8 @@ public final class Siphons {
                 extend(start, barred, open);
                 barred.set(p);
             }
-        } catch (StackOverflowError deep) {
-            throw new GaveUpException(what + ": gave up at a search of " + steps + " steps that does not fit on the stack, with "
+        } catch (StackOverflowError | OutOfMemoryError deep) {
+            throw new GaveUpException(what + ": gave up at a search of " + steps + " steps that does not fit into the memory, with "
                 + found.size() + " found");
         }
         found.sort(Comparator.comparing(BitSet::toString));
@@ -126,8 +127,10 @@ public final class Siphons {
         }
     }
 
+    /** A step, and its comparisons with what was found: many of those count as further steps. */
     private void step() {
-        if (++steps > limit) {
+        steps += 1 + found.size() / COMPARISONS;
+        if (steps > limit) {
             throw new GaveUpException(what + ": gave up at " + limit + " steps, with " + found.size() + " found");
         }
     }
@@ -161,8 +164,10 @@ public final class Siphons {
     }
 
     private static boolean contains(BitSet larger, BitSet smaller) {
-        BitSet rest = (BitSet) smaller.clone();
-        rest.andNot(larger);
-        return rest.isEmpty();
+        int p = smaller.nextSetBit(0);
+        while (p >= 0 && larger.get(p)) {
+            p = smaller.nextSetBit(p + 1);
+        }
+        return p < 0;
     }
 }

@@ -4,12 +4,15 @@ import java.util.Arrays;
 
 /** A list of ints. */
 final class Ints {
+    /** The most ints of a list. */
+    static final int MOST = Integer.MAX_VALUE - 16;
+
     private int[] values = new int[64];
     private int size;
 
     void add(int value) {
         if (size == values.length) {
-            values = Arrays.copyOf(values, (int) Math.min(Integer.MAX_VALUE - 16, values.length * 3L / 2));
+            values = Arrays.copyOf(values, (int) Math.min(MOST, values.length * 3L / 2));
         }
         values[size++] = value;
     }
@@ -31,6 +34,10 @@ final class Ints {
         copy.values = values.clone();
         copy.size = size;
         return copy;
+    }
+
+    int[] toArray() {
+        return Arrays.copyOf(values, size);
     }
 
     int size() {

@@ -1,13 +1,12 @@
 package tickbus.petri.analysis;
 
-import java.util.ArrayDeque;
 import java.util.ArrayList;
 import java.util.BitSet;
-import java.util.Deque;
 import java.util.HashSet;
 import java.util.List;
 import java.util.Optional;
 import java.util.Set;
+import java.util.stream.IntStream;
 import tickbus.petri.net.Effects;
 import tickbus.petri.net.Marking;
 import tickbus.petri.net.PetriNet;
@@ -23,85 +22,44 @@ import tickbus.petri.net.PetriNet;
 public final class Reachability {
     private final PetriNet net;
     private final MarkingStore store;
-    private final Ints firstEdge = new Ints();
-    private final Ints targets = new Ints();
-    private final Ints labels = new Ints();
-    /** The edge by which each marking was found. */
-    private final Ints parentEdge = new Ints();
+    /** The first edge of each marking; empty without firings. */
+    private final Ints firstEdge;
+    private final Ints targets;
+    private final Ints labels;
+    private final Ints deadlocks;
     private final int[] bounds;
-    private final BitSet fired = new BitSet();
-    private final int limit;
-    private boolean complete;
+    private final BitSet fired;
+    private final long edges;
+    private final boolean firings;
+    private final boolean reduced;
+    private final String gaveUp;
+    /** True if all reachable markings are here. */
+    private final boolean whole;
     private Components components;
 
-    private Reachability(PetriNet net, int limit) {
+    Reachability(PetriNet net, MarkingStore store, Ints firstEdge, Ints targets, Ints labels, Ints deadlocks, int[] bounds,
+            BitSet fired, long edges, boolean firings, boolean reduced, String gaveUp) {
         this.net = net;
-        this.limit = limit;
-        store = new MarkingStore(net.places().size());
-        bounds = new int[net.places().size()];
+        this.store = store;
+        this.firstEdge = firstEdge;
+        this.targets = targets;
+        this.labels = labels;
+        this.deadlocks = deadlocks;
+        this.bounds = bounds;
+        this.fired = fired;
+        this.edges = edges;
+        this.firings = firings;
+        this.reduced = reduced;
+        this.gaveUp = gaveUp;
+        whole = gaveUp == null && !reduced;
     }
 
-    /** Explores at most {@code limit} markings, 1 or more, and fewer if the heap has no room for them. */
+    /**
+     * Explores at most {@code limit} markings, 1 or more, and fewer if the heap has no room for them. {@link Exploration} has
+     * further limits, and explorations that keep less.
+     */
     public static Reachability explore(PetriNet net, int limit) {
-        if (limit < 1) {
-            throw new IllegalArgumentException("a limit of " + limit + " markings; expected 1 or more");
-        }
-        Reachability graph = new Reachability(net, limit);
-        graph.run();
-        return graph;
-    }
-
-    private void run() {
-        Effects effects = net.effects();
-        int transitions = net.transitions().size();
-        int[] tokens = net.initialMarking().toArray();
-        int[] next = new int[tokens.length];
-        store.add(tokens);
-        parentEdge.add(-1);
-        for (int number = 0; number < store.size(); number++) {
-            store.get(number, tokens);
-            for (int p = 0; p < tokens.length; p++) {
-                bounds[p] = Math.max(bounds[p], tokens[p]);
-            }
-            firstEdge.add(targets.size());
-            for (int t = 0; t < transitions; t++) {
-                if (!effects.isEnabled(tokens, t)) {
-                    continue;
-                }
-                System.arraycopy(tokens, 0, next, 0, tokens.length);
-                if (!hasFired(next, t)) {
-                    return;
-                }
-                fired.set(t);
-                int before = store.size();
-                long more = store.bytesToGrow() + targets.bytesToGrow() + labels.bytesToGrow() + parentEdge.bytesToGrow()
-                    + firstEdge.bytesToGrow();
-                if (more > 0 && !Memory.has(bytes() + more)) {
-                    return;
-                }
-                int target = store.add(next);
-                if (target == before) {
-                    if (before == limit) {
-                        return;
-                    }
-                    parentEdge.add(targets.size());
-                }
-                targets.add(target);
-                labels.add(t);
-            }
-        }
-        firstEdge.add(targets.size());
-        complete = true;
-    }
-
-    /** Fires the transition unless a place would have more tokens than an int can count; returns whether it did. */
-    private boolean hasFired(int[] tokens, int t) {
-        try {
-            net.effects().fire(tokens, t);
-            return true;
-        } catch (ArithmeticException overflow) {
-            return false;
-        }
+        return Exploration.of(net).markings(limit).run();
     }
 
     /** The net. */
@@ -109,24 +67,29 @@ public final class Reachability {
         return net;
     }
 
-    /** True if all reachable markings were found. */
+    /** True if the exploration came to its end: all reachable markings were found, or those that the deadlocks need. */
     public boolean isComplete() {
-        return complete;
+        return gaveUp == null;
     }
 
-    /** The number of markings found; all of them if {@link #isComplete}. */
+    /** The limit at which the exploration gave up; empty if it came to its end. */
+    public Optional<String> gaveUpBecause() {
+        return Optional.ofNullable(gaveUp);
+    }
+
+    /** The number of markings found. */
     public int size() {
-        return Math.min(store.size(), limit);
+        return store.size();
     }
 
-    /** The number of firings found between the markings. */
-    public int edges() {
-        return targets.size();
+    /** The number of firings found between the markings, also if they were not kept. */
+    public long edges() {
+        return edges;
     }
 
     /** The bytes in which markings and firings are kept. */
     public long bytes() {
-        return store.bytes() + firstEdge.bytes() + targets.bytes() + labels.bytes() + parentEdge.bytes();
+        return store.bytes() + firstEdge.bytes() + targets.bytes() + labels.bytes() + deadlocks.bytes();
     }
 
     /** The marking with this number. */
@@ -138,39 +101,56 @@ public final class Reachability {
 
     /** The number of a marking; -1 if it was not found. */
     public int find(Marking marking) {
-        int found = store.find(marking.toArray());
-        return found < size() ? found : -1;
+        return store.find(marking.toArray());
     }
 
     /** YES if the marking is reachable. */
     public Verdict isReachable(Marking marking) {
-        return find(marking) >= 0 ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
+        return find(marking) >= 0 ? Verdict.YES : whole ? Verdict.NO : Verdict.UNKNOWN;
     }
 
-    /** A shortest sequence of transitions, by index, that leads from the initial marking to the one of this number. */
+    /**
+     * A sequence of transitions, by index, that leads from the initial marking to the one of this number; a shortest one, unless
+     * the exploration was only for deadlocks.
+     */
     public int[] path(int number) {
-        Deque<Integer> reversed = new ArrayDeque<>();
+        Ints reversed = new Ints();
+        int[] tokens = new int[net.places().size()];
         int at = number;
-        while (parentEdge.get(at) >= 0) {
-            int edge = parentEdge.get(at);
-            reversed.push(labels.get(edge));
-            at = source(edge);
+        while (at > 0) {
+            store.get(at, tokens);
+            // The first marking that leads here is one that the exploration came from.
+            int first = at;
+            int by = -1;
+            for (int t = 0; t < net.transitions().size(); t++) {
+                int before = before(tokens, t);
+                if (before >= 0 && before < first) {
+                    first = before;
+                    by = t;
+                }
+            }
+            reversed.add(by);
+            at = first;
         }
-        return reversed.stream().mapToInt(Integer::intValue).toArray();
+        int[] path = new int[reversed.size()];
+        for (int i = 0; i < path.length; i++) {
+            path[i] = reversed.get(path.length - 1 - i);
+        }
+        return path;
     }
 
-    private int source(int edge) {
-        int low = 0;
-        int high = firstEdge.size() - 1;
-        while (low < high) {
-            int middle = (low + high + 1) >>> 1;
-            if (firstEdge.get(middle) <= edge) {
-                low = middle;
-            } else {
-                high = middle - 1;
+    /** The number of the marking from which the transition leads to these tokens; -1 if it was not found. */
+    private int before(int[] tokens, int t) {
+        Effects effects = net.effects();
+        int[] before = tokens.clone();
+        for (int i = effects.firstChange(t); i < effects.firstChange(t + 1); i++) {
+            int p = effects.changePlace(i);
+            before[p] -= effects.puts(i) - effects.takes(i);
+            if (before[p] < 0) {
+                return -1;
             }
         }
-        return low;
+        return effects.isEnabled(before, t) ? store.find(before) : -1;
     }
 
     /** The most tokens of a place in the markings found. */
@@ -185,24 +165,26 @@ public final class Reachability {
                 return Verdict.NO;
             }
         }
-        return complete ? Verdict.YES : Verdict.UNKNOWN;
+        return whole ? Verdict.YES : Verdict.UNKNOWN;
     }
 
     /** YES if the net is bounded; an exploration can only confirm this, {@link Coverability} can also deny it. */
     public Verdict isBounded() {
-        return complete ? Verdict.YES : Verdict.UNKNOWN;
+        return whole ? Verdict.YES : Verdict.UNKNOWN;
     }
 
     /**
      * A marking in which nothing is enabled.
      *
      * @param marking the deadlock
-     * @param firings a shortest sequence of transitions that leads there, by name
+     * @param firings the sequence of transitions that leads there, by name: {@link #path}
      */
     public record Deadlock(Marking marking, List<String> firings) {
     }
 
-    /** The nearest deadlock; empty if none was found. */
+    /**
+     * The deadlock that was found first; a nearest one, unless the exploration was only for deadlocks. Empty if none was found.
+     */
     public Optional<Deadlock> deadlock() {
         for (int number : deadlocks()) {
             List<String> names = new ArrayList<>();
@@ -216,24 +198,17 @@ public final class Reachability {
 
     /** The numbers of all deadlocks found. */
     public List<Integer> deadlocks() {
-        List<Integer> dead = new ArrayList<>();
-        // If the exploration gave up, the last marking was not explored completely.
-        for (int number = 0; number < firstEdge.size() - 1; number++) {
-            if (firstEdge.get(number) == firstEdge.get(number + 1)) {
-                dead.add(number);
-            }
-        }
-        return dead;
+        return IntStream.of(deadlocks.toArray()).boxed().toList();
     }
 
     /** YES if every reachable marking enables a transition. */
     public Verdict isDeadlockFree() {
-        return !deadlocks().isEmpty() ? Verdict.NO : complete ? Verdict.YES : Verdict.UNKNOWN;
+        return !deadlocks().isEmpty() ? Verdict.NO : isComplete() ? Verdict.YES : Verdict.UNKNOWN;
     }
 
     /** YES if the transition fires in some reachable marking. */
     public Verdict canFire(int transition) {
-        return fired.get(transition) ? Verdict.YES : complete ? Verdict.NO : Verdict.UNKNOWN;
+        return fired.get(transition) ? Verdict.YES : whole ? Verdict.NO : Verdict.UNKNOWN;
     }
 
     private Components components() {
@@ -245,12 +220,12 @@ public final class Reachability {
 
     /** YES if the transition can fire again from every reachable marking (it is live, level 4). */
     public Verdict isLive(int transition) {
-        return complete ? Verdict.of(liveTransitions().get(transition)) : Verdict.UNKNOWN;
+        return whole && firings ? Verdict.of(liveTransitions().get(transition)) : Verdict.UNKNOWN;
     }
 
     /** YES if every transition can fire again from every reachable marking. */
     public Verdict isLive() {
-        return complete ? Verdict.of(liveTransitions().cardinality() == net.transitions().size()) : Verdict.UNKNOWN;
+        return whole && firings ? Verdict.of(liveTransitions().cardinality() == net.transitions().size()) : Verdict.UNKNOWN;
     }
 
     /** A transition is live if each terminal component has it. */
@@ -278,8 +253,8 @@ public final class Reachability {
 
     /** The numbers of the home states: markings reachable from every reachable one. Empty if the net has no home state. */
     public BitSet homeStates() {
-        if (!complete) {
-            throw new GaveUpException(this + "; home states need all of them");
+        if (!whole || !firings) {
+            throw new GaveUpException(this + "; home states need all of them, with their firings");
         }
         Components parts = components();
         BitSet home = new BitSet();
@@ -302,7 +277,17 @@ public final class Reachability {
 
     /** YES if the initial marking is a home state. */
     public Verdict isReversible() {
-        return complete ? Verdict.of(homeStates().get(0)) : Verdict.UNKNOWN;
+        return whole && firings ? Verdict.of(homeStates().get(0)) : Verdict.UNKNOWN;
+    }
+
+    /** Fires the transition unless a place would have more tokens than an int can count; returns whether it did. */
+    private boolean hasFired(int[] tokens, int t) {
+        try {
+            net.effects().fire(tokens, t);
+            return true;
+        } catch (ArithmeticException overflow) {
+            return false;
+        }
     }
 
     /** The effective conflicts found, each ordered pair once. */
@@ -336,7 +321,7 @@ public final class Reachability {
     /** The extent of the exploration. */
     @Override
     public String toString() {
-        return "net " + net.name() + ": " + (complete ? size() + " markings, " + edges() + " firings"
-            : "gave up at " + size() + " markings");
+        return "net " + net.name() + ": " + (gaveUp == null ? size() + " markings, " + edges + " firings"
+            + (reduced ? ", as far as deadlocks need" : "") : "gave up at " + size() + " markings");
     }
 }

@@ -13,6 +13,7 @@ import java.util.stream.Collectors;
 import java.util.stream.IntStream;
 import tickbus.petri.analysis.Conflicts;
 import tickbus.petri.analysis.Coverability;
+import tickbus.petri.analysis.Exploration;
 import tickbus.petri.analysis.GaveUpException;
 import tickbus.petri.analysis.Reachability;
 import tickbus.petri.analysis.Semiflows;
@@ -57,15 +58,9 @@ final class Analysis {
     List<String> run(List<String> required) {
         line("net", net.name() + ": " + count(net.places().size(), "place") + ", " + count(net.transitions().size(), "transition")
             + ", " + count(net.arcs().size(), "arc"));
-        Reachability graph;
-        try {
-            graph = Reachability.explore(net, limit);
-        } catch (GaveUpException | OutOfMemoryError full) {
-            throw new IllegalArgumentException("net " + net.name() + ": its markings do not fit into the memory; give a smaller "
-                + "--limit than " + limit, full);
-        }
+        Reachability graph = Reachability.explore(net, limit);
         line("markings", graph.isComplete() ? graph.size() + ", with " + count(graph.edges(), "firing")
-            : "gave up at " + graph.size());
+            : "gave up at " + graph.size() + ": " + graph.gaveUpBecause().orElseThrow());
         Verdict bounded = graph.isBounded();
         if (bounded == Verdict.YES) {
             line("bounded", "yes; most tokens: " + bounds(graph::bound));
@@ -73,7 +68,11 @@ final class Analysis {
             bounded = coverability();
         }
         line("safe", answer(graph.isSafe()));
-        line("deadlock", deadlock(graph));
+        Reachability dead = graph.isDeadlockFree() == Verdict.UNKNOWN
+            ? Exploration.of(net).markings(limit).memory(Runtime.getRuntime().maxMemory() / 8).withoutFirings().onlyForDeadlocks()
+                .run() : graph;
+        line("deadlock", dead == graph ? deadlock(dead, "the nearest")
+            : deadlock(dead, "one") + " (stubborn sets: " + count(dead.size(), "marking") + ")");
         line("live", answer(graph.isLive()) + transitions(graph, "not live", graph::isLive));
         line("can fire", transitions(graph, "never", graph::canFire).isEmpty() ? graph.isComplete() ? "all" : "all, or unknown"
             : transitions(graph, "never", graph::canFire).substring(2));
@@ -96,7 +95,7 @@ final class Analysis {
             case "bounded" -> boundedness;
             case "safe" -> graph.isSafe();
             case "live" -> graph.isLive();
-            case "deadlock-free" -> graph.isDeadlockFree();
+            case "deadlock-free" -> dead.isDeadlockFree();
             default -> graph.isReversible();
         }).toList();
     }
@@ -116,11 +115,11 @@ final class Analysis {
         }
     }
 
-    private static String deadlock(Reachability graph) {
+    private static String deadlock(Reachability graph, String which) {
         return graph.deadlock().map(found -> {
             List<String> path = found.firings();
             String first = String.join(", ", path.subList(0, Math.min(LONGEST_PATH, path.size())));
-            return graph.deadlocks().size() + " found; the nearest is " + found.marking() + (path.isEmpty() ? ", the initial marking"
+            return graph.deadlocks().size() + " found; " + which + " is " + found.marking() + (path.isEmpty() ? ", the initial marking"
                 : " after " + count(path.size(), "firing") + ": " + first + (path.size() > LONGEST_PATH ? ", …" : ""));
         }).orElse(graph.isComplete() ? "none" : "none found so far");
     }
@@ -180,7 +179,7 @@ final class Analysis {
         return verdict.name().toLowerCase(Locale.ROOT);
     }
 
-    private static String count(int number, String what) {
+    private static String count(long number, String what) {
         return number + " " + what + (number == 1 ? "" : "s");
     }
 }

@@ -16,6 +16,7 @@ import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.petri.format.Pnml;
 import tickbus.petri.net.Delay;
+import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
 
 class CommandTest {
@@ -121,6 +122,15 @@ class CommandTest {
         assertTrue(out.contains("1 fired; then nothing could") && out.contains("this is a deadlock"), out);
     }
 
+    private static PetriNet independentCycles(int count) {
+        NetBuilder net = PetriNet.named("cycles");
+        for (int i = 0; i < count; i++) {
+            net.place("a" + i, 1).place("b" + i).transition("go" + i).input("a" + i).output("b" + i)
+                .transition("back" + i).input("b" + i).output("a" + i);
+        }
+        return net.build();
+    }
+
     @Test
     void anAnalysisPrintsWhatIsProvenAndCanRequireIt() throws IOException {
         assertEquals(0, run("", "analyse", net.toString(), "--require", "bounded,safe,live,deadlock-free,reversible"), () -> out + err);
@@ -134,6 +144,11 @@ class CommandTest {
             .transition("more").test("a", 1).output("b").transition("end").input("a").transition("never").input("a", 2).build()));
         assertEquals(1, run("", "analyse", grows.toString(), "--limit", "50", "--require", "bounded,live"));
         assertTrue(out.contains("gave up at 50") && out.contains("bounded      no; without bound: b"), out);
+        assertTrue(out.contains("markings     gave up at 50: the limit of 50 markings"), out);
+        Path many = Files.writeString(folder.resolve("many.pnml"), Pnml.write(independentCycles(20)));
+        assertEquals(0, run("", "analyse", many.toString(), "--limit", "1000", "--require", "deadlock-free"), () -> out + err);
+        assertTrue(out.contains("gave up at 1000") && out.contains("deadlock     none (stubborn sets: "), out);
+        assertEquals(1, run("", "analyse", grows.toString(), "--limit", "50", "--require", "bounded,live"));
         assertEquals(grows + ": not proven to be bounded\n" + grows + ": not proven to be live\n", err.replace("\r", ""));
     }
 

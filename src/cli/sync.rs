@@ -1,5 +1,6 @@
 //! `tickbus sync FILE`: the server of a run in lock-step, for clients in other processes.
 
+mod diff;
 mod gateway;
 mod prepare;
 
@@ -8,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::thread;
 
 use super::Outcome;
-use super::host::{PageAddress, page_address, show_run};
+use super::host::{PageAddress, page_address, recording, show_run};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Kinds;
@@ -16,7 +17,7 @@ use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
 use virtual_time::shared_memory;
-use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RunFile, tcp};
+use virtual_time::{Cause, Controls, Ended, Hosting, Logic, Meeting, RecordedRun, RunFile, tcp};
 
 /// Serve virtual time: clients advance in lock-step, and every run gives the same result.
 ///
@@ -36,6 +37,10 @@ pub(super) struct Arguments {
     #[arg(long)]
     paused: bool,
 
+    /// Record what is read in each step to this file: a name ending in .vcd or .csv.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+
     /// Serve the live page of the run, and print its address; without HOST:PORT, at 127.0.0.1:20080.
     #[arg(long, value_name = "HOST:PORT", num_args = 0..=1, default_missing_value = "", value_parser = page_address)]
     page: Option<PageAddress>,
@@ -44,6 +49,7 @@ pub(super) struct Arguments {
 /// Other commands for a run in lock-step.
 #[derive(Debug, clap::Subcommand)]
 enum Other {
+    Diff(diff::Arguments),
     Gateway(gateway::Arguments),
     Prepare(prepare::Arguments),
 }
@@ -51,6 +57,7 @@ enum Other {
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let path = match (&arguments.other, &arguments.file) {
         (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, kinds),
+        (Some(Other::Diff(arguments)), _) => return diff::run(arguments),
         (Some(Other::Prepare(arguments)), _) => return prepare::run(arguments),
         (None, file) => file.as_ref().expect("it is required"),
     };
@@ -68,6 +75,16 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
             eprintln!("{mistakes}\nsync: failed mistakes={}", mistakes.len());
             return Outcome::WrongInput;
         }
+    };
+    let (logic, recorded) = match &arguments.record {
+        None => (logic, RecordedRun::default()),
+        Some(record) => match attach(logic, record, &file, path) {
+            Ok(attached) => attached,
+            Err(why) => {
+                eprintln!("sync: --record: {why}\nsync: failed mistakes=1");
+                return Outcome::WrongInput;
+            }
+        },
     };
     let Some(stop) = stop_on_ctrl_c() else {
         return Outcome::BusFailed;
@@ -90,7 +107,27 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     if let Err(error) = spawned {
         eprintln!("sync: commands on stdin cannot be read: {error}");
     }
-    report(serve(file, logic, &controls))
+    let outcome = serve(file, logic, &controls);
+    if let Some(why) = recorded.error() {
+        eprintln!("sync: --record: {why}");
+        report(outcome);
+        return Outcome::BusFailed;
+    }
+    report(outcome)
+}
+
+/// Lets `logic` record the run of the file at `path`.
+fn attach<'l>(
+    logic: Logic<'l>,
+    record: &Path,
+    file: &RunFile,
+    path: &Path,
+) -> Result<(Logic<'l>, RecordedRun), String> {
+    let options = recording(record)?;
+    let run = path.file_stem().unwrap_or_default().to_string_lossy();
+    let clock = Monotonic::shared() as _;
+    RecordedRun::attach(logic, &options, &run, file.settings.steps, &clock)
+        .map_err(|error| error.to_string())
 }
 
 /// Returns a stop that Ctrl-C triggers.

@@ -2,6 +2,7 @@
 #![cfg(unix)]
 #![allow(missing_docs, reason = "tests")]
 
+mod diff;
 #[cfg(feature = "page")]
 mod page;
 

@@ -52,7 +52,7 @@ pub struct Column {
     pub is_edges: bool,
     /// The type of the values.
     pub kind: ValueKind,
-    /// The signal's address; unknown in a CSV file.
+    /// The signal's address; unknown in a CSV file, and without meaning in a recording of virtual time.
     pub address: Option<Address>,
     /// The signal's type; unknown in a CSV file.
     pub data_type: Option<DataType>,

@@ -28,7 +28,7 @@ mod tests;
 pub use columns::{Column, Columns, Tick, ValueKind};
 pub use options::{FILE_SHAPE, Format, Options, When, file_of};
 pub use places::FileClaim;
-pub use reading::{Recording, RecordingError};
+pub use reading::{MOST_COLUMNS, Recording, RecordingError};
 pub use recorder::{Recorder, RecorderCounters, RecorderError};
 pub use rows::Rows;
 pub use tape::Tape;

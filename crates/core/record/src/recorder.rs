@@ -207,6 +207,15 @@ fn open(path: &Path) -> Result<(File, Option<FileClaim>), RecorderError> {
 }
 
 impl Recorder {
+    /// Claims the file at `path` without changing it, as [`start`](Self::start) does: finds out early if it could.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be created, or is in use; the text says what to do.
+    pub fn claim(path: &Path) -> Result<Option<FileClaim>, RecorderError> {
+        open(path).map(|(_, claim)| claim)
+    }
+
     /// Opens the file that `options` name, relative to `folder`, and starts the thread that writes to it. The first
     /// tick overwrites the file.
     ///

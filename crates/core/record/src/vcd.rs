@@ -72,8 +72,9 @@ impl VcdSink {
             let what = if column.is_edges { "edges" } else { "signal" };
             let mut line = format!("{what} {id}");
             // Writing to a string cannot fail.
-            if let (Some(address), Some(data_type)) = (column.address, column.data_type) {
-                let _ = write!(line, " {address} {data_type}");
+            if let Some(data_type) = column.data_type {
+                let address = column.address.map(|address| address.to_string());
+                let _ = write!(line, " {} {data_type}", address.as_deref().unwrap_or("-"));
             }
             let _ = write!(line, " {}", quoted(&column.name));
             if column.is_scaled_integer() {
@@ -122,7 +123,8 @@ impl VcdSink {
             let name = match (station.is_empty(), area) {
                 (true, Some(area)) => letter(area).to_owned(),
                 (false, Some(area)) => format!("{station} {}", letter(area)),
-                (_, None) => "signals".to_owned(),
+                (true, None) => "signals".to_owned(),
+                (false, None) => station.to_owned(),
             };
             writer.add_module(&inner.unique(&name))?;
             let mut names = Names::default();

@@ -2,13 +2,14 @@
 //! not matter here.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
 use crate::hash::Trace;
-use crate::logic::{Access, Hook, Logic};
+use crate::logic::{Access, Commit, Hook, Logic};
 use crate::members::{Client, Members};
 use crate::shared_data::SharedData;
 use crate::{Declaration, Outcome, Step};
@@ -39,6 +40,7 @@ pub(crate) struct Barrier<'l> {
     state: State,
     step: Step,
     members: Vec<Member>,
+    shown: Arc<Members>,
     data: SharedData,
     logic: Logic<'l>,
     /// The variables with hooks for changes, in their order, each with its hook.
@@ -123,8 +125,18 @@ impl<'l> Barrier<'l> {
             }
         };
         let members: Vec<Member> = clients.into_iter().map(member).collect();
+        let client = |member: &Member| Client {
+            name: member.declaration.name.clone(),
+            multiple: member.declaration.multiple,
+            writes: member.writes.clone(),
+        };
+        let shown = Members {
+            clients: members.iter().map(client).collect(),
+            variables: data.variables().to_vec(),
+        };
         Ok(Self {
             length,
+            shown: Arc::new(shown),
             state: State::InitialWrite,
             step: Step {
                 sequence: 0,
@@ -189,16 +201,8 @@ impl<'l> Barrier<'l> {
     }
 
     /// The participants of the run.
-    pub(crate) fn members(&self) -> Members {
-        let client = |member: &Member| Client {
-            name: member.declaration.name.clone(),
-            multiple: member.declaration.multiple,
-            writes: member.writes.clone(),
-        };
-        Members {
-            clients: self.members.iter().map(client).collect(),
-            variables: self.data.variables().to_vec(),
-        }
+    pub(crate) const fn members(&self) -> &Arc<Members> {
+        &self.shown
     }
 
     /// The values that everyone sees, one per variable.
@@ -283,6 +287,18 @@ impl<'l> Barrier<'l> {
             member.is_due = member.next_update <= next;
         }
         Ok(())
+    }
+
+    /// Shows the last commit to those who read each of them.
+    pub(crate) fn show_commit(&mut self) -> Result<(), String> {
+        let commit = Commit {
+            step: self.step,
+            length: self.length,
+            members: &self.shown,
+            values: self.data.committed(),
+            trace: &self.trace,
+        };
+        (self.logic.commit.iter_mut()).try_for_each(|hook| hook(&commit))
     }
 
     /// Begins the next step, up to the runs of the clients that are due.

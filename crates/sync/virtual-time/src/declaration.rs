@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
-use tickbus_image::signal::DataType;
+use tickbus_image::signal::{DataType, Slot};
 
 /// The longest name of a client or variable, in bytes of UTF-8.
 pub(crate) const LONGEST_NAME: usize = 255;
@@ -150,6 +150,22 @@ pub const fn is_raw(data_type: DataType, slot: u64) -> bool {
     } else {
         slot << unused >> unused == slot
     }
+}
+
+/// The slot of a simulation with a [raw value](is_raw) of a run: a double, or the 64 bits of an LWORD, LINT or ULINT.
+pub fn slot_of(data_type: DataType, raw: u64) -> Slot {
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        reason = "32 bits at most"
+    )]
+    Slot::from_real(match data_type {
+        DataType::Lword | DataType::Lint | DataType::Ulint => return Slot::from_unsigned(raw),
+        DataType::Real => f32::from_bits(raw as u32).into(),
+        DataType::Lreal => f64::from_bits(raw),
+        _ if data_type.is_signed() => raw.cast_signed() as f64,
+        _ => raw as f64,
+    })
 }
 
 #[cfg(test)]

@@ -2,8 +2,15 @@
 
 use std::fmt;
 
+use tickbus_base::time::Nanos;
+
+use crate::hash::Trace;
+use crate::members::Members;
 use crate::shared_data::SharedData;
-use crate::{Step, Variable};
+use crate::{Step, TraceHash, Variable};
+
+/// A reader of every commit. Its error ends the run.
+pub type CommitHook<'l> = Box<dyn FnMut(&Commit<'_>) -> Result<(), String> + Send + 'l>;
 
 /// A piece of logic. Its error ends the run.
 pub type Hook<'l> = Box<dyn FnMut(&mut Access<'_>) -> Result<(), String> + Send + 'l>;
@@ -17,6 +24,7 @@ pub type Hook<'l> = Box<dyn FnMut(&mut Access<'_>) -> Result<(), String> + Send 
 /// | [`on_read`](Self::on_read) | once for each client that reads the variable in a step, in the order of clients and their reads | with the step's commit |
 /// | [`on_time`](Self::on_time) | time has moved on, before the clients run; in the order of registration | with the step's commit |
 ///
+/// [`on_commit`](Self::on_commit) is called after each commit, and writes nothing.
 /// Writes of the logic call no other hooks. If two hooks write the same variable before one commit, the later one wins.
 #[derive(Default)]
 pub struct Logic<'l> {
@@ -25,6 +33,7 @@ pub struct Logic<'l> {
     pub(crate) time: Vec<Hook<'l>>,
     pub(crate) change: Vec<(String, Hook<'l>)>,
     pub(crate) read: Vec<(String, Hook<'l>)>,
+    pub(crate) commit: Vec<CommitHook<'l>>,
 }
 
 impl fmt::Debug for Logic<'_> {
@@ -88,6 +97,53 @@ impl<'l> Logic<'l> {
     ) -> Self {
         self.read.push((name.into(), Box::new(hook)));
         self
+    }
+
+    /// Adds a reader of every commit, the initial values included.
+    #[must_use]
+    pub fn on_commit(
+        mut self,
+        hook: impl FnMut(&Commit<'_>) -> Result<(), String> + Send + 'l,
+    ) -> Self {
+        self.commit.push(Box::new(hook));
+        self
+    }
+}
+
+/// A commit, as everyone sees it from now on.
+#[derive(Debug)]
+pub struct Commit<'a> {
+    pub(crate) step: Step,
+    pub(crate) length: Nanos,
+    pub(crate) members: &'a Members,
+    pub(crate) values: &'a [u64],
+    pub(crate) trace: &'a Trace,
+}
+
+impl Commit<'_> {
+    /// The step that was committed; 0 for the initial values, whose time is one step below 0.
+    pub const fn step(&self) -> Step {
+        self.step
+    }
+
+    /// The virtual time of one step.
+    pub const fn length(&self) -> Nanos {
+        self.length
+    }
+
+    /// The raw values of all variables, in the order of [`members`](Self::members).
+    pub const fn values(&self) -> &[u64] {
+        self.values
+    }
+
+    /// The trace hash of the run up to this commit.
+    pub fn hash(&self) -> TraceHash {
+        self.trace.hash()
+    }
+
+    /// The participants and their variables, the same for every commit of a run.
+    pub const fn members(&self) -> &Members {
+        self.members
     }
 }
 

@@ -6,7 +6,6 @@ mod patience;
 mod showing;
 
 use std::collections::{BTreeSet, VecDeque};
-use std::sync::Arc;
 
 use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace};
@@ -14,7 +13,6 @@ use tickbus_base::toml_text::{printable, shown};
 
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
-use crate::members::Members;
 use crate::{Cause, Declaration, Ended, Outcome, Settings, Step};
 use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
@@ -54,8 +52,6 @@ pub struct Server<'l> {
     /// The deadline for the end of a stopped run.
     stop_by: Option<Nanos>,
     pace: Option<Pace>,
-    /// The participants, once somebody has viewed the running run.
-    shown: Option<Arc<Members>>,
 }
 
 #[derive(Debug)]
@@ -111,7 +107,6 @@ impl<'l> Server<'l> {
             singles: 0,
             stop_by: None,
             pace: None,
-            shown: None,
         })
     }
 
@@ -404,6 +399,9 @@ impl<'l> Server<'l> {
             if barrier.state() != State::PreRead {
                 if let Err(reason) = barrier.commit() {
                     return self.end_for(Cause::Logic, None, of_logic(&reason));
+                }
+                if let Err(reason) = barrier.show_commit() {
+                    return self.end_for(Cause::System, None, reason);
                 }
                 continue;
             }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use tickbus_base::statistics::Statistics;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::{Cause, LinkState};
-use tickbus_image::signal::{Area, DataType, Signal, Slot};
-use tickbus_virtual_time::{Controls, Members, Pacing, RunView, State, Step};
+use tickbus_image::signal::{Area, Signal, Slot};
+use tickbus_virtual_time::{Controls, Members, Pacing, RunView, State, Step, slot_of};
 use tickbus_web::Refused;
 
 use crate::exhibit::{Exhibit, Freshness};
@@ -83,24 +83,6 @@ impl Pace {
     }
 }
 
-/// The slot with a signal's raw value of a run, see [`tickbus_virtual_time::is_raw`].
-fn slot_of(signal: &Signal, value: u64) -> Slot {
-    if signal.is_integer_slot() {
-        return Slot::from_unsigned(value);
-    }
-    #[expect(
-        clippy::cast_precision_loss,
-        clippy::cast_possible_truncation,
-        reason = "32 bits at most"
-    )]
-    Slot::from_real(match signal.data_type {
-        DataType::Real => f32::from_bits(value as u32).into(),
-        DataType::Lreal => f64::from_bits(value),
-        data_type if data_type.is_signed() => value.cast_signed() as f64,
-        _ => value as f64,
-    })
-}
-
 impl ShownRun {
     pub(crate) fn new(id: i32, name: &str, controls: Controls, now: Nanos) -> Self {
         let mut run = Self {
@@ -155,7 +137,7 @@ impl ShownRun {
         self.signals = signals.collect();
         let values = self.signals.iter().zip(&view.values);
         let values: Vec<Slot> = values
-            .map(|(signal, value)| slot_of(signal, *value))
+            .map(|(signal, value)| slot_of(signal.data_type, *value))
             .collect();
         self.sheet = Sheet::new(now, &values);
     }
@@ -176,7 +158,7 @@ impl ShownRun {
                 0
             };
             let seen = Row {
-                slot: slot_of(signal, *value),
+                slot: slot_of(signal.data_type, *value),
                 bits: value & (u64::MAX >> (64 - signal.data_type.width().bits())),
                 edges: 0,
                 flags,

@@ -9,6 +9,7 @@ use std::io::{self, BufRead, BufReader};
 use std::path::Path;
 
 use self::csv::CsvReader;
+pub use self::vcd::MOST_COLUMNS;
 use self::vcd::VcdReader;
 use super::{Columns, Format, Tick};
 use tickbus_base::Mistake;

@@ -11,8 +11,8 @@ use crate::{Column, Columns, Tick, VERSION, ValueKind};
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::{Address, DataType, Slot};
 
-/// The largest number of columns.
-const MOST_COLUMNS: usize = 250_000;
+/// The largest number of columns that a reader accepts.
+pub const MOST_COLUMNS: usize = 250_000;
 
 /// The meaning of a variable in the file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -297,13 +297,16 @@ impl Header {
 
     fn column(&mut self, is_edges: bool, mut words: Words<'_>) -> Option<()> {
         let id = words.next()?.plain()?.parse().ok()?;
-        let address: Address = words.next()?.plain()?.parse().ok()?;
+        let address: Option<Address> = match words.next()?.plain()? {
+            "-" => None,
+            address => Some(address.parse().ok()?),
+        };
         let data_type: DataType = words.next()?.plain()?.parse().ok()?;
         let mut column = Column {
             name: words.next()?.quoted()?,
             is_edges,
             kind: ValueKind::Count,
-            address: Some(address),
+            address,
             data_type: Some(data_type),
             unit: None,
             station: String::new(),

@@ -12,11 +12,7 @@ impl Server<'_> {
     pub fn view(&mut self, now: Nanos) -> Option<RunView> {
         let members = match &self.phase {
             Phase::Joining(joining, _) => Arc::new(joining.members()),
-            // The members do not change any more, and may be many.
-            Phase::Running(barrier, _) => Arc::clone(
-                self.shown
-                    .get_or_insert_with(|| Arc::new(barrier.members())),
-            ),
+            Phase::Running(barrier, _) => Arc::clone(barrier.members()),
             Phase::Ended(_) => return None,
         };
         let (owes, values) = match &self.phase {

@@ -3,6 +3,7 @@
 mod common;
 mod example;
 mod model_check;
+mod recording;
 mod rules;
 mod sequences;
 mod server;

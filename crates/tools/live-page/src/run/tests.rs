@@ -2,6 +2,7 @@
 
 use std::num::NonZeroU32;
 
+use tickbus_image::signal::DataType;
 use tickbus_virtual_time::{Client, Variable};
 
 use super::*;

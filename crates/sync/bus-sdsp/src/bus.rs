@@ -10,10 +10,16 @@ use tickbus_virtual_time as sdsp;
 use tickbus_virtual_time::{Declaration, Ended, Meeting, Step};
 
 use super::run::{End, Run};
-use super::{Options, Variables};
+use super::{Every, Options, Variables};
 
 /// The most steps that one tick catches up on. More steps are assumed to be a wrong time.
 const MOST_STEPS: i64 = 100_000;
+
+/// The statistic with the clients that the server waits for.
+const WAITS_FOR: &str = "sdsp.waits_for";
+
+/// The fact if it waits for nobody.
+const NOBODY: &str = "nobody";
 
 /// A client of a run on virtual time.
 #[derive(Debug)]
@@ -22,6 +28,8 @@ pub struct Sdsp {
     timeout: Nanos,
     clock: Arc<dyn Clock>,
     declaration: Declaration,
+    /// Each tick is a step.
+    by_ticks: bool,
     stop: Stop,
     values: Values,
     state: State,
@@ -31,8 +39,12 @@ pub struct Sdsp {
 enum State {
     /// The client has not joined yet.
     Apart,
-    /// In a step; the next one is due at this time of the simulation.
-    Joined { run: Box<Run>, due: Nanos },
+    /// In a step; the next one is due at this time of the simulation. Virtual time began at `begun`.
+    Joined {
+        run: Box<Run>,
+        due: Nanos,
+        begun: Nanos,
+    },
     /// The run has ended, or continues without this client.
     Over(Result<(), BusError>),
 }
@@ -73,6 +85,7 @@ impl Sdsp {
                 receipt: None,
             },
             declaration,
+            by_ticks: options.every == Every::Tick && setup.hosted.is_none(),
             state: State::Apart,
         })
     }
@@ -90,23 +103,32 @@ impl Sdsp {
                 &self.declaration,
                 &values.types,
                 &values.slots,
-                &self.stop,
+                (&self.stop, &mut |whom| port.tell(WAITS_FOR, whom)),
             )?;
             values.are_sent(port);
-            let step = run.step()?;
+            let step = run.step(&mut |whom| port.tell(WAITS_FOR, whom))?;
+            port.tell(WAITS_FOR, NOBODY);
             let due = now + run.interval;
             values.deliver(now, run.reads(), port);
             self.begin(step, port);
             self.state = State::Joined {
                 run: Box::new(run),
                 due,
+                begun: now,
             };
             return Ok(due);
         }
-        let State::Joined { run, due } = &mut self.state else {
+        let State::Joined { run, due, begun } = &mut self.state else {
             unreachable!("the caller has seen to it");
         };
-        let late = now - *due;
+        // With ticks of any length each one after the current step asks for another: the due time is only what a
+        // simulation without a step of its own takes.
+        let since = if self.by_ticks {
+            *due - run.interval + Nanos(1)
+        } else {
+            *due
+        };
+        let late = now - since;
         if late > run.interval.times(MOST_STEPS) {
             return Err(run.give_up(&format!(
                 "its simulation time jumped from {due} to {now}, over more than {MOST_STEPS} steps; hand in the \
@@ -118,9 +140,22 @@ impl Sdsp {
             return Ok(*due);
         }
         loop {
-            run.advance(&values.slots)?;
+            let next = self.by_ticks.then_some(now - *begun);
+            let mut has_waited = false;
+            let step = run.advance(&values.slots, next, &mut |whom| {
+                port.tell(WAITS_FOR, whom);
+                has_waited = true;
+            })?;
+            if has_waited {
+                port.tell(WAITS_FOR, NOBODY);
+            }
             values.are_sent(port);
             values.deliver(now, run.reads(), port);
+            if self.by_ticks {
+                // With longer steps the server is ahead of this tick.
+                *due = *begun + step.time + run.interval;
+                return Ok(*due);
+            }
             *due += run.interval;
             if now < *due {
                 return Ok(*due);
@@ -146,6 +181,7 @@ impl Sdsp {
             }
             End::Broken(ended) => Err(bus_error(ended)),
         };
+        port.tell(WAITS_FOR, NOBODY);
         let (cause, why) = match &result {
             Ok(why) => (Cause::Left, why.clone()),
             Err(error) => (error.into(), error.to_string()),

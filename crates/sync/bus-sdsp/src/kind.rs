@@ -27,6 +27,7 @@ impl BusOptions for Options {
         );
         parts.push(match self.every {
             Every::Time(step) => format!("a step every {step}"),
+            Every::Tick => "a step in each tick".to_owned(),
             Every::Steps(multiple) if multiple.get() == 1 => "in each of its steps".to_owned(),
             Every::Steps(multiple) => format!("in one of {multiple} steps"),
         });

@@ -19,6 +19,9 @@ const NAME_LIMIT: usize = 120;
 /// How long the server may be silent. While it waits for clients or is paused, it sends a message every second.
 const TIMEOUT: Nanos = Nanos::from_secs(60);
 
+/// The value of `step` for a simulation whose ticks are of any length.
+const TICK: &str = "tick";
+
 /// The keys of the bus, for the schema of a driver.cfg.
 pub(crate) const KEYS: &[Key] = &[
     Key::new("address", Shape::ADDRESS, "Where the server listens"),
@@ -39,8 +42,8 @@ pub(crate) const KEYS: &[Key] = &[
     ),
     Key::new(
         "step",
-        Shape::Duration,
-        "Instead of \"multiple\": the virtual time of one step of this end",
+        Shape::Any(&[Shape::Duration, Shape::Choice(&[TICK])]),
+        "Instead of \"multiple\": the virtual time of one step of this end; \"tick\": each tick of the simulation is one",
     ),
     Key::new(
         "timeout",
@@ -75,6 +78,8 @@ pub enum Every {
     Steps(NonZeroU32),
     /// This virtual time: a whole multiple of the server's step, and above zero.
     Time(Nanos),
+    /// The ticks of the simulation: each is a step, the first of the server's at or after its time.
+    Tick,
 }
 
 impl Options {
@@ -122,6 +127,7 @@ impl Options {
             (Some(multiple), None) => (multiple.whole(1..=u32::MAX.into()))
                 .and_then(|multiple| u32::try_from(multiple).ok()?.try_into().ok())
                 .map(Every::Steps),
+            (None, Some(step)) if step.as_text() == Some(TICK) => Some(Every::Tick),
             (None, Some(step)) => step.duration().map(Every::Time),
             (None, None) => Some(Every::Steps(NonZeroU32::MIN)),
         };
@@ -212,6 +218,7 @@ impl Options {
             (_, Some(hosted)) => declaration.interval = Some(hosted.interval),
             (Every::Time(interval), None) => declaration.interval = Some(interval),
             (Every::Steps(multiple), None) => declaration.multiple = multiple,
+            (Every::Tick, None) => {}
         }
         declaration.writes = writes.iter().cloned().collect();
         declaration.reads = reads.iter().map(|variable| variable.name.clone()).collect();

@@ -28,6 +28,9 @@ impl From<Ended> for End {
     }
 }
 
+/// Gets what the server waits for, once a second.
+pub(super) type Told<'t> = &'t mut dyn FnMut(&str);
+
 /// A client that takes part in a run.
 #[derive(Debug)]
 pub(super) struct Run {
@@ -47,7 +50,7 @@ impl Run {
         declaration: &Declaration,
         types: &[DataType],
         initial: &[u64],
-        stop: &Stop,
+        (stop, told): (&Stop, Told<'_>),
     ) -> Result<Self, End> {
         let mut run = Self {
             connection: connect((meeting, clock), timeout, declaration, stop)?,
@@ -55,7 +58,7 @@ impl Run {
             interval: Nanos::ZERO,
             is_over: false,
         };
-        match run.wait()? {
+        match run.wait(told)? {
             Asked::Initial => {}
             other => unreachable!("a client is first asked for its initial values, not {other:?}"),
         }
@@ -76,15 +79,21 @@ impl Run {
         Ok(run)
     }
 
-    /// Finishes the step that this client is in, and waits for its next one.
-    pub(super) fn advance(&mut self, writes: &[u64]) -> Result<Step, End> {
-        self.connection.answer(writes);
-        self.step()
+    /// Finishes the step that this client is in, and waits for its next one, which is at the virtual time `next` or soon
+    /// after it; `None`: as declared.
+    pub(super) fn advance(
+        &mut self,
+        writes: &[u64],
+        next: Option<Nanos>,
+        told: Told<'_>,
+    ) -> Result<Step, End> {
+        self.connection.answer_until(writes, next);
+        self.step(told)
     }
 
     /// Waits for the next step of this client.
-    pub(super) fn step(&mut self) -> Result<Step, End> {
-        match self.wait()? {
+    pub(super) fn step(&mut self, told: Told<'_>) -> Result<Step, End> {
+        match self.wait(told)? {
             Asked::Step(step) => Ok(step),
             other => unreachable!("after the start a client is asked for steps, not {other:?}"),
         }
@@ -96,7 +105,7 @@ impl Run {
         self.connection.answer(writes);
         self.timeout = self.timeout.min(FAREWELL);
         // The next request gets no answer.
-        let _ = self.wait();
+        let _ = self.wait(&mut |_| {});
     }
 
     /// The values that this client reads in its step.
@@ -108,15 +117,15 @@ impl Run {
     pub(super) fn give_up(&mut self, reason: &str) -> End {
         self.connection.give_up(reason);
         loop {
-            match self.wait() {
+            match self.wait(&mut |_| {}) {
                 Ok(_) => {}
                 Err(end) => return end,
             }
         }
     }
 
-    fn wait(&mut self) -> Result<Asked, End> {
-        let asked = self.connection.wait(self.timeout);
+    fn wait(&mut self, told: Told<'_>) -> Result<Asked, End> {
+        let asked = self.connection.wait_telling(self.timeout, told);
         self.is_over = !matches!(asked, Ok(Asked::Initial | Asked::Step(_)));
         if let Err(ended) = &asked {
             self.connection.give_up(&ended.reason);

@@ -232,11 +232,12 @@ impl<'l> Barrier<'l> {
         self.owing == 0
     }
 
-    /// A client has finished its run of the step `sequence`; the error describes a violation of the protocol.
+    /// A client has finished its run of the step `sequence`, and wants to run again in the step `next`, or as declared
+    /// if that is 0; the error describes a violation of the protocol.
     pub(crate) fn done(
         &mut self,
         client: usize,
-        sequence: u64,
+        (sequence, next): (u64, u64),
         values: impl ExactSizeIterator<Item = u64>,
     ) -> Result<(), String> {
         let member = &mut self.members[client];
@@ -260,6 +261,9 @@ impl<'l> Barrier<'l> {
         }
         let staged = self.data.stage(member.writes.clone(), values);
         staged.map_err(|why| format!("wrote a wrong value in step {sequence}: {why}"))?;
+        if next != 0 {
+            member.next_update = next.max(now + 1);
+        }
         member.owes = false;
         self.owing -= 1;
         Ok(())

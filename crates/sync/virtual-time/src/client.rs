@@ -6,6 +6,7 @@ use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
+use crate::participant::step_at;
 use crate::wire::{self, FromServer};
 use crate::{Cause, Declaration, Ended, Outcome, Participant, Step};
 
@@ -31,6 +32,7 @@ pub struct Client {
     step: Nanos,
     read_types: Vec<DataType>,
     reads: Vec<u64>,
+    waits_for: String,
     out: Vec<u8>,
 }
 
@@ -52,6 +54,7 @@ impl Client {
             ran: None,
             step: Nanos::ZERO,
             read_types: Vec::new(),
+            waits_for: String::new(),
             out,
         })
     }
@@ -74,6 +77,11 @@ impl Client {
     /// The values that the client reads in this step.
     pub fn reads(&self) -> &[u64] {
         &self.reads
+    }
+
+    /// The text of the last waiting message; see [`Participant::waiting`].
+    pub fn waits_for(&self) -> &str {
+        &self.waits_for
     }
 
     /// The frame to send: first the join, then the last one made.
@@ -105,7 +113,9 @@ impl Client {
             self.owes = None;
             return Ok(Some(Asked::End(outcome)));
         }
-        if message == FromServer::Waiting {
+        if let FromServer::Waiting(whom) = message {
+            self.waits_for.clear();
+            self.waits_for.push_str(whom);
             return Ok(None);
         }
         if let Some(owed) = self.owes {
@@ -124,6 +134,9 @@ impl Client {
                     return Err(violated("started twice".to_owned()));
                 }
                 count(reads.len())?;
+                if step <= Nanos::ZERO {
+                    return Err(violated(format!("starts a run with steps of {step}")));
+                }
                 (self.step, self.read_types) = (step, reads);
                 self.owes = Some(0);
                 Ok(Some(Asked::Initial))
@@ -141,7 +154,7 @@ impl Client {
                 self.owes = Some(step.sequence);
                 Ok(Some(Asked::Step(step)))
             }
-            FromServer::End(_) | FromServer::Waiting => unreachable!("dealt with above"),
+            FromServer::End(_) | FromServer::Waiting(_) => unreachable!("dealt with above"),
         }
     }
 
@@ -151,11 +164,22 @@ impl Client {
     ///
     /// When nothing was requested, or `writes` does not have one value per variable of [`Declaration::writes`].
     pub fn answer(&mut self, writes: &[u64]) {
+        self.answer_until(writes, None);
+    }
+
+    /// Like [`answer`](Self::answer), with the virtual time at which the client wants to run next; see
+    /// [`Participant::next_update`].
+    ///
+    /// # Panics
+    ///
+    /// The same as for `answer`.
+    pub fn answer_until(&mut self, writes: &[u64], next: Option<Nanos>) {
         let sequence = self.owes.take().expect("the server has asked");
         assert_eq!(writes.len(), self.declaration.writes.len(), "values");
         self.ran = Some(sequence);
         self.out.clear();
-        wire::done(&mut self.out, sequence, writes);
+        let next = next.map_or(0, |time| step_at(time, self.step));
+        wire::done(&mut self.out, sequence, next, writes);
     }
 
     /// Makes the frame that says why the client gives up.
@@ -202,6 +226,19 @@ impl Connection {
     ///
     /// The server is lost, violates the protocol or sends nothing, or this client was stopped.
     pub fn wait(&mut self, limit: Nanos) -> Result<Asked, Ended> {
+        self.wait_telling(limit, &mut |_| {})
+    }
+
+    /// Like [`wait`](Self::wait); `told` gets what the server waits for, once a second, see [`Participant::waiting`].
+    ///
+    /// # Errors
+    ///
+    /// The same as for `wait`.
+    pub fn wait_telling(
+        &mut self,
+        limit: Nanos,
+        told: &mut dyn FnMut(&str),
+    ) -> Result<Asked, Ended> {
         loop {
             let steps = self.client.steps();
             let frame = self.line.receive(limit);
@@ -209,7 +246,7 @@ impl Connection {
             let frame = frame.map_err(|ended| Ended { steps, ..ended })?;
             match self.client.receive(frame) {
                 Ok(Some(asked)) => return Ok(asked),
-                Ok(None) => {}
+                Ok(None) => told(self.client.waits_for()),
                 Err(ended) => {
                     self.give_up(&ended.reason);
                     return Err(ended);
@@ -225,7 +262,17 @@ impl Connection {
     ///
     /// When nothing was requested, or the number of values is wrong.
     pub fn answer(&mut self, writes: &[u64]) {
-        self.client.answer(writes);
+        self.answer_until(writes, None);
+    }
+
+    /// Like [`answer`](Self::answer), with the virtual time at which the client wants to run next; see
+    /// [`Participant::next_update`].
+    ///
+    /// # Panics
+    ///
+    /// The same as for `answer`.
+    pub fn answer_until(&mut self, writes: &[u64], next: Option<Nanos>) {
+        self.client.answer_until(writes, next);
         self.line.send(self.client.frame());
     }
 
@@ -243,7 +290,8 @@ impl Connection {
     pub fn run(mut self, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
         let mut writes = vec![0; self.client.declaration.writes.len()];
         loop {
-            match self.wait(Nanos::MAX)? {
+            let asked = self.wait_telling(Nanos::MAX, &mut |whom| participant.waiting(whom));
+            match asked? {
                 Asked::Initial => participant.initial(&mut writes),
                 Asked::Step(step) => {
                     let ran = participant.run(step, self.client.reads(), &mut writes);
@@ -255,7 +303,7 @@ impl Connection {
                 }
                 Asked::End(outcome) => return outcome,
             }
-            self.answer(&writes);
+            self.answer_until(&writes, participant.next_update());
         }
     }
 }

@@ -102,9 +102,11 @@ impl fmt::Debug for Hosting<'_> {
 /// Passes a frame of the client at `seat`, without its header, to the server.
 pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
     match wire::from_client(frame) {
-        Ok(FromClient::Done { sequence, writes }) => {
-            server.done(now, seat, sequence, writes.iter());
-        }
+        Ok(FromClient::Done {
+            sequence,
+            next,
+            writes,
+        }) => server.done_until(now, seat, (sequence, next), writes.iter()),
         Ok(FromClient::Join {
             declaration,
             version,

@@ -3,6 +3,7 @@
 use tickbus_base::time::Nanos;
 
 use crate::client::Asked;
+use crate::participant::step_at;
 use crate::server::{Server, ToClient};
 use crate::{Declaration, Ended, Outcome, Participant};
 
@@ -13,6 +14,8 @@ pub(crate) struct Locals<'p>(Vec<Local<'p>>);
 struct Local<'p> {
     participant: &'p mut dyn Participant,
     seat: usize,
+    /// The virtual time of one step of the server.
+    length: Nanos,
     asked: Option<Asked>,
     reads: Vec<u64>,
     writes: Vec<u64>,
@@ -38,6 +41,7 @@ impl<'p> Locals<'p> {
             let local = Local {
                 participant,
                 seat,
+                length: Nanos::ZERO,
                 asked: None,
                 reads: vec![0; declaration.reads.len()],
                 writes: vec![0; declaration.writes.len()],
@@ -57,12 +61,15 @@ impl<'p> Locals<'p> {
             return false;
         };
         match message {
-            ToClient::Start { .. } => local.asked = Some(Asked::Initial),
+            ToClient::Start { step, .. } => {
+                local.length = *step;
+                local.asked = Some(Asked::Initial);
+            }
             ToClient::Step { step, reads } => {
                 local.reads.copy_from_slice(reads);
                 local.asked = Some(Asked::Step(*step));
             }
-            ToClient::Waiting => {}
+            ToClient::Waiting(_) => {}
             ToClient::End(end) => {
                 local.asked = None;
                 local.end = Some((*end).clone());
@@ -78,6 +85,7 @@ impl<'p> Locals<'p> {
             let Local {
                 participant,
                 seat,
+                length,
                 reads,
                 writes,
                 ..
@@ -92,7 +100,10 @@ impl<'p> Locals<'p> {
             };
             has_run = true;
             match ran {
-                Ok(()) => server.done(now, *seat, sequence, writes.iter().copied()),
+                Ok(()) => {
+                    let next = (participant.next_update()).map_or(0, |time| step_at(time, *length));
+                    server.done_until(now, *seat, (sequence, next), writes.iter().copied());
+                }
                 Err(reason) => server.gave_up(*seat, &reason),
             }
         }

@@ -31,4 +31,46 @@ pub trait Participant {
     ///
     /// The reason why the client cannot continue; this ends the run for everyone.
     fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String>;
+
+    /// The virtual time at which the client wants to run next, asked after [`initial`](Self::initial) and after each
+    /// [`run`](Self::run), for simulations that know the time of their next event. The client runs in the first step at
+    /// or after this time, in the following step at the earliest; the values that it has written stay until then.
+    /// `None`: as declared, by its multiple or interval.
+    fn next_update(&self) -> Option<Nanos> {
+        None
+    }
+
+    /// The server has been waiting for others for a second or more, while this client has nothing to do: `for_whom` is
+    /// a text for people, such as `"plc" to finish step 42`. Called once a second over TCP, and never elsewhere.
+    fn waiting(&mut self, for_whom: &str) {
+        let _ = for_whom;
+    }
+}
+
+/// The number of the first step at or after a virtual time, with steps of `length`.
+pub(crate) fn step_at(time: Nanos, length: Nanos) -> u64 {
+    let time = time.0.max(0).unsigned_abs();
+    time.div_ceil(length.0.unsigned_abs().max(1)) + 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_belongs_to_the_first_step_that_is_not_before_it() {
+        let cases = [
+            (i64::MIN, 1),
+            (-1, 1),
+            (0, 1),
+            (1, 2),
+            (9, 2),
+            (10, 2),
+            (11, 3),
+        ];
+        for (time, step) in cases {
+            assert_eq!(step_at(Nanos(time), Nanos(10)), step, "{time}");
+        }
+        assert_eq!(step_at(Nanos::MAX, Nanos(1)), 1 << 63);
+    }
 }

@@ -40,6 +40,8 @@ pub struct Server<'l> {
     informed: BTreeSet<usize>,
     /// When these clients were last informed.
     informed_at: Nanos,
+    /// The text that they got.
+    waits_for: String,
     outbox: VecDeque<Out>,
     news: VecDeque<String>,
     /// The end of a refused client, while its message is fetched.
@@ -100,6 +102,7 @@ impl<'l> Server<'l> {
             seats: Vec::new(),
             informed: BTreeSet::new(),
             informed_at: now,
+            waits_for: String::new(),
             outbox: VecDeque::new(),
             news: VecDeque::new(),
             refused: Err(Ended::before(Cause::Refused, "")),
@@ -238,6 +241,18 @@ impl<'l> Server<'l> {
         sequence: u64,
         values: impl ExactSizeIterator<Item = u64>,
     ) {
+        self.done_until(now, seat, (sequence, 0), values);
+    }
+
+    /// Like [`done`](Self::done), for a client that wants to run again in the step `next`: in the following one if that
+    /// has passed, and as declared if it is 0.
+    pub fn done_until(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        (sequence, next): (u64, u64),
+        values: impl ExactSizeIterator<Item = u64>,
+    ) {
         let (Seat::Client(client), Phase::Running(barrier, _)) =
             (self.seats[seat], &mut self.phase)
         else {
@@ -246,7 +261,7 @@ impl<'l> Server<'l> {
         if self.outbox.iter().any(|out| out.seat() == seat) {
             return self.violated(seat, "answered before it was asked");
         }
-        if let Err(reason) = barrier.done(client, sequence, values) {
+        if let Err(reason) = barrier.done(client, (sequence, next), values) {
             return self.violated(seat, &reason);
         }
         if barrier.is_synchronised() {
@@ -345,7 +360,7 @@ impl<'l> Server<'l> {
                 step: self.settings.step,
                 reads: barrier.read_types(client),
             },
-            (Out::Waiting(_), ..) => ToClient::Waiting,
+            (Out::Waiting(_), ..) => ToClient::Waiting(&self.waits_for),
             (Out::Refused(_, ended), ..) => {
                 self.seats[seat] = Seat::Free;
                 self.refused = Err(*ended);

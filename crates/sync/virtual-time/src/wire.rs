@@ -14,7 +14,8 @@ use crate::server::ToClient;
 use crate::{Cause, Declaration, Ended, Outcome, Step, TraceHash, Variable};
 use reader::Reader;
 
-/// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`].
+/// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`] and
+/// ask for no step.
 pub const VERSION: u16 = 2;
 
 /// The oldest version that a server accepts.
@@ -35,6 +36,7 @@ const MAGIC: [u8; 4] = *b"SDSP";
 const JOIN: u8 = 0x01;
 const DONE: u8 = 0x02;
 const GIVE_UP: u8 = 0x03;
+const DONE_UNTIL: u8 = 0x04;
 const START: u8 = 0x81;
 const STEP: u8 = 0x82;
 const FINISHED: u8 = 0x83;
@@ -66,6 +68,8 @@ pub enum FromClient<'a> {
     Done {
         /// The step; 0 is the initial write.
         sequence: u64,
+        /// The step in which the client wants to run next; 0: as declared.
+        next: u64,
         /// The values that the client writes, in the order of its declaration.
         writes: Slots<'a>,
     },
@@ -93,7 +97,7 @@ pub enum FromServer<'a> {
     /// See [`ToClient::End`].
     End(Result<Outcome, Ended>),
     /// See [`ToClient::Waiting`].
-    Waiting,
+    Waiting(&'a str),
 }
 
 /// The length of the frame at the beginning of `bytes`, with its header, if already known.
@@ -181,10 +185,15 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
     Ok(())
 }
 
-/// Appends the values that a client writes after its run of the step `sequence`.
-pub fn done(out: &mut Vec<u8>, sequence: u64, writes: &[u64]) {
-    append(out, DONE, |out| {
+/// Appends the values that a client writes after its run of the step `sequence`. It runs next in the step `next`; 0: as
+/// declared.
+pub fn done(out: &mut Vec<u8>, sequence: u64, next: u64, writes: &[u64]) {
+    let kind = if next == 0 { DONE } else { DONE_UNTIL };
+    append(out, kind, |out| {
         out.extend_from_slice(&sequence.to_le_bytes());
+        if next != 0 {
+            out.extend_from_slice(&next.to_le_bytes());
+        }
         slots(out, writes);
     });
 }
@@ -208,7 +217,9 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
             out.extend_from_slice(&step.time.0.to_le_bytes());
             slots(out, reads);
         }),
-        ToClient::Waiting => append(out, WAITING, |_| {}),
+        ToClient::Waiting(what) => append(out, WAITING, |out| {
+            out.extend_from_slice(cut(what).as_bytes());
+        }),
         ToClient::End(Ok(outcome)) => append(out, FINISHED, |out| {
             out.extend_from_slice(&outcome.steps.to_le_bytes());
             out.extend_from_slice(&outcome.time.0.to_le_bytes());
@@ -239,6 +250,15 @@ pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
         JOIN => read_join(&mut reader)?,
         DONE => FromClient::Done {
             sequence: reader.word()?,
+            next: 0,
+            writes: reader.slots()?,
+        },
+        DONE_UNTIL => FromClient::Done {
+            sequence: reader.word()?,
+            next: match reader.word()? {
+                0 => return Err("asked for step 0 as its next one; expected 1 or more".to_owned()),
+                next => next,
+            },
             writes: reader.slots()?,
         },
         GIVE_UP => FromClient::GiveUp(reader.rest_as_text()?),
@@ -314,7 +334,7 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
             },
             reads: reader.slots()?,
         },
-        WAITING => FromServer::Waiting,
+        WAITING => FromServer::Waiting(reader.rest_as_text()?),
         FINISHED => FromServer::End(Ok(Outcome {
             steps: reader.word()?,
             time: nanos(reader.word()?),

@@ -4,3 +4,4 @@
 mod rig;
 mod sdsp;
 mod server;
+mod ticks;

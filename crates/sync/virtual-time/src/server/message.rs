@@ -35,9 +35,10 @@ pub enum ToClient<'a> {
         /// The values that the client reads, in the order of its declaration.
         reads: &'a [u64],
     },
-    /// The server waits: for others to join or to answer, or it is paused. Idle clients get this once a second, so that
-    /// they can tell a waiting server from one that hangs.
-    Waiting,
+    /// The server waits: for others to join or to answer, or it is paused; the text for people says for what, such as
+    /// `"plc" to finish step 42`. Idle clients get this once a second, so that they can tell a waiting server from one
+    /// that hangs.
+    Waiting(&'a str),
     /// The run has ended, or the client does not take part in it. No message follows.
     End(&'a Result<Outcome, Ended>),
 }

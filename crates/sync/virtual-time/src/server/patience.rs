@@ -1,9 +1,13 @@
 //! The parts that depend on the wall clock: pacing of steps, and timeouts.
 
 use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::shown;
 
 use super::{Out, Phase, STOP_PATIENCE, Seat, Server};
 use crate::{Cause, State};
+
+/// The most clients that are named as those that the server waits for.
+const MOST_NAMED: usize = 5;
 
 /// How often idle clients learn that the server waits.
 const INFORM: Nanos = Nanos::from_secs(1);
@@ -73,6 +77,10 @@ impl Server<'_> {
             return;
         }
         self.informed_at = now;
+        if self.informed.is_empty() {
+            return;
+        }
+        self.waits_for = self.waits_for();
         let barrier = match &self.phase {
             Phase::Joining(..) => None,
             Phase::Running(barrier, _) => Some(barrier),
@@ -89,6 +97,31 @@ impl Server<'_> {
             if is_idle && self.outbox.iter().all(|out| out.seat() != *seat) {
                 self.outbox.push_back(Out::Waiting(*seat));
             }
+        }
+    }
+
+    /// Says what the server waits for, as the continuation of "it waits for …".
+    fn waits_for(&self) -> String {
+        let barrier = match &self.phase {
+            Phase::Joining(joining, _) => return format!("{} to join", joining.missing()),
+            Phase::Running(barrier, _) => barrier,
+            Phase::Ended(_) => return String::new(),
+        };
+        let mut owing = (barrier.owing()).map(|client| shown(&barrier.declaration(client).name));
+        let named: Vec<String> = (owing.by_ref().take(MOST_NAMED))
+            .map(|name| format!("\"{name}\""))
+            .collect();
+        let more = match owing.count() {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        match barrier.step().sequence {
+            _ if named.is_empty() && self.is_paused() => {
+                "a command, since the run is paused".to_owned()
+            }
+            _ if named.is_empty() => "the time of the next step".to_owned(),
+            0 => format!("{}{more} to send initial values", named.join(", ")),
+            step => format!("{}{more} to finish step {step}", named.join(", ")),
         }
     }
 

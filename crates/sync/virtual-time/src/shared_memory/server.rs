@@ -203,7 +203,7 @@ impl Host<'_, '_, '_> {
             let Some((client, message)) = self.server.poll() else {
                 break;
             };
-            if matches!(message, ToClient::Waiting) {
+            if matches!(message, ToClient::Waiting(_)) {
                 // Clients watch the pulse instead: a mailbox has room for one frame.
                 continue;
             }

@@ -174,7 +174,7 @@ impl Host<'_, '_, '_> {
             let Some((seat, message)) = self.server.poll() else {
                 break;
             };
-            has_asked |= !matches!(message, ToClient::End(_) | ToClient::Waiting);
+            has_asked |= !matches!(message, ToClient::End(_) | ToClient::Waiting(_));
             if self.locals.take(seat, &message) {
                 continue;
             }

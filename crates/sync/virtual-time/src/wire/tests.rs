@@ -56,6 +56,7 @@ proptest! {
     fn what_clients_send_is_read_as_it_was_written(
         declaration in declaration(),
         sequence: u64,
+        next: u64,
         writes: Vec<u64>,
         reason in ".{0,99}",
     ) {
@@ -64,10 +65,10 @@ proptest! {
         let version = VERSION;
         prop_assert_eq!(from_client(content(&out)), Ok(FromClient::Join { declaration, version }));
         out.clear();
-        done(&mut out, sequence, &writes);
+        done(&mut out, sequence, next, &writes);
         match from_client(content(&out)) {
-            Ok(FromClient::Done { sequence: read, writes: slots }) => {
-                prop_assert_eq!(read, sequence);
+            Ok(FromClient::Done { sequence: read, next: wanted, writes: slots }) => {
+                prop_assert_eq!((read, wanted), (sequence, next));
                 prop_assert_eq!(slots.iter().collect::<Vec<_>>(), writes);
             }
             other => prop_assert!(false, "{:?}", other),
@@ -84,6 +85,7 @@ proptest! {
         reads: Vec<u64>,
         types in proptest::collection::vec(proptest::sample::select(&DataType::ALL[..]), 0..20),
         end in ended(),
+        whom in ".{0,99}",
     ) {
         let mut out = Vec::new();
         let step = Step { sequence, time: Nanos(time) };
@@ -103,8 +105,8 @@ proptest! {
         to_client(&mut out, &ToClient::End(&end));
         prop_assert_eq!(from_server(content(&out)), Ok(FromServer::End(end)));
         out.clear();
-        to_client(&mut out, &ToClient::Waiting);
-        prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Waiting));
+        to_client(&mut out, &ToClient::Waiting(&whom));
+        prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Waiting(&whom)));
     }
 
     #[test]
@@ -116,8 +118,8 @@ proptest! {
             Ok(FromClient::Join { declaration, version: VERSION }) => {
                 join(&mut out, &declaration).expect("short");
             }
-            Ok(FromClient::Done { sequence, writes }) => {
-                done(&mut out, sequence, &writes.iter().collect::<Vec<_>>());
+            Ok(FromClient::Done { sequence, next, writes }) => {
+                done(&mut out, sequence, next, &writes.iter().collect::<Vec<_>>());
             }
             Ok(FromClient::GiveUp(reason)) => give_up(&mut out, reason),
             // Joins of version 1 can be read, but not written.
@@ -143,6 +145,22 @@ fn no_prefix_of_a_message_is_one() {
     out.push(0);
     let longer = from_client(&out[HEADER..]).expect_err("too long");
     assert_eq!(longer, "sent a message with 1 bytes too many");
+}
+
+#[test]
+fn a_step_that_is_wanted_next_has_a_number() {
+    let mut out = Vec::new();
+    done(&mut out, 7, 9, &[1]);
+    assert_eq!(out[HEADER], DONE_UNTIL);
+    for length in HEADER..HEADER + 17 {
+        assert!(from_client(&out[HEADER..length]).is_err(), "{length}");
+    }
+    out[HEADER + 9] = 0;
+    let told = from_client(&out[HEADER..]).expect_err("no step");
+    assert_eq!(told, "asked for step 0 as its next one; expected 1 or more");
+    out.clear();
+    done(&mut out, 7, 0, &[1]);
+    assert_eq!(out[HEADER], DONE);
 }
 
 #[test]

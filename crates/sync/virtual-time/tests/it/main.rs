@@ -3,6 +3,7 @@
 mod common;
 mod example;
 mod model_check;
+mod next_update;
 mod recording;
 mod rules;
 mod sequences;

@@ -20,6 +20,11 @@ struct Choices {
     at: usize,
 }
 
+/// True for a client that asks for each of its steps, in place of declaring a multiple.
+const fn asks(client: usize) -> bool {
+    client % 2 == 1
+}
+
 impl Choices {
     fn choose(&mut self, of: usize) -> usize {
         if self.at == self.taken.len() {
@@ -156,7 +161,9 @@ impl World {
                 self.clients[at].answered.push(sequence);
                 let seat = self.clients[at].seat.expect("enabled");
                 let value = 100 * sequence + at as u64;
-                self.server.done(now, seat, sequence, [value].into_iter());
+                let answer = (sequence, self.next(at, sequence));
+                self.server
+                    .done_until(now, seat, answer, [value].into_iter());
             }
             Action::Lose(at) => {
                 let was_running = self.has_started();
@@ -184,7 +191,9 @@ impl World {
                 let seat = self.clients[at].seat.expect("enabled");
                 for sequence in [sequence, sequence + 1] {
                     let value = 100 * sequence + at as u64;
-                    self.server.done(now, seat, sequence, [value].into_iter());
+                    let answer = (sequence, self.next(at, sequence));
+                    self.server
+                        .done_until(now, seat, answer, [value].into_iter());
                 }
             }
             Action::GiveUp(at) => {
@@ -208,12 +217,21 @@ impl World {
         self.deliver();
     }
 
+    /// The step that a client asks for when it answers the step `sequence`.
+    fn next(&self, at: usize, sequence: u64) -> u64 {
+        match sequence {
+            1.. if asks(at) => sequence + u64::from(self.clients[at].multiple),
+            _ => 0,
+        }
+    }
+
     fn declaration(&self, at: usize) -> Declaration {
         let client = &self.clients[at];
         Declaration {
             interval: None,
             name: client.name.clone(),
-            multiple: NonZeroU32::new(client.multiple).expect("above zero"),
+            multiple: NonZeroU32::new(if asks(at) { 1 } else { client.multiple })
+                .expect("above zero"),
             writes: vec![Variable::new(format!("x{at}"), DataType::Ulint)],
             reads: (0..self.clients.len()).map(|at| format!("x{at}")).collect(),
         }
@@ -238,7 +256,7 @@ impl World {
                     assert_eq!(step.time.0, (step.sequence.cast_signed() - 1) * 1_000_000);
                     (seat, step.sequence, Some(reads.to_vec()), None)
                 }
-                Some((_, ToClient::Waiting)) => continue,
+                Some((_, ToClient::Waiting(_))) => continue,
                 Some((seat, ToClient::End(end))) => (seat, 0, None, Some(end.clone())),
             };
             if self.stranger == Some(seat) {

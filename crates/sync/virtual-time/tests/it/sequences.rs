@@ -121,7 +121,7 @@ fn play(events: &[Event], pacing: Pacing, steps: Option<u64>) {
                     assert_eq!(reads.len(), 1);
                     step.sequence
                 }
-                ToClient::Waiting => continue,
+                ToClient::Waiting(_) => continue,
                 ToClient::End(_) => {
                     seats.remove(&at);
                     continue;

@@ -51,7 +51,7 @@ impl Bench {
             asked.push(match message {
                 ToClient::Start { .. } => 0,
                 ToClient::Step { step, .. } => step.sequence,
-                ToClient::Waiting => continue,
+                ToClient::Waiting(_) => continue,
                 ToClient::End(end) => panic!("{end:?}"),
             });
         }
@@ -374,27 +374,38 @@ fn clients_that_have_nothing_to_do_are_told_every_second_that_the_server_waits()
     let told = |server: &mut Server<'_>| {
         let mut seats = Vec::new();
         while let Some((seat, message)) = server.poll() {
-            assert_eq!(message, ToClient::Waiting);
-            seats.push(seat);
+            let ToClient::Waiting(whom) = message else {
+                panic!("{message:?}");
+            };
+            seats.push((seat, whom.to_owned()));
         }
         seats
     };
     let (a, b) = (joined(&mut server, "a", 2), joined(&mut server, "b", 1));
     assert_eq!(server.deadline(), now(1));
     server.tick(now(1));
-    assert_eq!(told(&mut server), [a], "others have to join");
+    let expected = [(a, "\"c\" to join".to_owned())];
+    assert_eq!(told(&mut server), expected, "b is of version 1");
     server.tick(now(1) + Nanos(MS));
-    assert_eq!(told(&mut server), [0; 0]);
+    assert_eq!(told(&mut server), []);
     let c = joined(&mut server, "c", 2);
     assert!((0..3).all(|_| matches!(server.poll(), Some((_, ToClient::Start { .. })))));
     server.done(now(1), a, 0, [].into_iter());
     server.tick(now(2));
-    assert_eq!(told(&mut server), [a], "the others have not answered");
+    let expected = [(a, "\"b\", \"c\" to send initial values".to_owned())];
+    assert_eq!(told(&mut server), expected);
     for seat in [b, c] {
         server.done(now(2), seat, 0, [].into_iter());
     }
     server.tick(now(3));
-    assert_eq!(told(&mut server), [a, c], "the run is paused");
+    let paused = || "a command, since the run is paused".to_owned();
+    assert_eq!(told(&mut server), [(a, paused()), (c, paused())]);
+    server.control(now(3), Control::Run);
+    assert!((0..3).all(|_| server.poll().is_some()), "all are due");
+    server.done(now(3), c, 1, [].into_iter());
+    server.tick(now(4));
+    let expected = [(c, "\"a\", \"b\" to finish step 1".to_owned())];
+    assert_eq!(told(&mut server), expected);
 }
 
 #[test]

@@ -10,15 +10,17 @@ import tickbus.sdsp.EndedException.Cause;
 /** Lets a {@link Participant} take part in a run over TCP. */
 public final class Client {
     private static final byte[] MAGIC = {'S', 'D', 'S', 'P'};
-    private static final short VERSION = 1;
+    private static final short VERSION = 2;
 
     private static final byte JOIN = 0x01;
     private static final byte DONE = 0x02;
     private static final byte GIVE_UP = 0x03;
+    private static final byte DONE_UNTIL = 0x04;
     private static final byte START = (byte) 0x81;
     private static final byte STEP = (byte) 0x82;
     private static final byte FINISHED = (byte) 0x83;
     private static final byte ENDED = (byte) 0x84;
+    private static final byte WAITING = (byte) 0x85;
 
     private static final int LONGEST_NAME = 255;
     private static final int LONGEST_REASON = 4096;
@@ -30,6 +32,8 @@ public final class Client {
     private final long[] writes;
     /** The last step that ran; 0 is the initial write, and -1 before that. */
     private long ran = -1;
+    /** The virtual time of one step of the server, in nanoseconds. */
+    private long serverStep;
     /** Why the participant cannot continue. */
     private Throwable failure;
 
@@ -78,7 +82,7 @@ public final class Client {
 
     /** The size of a join message without its kind. */
     private static int size(Declaration declaration) {
-        long size = MAGIC.length + Short.BYTES + Integer.BYTES + 2 * Short.BYTES + name(declaration.name()).length + 1;
+        long size = MAGIC.length + Short.BYTES + Integer.BYTES + Long.BYTES + 2 * Short.BYTES + name(declaration.name()).length + 1;
         for (Variable variable : declaration.writes()) {
             size += 2 + name(variable.name()).length;
         }
@@ -104,7 +108,7 @@ public final class Client {
 
     private void join(Declaration declaration, int size) throws IOException {
         ByteBuffer out = frames.begin(1 + size, JOIN);
-        out.put(MAGIC).putShort(VERSION).putInt(declaration.multiple());
+        out.put(MAGIC).putShort(VERSION).putInt(declaration.multiple()).putLong(declaration.intervalNanos());
         putName(out, declaration.name());
         out.putShort((short) declaration.writes().size());
         for (Variable variable : declaration.writes()) {
@@ -130,6 +134,7 @@ public final class Client {
                         frames.expect(3 * Long.BYTES);
                         return new Outcome(in.getLong(), in.getLong(), in.getLong());
                     }
+                    case WAITING -> participant.waiting(frames.text(frames.left()));
                     case ENDED -> throw ended(in);
                     default -> throw new Frames.Violation(String.format("sent a message of the unknown kind 0x%02X", kind));
                 }
@@ -142,9 +147,12 @@ public final class Client {
 
     private void start(ByteBuffer in) throws IOException {
         frames.expect(Long.BYTES);
-        in.getLong();
+        serverStep = in.getLong();
         if (ran >= 0) {
             throw new Frames.Violation("started twice");
+        }
+        if (serverStep <= 0) {
+            throw new Frames.Violation("starts a run with steps of " + serverStep + " ns");
         }
         // The types of the variables that the participant reads, which it knows.
         expectValues(frames.left());
@@ -199,8 +207,14 @@ public final class Client {
 
     private void done(long sequence) throws IOException {
         ran = sequence;
-        ByteBuffer out = frames.begin(1 + Long.BYTES * (1 + writes.length), DONE);
+        long nanos = participant.nextUpdate();
+        boolean asks = nanos != Participant.AS_DECLARED;
+        ByteBuffer out = frames.begin(1 + Long.BYTES * ((asks ? 2 : 1) + writes.length), asks ? DONE_UNTIL : DONE);
         out.putLong(sequence);
+        if (asks) {
+            // The first step at or after this time; step 1 is at time 0.
+            out.putLong(nanos <= 0 ? 1 : (nanos - 1) / serverStep + 2);
+        }
         for (long slot : writes) {
             out.putLong(slot);
         }

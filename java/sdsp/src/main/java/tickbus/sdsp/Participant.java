@@ -7,6 +7,9 @@ package tickbus.sdsp;
  * their format. The arrays belong to the client's connection, which reuses them for each step.
  */
 public interface Participant {
+    /** The result of {@link #nextUpdate} for a client that runs as it has declared. */
+    long AS_DECLARED = Long.MIN_VALUE;
+
     /**
      * The variables that the participant writes and reads. Asked once, before the run.
      *
@@ -32,4 +35,24 @@ public interface Participant {
      * @throws Exception if the participant cannot continue; the message gives the reason, and the run ends for everyone
      */
     void run(long sequence, long nanos, long[] reads, long[] writes) throws Exception;
+
+    /**
+     * The virtual time at which the participant wants to run next, asked after {@link #initial} and after each {@link #run},
+     * for simulations that know the time of their next event. The participant runs in the first step at or after this time,
+     * in the following step at the earliest; the values that it has written stay until then.
+     *
+     * @return the time in nanoseconds; {@link #AS_DECLARED} for the next step by the declaration
+     */
+    default long nextUpdate() {
+        return AS_DECLARED;
+    }
+
+    /**
+     * The server has been waiting for other clients for a second or more, or is paused. Called once a second while the
+     * participant has nothing to do.
+     *
+     * @param forWhom a text for people, such as {@code "plc" to finish step 42}
+     */
+    default void waiting(String forWhom) {
+    }
 }

@@ -15,6 +15,7 @@ import java.net.InetAddress;
 import java.net.InetSocketAddress;
 import java.net.ServerSocket;
 import java.nio.ByteBuffer;
+import java.time.Duration;
 import java.util.ArrayList;
 import java.util.List;
 import java.util.Optional;
@@ -59,8 +60,8 @@ class ClientTest {
     void aRunIsPlayedToItsEnd() throws Exception {
         Counter counter = new Counter();
         try (FakeServer server = new FakeServer(s -> {
-            ByteBuffer expected = FakeServer.buffer(32).put((byte) 1).put("SDSP".getBytes(UTF_8)).putShort((short) 1).putInt(3)
-                .put((byte) 7).put("zähler".getBytes(UTF_8)).putShort((short) 1).put((byte) 9).put((byte) 3)
+            ByteBuffer expected = FakeServer.buffer(40).put((byte) 1).put("SDSP".getBytes(UTF_8)).putShort((short) 2).putInt(3)
+                .putLong(0).put((byte) 7).put("zähler".getBytes(UTF_8)).putShort((short) 1).put((byte) 9).put((byte) 3)
                 .put("out".getBytes(UTF_8)).putShort((short) 1).put((byte) 2).put("in".getBytes(UTF_8));
             assertEquals(expected.flip(), s.receive());
             assertDone(0, -1, s.start(1));
@@ -75,6 +76,57 @@ class ClientTest {
             assertEquals("00000000000000fe", outcome.hashText());
         }
         assertEquals(List.of("1@0:7,-1", "4@3000000:-9,8"), counter.steps);
+    }
+
+    /** Asks for the step of its next event, and hears for whom the server waits. */
+    private static final class Events extends Counter {
+        final List<String> waits = new ArrayList<>();
+        private final long[] times = {Long.MIN_VALUE, 2_500_000, 3_000_000, 3_000_001, 0, Long.MAX_VALUE};
+
+        @Override
+        public Declaration declare() {
+            return Declaration.every("e", Duration.ofMillis(20), List.of(new Variable("out", DataType.DINT)), List.of("in"));
+        }
+
+        @Override
+        public long nextUpdate() {
+            return times[steps.size()];
+        }
+
+        @Override
+        public void waiting(String forWhom) {
+            waits.add(forWhom);
+        }
+    }
+
+    @Test
+    void aSimulationOfEventsAsksForItsNextStepAndKnowsWhomItWaitsFor() throws Exception {
+        Events events = new Events();
+        try (FakeServer server = new FakeServer(s -> {
+            ByteBuffer join = s.receive();
+            assertEquals(2, join.getShort(5));
+            assertEquals(1, join.getInt(7));
+            assertEquals(20_000_000, join.getLong(11));
+            s.send(0x85, FakeServer.buffer(50).put("\"plc\" to join".getBytes(UTF_8)));
+            assertDone(0, -1, s.start(1));
+            long[] wanted = {4, 4, 5, 1, Long.MAX_VALUE / 1_000_000 + 2};
+            for (int step = 1; step <= wanted.length; step++) {
+                s.step(step, 0, 7);
+                ByteBuffer frame = s.receive();
+                assertEquals(25, frame.remaining());
+                assertEquals(0x04, frame.get());
+                assertEquals(step, frame.getLong());
+                assertEquals(wanted[step - 1], frame.getLong());
+                assertEquals(8, frame.getLong());
+                s.send(0x85, FakeServer.buffer(0));
+            }
+            s.finish(5, 0, 0);
+        })) {
+            Client.join(server.address(), events);
+        }
+        assertEquals(List.of("\"plc\" to join", "", "", "", "", ""), events.waits);
+        assertThrows(IllegalArgumentException.class,
+            () -> Declaration.every("a", Duration.ofNanos(-1), List.of(), List.of()));
     }
 
     @Test
@@ -232,6 +284,7 @@ class ClientTest {
             new Case("too short", s -> s.send(0x83, FakeServer.buffer(23).put(new byte[23]))),
             new Case("unknown cause 10", s -> s.send(0x84, FakeServer.buffer(10).put((byte) 10).put(new byte[9]))),
             new Case("too short", s -> s.send(0x84, FakeServer.buffer(10).put((byte) 1).put(new byte[8]).put((byte) 5))),
+            new Case("steps of 0 ns", s -> s.send(0x81, FakeServer.buffer(9).putLong(0).put((byte) 15))),
             new Case("started twice", s -> {
                 s.sendStart(1);
                 s.sendStart(1);

@@ -7,6 +7,7 @@ import static org.junit.jupiter.api.Assertions.assertTrue;
 import java.io.IOException;
 import java.nio.file.Files;
 import java.nio.file.Path;
+import java.time.Duration;
 import java.util.HexFormat;
 import java.util.List;
 import java.util.regex.Matcher;
@@ -41,8 +42,16 @@ class DocumentsTest {
         assertEquals(0, code);
     }
 
-    /** Writes fixed values, one after another. */
-    private record Player(Declaration declare, List<Long> values) implements Participant {
+    /** Writes fixed values, one after another, and asks for step 3 after step 1. */
+    private static final class Player implements Participant {
+        private final List<Long> values = List.of(0L, -300L);
+        private long ran;
+
+        @Override
+        public Declaration declare() {
+            return Declaration.every("plc", Duration.ofMillis(20), List.of(new Variable("speed", DataType.INT)), List.of("level"));
+        }
+
         @Override
         public void initial(long[] writes) {
             writes[0] = values.get(0);
@@ -50,23 +59,26 @@ class DocumentsTest {
 
         @Override
         public void run(long sequence, long nanos, long[] reads, long[] writes) {
+            ran = sequence;
             writes[0] = values.get((int) sequence);
+        }
+
+        @Override
+        public long nextUpdate() {
+            return ran == 0 ? AS_DECLARED : 20_000_000;
         }
     }
 
     @Test
     void theBytesInTheFormatAreThoseOfThisClient() throws Exception {
-        play(new Player(new Declaration("tank", 1, List.of(new Variable("level", DataType.REAL)), List.of("speed")),
-            List.of((long) Float.floatToRawIntBits(2.5f), (long) Float.floatToRawIntBits(2.25f))));
-        play(new Player(new Declaration("plc", 2, List.of(new Variable("speed", DataType.INT)), List.of("level")),
-            List.of(0L, -300L)));
+        play(new Player());
     }
 
     private static void play(Player client) throws Exception {
         String[] lines = block("sdsp.md", "tank > ").split("\n");
         try (FakeServer server = new FakeServer(s -> {
             for (String line : lines) {
-                Matcher part = Pattern.compile(client.declare.name() + " +([<>])((?: [0-9a-f]{2})+).*").matcher(line);
+                Matcher part = Pattern.compile(client.declare().name() + " +([<>])((?: [0-9a-f]{2})+).*").matcher(line);
                 if (part.matches()) {
                     byte[] bytes = HexFormat.ofDelimiter(" ").parseHex(part.group(2).strip());
                     if (part.group(1).equals(">")) {

@@ -28,6 +28,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         "a_program_without_a_statement_is_refused",
         a_program_without_a_statement_is_refused,
     ),
+    (
+        "c_code_that_openplc_editor_appends_as_comments_is_left_out",
+        c_code_that_openplc_editor_appends_as_comments_is_left_out,
+    ),
 ];
 
 /// Names from machines, and words that have a meaning in C, to `iec2c` or in the generated text.
@@ -227,6 +231,33 @@ fn drivers_may_be_called_as_anything_in_the_library_of_iec2c() -> Result<(), Abs
         ];
         compiles(&compiler, &config(name, BUSES[2], &signals));
     }
+    Ok(())
+}
+
+fn c_code_that_openplc_editor_appends_as_comments_is_left_out() -> Result<(), Absent> {
+    let compiler = Compiler::find()?;
+    let text = program(&config("Test rig", BUSES[0], &["Run"]));
+    let appended =
+        "(*DBG:#include \"POUS.h\"*)\r\n(*DBG:  return (void *)&RUN;*)\n(*FILE:LAMP (a *) b*)\n";
+    let folder = tempfile::tempdir().expect("a folder");
+    compiler.build(&format!("{text}\n{appended}"), folder.path());
+    // Messages keep their lines.
+    let wrong = folder.path().join("wrong.st");
+    std::fs::write(
+        &wrong,
+        format!(
+            "{appended}PROGRAM Press\nVAR Lamp : BOOL; END_VAR\nLamp := Nobody;\nEND_PROGRAM\n"
+        ),
+    )
+    .expect("the file is written");
+    let output = Command::new(Path::new(env!("CARGO_MANIFEST_DIR")).join("plc/build"))
+        .arg(&wrong)
+        .env("IEC2C", &compiler.program)
+        .env("IEC2C_LIB", &compiler.library)
+        .output()
+        .expect("plc/build runs");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.starts_with("wrong.st:6"), "{told}");
     Ok(())
 }
 

@@ -307,7 +307,7 @@ fn openplc_counts_elements_and_its_memories_stand_apart() {
         ]
     );
     assert!(
-        imported.text.contains("\"%IW8\"   # %IW0"),
+        imported.text.contains("\"%IW4\"   # %IW0"),
         "{}",
         imported.text
     );
@@ -327,6 +327,7 @@ fn openplc_counts_elements_and_its_memories_stand_apart() {
     };
     let imported = read_as("plc.xml", OPENPLC, bytes).expect("bytes");
     assert_eq!(lines(&imported)[2], "valve %QW100 INT");
+    assert!(!imported.text.contains("addressing"), "{}", imported.text);
     // Where they do not overlap, all addresses are kept.
     let apart = OPENPLC.replace("%IW0\"", "%IW1\"");
     assert_eq!(lines(&read("plc.xml", &apart))[1], "level %IW2 INT");
@@ -344,6 +345,10 @@ fn structured_text_with_a_configuration_is_openplcs() {
     let imported = read("main.st", &text);
     assert_eq!(lines(&imported), ["level %IW200 INT", "door %IX0.0 BOOL"]);
     assert!(imported.text.contains("# closed"), "{}", imported.text);
+    // A hosted program takes the unit of the driver.cfg, so its addresses are those of the signals.
+    for kept in ["\naddressing = \"iec\" ", "\"%IW100\""] {
+        assert!(imported.text.contains(kept), "{}", imported.text);
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::device::Client;
 use super::rows::{Tag, World};
-use tickbus_image::signal::ByteOrder;
+use tickbus_image::signal::{Address, Addressing, ByteOrder, Width};
 
 /// The longest comment that is copied, in characters.
 const LONGEST_COMMENT: usize = 200;
@@ -33,7 +33,7 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
          {}{}\n\
          [driver]\n\
          id   = 1                       # a number that no other driver of the simulator has\n\
-         name = {}\n\n\
+         name = {}\n{}\n\
          [fieldbus]\n{}",
         comment(&source),
         remark(world),
@@ -43,6 +43,10 @@ pub(super) fn driver_cfg(file: &Path, tags: &[Tag], world: World) -> String {
             ""
         },
         text(name),
+        match addressing(world) {
+            Addressing::Elements => COUNTS_ELEMENTS,
+            Addressing::Bytes => "",
+        },
         bus(world)
     );
     if matches!(world, World::Device(_)) {
@@ -68,6 +72,29 @@ pub(super) fn replies(out: &mut String, sections: &[&str]) {
     for section in sections {
         out.push('\n');
         out.push_str(section);
+    }
+}
+
+/// The key with which the addresses stay as the PLC has them, here and for a hosted program.
+const COUNTS_ELEMENTS: &str =
+    "addressing = \"iec\"             # as in the PLC: %IW1 is the second word\n";
+
+/// The unit of the numbers in the addresses that are written.
+const fn addressing(world: World) -> Addressing {
+    match world {
+        World::Image(image) => image.addressing,
+        World::Device(_) | World::Modules => Addressing::Bytes,
+    }
+}
+
+/// An address in the unit of the file.
+fn printed(address: Address, addressing: Addressing) -> String {
+    match (addressing, address.width) {
+        (Addressing::Bytes, _) | (_, Width::Bit) => address.to_string(),
+        (Addressing::Elements, width) => {
+            let number = address.byte / width.bytes();
+            format!("{}{}{number}", address.area, width.letter())
+        }
     }
 }
 
@@ -132,7 +159,10 @@ fn signal(out: &mut String, tag: &Tag, world: World) {
         writeln!(out, "{key:<7} = {value}").expect("a String takes all");
     };
     line("name", text(&tag.name));
-    line("address", format!("\"{address}\"{remark}"));
+    line(
+        "address",
+        format!("\"{}\"{remark}", printed(address, addressing(world))),
+    );
     if address.width.data_type() != tag.data_type {
         line("type", format!("\"{}\"", tag.data_type));
     }

@@ -61,7 +61,7 @@ const WORDS: [(Role, &str); 7] = [
     (
         Role::Operator,
         "button pushbutton pb taster schalter key select selector wahl reset ack quittieren quit start stop \
-        joystick manual hand auto",
+        joystick manual hand auto req request anforderung",
     ),
     (
         Role::Running,
@@ -97,10 +97,25 @@ const NO_COMMAND: &str = "reset ack quittieren stop fault alarm stoerung lamp li
 /// Words of a valve rather than a cylinder.
 const VALVE: &str = "valve ventil open opened offen auf geoeffnet gate klappe";
 
+/// Words of devices that hold a part: they work closed, so that is their far end.
+const HOLDING: &str = "clamp gripper grip jaw jaws chuck vice greifer zange spanner spannfutter";
+
+/// The words of an end or a command that mean the opposite for such a device.
+const SHUT_OR_OPEN: &str =
+    "closed close geschlossen schliessen zu open opened oeffnen offen auf geoeffnet";
+
+/// Words of an input that is off when somebody stops the machine, in most of them.
+const STOPS: &str = "estop emergency notaus nothalt";
+
+/// The value of such an input, with a remark: some programs read it the other way round.
+const RELEASED: &str =
+    "true   # released; leave this reply out if true means pressed in the program";
+
 /// Words that say nothing about which device a point belongs to.
 const FILLERS: &str = "is ist di ai ix input eingang sensor switch limit ls end endlage endschalter ini signal pos \
     position do ao qx output ausgang cmd command befehl on ein coil sol solenoid contactor schuetz \
-    ansteuerung to move go set the of at enable rel release actual setpoint sp pv soll istwert sollwert";
+    ansteuerung activate actuate energize energise to move go set \
+    the of at enable rel release actual setpoint sp pv soll istwert sollwert";
 
 /// The words of a name in small letters, without umlauts: `Pumpe1_Läuft` has `pumpe`, `1`, `laeuft`.
 fn words(text: &str) -> Vec<String> {
@@ -153,8 +168,17 @@ fn is_one(word: &str, of: &str) -> bool {
 }
 
 fn role(words: &[String]) -> Option<Role> {
-    let found = WORDS.iter().find(|(_, of)| has(words, of));
-    found.map(|(role, _)| *role)
+    let (role, _) = WORDS.iter().find(|(_, of)| has(words, of))?;
+    Some(match role {
+        Role::Far if closes(words) => Role::Near,
+        Role::Near if closes(words) => Role::Far,
+        role => *role,
+    })
+}
+
+/// True for an end or command of what holds a part: closing it is the way forth.
+fn closes(words: &[String]) -> bool {
+    has(words, HOLDING) && has(words, SHUT_OR_OPEN)
 }
 
 /// The words that name a device, sorted, each with the number or letter behind it: `Pump 1 on` has `pump` with `1`.
@@ -240,6 +264,14 @@ fn command(device: &Device, way: Way, commands: &[Command]) -> Option<usize> {
     best(0).or_else(|| best(1))
 }
 
+/// True if the name or the comment of an output has no word that the device lacks, except for codes of parts (`Y12`).
+fn says_no_more(command: &Command, device: &Device) -> bool {
+    let is_known =
+        |word: &(String, String)| device.contains(word) || !word.0.is_empty() && !word.1.is_empty();
+    let mut devices = command.devices.iter().filter(|of| !of.is_empty());
+    devices.any(|of| of.iter().all(is_known))
+}
+
 /// Proposes replies for those of the `points` that are inputs and that nothing writes.
 pub fn propose(points: &[Point<'_>]) -> Vec<Proposal> {
     let mut commands = Vec::new();
@@ -252,11 +284,11 @@ pub fn propose(points: &[Point<'_>]) -> Vec<Proposal> {
             (false, true) if [&name, &comment].iter().any(|of| has(of, NO_COMMAND)) => {}
             (false, true) => {
                 let way = |words: &[String]| {
-                    let back = has(words, BACK).then_some(Way::Back);
-                    if has(words, FORTH) {
-                        Some(Way::Forth)
-                    } else {
-                        back
+                    let is_forth = has(words, FORTH);
+                    match (is_forth || has(words, BACK), is_forth != closes(words)) {
+                        (false, _) => None,
+                        (true, true) => Some(Way::Forth),
+                        (true, false) => Some(Way::Back),
                     }
                 };
                 let way = way(&name).or_else(|| way(&comment)).unwrap_or(Way::On);
@@ -345,10 +377,16 @@ fn of_device(
         );
     }
     let (far, near) = (first(Role::Far), first(Role::Near));
-    let forth = forth.or(on);
+    // An output that names no direction may be any output of a larger device, such as the lamp of a station.
+    let plain = on.filter(|index| {
+        let mut of_index = commands.iter().filter(|command| command.index == *index);
+        of_index.any(|command| says_no_more(command, device))
+    });
+    let forth = forth.or(plain);
     if far.or(near).is_some() && forth.is_some() {
         let mut ends = [far, near].into_iter().flatten();
-        let (kind, keys, time) = if ends.any(|index| has(&words(points[index].name), VALVE)) {
+        let is_valve = |words: &[String]| has(words, VALVE) && !has(words, HOLDING);
+        let (kind, keys, time) = if ends.any(|index| is_valve(&words(points[index].name))) {
             ("valve", ["open", "close", "opened", "closed"], "open_time")
         } else {
             (
@@ -365,7 +403,9 @@ fn of_device(
         let is_way =
             [Role::Far, Role::Near].contains(role) && has(&words(points[*index].name), HEALTHY);
         if (*role == Role::Healthy || is_way) && !made.contains(index) {
-            let keys = [("signal", name(*index)), ("value", "true".to_owned())];
+            let is_stop = has(&words(points[*index].name), STOPS);
+            let value = if is_stop { RELEASED } else { "true" };
+            let keys = [("signal", name(*index)), ("value", value.to_owned())];
             proposals.push(proposal("constant", vec![*index], &keys));
         }
     }
@@ -460,9 +500,29 @@ mod tests {
             (
                 &["Not-Aus", "Door closed", "Air OK"],
                 &[],
-                "kind = constant, signal = Not-Aus, value = true\n\
+                "kind = constant, signal = Not-Aus, value = true   # released; leave this reply out if true means pressed \
+                 in the program\n\
                  kind = constant, signal = Door closed, value = true\n\
                  kind = constant, signal = Air OK, value = true\n",
+            ),
+            // What holds a part does its work closed.
+            (
+                &["Clamp2Closed", "Clamp2Open", "xGreifer_zu", "Jaw opened"],
+                &[
+                    "Clamp2Activate",
+                    "xGreifer_auf",
+                    "xGreifer_schliessen",
+                    "Jaw close",
+                ],
+                "kind = cylinder, extend = Clamp2Activate, extended = Clamp2Closed, retracted = Clamp2Open, extend_time = 1s\n\
+                 kind = cylinder, extend = xGreifer_schliessen, retract = xGreifer_auf, extended = xGreifer_zu, \
+                 extend_time = 1s\n\
+                 kind = cylinder, extend = Jaw close, retracted = Jaw opened, extend_time = 1s\n",
+            ),
+            (
+                &["Stopper_out"],
+                &["Y12_Stopper", "Belt_lubrication"],
+                "kind = cylinder, extend = Y12_Stopper, extended = Stopper_out, extend_time = 1s\n",
             ),
             (
                 &["%Speed actual"],
@@ -484,8 +544,18 @@ mod tests {
             "Alarm 3",
             "B12",
             "Pump 3 running",
+            "Saw_out_req",
+            "Mill_opened",
+            "Cell4_home",
         ];
-        assert_eq!(proposed(&inputs, &["Pump 1 on", "Pump 2 on"]), "");
+        let outputs = [
+            "Pump 1 on",
+            "Pump 2 on",
+            "Saw_out_allowed",
+            "Mill_make_lids",
+            "Cell4_part_clamp",
+        ];
+        assert_eq!(proposed(&inputs, &outputs), "");
     }
 
     #[test]

@@ -197,11 +197,44 @@ fn machine(has_replies: bool) -> String {
     }
 }
 
+/// The same commands, and 500 positions of cylinders that they move; the replies themselves, if asked for. No cylinder
+/// arrives before its command changes again, so that every position changes in every tick.
+fn cylinders(has_replies: bool) -> String {
+    let mut text = String::new();
+    for bit in 0..64 {
+        let address = format!("%IX{}.{}", bit / 8, bit % 8);
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"C {bit}\"\naddress = \"{address}\"\n"
+        );
+    }
+    for part in 0..500 {
+        let _ = write!(
+            text,
+            "[[signal]]\nname = \"P {part}\"\naddress = \"%ID{}\"\ntype = \"REAL\"\n",
+            8 + 4 * part
+        );
+        if has_replies {
+            let _ = write!(
+                text,
+                "[[reply]]\nkind = \"cylinder\"\nextend = \"C {}\"\nposition = \"P {part}\"\nextend_time = \"2s\"\n",
+                part % 64
+            );
+        }
+    }
+    text
+}
+
 /// The cost of 500 replies: each command changes every second, so that most parts are under way.
 fn replies(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("replies");
-    for (name, has_replies) in [("none", false), ("500", true)] {
-        let config = config("free", &machine(has_replies));
+    for (name, text) in [
+        ("none", machine(false)),
+        ("500", machine(true)),
+        ("no positions", cylinders(false)),
+        ("500 positions", cylinders(true)),
+    ] {
+        let config = config("free", &text);
         let mut driver = Driver::open(config, Monotonic::shared()).expect("opens");
         let mut slots = driver.initial_slots();
         let mut tick = 0;

@@ -52,23 +52,24 @@ pub(crate) enum Behaviour {
 }
 
 impl Behaviour {
-    /// Makes the signals of a tick. Returns true if the next tick can change them although nothing else changes.
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
+    /// Makes the signals of a tick. Returns when they can change next although no signal that the reply reads changes: the
+    /// time of this tick for the next one, [`Nanos::MAX`] for never. Until then, no tick has to call this.
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         match self {
             Self::Constant(output, value) => {
                 io.put_slot(output.signal(), *value);
-                false
+                Nanos::MAX
             }
-            Self::Follows(it) => it.step(passed, io),
-            Self::Motor(it) => it.step(passed, io),
+            Self::Follows(it) => it.step(io),
+            Self::Motor(it) => it.step(io),
             Self::Travel(it) => it.step(io),
-            Self::Lag(it) => it.step(passed, io),
+            Self::Lag(it) => it.step(io),
             Self::Switch(it) => it.step(io),
             Self::Counter(it) => it.step(io),
             Self::Encoder(it) => it.step(io),
-            Self::Blink(it) => it.step(passed, io),
-            Self::LifeSign(it) => it.step(passed, io),
-            Self::Rule(it) => it.step(passed, io),
+            Self::Blink(it) => it.step(io),
+            Self::LifeSign(it) => it.step(io),
+            Self::Rule(it) => it.step(io),
         }
     }
 }

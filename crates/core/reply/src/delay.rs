@@ -12,8 +12,8 @@ pub(crate) struct Delay {
     pub(crate) on_after: Nanos,
     pub(crate) off_after: Nanos,
     is_on: bool,
-    /// How long the input has differed from the output.
-    differs: Option<Nanos>,
+    /// When the output follows the input, if they differ.
+    due: Option<Nanos>,
 }
 
 impl Delay {
@@ -25,22 +25,21 @@ impl Delay {
         }
     }
 
-    /// True while the output is to follow later.
-    pub(crate) const fn is_waiting(&self) -> bool {
-        self.differs.is_some()
+    /// When the output follows the input; never if it does.
+    pub(crate) fn due(&self) -> Nanos {
+        self.due.unwrap_or(Nanos::MAX)
     }
 
     /// Returns the delayed bit.
-    pub(crate) fn step(&mut self, input: bool, passed: Nanos) -> bool {
+    pub(crate) fn step(&mut self, input: bool, now: Nanos) -> bool {
         if input == self.is_on {
-            self.differs = None;
+            self.due = None;
         } else {
             // The delay begins in the tick in which the input is seen to differ.
-            let differs = self.differs.map_or(Nanos::ZERO, |before| before + passed);
-            let due = if input { self.on_after } else { self.off_after };
-            self.differs = Some(differs);
-            if differs >= due {
-                (self.is_on, self.differs) = (input, None);
+            let after = if input { self.on_after } else { self.off_after };
+            let due = *self.due.get_or_insert(now + after);
+            if now >= due {
+                (self.is_on, self.due) = (input, None);
             }
         }
         self.is_on
@@ -57,9 +56,9 @@ pub(crate) struct Follows {
 }
 
 impl Follows {
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
-        let on = self.delay.step(self.when.hold(io.slots), passed);
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
+        let on = self.delay.step(self.when.hold(io.slots), io.now);
         io.put_bit(self.signal, on != self.inverted);
-        self.delay.is_waiting()
+        self.delay.due()
     }
 }

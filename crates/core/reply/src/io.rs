@@ -36,11 +36,19 @@ pub(crate) struct Io<'a> {
     pub(crate) made: &'a mut [Made],
     pub(crate) board: &'a FaultBoard,
     pub(crate) awake: &'a mut Awake,
-    /// The length of the tick.
+    /// The time at the end of the tick, since the first one.
+    pub(crate) now: Nanos,
+    /// The length of the tick, and the same in seconds.
+    pub(crate) passed: Nanos,
     pub(crate) seconds: f64,
 }
 
 impl Io<'_> {
+    /// When a reply has work next that changes in every tick while it moves.
+    pub(crate) const fn next_tick_if(&self, moves: bool) -> Nanos {
+        if moves { self.now } else { Nanos::MAX }
+    }
+
     pub(crate) fn put_bit(&mut self, output: Output, on: bool) {
         self.put_slot(output.signal(), Slot::from_real(f64::from(u8::from(on))));
     }

@@ -40,7 +40,8 @@ pub(crate) enum Source {
 }
 
 impl Lag {
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
+        let passed = io.passed;
         let [low, high] = self.limits;
         let to = match &self.source {
             Source::Number {
@@ -73,10 +74,10 @@ impl Lag {
         }
         if self.noise == 0.0 {
             io.put(self.signal, at.clamp(low, high));
-            return (at - before).abs() > 0.0 || passed == Nanos::ZERO;
+            return io.next_tick_if((at - before).abs() > 0.0 || passed == Nanos::ZERO);
         }
         let noise = self.noise * self.random.around_zero();
         io.put(self.signal, (at + noise).clamp(low, high));
-        true
+        io.now
     }
 }

@@ -7,35 +7,32 @@ use super::signal::Form;
 
 /// Conditions that must hold together.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Levels(Box<[Level]>);
-
-#[derive(Clone, Debug, PartialEq)]
-enum Level {
-    /// The signal is a BOOL, and is on if this is true. Most conditions are this small.
+pub(crate) enum Levels {
+    /// A single BOOL, which is on if this is true: most conditions are so, and need no memory elsewhere.
     Bit(u32, bool),
-    Other(Box<(Condition, Form)>),
+    All(Box<[(Condition, Form)]>),
 }
 
 impl Levels {
     pub(crate) fn new(conditions: Vec<(Condition, Form)>) -> Self {
-        let level = |(condition, form): (Condition, Form)| match (
-            &condition.demand,
-            u32::try_from(condition.signal),
-        ) {
-            (Demand::On, Ok(signal)) => Level::Bit(signal, true),
-            (Demand::Off, Ok(signal)) => Level::Bit(signal, false),
-            _ => Level::Other(Box::new((condition, form))),
-        };
-        Self(conditions.into_iter().map(level).collect())
+        if let [(condition, _)] = &conditions[..]
+            && let Ok(signal) = u32::try_from(condition.signal)
+        {
+            match condition.demand {
+                Demand::On => return Self::Bit(signal, true),
+                Demand::Off => return Self::Bit(signal, false),
+                _ => {}
+            }
+        }
+        Self::All(conditions.into())
     }
 
     pub(crate) fn hold(&self, slots: &[Slot]) -> bool {
-        self.0.iter().all(|level| match level {
-            Level::Bit(signal, on) => (slots[*signal as usize].real() != 0.0) == *on,
-            Level::Other(it) => {
-                let (condition, form) = &**it;
+        match self {
+            Self::Bit(signal, on) => (slots[*signal as usize].real() != 0.0) == *on,
+            Self::All(all) => all.iter().all(|(condition, form)| {
                 condition.holds_for(form.real(slots[condition.signal]), slots)
-            }
-        })
+            }),
+        }
     }
 }

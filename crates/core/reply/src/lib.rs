@@ -15,6 +15,7 @@ mod levels;
 mod motor;
 mod numbers;
 mod order;
+mod part;
 mod pulses;
 mod replies;
 mod rule;

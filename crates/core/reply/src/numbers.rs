@@ -1,6 +1,7 @@
 //! Replies that count, and switches at a number.
 
 use tickbus_base::Threshold;
+use tickbus_base::time::Nanos;
 
 use super::io::Io;
 use super::levels::Levels;
@@ -15,10 +16,10 @@ pub(crate) struct Switch {
 }
 
 impl Switch {
-    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> bool {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let on = self.threshold.update(self.input.value(io.slots));
         io.put_bit(self.signal, on);
-        false
+        Nanos::MAX
     }
 }
 
@@ -38,7 +39,7 @@ pub(crate) struct Counter {
 }
 
 impl Counter {
-    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> bool {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let down = self.down.as_ref().is_some_and(|down| down.hold(io.slots));
         let hold = [self.up.hold(io.slots), down];
         for (index, by) in [1.0, -1.0].into_iter().enumerate() {
@@ -55,7 +56,7 @@ impl Counter {
             self.count = self.start;
         }
         io.put(self.signal, self.count);
-        false
+        Nanos::MAX
     }
 }
 
@@ -85,7 +86,7 @@ pub(crate) enum Speed {
 }
 
 impl Encoder {
-    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> bool {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let rate = match &self.source {
             Speed::Number { input, gain } => input.value(io.slots) * gain,
             Speed::Conditions {
@@ -113,7 +114,7 @@ impl Encoder {
             self.count = self.start;
         }
         io.put(self.signal, self.count.floor());
-        rate != 0.0
+        io.next_tick_if(rate != 0.0)
     }
 }
 

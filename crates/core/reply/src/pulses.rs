@@ -12,24 +12,29 @@ use super::signal::{Input, Output};
 pub(crate) struct Blink {
     pub(crate) signal: Output,
     pub(crate) on_for: Nanos,
-    pub(crate) off_for: Nanos,
+    /// As long as `on_for` if it is not stated.
+    pub(crate) off_for: Option<Nanos>,
     /// The lamp blinks while these hold, and is off else.
     pub(crate) when: Option<Levels>,
-    /// The time since it was switched on; `None` while it does not blink.
+    /// The time at which it began to blink; `None` while it does not blink.
     pub(crate) since: Option<Nanos>,
 }
 
 impl Blink {
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let blinks = self.when.as_ref().is_none_or(|when| when.hold(io.slots));
-        let period = self.on_for + self.off_for;
-        self.since = blinks.then(|| match self.since {
-            None => Nanos::ZERO,
-            Some(since) => Nanos((since + passed).0 % period.0),
-        });
-        let on = self.since.is_some_and(|since| since < self.on_for);
+        if !blinks {
+            self.since = None;
+            io.put_bit(self.signal, false);
+            return Nanos::MAX;
+        }
+        let period = self.on_for + self.off_for.unwrap_or(self.on_for);
+        let since = *self.since.get_or_insert(io.now);
+        let phase = Nanos((io.now - since).0 % period.0);
+        let on = phase < self.on_for;
         io.put_bit(self.signal, on);
-        blinks
+        let change = if on { self.on_for } else { period };
+        io.now + (change - phase)
     }
 }
 
@@ -46,25 +51,29 @@ pub(crate) struct LifeSign {
 /// Where the count comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Beat {
-    /// The count goes up each time so much time has passed.
+    /// The count goes up each time this time has passed; `since` is the time of the last one.
     Every { every: Nanos, since: Nanos },
     /// The count is the PLC's own.
     Echo(Input),
 }
 
 impl LifeSign {
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
-        match &mut self.source {
-            Beat::Echo(input) => self.count = input.value(io.slots),
-            Beat::Every { every, since } => {
-                let all = *since + passed;
-                *since = Nanos(all.0 % every.0);
-                #[expect(clippy::cast_precision_loss, reason = "a few beats")]
-                let beats = (all.0 / every.0) as f64;
-                self.count = wrapped(self.count + beats, self.limits);
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
+        let next = match &mut self.source {
+            Beat::Echo(input) => {
+                self.count = input.value(io.slots);
+                Nanos::MAX
             }
-        }
+            Beat::Every { every, since } => {
+                let beats = (io.now - *since).0 / every.0;
+                *since += every.times(beats);
+                #[expect(clippy::cast_precision_loss, reason = "a few beats")]
+                let beats = beats as f64;
+                self.count = wrapped(self.count + beats, self.limits);
+                *since + *every
+            }
+        };
         io.put(self.signal, self.count);
-        matches!(self.source, Beat::Every { .. })
+        next
     }
 }

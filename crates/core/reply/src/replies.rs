@@ -34,11 +34,13 @@ pub struct Replies {
     long_ticks: u32,
     /// The time of the last tick.
     time: Option<Nanos>,
+    /// The time of the last tick since the first one; never goes back.
+    now: Nanos,
 }
 
 impl Replies {
-    /// The replies at their beginning, for the signals of `table`; `None` if there are none. What the driver has to log
-    /// about them goes to `board`.
+    /// Creates the replies in their initial state, for the signals of `table`; `None` if there are no replies. What the
+    /// driver has to log about them goes to `board`.
     pub fn new(replies: &[Reply], table: &SignalTable, board: &Arc<FaultBoard>) -> Option<Self> {
         if replies.is_empty() {
             return None;
@@ -90,6 +92,7 @@ impl Replies {
             shortest,
             long_ticks: 0,
             time: None,
+            now: Nanos::ZERO,
         })
     }
 
@@ -99,24 +102,33 @@ impl Replies {
         let before = self.time.replace(time).unwrap_or(time);
         let passed = (time - before).max(Nanos::ZERO);
         self.note_long_ticks(passed);
+        self.now += passed;
+        let now = self.now;
         let mut io = Io {
             slots,
             made: &mut self.made,
             board: &self.board,
             awake: &mut self.awake,
+            now,
+            passed,
             seconds: seconds(passed),
         };
         for signal in &self.kept {
             io.keep(*signal);
         }
-        io.awake.begin(io.slots);
+        io.awake.begin(now, io.slots);
         for (word, behaviours) in self.behaviours.chunks_mut(64).enumerate() {
             let (mut bits, mut staying) = (io.awake.take(word), 0);
             while bits != 0 {
                 let place = bits.trailing_zeros() as usize;
                 bits &= bits - 1;
                 io.awake.begin_reply(64 * word + place);
-                staying |= u64::from(behaviours[place].step(passed, &mut io)) << place;
+                let next = behaviours[place].step(&mut io);
+                if next <= now {
+                    staying |= 1 << place;
+                } else if next < Nanos::MAX {
+                    io.awake.rest_until(64 * word + place, next);
+                }
                 // The reply may have woken others.
                 bits |= io.awake.take(word);
             }

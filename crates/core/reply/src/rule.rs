@@ -148,12 +148,10 @@ pub(crate) struct Ruled {
     pub(crate) course: Course,
     /// True for each condition whose signal was on in the previous tick; `None` before the first.
     pub(crate) were_on: Vec<Option<bool>>,
-    pub(crate) time: Nanos,
 }
 
 impl Ruled {
-    pub(crate) fn step(&mut self, passed: Nanos, io: &mut Io<'_>) -> bool {
-        self.time += passed;
+    pub(crate) fn step(&mut self, io: &mut Io<'_>) -> Nanos {
         let mut holds = true;
         for (place, (condition, form)) in self.rule.when.iter().zip(&self.forms).enumerate() {
             let value = form.real(io.slots[condition.signal]);
@@ -165,8 +163,9 @@ impl Ruled {
                 _ => condition.holds_for(value, io.slots),
             };
         }
-        self.course.step(&self.rule, holds, (self.time, passed), io);
+        let moment = (io.now, io.passed);
+        self.course.step(&self.rule, holds, moment, io);
         // A rule counts its times in each tick.
-        true
+        io.now
     }
 }

@@ -73,7 +73,7 @@ impl Reply {
     }
 
     /// Changes the value of a key, for replies that have not begun: seconds for a time. Changes nothing if the reply has
-    /// no such key.
+    /// no such key. A time that the reply does not state, such as `retract_time`, follows the time that it defaults to.
     pub fn set(&mut self, key: &str, value: f64) {
         match self.place(key) {
             #[expect(clippy::cast_possible_truncation, reason = "at most some years")]
@@ -91,12 +91,16 @@ impl Reply {
             (Behaviour::Follows(it), "off_after") => Time(&mut it.delay.off_after),
             (Behaviour::Motor(it), "on_after") => Time(&mut it.contact.on_after),
             (Behaviour::Motor(it), "off_after") => Time(&mut it.contact.off_after),
-            (Behaviour::Motor(it), "start_time") => Rate(&mut it.rates[0]),
-            (Behaviour::Motor(it), "stop_time") => Rate(&mut it.rates[1]),
+            (Behaviour::Motor(it), "start_time") => Rate(&mut it.rates.forth),
+            (Behaviour::Motor(it), "stop_time") => {
+                Rate(it.rates.back.get_or_insert(it.rates.forth))
+            }
             (Behaviour::Motor(it), "full_speed") => Number(&mut it.full_speed),
             (Behaviour::Travel(it), key) => match (self.kind, key) {
-                ("cylinder", "extend_time") | ("valve", "open_time") => Rate(&mut it.rates[0]),
-                ("cylinder", "retract_time") | ("valve", "close_time") => Rate(&mut it.rates[1]),
+                ("cylinder", "extend_time") | ("valve", "open_time") => Rate(&mut it.rates.forth),
+                ("cylinder", "retract_time") | ("valve", "close_time") => {
+                    Rate(it.rates.back.get_or_insert(it.rates.forth))
+                }
                 _ => return None,
             },
             (Behaviour::Lag(it), "time") => Time(&mut it.time),
@@ -115,7 +119,7 @@ impl Reply {
                 _ => return None,
             },
             (Behaviour::Blink(it), "on_for") => Time(&mut it.on_for),
-            (Behaviour::Blink(it), "off_for") => Time(&mut it.off_for),
+            (Behaviour::Blink(it), "off_for") => Time(it.off_for.get_or_insert(it.on_for)),
             (Behaviour::LifeSign(it), "every") => match &mut it.source {
                 Beat::Every { every, .. } => Time(every),
                 Beat::Echo(_) => return None,

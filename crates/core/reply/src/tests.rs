@@ -112,7 +112,7 @@ impl Machine {
         self.replies.step(time, &mut self.slots);
     }
 
-    /// The values of a signal in so many ticks, as text.
+    /// The values of a signal in each of the next `ticks` ticks, as text.
     fn values(&mut self, name: &str, ticks: usize) -> String {
         let values = (0..ticks).map(|_| {
             self.tick();
@@ -437,7 +437,7 @@ fn ticks_that_are_longer_than_a_time_are_noted_and_a_late_one_is_not() {
 
 #[test]
 fn a_reply_that_rests_makes_what_it_would_make_at_work() {
-    let text = "[[reply]]\nkind = \"follows\"\nsignal = \"a\"\nwhen = [\"A\", \"not d\"]\non_after = \"30ms\"\n\
+    let shows_numbers = "[[reply]]\nkind = \"follows\"\nsignal = \"a\"\nwhen = [\"A\", \"not d\"]\non_after = \"30ms\"\n\
                 [[reply]]\nkind = \"motor\"\ncontactor = \"B\"\nrunning = \"b\"\non_after = \"20ms\"\nstart_time = \"50ms\"\n\
                 speed = \"i\"\ntrip = \"C\"\nreset = \"D\"\noverload = \"c\"\n\
                 [[reply]]\nkind = \"blink\"\nsignal = \"d\"\nwhen = \"C\"\non_for = \"20ms\"\n\
@@ -446,30 +446,98 @@ fn a_reply_that_rests_makes_what_it_would_make_at_work() {
                 [[reply]]\nkind = \"rule\"\nwhen = \"D\"\nset = { e = false }\n\
                 [[reply]]\nkind = \"counter\"\nsignal = \"k\"\nwhen = \"a\"\nreset = \"D\"\n\
                 [[reply]]\nkind = \"encoder\"\nsignal = \"l\"\ninput = \"i\"\n";
-    let (mut resting, mut working) = (Machine::new(text), Machine::new(text));
-    let (mut random, mut most) = (Random::new(1, 0), 0.0_f64);
-    for tick in 0..5_000 {
-        for (name, chance) in [("A", 0.1), ("B", 0.05), ("C", 0.02), ("D", 0.02)] {
-            if random.happens(chance) {
-                let value = 1.0 - resting.value(name);
-                resting.set(name, value);
-                working.set(name, value);
+    // Nothing shows how far these are, so that they rest on their way.
+    let shows_ends = "[[reply]]\nkind = \"motor\"\ncontactor = \"B\"\nat_speed = \"b\"\non_after = \"30ms\"\n\
+                start_time = \"110ms\"\nstop_time = \"70ms\"\n\
+                [[reply]]\nkind = \"cylinder\"\nextend = \"b\"\nretract = \"D\"\nimpulse = true\nextended = \"a\"\n\
+                extend_time = \"90ms\"\nretract_time = \"170ms\"\n\
+                [[reply]]\nkind = \"valve\"\nopen = \"A\"\nclose = \"C\"\nopened = \"c\"\nclosed = \"d\"\nopen_time = \"130ms\"\n\
+                [[reply]]\nkind = \"blink\"\nsignal = \"e\"\nwhen = \"A\"\non_for = \"50ms\"\noff_for = \"30ms\"\n\
+                [[reply]]\nkind = \"life-sign\"\nsignal = \"k\"\nevery = \"20ms\"\n\
+                [[reply]]\nkind = \"counter\"\nsignal = \"l\"\nwhen = \"a\"\n";
+    for text in [shows_numbers, shows_ends] {
+        let (mut resting, mut working) = (Machine::new(text), Machine::new(text));
+        let (mut random, mut time) = (Random::new(1, 0), Nanos::ZERO);
+        let mut changes = vec![0; resting.slots.len()];
+        for tick in 0..20_000 {
+            for (name, chance) in [("A", 0.1), ("B", 0.05), ("C", 0.02), ("D", 0.02)] {
+                if random.happens(chance) {
+                    let value = 1.0 - resting.value(name);
+                    resting.set(name, value);
+                    working.set(name, value);
+                }
+            }
+            // A simulation hands over zeros from time to time.
+            if random.happens(0.05) {
+                for name in ["a", "b", "e", "j"] {
+                    resting.set(name, 0.0);
+                    working.set(name, 0.0);
+                }
+            }
+            // Most ticks are as long as the last one, some longer, some take no time.
+            time += Nanos::from_millis(match tick % 7 {
+                3 => 0,
+                5 => 13,
+                _ => 10,
+            });
+            let before = resting.slots.clone();
+            working.replies.awake.wake_all();
+            resting.replies.step(time, &mut resting.slots);
+            working.replies.step(time, &mut working.slots);
+            assert_eq!(resting.slots, working.slots, "{tick}");
+            for (changes, (before, now)) in
+                changes.iter_mut().zip(before.iter().zip(&resting.slots))
+            {
+                *changes += u32::from(before != now);
             }
         }
-        // A simulation hands over zeros from time to time.
-        if random.happens(0.05) {
-            for name in ["a", "b", "e", "j"] {
-                resting.set(name, 0.0);
-                working.set(name, 0.0);
-            }
-        }
-        working.replies.awake.wake_all();
-        resting.tick();
-        working.tick();
-        assert_eq!(resting.slots, working.slots, "{tick}");
-        most = most.max(resting.value("k"));
+        let made = resting.table.signals.iter().zip(&changes);
+        let still = made.filter(|(signal, changes)| {
+            text.contains(&format!("= \"{}\"\n", signal.name)) && **changes < 20
+        });
+        let still: Vec<_> = still.map(|(signal, _)| signal.name.as_str()).collect();
+        assert!(
+            still.iter().all(|name| "ABCD".contains(name)),
+            "they move: {still:?}"
+        );
     }
-    assert!(most > 0.0, "it moves");
+}
+
+#[test]
+fn a_time_that_a_reply_does_not_state_follows_the_one_that_it_defaults_to() {
+    for (kind, [forth, back]) in [
+        (
+            "kind = \"cylinder\"\nextend = \"A\"\nextended = \"a\"",
+            ["extend_time", "retract_time"],
+        ),
+        (
+            "kind = \"valve\"\nopen = \"A\"\nopened = \"a\"",
+            ["open_time", "close_time"],
+        ),
+        (
+            "kind = \"motor\"\ncontactor = \"A\"\nrunning = \"a\"",
+            ["start_time", "stop_time"],
+        ),
+        ("kind = \"blink\"\nsignal = \"a\"", ["on_for", "off_for"]),
+    ] {
+        let settings = |reply: &Reply| {
+            let value = |key| reply.settings().into_iter().find(|one| one.key == key);
+            [forth, back].map(|key| value(key).expect(key).value)
+        };
+        let text = format!("[[reply]]\n{kind}\n{forth} = \"200ms\"\n");
+        let mut reply = read(&text).expect(kind).remove(0);
+        assert_eq!(settings(&reply), [0.2, 0.2]);
+        reply.set(forth, 0.5);
+        assert_eq!(settings(&reply), [0.5, 0.5]);
+        // From then on it has its own.
+        reply.set(back, 0.25);
+        reply.set(forth, 0.125);
+        assert_eq!(settings(&reply), [0.125, 0.25]);
+        let text = format!("{text}{back} = \"100ms\"\n");
+        let mut reply = read(&text).expect(kind).remove(0);
+        reply.set(forth, 0.5);
+        assert_eq!(settings(&reply), [0.5, 0.1]);
+    }
 }
 
 #[test]

@@ -10,8 +10,9 @@ use super::reader::Reader;
 use crate::behaviour::{Behaviour, RULE};
 use crate::delay::{Delay, Follows};
 use crate::lag::{Lag, Source};
-use crate::motor::{Motor, rate};
+use crate::motor::Motor;
 use crate::numbers::{Counter, Encoder, Speed, Switch};
+use crate::part::{Part, Rates};
 use crate::pulses::{Beat, Blink, LifeSign};
 use crate::signal::Output;
 use crate::travel::{Drive, Travel};
@@ -123,11 +124,10 @@ fn motor(reader: &Reader<'_>) -> Option<Behaviour> {
     let [running, at_speed, overload, healthy] = outputs;
     let [start_time, stop_time] = times;
     sound.into_iter().collect::<Option<()>>()?;
-    let start_time = start_time?.unwrap_or_default();
     Some(Behaviour::Motor(Box::new(Motor {
         contactor: contactor??,
         contact: contact?,
-        rates: [rate(start_time), rate(stop_time?.unwrap_or(start_time))],
+        rates: Rates::of(start_time?.unwrap_or_default(), stop_time?),
         full_speed: full_speed?.unwrap_or(100.0),
         trip: trip?,
         reset: reset?,
@@ -136,7 +136,7 @@ fn motor(reader: &Reader<'_>) -> Option<Behaviour> {
         speed: speed?,
         overload: overload?,
         healthy: healthy?,
-        part: 0.0,
+        part: Part::new(0.0),
         has_tripped: false,
     })))
 }
@@ -192,16 +192,15 @@ fn travel(reader: &Reader<'_>, keys: &TravelKeys) -> Option<Behaviour> {
             forth: forth??,
             back: back?,
             impulse: impulse?,
-            last: None,
         },
     };
     Some(Behaviour::Travel(Box::new(Travel {
         drive,
-        rates: [rate(time), rate(time_back?.unwrap_or(time))],
+        rates: Rates::of(time, time_back?),
         ends: [far?, near?],
         position: position?,
         limits,
-        part: (start.unwrap_or(low) - low) / (high - low),
+        part: Part::new((start.unwrap_or(low) - low) / (high - low)),
     })))
 }
 
@@ -338,7 +337,7 @@ fn blink(reader: &Reader<'_>) -> Option<Behaviour> {
     Some(Behaviour::Blink(Blink {
         signal: signal??,
         on_for,
-        off_for: off_for?.unwrap_or(on_for),
+        off_for: off_for?,
         when: when?,
         since: None,
     }))

@@ -209,7 +209,6 @@ impl<'a> Reader<'a> {
             forms: forms.collect(),
             were_on: vec![None; rule.when.len()],
             course: Course::default(),
-            time: Nanos::ZERO,
             rule,
         };
         self.outputs.borrow_mut().extend(made);

@@ -16,6 +16,8 @@ mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
 mod modbus;
+#[cfg(feature = "page")]
+mod observed_rig;
 mod observer;
 #[cfg(feature = "opcua")]
 mod opcua;
@@ -49,6 +51,8 @@ fn main() -> ExitCode {
         #[cfg(feature = "opcua")]
         ("opcua", opcua::TESTS),
         ("modbus", modbus::TESTS),
+        #[cfg(feature = "page")]
+        ("observed_rig", observed_rig::TESTS),
         ("observer", observer::TESTS),
         #[cfg(feature = "mqtt")]
         ("bridge", bridge::TESTS),

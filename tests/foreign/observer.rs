@@ -44,7 +44,7 @@ fn python(kind: &str, script: &str) -> Result<Command, Absent> {
     Ok(python)
 }
 
-fn free_port() -> u16 {
+pub(crate) fn free_port() -> u16 {
     let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
     free.local_addr().expect("it is bound").port()
 }

@@ -489,6 +489,63 @@ fn keys_of_replies_are_fitted_within_a_percent() {
 }
 
 #[test]
+fn a_way_back_that_is_not_stated_follows_the_way_forth_when_that_is_fitted() {
+    let bench = Bench::new();
+    bench.file("lift.cfg", LIFT);
+    let one_time =
+        |extend: &str| replied(extend, "1s", "300ms", 160.0).replace("retract_time = \"1s\"\n", "");
+    bench.file("right.toml", &one_time("1200ms"));
+    record(&bench, "right.toml", "real.vcd");
+    bench.file("guess.toml", &one_time("600ms"));
+    bench.file(
+        "fit.toml",
+        "runs = 60\n[[parameter]]\nreply = \"lift\"\nkey = \"extend_time\"\nfrom = \"100ms\"\nto = \"2900ms\"\n",
+    );
+    let with = ["real.vcd", "--model", "guess.toml", "--ignore", "Start"];
+    let found = bench.json(&[&with[..], &["--fit", "fit.toml"]].concat());
+    let fitted = &found["fit"]["parameters"][0];
+    let value = fitted["value"].as_f64().expect("a number");
+    assert!((value - 1.2).abs() <= 0.012, "{found:#}");
+    // The way back as well: with the old time its edges would be late.
+    assert_eq!(found["likeness"].as_f64(), Some(1.0), "{found:#}");
+}
+
+/// Rules, `set` and replies that write one signal: the same one wins in a model as in the driver of a test.
+#[test]
+fn a_model_gives_a_signal_to_the_same_writer_as_a_test_does() {
+    let rules = [
+        // A rule wins from its first value on that is not 0, and then for good.
+        "[[machine.rule]]\nwhen = \"Run\"\nafter = \"2s\"\nset = { Height = 7.0 }\nelse = { Height = 0.0 }\n",
+        // A rule that only ever writes 0 does not.
+        "[[machine.rule]]\nwhen = \"Run\"\nset = { Height = 0.0, Top = false }\n",
+        // A ramp begins at what the reply has made.
+        "[[machine.rule]]\nwhen = \"Top\"\nramp = { signal = \"Height\", to = 300, per_second = 50 }\n",
+        // A value from the beginning takes the signal from the reply, even if it is 0.
+        "[machine.set]\nTop = false\nHeight = 0.0\n",
+        "[machine.set]\nBottom = false\n[[machine.rule]]\nwhen = \"Top\"\nset = { Bottom = true }\nelse = { Bottom = false }\n",
+    ];
+    let plain = replied("1200ms", "2300ms", "300ms", 160.0);
+    let mut heights = Vec::new();
+    for extra in rules {
+        let bench = Bench::new();
+        bench.file("lift.cfg", LIFT);
+        let text = plain.replace("expect = \"Bottom\" ", "");
+        bench.file(
+            "both.toml",
+            &text.replace("[[test]]", &format!("{extra}[[test]]")),
+        );
+        record(&bench, "both.toml", "real.vcd");
+        let found = bench.json(&["real.vcd", "--model", "both.toml", "--ignore", "Start"]);
+        assert_eq!(found["likeness"].as_f64(), Some(1.0), "{extra}\n{found:#}");
+        // And the extra lines do something.
+        bench.file("plain.toml", &text);
+        let found = bench.json(&["real.vcd", "--model", "plain.toml", "--ignore", "Start"]);
+        heights.push(found["likeness"].as_f64() == Some(1.0));
+    }
+    assert_eq!(heights, [false, true, false, false, false]);
+}
+
+#[test]
 fn mistakes_in_a_file_of_parameters_have_their_places() {
     let bench = Bench::new();
     bench.file("lift.cfg", LIFT);

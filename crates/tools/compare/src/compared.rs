@@ -153,10 +153,9 @@ fn one(signal: &Signal, real: &View<'_>, simulated: &View<'_>, window: Nanos) ->
         };
         (likeness, Outcome::Bool(found))
     } else {
-        let (real, simulated) = (real.curve(), simulated.curve());
-        let changes = real.changes.len().max(simulated.changes.len()) > 1;
-        let found = curve::compared(real, simulated, window);
-        let counts = changes || found.greatest > 0.0;
+        let found = curve::compared(real.curve(), simulated.curve(), window);
+        // The same value again after a gap is no change.
+        let counts = found.range > 0.0 || found.greatest > 0.0;
         let likeness = (counts && !found.greatest.is_nan()).then(|| found.likeness(window));
         (likeness, Outcome::Number(found))
     };
@@ -240,6 +239,17 @@ mod tests {
             (found.signals[0].likeness, found.likeness),
             (Some(0.0), 0.0)
         );
+    }
+
+    #[test]
+    fn a_number_that_is_the_same_after_a_gap_has_not_changed() {
+        let gap = [(2000, f64::NAN), (3000, -1000.0)];
+        let mut real = side(&[2000], &[], 0);
+        for (at, value) in gap {
+            real.run.change(1, Nanos::from_millis(at), value);
+        }
+        let found = result(&real, &side(&[2000], &[], 0));
+        assert_eq!(found.signals[1].likeness, None);
     }
 
     #[test]

@@ -218,7 +218,7 @@ fn size(signal: &SignalResult, key: usize) -> Option<(Size, String)> {
                     _ => (found.worst.0, Some(found.worst.1)),
                 });
                 let (most, at) = sizes.max_by_key(|(size, at)| (size.0.abs(), Reverse(*at)))?;
-                let at = at.map(|at| format!(" at {at}"));
+                let at = at.map(|at| format!(" at {}", at.rounded()));
                 Some((time(most), at.unwrap_or_default()))
             }
             "missing" | "extra" => {
@@ -228,7 +228,7 @@ fn size(signal: &SignalResult, key: usize) -> Option<(Size, String)> {
                     &found.missing
                 };
                 let first = edges.first();
-                let first = first.map(|edge| format!(" from {} on", edge.at));
+                let first = first.map(|edge| format!(" from {} on", edge.at.rounded()));
                 Some((Size::Edges(edges.len() as u64), first.unwrap_or_default()))
             }
             _ => None,
@@ -236,7 +236,10 @@ fn size(signal: &SignalResult, key: usize) -> Option<(Size, String)> {
         Outcome::Number(found) => match key {
             "shift" => Some(no_time(time(found.shift))),
             "rms" => Some(no_time(Size::Number(found.rms))),
-            "greatest" => Some((Size::Number(found.greatest), format!(" at {}", found.at))),
+            "greatest" => Some((
+                Size::Number(found.greatest),
+                format!(" at {}", found.at.rounded()),
+            )),
             _ => None,
         },
     }

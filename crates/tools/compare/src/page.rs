@@ -17,8 +17,8 @@ const SIMULATED: &str = " · simulated";
 /// How much of the chart a link shows before and after an edge, in windows.
 const AROUND: i64 = 2;
 
-/// Both runs in one, for the chart: each compared signal, and below it its simulated twin, moved by `moved`. At most
-/// `budget` changes are kept.
+/// Both runs in one, for the chart: each compared signal, and below it its simulated twin, moved by `moved`; first the
+/// signals that change. At most `budget` changes are kept.
 pub fn both(
     real: &Side,
     simulated: &Side,
@@ -44,7 +44,9 @@ pub fn both(
         }
     };
     let steps = compared.steps.iter().map(|steps| &steps.signal);
-    let names = steps.chain(compared.signals.iter().map(|signal| &signal.name));
+    let mut signals: Vec<&SignalResult> = compared.signals.iter().collect();
+    signals.sort_by_key(|signal| signal.likeness.is_none());
+    let names = steps.chain(signals.into_iter().map(|signal| &signal.name));
     let mut seen = BTreeSet::new();
     for name in names.filter(|name| seen.insert(*name)) {
         add(real, name, "", Nanos::ZERO);
@@ -118,7 +120,7 @@ fn bools(compared: &Compared) -> impl Iterator<Item = (&SignalResult, f64, &Bool
 /// A time, which leads to its surroundings in the chart.
 fn around(at: Nanos, window: Nanos) -> Cell {
     let reach = window.times(AROUND);
-    Cell::Chart(at - reach, at + reach, at.to_string())
+    Cell::Chart(at - reach, at + reach, at.rounded().to_string())
 }
 
 fn edges(compared: &Compared) -> MoreTable {

@@ -149,6 +149,12 @@ impl Model {
             .collect();
         let mut stub = Stub::new(&self.rules, &watches);
         let mut replies = Replies::new(&self.replies, table, &Arc::default());
+        // As in a test: `set` takes a signal from its reply, whatever the value.
+        if let Some(replies) = &mut replies {
+            for (signal, _) in &self.initial {
+                replies.borrow(*signal, true);
+            }
+        }
         let mut shown = Shown::new(table);
         // The first recorded tick ended one step after the begin.
         let second = commands.times.iter().find(|time| *time > first);
@@ -258,7 +264,7 @@ fn read(
     let config = root.require("config", format!("add config = \"driver.cfg\": {right}"));
     let step = root.take("step");
     let machine = root.require("machine", "describe the machine: an FMU, rules or replies");
-    // What a test needs beside the machine is no mistake, and of no use here.
+    // A test file has more tables, which a model does not need.
     root.finish_open();
     let step = match step {
         None => None,

@@ -5,9 +5,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 
-use crate::fixture::{library, tanks};
+use crate::fixture::{library, made, tanks};
 use crate::harness::{self, Absent, Test};
-use tempfile::TempDir;
 use tickbus::driver::Driver;
 use tickbus::driver_cfg::Config;
 use tickbus::signal::{Area, DataType, Slot};
@@ -66,30 +65,36 @@ fn tool(arguments: &[&str]) -> Result<(), Absent> {
     Ok(())
 }
 
-/// The FMU of a driver.cfg, in a separate folder.
-fn export(config: &Path, version: &str) -> (TempDir, String) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let fmu = folder.path().join("driver.fmu");
+/// Writes the FMU of a driver.cfg.
+fn export(config: &Path, version: &str, fmu: &Path) {
     let output = Command::new(env!("CARGO_BIN_EXE_tickbus"))
         .arg("export")
         .arg(config)
         .args(["--for", version, "--library"])
         .arg(library())
         .arg("--out")
-        .arg(&fmu)
+        .arg(fmu)
         .output()
         .expect("it runs");
     assert!(output.status.success(), "{}", text(&output.stderr));
-    let fmu = fmu.to_str().expect("UTF-8").to_owned();
-    (folder, fmu)
 }
 
 /// The FMUs of tests/fmi/types.cfg, in both versions.
 fn types() -> [&'static str; 2] {
-    static MADE: OnceLock<[(TempDir, String); 2]> = OnceLock::new();
+    const VERSIONS: [&str; 2] = ["fmi2", "fmi3"];
+    static MADE: OnceLock<[String; 2]> = OnceLock::new();
     let config = Path::new(ROOT).join("tests/fmi/types.cfg");
-    let made = MADE.get_or_init(|| ["fmi2", "fmi3"].map(|version| export(&config, version)));
-    [&made[0].1, &made[1].1]
+    let made = MADE.get_or_init(|| {
+        let file = |version| format!("{version}.fmu");
+        let folder = made("types", |folder| {
+            for version in VERSIONS {
+                export(&config, version, &folder.join(file(version)));
+            }
+        });
+        let path = |version| folder.join(file(version)).to_str().map(str::to_owned);
+        VERSIONS.map(|version| path(version).expect("UTF-8"))
+    });
+    made.each_ref().map(String::as_str)
 }
 
 fn in_fmpy() -> Result<(), Absent> {
@@ -193,9 +198,11 @@ fn rig() -> Result<(), Absent> {
     record(&config, &own);
     let own = std::fs::read(own).expect("a recording");
     for version in ["fmi2", "fmi3"] {
-        let (_folder, fmu) = export(&config, version);
+        let fmu = folder.path().join(format!("{version}.fmu"));
+        export(&config, version, &fmu);
+        let fmu = fmu.to_str().expect("UTF-8");
         let record = folder.path().join(format!("{version}.vcd"));
-        tool(&["rig", &fmu, record.to_str().expect("UTF-8")])?;
+        tool(&["rig", fmu, record.to_str().expect("UTF-8")])?;
         assert!(
             std::fs::read(record).expect("a recording") == own,
             "{version}: the recordings differ"

@@ -32,69 +32,80 @@ pub(crate) fn err(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// The native library that cargo has built for this test, beside or above its program; without debug tables if there is
-/// `strip`.
+/// Makes what a test program needs many times, and returns its folder: one under `target/tmp`, which the next run uses again,
+/// because a `TempDir` in a static is never dropped. `make` fills another folder, whose files then replace the old ones
+/// whole, so that two programs can run at once.
+pub(crate) fn made(name: &str, make: impl FnOnce(&Path)) -> PathBuf {
+    let all = Path::new(env!("CARGO_TARGET_TMPDIR"));
+    let folder = all.join(format!("{}-{name}", env!("CARGO_CRATE_NAME")));
+    std::fs::create_dir_all(&folder).expect("a folder");
+    let fresh = tempfile::tempdir_in(all).expect("a folder");
+    make(fresh.path());
+    for file in std::fs::read_dir(fresh.path()).expect("its files") {
+        let file = file.expect("a file");
+        std::fs::rename(file.path(), folder.join(file.file_name())).expect("the same disk");
+    }
+    folder
+}
+
+/// The native library that cargo has built for this test, beside or above its program; without debug tables if `strip` is
+/// installed.
 pub(crate) fn library() -> &'static Path {
-    static LIBRARY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, library) = LIBRARY.get_or_init(|| {
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
         let name = libloading::library_filename("tickbus");
         let test = std::env::current_exe().expect("a test has a path");
         let mut places = test.ancestors().skip(1).take(2).map(|dir| dir.join(&name));
         let built = places
             .find(|place| place.exists())
             .expect("cargo has built it");
-        let folder = tempfile::tempdir().expect("a folder");
-        let small = folder.path().join(&name);
-        let stripped = Command::new("strip")
-            .arg("-o")
-            .arg(&small)
-            .arg(&built)
-            .status();
-        let library = if stripped.is_ok_and(|status| status.success()) {
-            small
-        } else {
-            built
-        };
-        (folder, library)
-    });
-    library
+        let folder = made("stripped", |folder| {
+            let stripped = Command::new("strip")
+                .arg("-o")
+                .arg(folder.join(&name))
+                .arg(&built)
+                .status();
+            if !stripped.is_ok_and(|status| status.success()) {
+                std::fs::copy(&built, folder.join(&name)).expect("a copy");
+            }
+        });
+        folder.join(name)
+    })
 }
 
 /// The example's two FMUs, built once: the folder with tank2.fmu and tank3.fmu.
 pub(crate) fn tanks() -> &'static Path {
-    static TANKS: OnceLock<TempDir> = OnceLock::new();
-    let folder = TANKS.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let built = Command::new(repository().join("examples/fmu-tank/build"))
-            .arg(folder.path())
-            .output()
-            .expect("it runs");
-        assert!(built.status.success(), "{}", err(&built));
-        for file in ["tank.cfg", "tank.toml"] {
-            let from = repository().join("examples/fmu-tank").join(file);
-            std::fs::copy(from, folder.path().join(file)).expect("a copy");
-        }
-        folder
-    });
-    folder.path()
+    static TANKS: OnceLock<PathBuf> = OnceLock::new();
+    TANKS.get_or_init(|| {
+        made("tanks", |folder| {
+            let built = Command::new(repository().join("examples/fmu-tank/build"))
+                .arg(folder)
+                .output()
+                .expect("it runs");
+            assert!(built.status.success(), "{}", err(&built));
+            for file in ["tank.cfg", "tank.toml"] {
+                let from = repository().join("examples/fmu-tank").join(file);
+                std::fs::copy(from, folder.join(file)).expect("a copy");
+            }
+        })
+    })
 }
 
 /// The library of `misbehave.c`, compiled once.
 pub(crate) fn misbehaving() -> &'static Path {
-    static LIBRARY: OnceLock<(TempDir, PathBuf)> = OnceLock::new();
-    let (_, library) = LIBRARY.get_or_init(|| {
-        let folder = tempfile::tempdir().expect("a folder");
-        let library = folder.path().join("misbehave.so");
-        let compiled = Command::new("cc")
-            .args(["-std=gnu99", "-Wall", "-fPIC", "-shared", "-o"])
-            .arg(&library)
-            .arg(repository().join("tests/fmi/misbehave.c"))
-            .output()
-            .expect("the compiler runs");
-        assert!(compiled.status.success(), "{}", err(&compiled));
-        (folder, library)
-    });
-    library
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
+        let folder = made("misbehave", |folder| {
+            let compiled = Command::new("cc")
+                .args(["-std=gnu99", "-Wall", "-fPIC", "-shared", "-o"])
+                .arg(folder.join("misbehave.so"))
+                .arg(repository().join("tests/fmi/misbehave.c"))
+                .output()
+                .expect("the compiler runs");
+            assert!(compiled.status.success(), "{}", err(&compiled));
+        });
+        folder.join("misbehave.so")
+    })
 }
 
 /// A model description of FMI 2.0 with an input and an output of type Real.

@@ -45,7 +45,7 @@ impl Role {
     ///
     /// # Errors
     ///
-    /// It is an observer, who sees what is there.
+    /// This end is an observer, which writes nothing.
     pub fn check_faults(self) -> Result<(), Mistake> {
         if self == Self::Observer {
             return Err(Mistake::new(

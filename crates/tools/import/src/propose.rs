@@ -1,7 +1,8 @@
 //! Proposes replies for the inputs of a PLC that nobody writes: by their names and comments, in English and German, with
 //! the outputs of similar names as partners.
 //!
-//! A proposal is a guess that an engineer reads before it is used. Where the words say nothing there is none.
+//! A proposal is a guess that an engineer reads before it is used. An input whose words have no
+//! known meaning gets no proposal.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -44,7 +44,7 @@ impl Plant {
     ///
     /// # Errors
     ///
-    /// It has no such fault.
+    /// The FMU has no such fault.
     pub(super) fn check_fault(&self, name: &str, value: f64) -> Result<(), Mistake> {
         self.fmu.model.check_fault(name, value)
     }

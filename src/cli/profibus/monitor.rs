@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::Outcome;
 use crate::cli::host::span;
-use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialLine, SerialSettings};
+use tickbus_base::os::{Interest, Marks, Parity, PollSet, SerialEar, SerialSettings};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_bus_profibus::monitor::{Heard, Monitor, words};
 use tickbus_fieldbus::BusError;
@@ -78,8 +78,7 @@ fn listen(arguments: &Arguments) -> Result<(), String> {
     }
     let device = arguments.device.display().to_string();
     let failed = |error| BusError::from(error).to_string();
-    let mut port =
-        serial::open_marking(&device, settings, &*Monotonic::shared()).map_err(failed)?;
+    let mut port = serial::listen(&device, settings, &*Monotonic::shared()).map_err(failed)?;
     let create = |file: &Option<PathBuf>| file.as_deref().map(create).transpose();
     let mut keep = Keep {
         prints: arguments.telegrams,
@@ -115,7 +114,7 @@ fn create(file: &Path) -> Result<BufWriter<File>, String> {
 
 fn watch(
     arguments: &Arguments,
-    port: &mut SerialLine,
+    port: &mut SerialEar,
     keep: &mut Keep,
     stop: &Stop,
 ) -> Result<(), Ending> {

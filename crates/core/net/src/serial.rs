@@ -4,7 +4,7 @@ use std::fmt;
 use std::io::{self, ErrorKind};
 use std::path::Path;
 
-use tickbus_base::os::{SerialLine, SerialPort, SerialSettings};
+use tickbus_base::os::{SerialEar, SerialLine, SerialPort, SerialSettings};
 use tickbus_base::time::Clock;
 use tickbus_base::toml_text::{Key, Shape, Value};
 
@@ -47,6 +47,20 @@ pub fn open_marking(
     clock: &dyn Clock,
 ) -> Result<SerialLine, Error> {
     SerialLine::open(device, settings, clock.simulation())
+        .map_err(|error| no_port(device, settings, &error))
+}
+
+/// As [`open_marking`], for a line that is only listened to.
+///
+/// # Errors
+///
+/// As [`open`].
+pub fn listen(
+    device: &str,
+    settings: SerialSettings,
+    clock: &dyn Clock,
+) -> Result<SerialEar, Error> {
+    SerialEar::open(device, settings, clock.simulation())
         .map_err(|error| no_port(device, settings, &error))
 }
 

@@ -51,7 +51,7 @@ pub use process_watch::ProcessWatch;
 pub use pseudo_terminal::PseudoTerminal;
 pub(crate) use real_time::{Os, RealTimeSystem};
 pub use serial::{Parity, SerialPort, SerialSettings};
-pub use serial_line::SerialLine;
+pub use serial_line::{SerialEar, SerialLine};
 pub use shared_memory::{MemoryFile, SharedMemory};
 pub use time_stamp_counter::TimeStampCounter;
 pub use timer_slack::wake_on_time;

@@ -46,6 +46,12 @@ impl Pollable for super::SerialLine {
     }
 }
 
+impl Pollable for super::SerialEar {
+    fn source(&self) -> Source<'_> {
+        self.line().source()
+    }
+}
+
 impl<P: Pollable + ?Sized> Pollable for Box<P> {
     fn source(&self) -> Source<'_> {
         (**self).source()

@@ -35,6 +35,41 @@ impl SerialLine {
     }
 }
 
+/// A serial line that is only listened to: it cannot be written to.
+#[derive(Debug)]
+pub struct SerialEar(SerialLine);
+
+impl SerialEar {
+    /// As [`SerialLine::open`]; on Unix the port itself is opened for reading alone.
+    ///
+    /// # Errors
+    ///
+    /// As of [`SerialLine::open`].
+    pub fn open(
+        device: &str,
+        settings: SerialSettings,
+        simulation: Option<&dyn Simulation>,
+    ) -> io::Result<Self> {
+        if simulation.is_some() {
+            return Ok(Self(SerialLine::open(device, settings, simulation)?));
+        }
+        let port = SerialPort::open_to_listen(Path::new(device), settings)?;
+        port.mark_damaged()?;
+        Ok(Self(SerialLine::Os(port)))
+    }
+
+    /// The line to wait for.
+    pub(super) fn line(&self) -> &SerialLine {
+        &self.0
+    }
+}
+
+impl Read for SerialEar {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.read(buffer)
+    }
+}
+
 impl Read for SerialLine {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {

@@ -26,7 +26,20 @@ impl SerialPort {
     ///
     /// The port does not exist, is no serial port, is in use by another program, or does not support the settings.
     pub fn open(device: &Path, settings: SerialSettings) -> io::Result<Self> {
-        let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
+        Self::open_for(device, settings, OFlags::RDWR)
+    }
+
+    /// As [`open`](Self::open), for reading alone: the system refuses every write.
+    ///
+    /// # Errors
+    ///
+    /// As of [`open`](Self::open).
+    pub fn open_to_listen(device: &Path, settings: SerialSettings) -> io::Result<Self> {
+        Self::open_for(device, settings, OFlags::RDONLY)
+    }
+
+    fn open_for(device: &Path, settings: SerialSettings, access: OFlags) -> io::Result<Self> {
+        let flags = access | OFlags::NOCTTY | OFlags::NONBLOCK | OFlags::CLOEXEC;
         let port = open(device, flags, Mode::empty())?;
         let is_pseudo = is_pseudo_terminal(device);
         if is_pseudo {
@@ -271,6 +284,26 @@ mod tests {
         assert!(opened.is_ok(), "{opened:?}");
         drop(port);
         SerialPort::open(&near, SETTINGS).expect("it is free again");
+    }
+
+    #[test]
+    fn a_port_that_was_opened_to_listen_reads_and_cannot_write() {
+        let (mut far, near) = PseudoTerminal::open().expect("a pseudo-terminal");
+        let mut port = SerialPort::open_to_listen(&near, SETTINGS).expect("a port");
+        let refused = port.write(&[1]).expect_err("it only listens");
+        assert_eq!(refused.raw_os_error(), Some(Errno::BADF.raw_os_error()));
+        far.write_all(&[7]).expect("room");
+        rustix::event::poll(
+            &mut [rustix::event::PollFd::new(
+                &port,
+                rustix::event::PollFlags::IN,
+            )],
+            None,
+        )
+        .expect("it is there");
+        let mut bytes = [0; 4];
+        assert_eq!(port.read(&mut bytes).expect("a byte"), 1);
+        assert_eq!(bytes[0], 7);
     }
 
     #[test]

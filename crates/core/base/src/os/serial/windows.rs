@@ -99,6 +99,15 @@ impl SerialPort {
         Ok(opened)
     }
 
+    /// As [`open`](Self::open), for an owner that only reads; the system would accept a write.
+    ///
+    /// # Errors
+    ///
+    /// As of [`open`](Self::open).
+    pub fn open_to_listen(device: &Path, settings: SerialSettings) -> io::Result<Self> {
+        Self::open(device, settings)
+    }
+
     fn thread(&mut self, name: &str, work: impl FnOnce() + Send + 'static) -> io::Result<()> {
         let thread = Builder::new().name(name.to_owned()).spawn(work)?;
         self.threads.push(thread);

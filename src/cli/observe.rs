@@ -7,7 +7,7 @@ use super::host::{self, Job, span};
 use tickbus_base::time::Nanos;
 use tickbus_driver_cfg::Kinds;
 use tickbus_fieldbus::Role;
-use tickbus_plc::{Program, Scan};
+use tickbus_programs::Idle;
 
 /// Watch and record the %I and %Q of a PLC that runs, without writing anything.
 ///
@@ -32,36 +32,8 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
         file: &arguments.file,
         kinds,
         role: Role::Observer,
-        program: Box::new(Onlooker),
+        program: Box::new(Idle),
         interval: arguments.tick,
     };
     host::run(job, &arguments.host)
-}
-
-/// The program at an end that only looks: it has inputs alone, and does nothing with them.
-#[derive(Clone, Copy, Debug)]
-struct Onlooker;
-
-impl Program for Onlooker {
-    fn name(&self) -> &'static str {
-        "observer"
-    }
-
-    fn input_bytes(&self) -> usize {
-        0
-    }
-
-    fn output_bytes(&self) -> usize {
-        0
-    }
-
-    fn for_another_station(&self, _station: usize) -> Option<Box<dyn Program>> {
-        Some(Box::new(*self))
-    }
-
-    fn can_hang(&self) -> bool {
-        false
-    }
-
-    fn scan(&mut self, _scan: &mut Scan<'_>) {}
 }

@@ -79,6 +79,56 @@ fn the_monitor_tells_who_is_there_and_keeps_every_telegram() {
     packets(&fs::read(&pcap).expect("a file"));
 }
 
+/// A machine's own driver.cfg will do: what it would write is left alone.
+#[test]
+fn observe_records_both_sides_of_an_exchange_by_the_driver_cfg_of_the_machine_and_sends_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = pty::Line::new();
+    let text = format!(
+        "[driver]\nid = 1\nname = \"x\"\n[fieldbus]\nkind = \"profibus-device\"\ndevice = \"{}\"\n\
+         baud = 500000\nmax_tsdr = 1000\naddress = 8\nident = 0x4711\nconfig = [0x50, 0x60]\n\
+         [[signal]]\nname = \"out\"\naddress = \"%QW0\"\ntype = \"WORD\"\nfail_safe = 1\n\
+         [[signal]]\nname = \"in\"\naddress = \"%IW0\"\ntype = \"WORD\"\n",
+        line.end(0).display()
+    );
+    fs::write(folder.path().join("x.cfg"), text).expect("a file");
+    let observer = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args(["observe", "x.cfg", "--record", "run.csv", "--stats"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("it runs");
+    let mut end = OpenOptions::new()
+        .write(true)
+        .open(line.end(1))
+        .expect("the other end");
+    let (recording, both) = (folder.path().join("run.csv"), ",4660,22136");
+    await_that("both sides are recorded", || {
+        for telegram in TELEGRAMS {
+            end.write_all(telegram).expect("a line");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+        fs::read_to_string(&recording).is_ok_and(|text| text.contains(both))
+    });
+    let pid = i32::try_from(observer.id())
+        .ok()
+        .and_then(Pid::from_raw)
+        .expect("a process");
+    kill_process(pid, Signal::TERM).expect("it is there");
+    let output = observer.wait_with_output().expect("it ends");
+    assert!(output.status.success(), "{output:?}");
+    let told = String::from_utf8(output.stdout).expect("UTF-8");
+    for words in [
+        "observe: running: observing what master 2 exchanges\n",
+        "\ndiagnosis=8: Station_Not_Ready, Prm_Req: 02 05 00 FF 47 11\n",
+        "\nline.octets_out=0\n",
+        "\nwrites=never\n",
+    ] {
+        assert!(told.contains(words), "{words}\n{told}");
+    }
+    assert_eq!(line.octets(0), 0);
+}
+
 /// The head of a pcap file, and the first packets, which are the telegrams.
 fn packets(file: &[u8]) {
     let word = |at: usize| u32::from_le_bytes(file[at..at + 4].try_into().expect("4 bytes"));

@@ -41,6 +41,8 @@ pub(crate) struct StationSetup {
     /// The positions of the signals among the bytes that the station sends and receives.
     pub(crate) inputs: Layout,
     pub(crate) outputs: Layout,
+    /// The bytes of `%I` and of `%Q` in the PLC's image.
+    pub(crate) sizes: [usize; 2],
 }
 
 impl ProfibusDevice {

@@ -2,7 +2,8 @@
 //!
 //! The core knows no port and no image. [`telegram`] reads and writes telegrams. A [`Station`] is one slave, a function
 //! of its state, the time and a request, to an answer. A [`Segment`] has all stations of a line, and finds the
-//! telegrams among the bytes. A [`Gsd`] is a manufacturer's description of a device.
+//! telegrams among the bytes. An observer takes what a master and its stations exchange off the line, and sends
+//! nothing. A [`Gsd`] is a manufacturer's description of a device.
 
 pub mod advice;
 mod configuration;
@@ -12,6 +13,7 @@ mod finder;
 mod gsd;
 mod layout;
 pub mod monitor;
+mod observer;
 mod options;
 mod parameters;
 mod rates;

@@ -12,7 +12,7 @@ use tickbus_base::time::{Nanos, TimeHistogram};
 use crate::finder::{Finder, Found};
 use crate::telegram::{BROADCAST, Control, Frame, Telegram};
 pub use words::words;
-use words::{Service, service};
+pub(crate) use words::{Service, service};
 
 /// Records the traffic and the stations of a line; sends nothing.
 #[derive(Debug)]
@@ -30,6 +30,8 @@ struct Seen {
     damaged: u64,
     /// The last request, as long as its answer may still come.
     open: Option<Open>,
+    /// The request that the last telegram has answered.
+    answered: Option<Open>,
     /// The last request without an answer.
     unanswered: Option<Open>,
 }
@@ -61,6 +63,17 @@ struct SlaveSeen {
     replies: TimeHistogram,
 }
 
+/// How far a station has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Progress {
+    /// The master that sent the last request.
+    pub(crate) master: u8,
+    /// The station has ever answered.
+    pub(crate) answers: bool,
+    /// The state in words.
+    pub(crate) state: &'static str,
+}
+
 /// One piece of traffic.
 #[derive(Debug)]
 pub struct Heard<'a> {
@@ -68,6 +81,8 @@ pub struct Heard<'a> {
     pub telegram: Option<Telegram<'a>>,
     /// The bytes.
     pub bytes: &'a [u8],
+    /// The bytes of the request that the telegram answers, if it is an answer in time.
+    pub request: Option<&'a [u8]>,
     /// A remark; empty if there is nothing remarkable.
     pub note: &'static str,
 }
@@ -96,14 +111,19 @@ impl Monitor {
                     Heard {
                         telegram: None,
                         bytes: &[],
+                        request: None,
                         note: "damaged bytes",
                     }
                 }
-                Found::Telegram(telegram, bytes) => Heard {
-                    note: all.telegram(now, &telegram, bytes),
-                    telegram: Some(telegram),
-                    bytes,
-                },
+                Found::Telegram(telegram, bytes) => {
+                    let note = all.telegram(now, &telegram, bytes);
+                    Heard {
+                        telegram: Some(telegram),
+                        bytes,
+                        request: all.answered.as_ref().map(|open| &open.bytes[..]),
+                        note,
+                    }
+                }
             };
             each(&heard);
             Ok::<(), Infallible>(())
@@ -111,6 +131,29 @@ impl Monitor {
         match heard {
             Ok(()) => {}
         }
+    }
+
+    /// How far a station has come; `None` if no master has sent it a request.
+    pub(crate) fn progress(&self, station: u8) -> Option<Progress> {
+        let slave = self.all.slaves.get(&station)?;
+        Some(Progress {
+            master: slave.master,
+            answers: slave.answers > 0,
+            state: slave.state,
+        })
+    }
+
+    /// The addresses of the stations that have answered a master.
+    pub(crate) fn answering(&self) -> impl Iterator<Item = u8> {
+        let slaves = self.all.slaves.iter();
+        slaves
+            .filter(|(_, slave)| slave.answers > 0)
+            .map(|(address, _)| *address)
+    }
+
+    /// How often bytes were heard that are no telegram.
+    pub(crate) fn damaged(&self) -> u64 {
+        self.all.damaged
     }
 
     /// The stations and their masters, one per line.
@@ -150,6 +193,7 @@ impl Monitor {
 impl Seen {
     fn telegram(&mut self, now: Nanos, telegram: &Telegram<'_>, bytes: &[u8]) -> &'static str {
         self.telegrams += 1;
+        self.answered = None;
         match telegram {
             Telegram::Token { source, .. } => {
                 self.give_up();
@@ -227,6 +271,7 @@ impl Seen {
             _ if slave.state.is_empty() || slave.state == "silent" => "answers",
             _ => slave.state,
         };
+        self.answered = Some(open);
         ""
     }
 }

@@ -11,12 +11,15 @@ use std::path::Path;
 use tickbus_base::Mistake;
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
-use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
+use tickbus_fieldbus::{
+    At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OBSERVES, OpenError, Role,
+};
 use tickbus_image::signal::{Area, Signal, SignalTable};
 use tickbus_net::serial;
 
 use crate::device::{LineOptions, ProfibusDevice, StationSetup};
 use crate::layout::{Layout, Place};
+use crate::observer::ProfibusObserver;
 use crate::rates::{RATES, Rate, SLOT_TIME_LIMIT};
 pub use station::{Device, StationOptions};
 use station::{check_sizes, read_station};
@@ -55,6 +58,8 @@ const BAUDS: [u32; RATES.len()] = {
 pub struct Options {
     /// The serial line.
     pub line: LineOptions,
+    /// The stations are observed; otherwise this end is them.
+    observes: bool,
     /// The keys of a station in `[fieldbus]`.
     common: Keys,
     /// The keys of the `[[station]]` tables.
@@ -87,6 +92,7 @@ impl BusKind for Options {
     const NAME: &'static str = "profibus-device";
     const KEYS: &'static [&'static [Key]] = &[KEYS, station::KEYS];
     const STATION_KEYS: &'static [Key] = station::OWN_KEYS;
+    const CAN_OBSERVE: bool = true;
 
     fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let device = table.require(
@@ -123,6 +129,7 @@ impl BusKind for Options {
                 },
                 max_tsdr,
             },
+            observes: role == Role::Observer,
             common,
             own: Vec::new(),
             places: BTreeMap::new(),
@@ -138,7 +145,11 @@ impl BusOptions for Options {
                 "PROFIBUS DP on {} at {}",
                 self.line.device, self.line.settings
             ),
-            format!("answers within {} bits", self.line.max_tsdr),
+            if self.observes {
+                OBSERVES.to_owned()
+            } else {
+                format!("answers within {} bits", self.line.max_tsdr)
+            },
         ];
         let stations = self.stations().map(|station| {
             let address = station.address;
@@ -167,9 +178,11 @@ impl BusOptions for Options {
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
         let stations: Result<Vec<_>, _> = self.setups(setup.folder, setup.table).collect();
         let stations = stations.map_err(|(_, mistake)| OpenError::Config(mistake))?;
-        Ok(Bus::Free(Box::new(ProfibusDevice::new(
-            &self.line, stations,
-        ))))
+        Ok(Bus::Free(if self.observes {
+            Box::new(ProfibusObserver::new(&self.line, stations))
+        } else {
+            Box::new(ProfibusDevice::new(&self.line, stations))
+        }))
     }
 
     fn has_diagnosis(&self) -> bool {
@@ -225,10 +238,12 @@ impl BusOptions for Options {
     }
 
     fn details(&self, folder: &Path, table: &SignalTable) -> Vec<(String, String)> {
+        let table = &table.as_in_plc();
         let stations = self.stations().zip(&table.stations).enumerate();
         let details = stations.map(|(index, (station, signals))| {
             let has_places = self.have_places(table, index);
-            station.details(&self.line, folder, signals, has_places)
+            let line = (!self.observes).then_some(&self.line);
+            station.details(line, folder, signals, has_places)
         });
         details.flatten().flatten().collect()
     }
@@ -271,8 +286,10 @@ impl Options {
         folder: &Path,
         table: &SignalTable,
     ) -> impl Iterator<Item = Result<StationSetup, (usize, Mistake)>> {
-        let stations = self.stations().zip(&table.stations).enumerate();
-        stations.map(move |(index, (station, signals))| {
+        let table = table.as_in_plc();
+        let stations = self.stations().enumerate().take(table.stations.len());
+        stations.map(move |(index, station)| {
+            let signals = &table.stations[index];
             let identity = station.identity(folder, signals)?;
             let layout = |area| {
                 let own = table.signals.iter();
@@ -280,12 +297,13 @@ impl Options {
                 Layout::new(own, &self.places, &identity.configuration, area)
             };
             let (inputs, outputs) = (layout(Area::Input)?, layout(Area::Output)?);
-            station.check_modules(&identity, signals, self.have_places(table, index))?;
+            station.check_modules(&identity, signals, self.have_places(&table, index))?;
             Ok(StationSetup {
                 address: station.address,
                 identity,
                 inputs,
                 outputs,
+                sizes: [signals.input_bytes, signals.output_bytes],
             })
         })
     }

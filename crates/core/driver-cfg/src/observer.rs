@@ -9,6 +9,7 @@ pub(super) const OF_LINE: &[&str] = &[
     "watchdog",
     "at_close",
     "while_stale",
+    "max_tsdr",
 ];
 
 /// Those of `[[signal]]`.

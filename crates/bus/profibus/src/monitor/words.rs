@@ -6,7 +6,7 @@ use crate::telegram::{BROADCAST, Control, Frame, Telegram};
 
 /// The purpose of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Service {
+pub(crate) enum Service {
     Status,
     DataExchange,
     SetPrm,
@@ -26,7 +26,7 @@ impl Service {
     }
 }
 
-pub(super) fn service(frame: &Frame<'_>) -> Service {
+pub(crate) fn service(frame: &Frame<'_>) -> Service {
     if frame.control.function() == Control::FDL_STATUS {
         return Service::Status;
     }

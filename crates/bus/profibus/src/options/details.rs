@@ -12,10 +12,11 @@ use crate::configuration::{SlotModule, hex};
 use crate::device::LineOptions;
 
 impl StationOptions {
-    /// The lines, each with its heading; `None` for a station with mistakes.
+    /// The lines, each with its heading; `None` for a station with mistakes. `line` is the line of a device, which
+    /// answers there.
     pub(super) fn details(
         &self,
-        line: &LineOptions,
+        line: Option<&LineOptions>,
         folder: &Path,
         signals: &signal::Station,
         has_places: [bool; 2],
@@ -30,15 +31,17 @@ impl StationOptions {
             let (model, vendor) = (shown(&gsd.model), shown(&gsd.vendor));
             let text = format!("station {address}: \"{model}\" of \"{vendor}\", ident {ident:04X}");
             put("device", text);
-            let baud = line.settings.baud;
-            match gsd.rates.get(&baud) {
-                None => notes.push(format!("its GSD file does not support {baud} baud")),
-                Some(most) if line.max_tsdr > *most => notes.push(format!(
-                    "this end answers within {} bits, its GSD file says {most}: set a longer slot time in the PLC's \
-                     project",
-                    line.max_tsdr
-                )),
-                Some(_) => {}
+            if let Some(line) = line {
+                let baud = line.settings.baud;
+                match gsd.rates.get(&baud) {
+                    None => notes.push(format!("its GSD file does not support {baud} baud")),
+                    Some(most) if line.max_tsdr > *most => notes.push(format!(
+                        "this end answers within {} bits, its GSD file says {most}: set a longer slot time in the \
+                         PLC's project",
+                        line.max_tsdr
+                    )),
+                    Some(_) => {}
+                }
             }
         } else {
             put(

@@ -9,6 +9,7 @@
 mod damaged_characters;
 mod foreign_diagnosis;
 mod foreign_line;
+mod foreign_observer;
 mod foreign_profibus;
 #[cfg(unix)]
 mod peer;

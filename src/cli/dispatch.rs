@@ -6,11 +6,13 @@ use std::thread;
 
 use super::Outcome;
 use super::host::span;
-use super::lab::{self, address};
+use super::lab::{self, address, key};
 use tickbus_base::os::raise_open_files;
 use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop, system_time};
 use tickbus_dispatcher::tcp::{Hosting, Listener};
-use tickbus_dispatcher::{Dispatcher, Door, Identity, OnLoss, PORT, PatchFile, Post, Settings};
+use tickbus_dispatcher::{
+    Dispatcher, Door, Identity, Key, OnLoss, PORT, PatchFile, Post, Settings,
+};
 use tickbus_dispatcher_zenoh::{Failure, Options, computer_name};
 use tickbus_net::Address;
 
@@ -39,6 +41,10 @@ pub(super) struct Arguments {
     /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
+
+    /// The file with the key that each client states in its first line (KEY and the key): 16 to 128 characters.
+    #[arg(long, value_name = "FILE", value_parser = key)]
+    key_file: Option<Key>,
 
     /// Join dispatchers on other hosts into one laboratory, over Zenoh; patches name the clients of any host.
     #[arg(long)]
@@ -168,6 +174,9 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         }
     };
     let mut dispatcher = Dispatcher::new(settings(arguments), patch);
+    if let Some(key) = &arguments.key_file {
+        dispatcher.require(key.clone());
+    }
     let door = Door::new(&stop);
     if arguments.zenoh {
         match join(arguments, &mut dispatcher, &door) {
@@ -209,8 +218,12 @@ pub(super) fn run(arguments: &Arguments) -> Outcome {
         return failed(format!("the system cannot wait for sockets: {error}"));
     }
     let traffic = dispatcher.traffic();
+    let wrong_keys = match dispatcher.wrong_keys() {
+        0 => String::new(),
+        count => format!(" wrong_keys={count}"),
+    };
     say(&format!(
-        "ok lines={} values={} overtaken={} refused={} connections={}",
+        "ok lines={} values={} overtaken={} refused={} connections={}{wrong_keys}",
         traffic.lines,
         traffic.values,
         traffic.overtaken,

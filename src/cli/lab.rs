@@ -1,10 +1,12 @@
 //! Shared by the commands of a virtual laboratory.
 
 use std::io::{self, Write as _};
+use std::path::Path;
 
 use super::Outcome;
 use tickbus_base::Mistake;
 use tickbus_base::time::Stop;
+use tickbus_dispatcher::Key;
 use tickbus_net::Address;
 
 /// Parses an address to listen on.
@@ -18,6 +20,11 @@ pub(super) fn dialled(text: &str) -> Result<Address, String> {
     let checked = address.check_dialled();
     checked.map_err(|mistake| mistake.to_string())?;
     Ok(address)
+}
+
+/// Reads the key of a laboratory from the file that `--key-file` names.
+pub(super) fn key(file: &str) -> Result<Key, String> {
+    Key::load(Path::new(file)).map_err(|mistake| mistake.to_string())
 }
 
 /// Prints a line of the command `title`. The command continues even if the reader of stdout is gone.

@@ -7,11 +7,11 @@ use std::path::PathBuf;
 
 use super::Outcome;
 use super::host::span;
-use super::lab::{self, dialled};
+use super::lab::{self, dialled, key};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::client::{Client, Profile};
-use tickbus_dispatcher::{Counts, PORT, Role};
+use tickbus_dispatcher::{Counts, Key, PORT, Role};
 use tickbus_function_blocks::{Controller, Program, Terminals};
 use tickbus_net::Address;
 
@@ -29,6 +29,10 @@ pub(super) struct Arguments {
     /// The address of the dispatcher.
     #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
+
+    /// The file with the key of the laboratory, if it has one.
+    #[arg(long, value_name = "FILE", value_parser = key)]
+    key_file: Option<Key>,
 
     /// The name of this controller in the laboratory.
     #[arg(long)]
@@ -92,6 +96,7 @@ fn read(arguments: &Arguments) -> Result<(Program, Client), Mistakes> {
         counts,
         cables,
         alive: None,
+        key: arguments.key_file.clone(),
     };
     let client = Client::new(profile, KEEP_ALIVE);
     let client = client.map_err(|mistake| Mistakes::of("--name", mistake))?;

@@ -46,6 +46,10 @@ fn carry(map: Map, stop: &Stop) -> Outcome {
         news: &mut say,
     };
     if let Err(error) = run(&mut mapping, hosting) {
+        if error.kind() == std::io::ErrorKind::InvalidInput {
+            eprintln!("bridge: {error}");
+            return Outcome::WrongInput;
+        }
         return failed(format!(
             "the system has no more sockets or threads: {error}"
         ));

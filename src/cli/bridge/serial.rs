@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use super::say;
 use crate::cli::Outcome;
-use crate::cli::lab::dialled;
+use crate::cli::lab::{dialled, key};
 use tickbus_base::os::{Parity, SerialSettings};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_bridge::serial::{Device, Hosting, VirtualPort, run as carry};
 use tickbus_bridge::{AsciiBridge, LineEnd};
-use tickbus_dispatcher::PORT;
+use tickbus_dispatcher::{Key, PORT};
 use tickbus_net::Address;
 
 /// Pass lines of text between a serial line and the dispatcher, for the ASCII driver of a SCADA system.
@@ -29,6 +29,10 @@ pub(super) struct Arguments {
     /// The address of the dispatcher.
     #[arg(long, value_name = "HOST:PORT", default_value_t = Address::local(PORT), value_parser = dialled)]
     dispatcher: Address,
+
+    /// The file with the key of the laboratory, if it has one.
+    #[arg(long, value_name = "FILE", value_parser = key)]
+    key_file: Option<Key>,
 
     /// Bits per second.
     #[arg(long, value_name = "NUMBER", conflicts_with = "pty", default_value_t = 9600, value_parser = clap::value_parser!(u32).range(1..))]
@@ -93,7 +97,8 @@ pub(super) fn run(arguments: &Arguments, stop: &Stop) -> Outcome {
         End::Lf => LineEnd::Lf,
         End::Crlf => LineEnd::CrLf,
         End::Cr => LineEnd::Cr,
-    });
+    })
+    .with_key(arguments.key_file.clone());
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         stop,

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use tickbus_base::time::Nanos;
 use tickbus_dispatcher::grammar::{Identification, LONGEST_LINE, Line, Values, parse};
-use tickbus_dispatcher::{Channel, Counts, Number};
+use tickbus_dispatcher::{Channel, Counts, Key, Number};
 
 use crate::lines::{Cut, Lines};
 use crate::outbox::{Outbox, put};
@@ -68,6 +68,10 @@ pub struct AsciiBridge {
     /// Input from the serial line that waits for room in `requests`.
     unread: Vec<u8>,
     state: State,
+    /// The key of the laboratory, if it has one.
+    key: Option<Key>,
+    /// The key was sent, and not answered yet.
+    awaits_key: bool,
     client: Option<Client>,
     /// CONNECT, DISCONNECT and LIST lines that may not have been carried out yet.
     requests: VecDeque<Vec<u8>>,
@@ -140,6 +144,8 @@ impl AsciiBridge {
             to_dispatcher: Outbox::new(b"\r\n"),
             unread: Vec::new(),
             state: State::Away,
+            key: None,
+            awaits_key: false,
             client: None,
             requests: VecDeque::new(),
             pings: VecDeque::new(),
@@ -147,6 +153,13 @@ impl AsciiBridge {
             heard: Nanos::ZERO,
             traffic: Traffic::default(),
         }
+    }
+
+    /// States this key to the dispatcher in the client's place.
+    #[must_use]
+    pub fn with_key(mut self, key: Option<Key>) -> Self {
+        self.key = key;
+        self
     }
 
     /// The time since which it waits for an answer of the dispatcher; `None` if it does not.
@@ -253,6 +266,9 @@ impl AsciiBridge {
                 self.client = None;
                 self.requests.clear();
                 self.leave(true);
+            }
+            (Ok(Line::Key(_)), _) => {
+                self.refuse("400 the bridge states the key; start it with --key-file");
             }
             (_, State::Leaving { .. }) if self.client.is_none() => self.traffic.dropped += 1,
             (Ok(Line::Ping), State::Away | State::Refused | State::Leaving { .. }) => {
@@ -383,6 +399,9 @@ impl AsciiBridge {
 
     /// The dispatcher has sent a line.
     fn obey(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
+        if std::mem::take(&mut self.awaits_key) {
+            return self.key_answered(line);
+        }
         if line == b"OK PING" {
             let asker = self.pings.pop_front().map(|(asker, _)| asker);
             match (asker, self.state) {
@@ -405,6 +424,20 @@ impl AsciiBridge {
         Ok(())
     }
 
+    /// The dispatcher has answered the key.
+    fn key_answered(&mut self, line: &[u8]) -> Result<(), String> {
+        if line == b"OK KEY" {
+            return Ok(());
+        }
+        if let Some(client) = &mut self.client
+            && std::mem::take(&mut client.is_waiting)
+        {
+            self.pass(line);
+        }
+        self.state = State::Refused;
+        Err(format!("it answers {}", String::from_utf8_lossy(line)))
+    }
+
     /// The dispatcher has answered the identification.
     fn introduced(&mut self, now: Nanos, line: &[u8]) -> Result<(), String> {
         let Some(client) = &mut self.client else {
@@ -415,8 +448,12 @@ impl AsciiBridge {
             if is_first {
                 self.pass(line);
             }
-            // The name is taken, as it is for a while when a cable was pulled; or there are too many clients.
-            if line.starts_with(b"ERR 409") || line.starts_with(b"ERR 429") {
+            // The name is taken, as it is for a while when a cable was pulled; there are too many clients; or the laboratory
+            // has a key.
+            if [b"ERR 401", b"ERR 409", b"ERR 429"]
+                .iter()
+                .any(|code| line.starts_with(*code))
+            {
                 self.state = State::Refused;
                 let text = String::from_utf8_lossy(line);
                 return Err(format!("it answers {text}"));
@@ -490,6 +527,10 @@ impl Speaker for AsciiBridge {
         self.pings.clear();
         self.sent = now;
         self.heard = now;
+        self.awaits_key = self.key.is_some();
+        if let Some(key) = &self.key {
+            self.to_dispatcher.line(key.line().as_bytes());
+        }
         self.state = match &mut self.client {
             Some(client) => {
                 let values = client.inputs.iter();

@@ -1,5 +1,7 @@
 //! The kind `dispatcher`, for the list of bus kinds.
 
+use std::path::Path;
+
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table};
@@ -39,7 +41,12 @@ impl BusOptions for Options {
     }
 
     fn files(&self) -> Vec<NamedFile> {
-        Vec::new()
+        let key = self.key_file.iter().cloned();
+        key.map(NamedFile::Secret).collect()
+    }
+
+    fn check_files(&self, folder: &Path, _table: &SignalTable, collector: &Collector<'_>) {
+        self.check_key(folder, collector);
     }
 
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {

@@ -1,19 +1,23 @@
 //! The options of the bus in a driver.cfg.
 
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Key, Shape, Table, Value};
 use tickbus_dispatcher::client::Profile;
 use tickbus_dispatcher::{
-    Cable, Channel, Kind, LEAST_PROMISE, LONGEST_NAME, LONGEST_PROMISE, MOST_CHANNELS, PORT,
-    Role as Part, is_name,
+    Cable, Channel, Key as LabKey, Kind, LEAST_PROMISE, LONGEST_NAME, LONGEST_PROMISE,
+    MOST_CHANNELS, PORT, Role as Part, is_name,
 };
 use tickbus_fieldbus::{At, BusSetup, Role};
 use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
 
 use super::channels::{Channels, kind_of};
+
+/// The longest path, in characters.
+const PATH_LIMIT: usize = 1000;
 
 /// The keys of the bus, for the schema of a driver.cfg.
 pub(crate) const KEYS: &[Key] = &[
@@ -28,6 +32,11 @@ pub(crate) const KEYS: &[Key] = &[
         Shape::List(&Shape::Text, 0, usize::MAX),
         "The connections to request, such as \"I1:PUMP:Q2\"",
     ),
+    Key::new(
+        "key_file",
+        Shape::Label(PATH_LIMIT),
+        "The file with the key of the laboratory, relative to the folder of this file",
+    ),
 ];
 
 /// The options of the bus `dispatcher`.
@@ -39,6 +48,8 @@ pub struct Options {
     pub name: Option<String>,
     /// The connections to request, each with its offset in the file.
     pub cables: Vec<(usize, Cable)>,
+    /// The file with the key of the laboratory, if it has one; relative to the folder of the driver.cfg.
+    pub key_file: Option<PathBuf>,
     /// Signals with their own channel, by name: `[fieldbus.at]`.
     pub at: BTreeMap<String, Channel>,
     pub(super) role: Role,
@@ -47,11 +58,12 @@ pub struct Options {
 }
 
 impl Options {
-    /// Reads `address`, `name` and `connect`. With `moved`, `set_address` follows.
+    /// Reads `address`, `name`, `connect` and `key_file`. With `moved`, `set_address` follows.
     pub fn read(role: Role, moved: bool, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let name = table.take("name");
         let connect = table.take("connect");
+        let key_file = table.take("key_file");
         let address = address.map_or(Some(Address::local(PORT)), |value| {
             let address = Address::read(&value)?;
             if !moved && let Err(mistake) = address.check_dialled() {
@@ -61,10 +73,15 @@ impl Options {
         });
         let name = name.map_or(Some(None), |value| read_name(&value).map(Some));
         let cables = connect.map_or(Some(Vec::new()), |value| read_cables(&value));
+        let key_file = key_file.map_or(Some(None), |value| {
+            let file = value.label(PATH_LIMIT, "name the file with the key of the laboratory");
+            file.map(|file| Some(PathBuf::from(file)))
+        });
         Some(Self {
             address: address?,
             name: name?,
             cables: cables?,
+            key_file: key_file?,
             at: BTreeMap::new(),
             role,
             offset: table.at(),
@@ -77,6 +94,19 @@ impl Options {
         address.check_dialled()?;
         self.address = address;
         Ok(())
+    }
+
+    /// The key of the laboratory; `folder` is that of the driver.cfg.
+    fn key(&self, folder: &Path) -> Result<Option<LabKey>, Mistake> {
+        let key = self.key_file.as_ref();
+        key.map(|file| LabKey::load(&folder.join(file))).transpose()
+    }
+
+    /// Reports a key that cannot be read.
+    pub(super) fn check_key(&self, folder: &Path, collector: &Collector<'_>) {
+        if let Err(mistake) = self.key(folder) {
+            collector.collect(self.offset, mistake);
+        }
     }
 
     /// The channels of all signals.
@@ -136,7 +166,7 @@ impl Options {
     ///
     /// # Errors
     ///
-    /// No name is stated, and the driver's name is not valid.
+    /// No name is stated, and the driver's name is not valid; or the key cannot be read.
     pub(super) fn profile(&self, setup: &BusSetup<'_>) -> Result<Profile, Mistake> {
         let name = match (&self.name, self.role) {
             (Some(name), _) => name.clone(),
@@ -159,6 +189,7 @@ impl Options {
             cables: self.cables.iter().map(|(_, cable)| cable.clone()).collect(),
             // Clients fed by this driver lose their source if it falls silent for longer than its `max_age`.
             alive: Some(setup.max_age.clamp(LEAST_PROMISE, LONGEST_PROMISE)),
+            key: self.key(setup.folder)?,
         };
         profile.check().map(|()| profile)
     }

@@ -1,5 +1,6 @@
 //! The dispatcher without its sockets: lines in, lines out; the caller passes the time.
 
+mod guard;
 mod laboratory;
 mod operator;
 mod requests;
@@ -21,6 +22,7 @@ use crate::number::Number;
 use crate::patch::{Patch, Pin};
 use crate::refusal::{Code, Refusal};
 
+use guard::Guard;
 pub use operator::{Order, Reply};
 use requests::Waiting;
 
@@ -54,6 +56,7 @@ impl Default for Settings {
 #[derive(Debug)]
 pub struct Dispatcher {
     settings: Settings,
+    guard: Guard,
     board: Board,
     sessions: Vec<Option<Session>>,
     free: Vec<usize>,
@@ -79,6 +82,10 @@ pub struct Dispatcher {
 }
 
 #[derive(Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "independent facts about a client"
+)]
 struct Session {
     peer: SocketAddr,
     /// When the client's last complete line came, or the connection was made.
@@ -87,6 +94,8 @@ struct Session {
     begun: Vec<u8>,
     /// The rest of the current line is too long, and is skipped.
     is_skipping: bool,
+    /// The client has stated the key of the laboratory, or there is none.
+    is_admitted: bool,
     is_version_2: bool,
     /// The client has promised a line at least this often.
     alive: Option<Nanos>,
@@ -142,6 +151,7 @@ impl Dispatcher {
     pub fn new(settings: Settings, patch: Patch) -> Self {
         Self {
             settings,
+            guard: Guard::default(),
             board: Board::new(patch, settings.on_loss),
             sessions: Vec::new(),
             free: Vec::new(),
@@ -192,12 +202,14 @@ impl Dispatcher {
             heard: now,
             begun: Vec::new(),
             is_skipping: false,
+            is_admitted: !self.guard.is_closed(),
             is_version_2: false,
             alive: None,
             is_silent: false,
             progress: Progress::Going,
         });
-        self.next_look = self.next_look.min(now + self.settings.idle);
+        let patience = self.patience(seat);
+        self.next_look = self.next_look.min(now + patience);
         Ok(seat)
     }
 
@@ -425,11 +437,15 @@ impl Dispatcher {
         if !matches!(line, Ok(Line::Values(_))) {
             self.speak_again(now, seat);
         }
+        let is_admitted = self.session(seat).is_some_and(|it| it.is_admitted);
+        if !is_admitted && !matches!(line, Ok(Line::Nothing | Line::Key(_))) {
+            return Err(self.refuse_stranger(seat));
+        }
         let line = line?;
         let is_plugged = self.board.device(seat).is_some();
         let may_come_first = matches!(
             line,
-            Line::Nothing | Line::Identify(_) | Line::Ping | Line::Bye
+            Line::Nothing | Line::Key(_) | Line::Identify(_) | Line::Ping | Line::Bye
         );
         if !is_plugged && !may_come_first {
             return Err(Code::IdentifyFirst
@@ -438,6 +454,7 @@ impl Dispatcher {
         self.board.begin_line();
         match line {
             Line::Nothing => {}
+            Line::Key(said) => self.unlock(now, seat, said)?,
             Line::Identify(identification) => self.identify(now, seat, identification)?,
             Line::Values(values) => self.values(seat, values)?,
             Line::Connect(joints) => self.connect(seat, joints)?,

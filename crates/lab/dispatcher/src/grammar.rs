@@ -1,7 +1,8 @@
 //! The lines that a client may send.
 //!
 //! ```text
-//! line       = [ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
+//! line       = [key | ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
+//! key        = "KEY" 16*128(visible character)
 //! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) *("V=2" | "V=3" | "ALIVE=" time)
 //! values     = "P" *(channel "=" number)
 //! connect    = "CONNECT" 1*(channel ":" name ":" channel)
@@ -36,6 +37,8 @@ pub const LONGEST_PROMISE: Nanos = Nanos::from_secs(60);
 pub enum Line<'a> {
     /// An empty line.
     Nothing,
+    /// The key of the laboratory, as the client states it.
+    Key(&'a [u8]),
     /// The client's identification.
     Identify(Identification<'a>),
     /// Values of its outputs.
@@ -84,6 +87,10 @@ pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
             Some(_) => Err(words.unexpected("a keyword such as P or CONNECT")),
         };
     };
+    if keyword.eq_ignore_ascii_case(b"KEY") {
+        // A key can have any sign, and no answer repeats it.
+        return Ok(Line::Key(words.0.trim_ascii()));
+    }
     if let Some(role) = Role::parse(keyword) {
         return identification(role, words).map(Line::Identify);
     }

@@ -18,8 +18,10 @@ pub struct Refusal {
 pub enum Code {
     /// 400: the line is not in the grammar.
     Syntax,
-    /// 401: the client has not identified itself.
+    /// 401: the client has not stated the laboratory's key, or has not identified itself.
     IdentifyFirst,
+    /// 403: the key of the laboratory is wrong; the connection is closed.
+    WrongKey,
     /// 404: there is no such client, channel or connection.
     NotFound,
     /// 408: no line came for too long; the connection is closed.
@@ -42,6 +44,7 @@ impl Code {
         match self {
             Self::Syntax => 400,
             Self::IdentifyFirst => 401,
+            Self::WrongKey => 403,
             Self::NotFound => 404,
             Self::TimeOut => 408,
             Self::Conflict => 409,

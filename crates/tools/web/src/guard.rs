@@ -9,6 +9,8 @@ use std::net::IpAddr;
 
 use hyper::header::{AUTHORIZATION, HOST, HeaderMap, HeaderName, ORIGIN};
 
+use tickbus_base::is_same_secret;
+
 use crate::token;
 
 /// Checks requests.
@@ -98,12 +100,8 @@ impl Guard {
             return Token::Missing;
         }
         let given = only(headers, &AUTHORIZATION).and_then(|it| it.strip_prefix("Bearer "));
-        // The duration of the comparison must not reveal how much of the token is right.
-        let is_right = given.is_some_and(|given| {
-            let pairs = given.bytes().zip(self.token.bytes());
-            let differences = pairs.fold(0, |all, (one, other)| all | (one ^ other));
-            given.len() == self.token.len() && differences == 0
-        });
+        let is_right =
+            given.is_some_and(|given| is_same_secret(given.as_bytes(), self.token.as_bytes()));
         if is_right { Token::Right } else { Token::Wrong }
     }
 }

@@ -4,18 +4,26 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text, shown};
-use tickbus_dispatcher::{Channel, Counts, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role, is_name};
+use tickbus_dispatcher::{
+    Channel, Counts, Key, Kind, LONGEST_NAME, MOST_CHANNELS, PORT, Role, is_name,
+};
 use tickbus_net::Address;
+
+use super::access::{Access, key_of};
 
 /// The description of a bridge between MQTT and the dispatcher.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
     /// The address of the MQTT broker.
     pub broker: Address,
+    /// How the broker lets the bridge in.
+    pub access: Access,
     /// The topic for the state of the bridge.
     pub status: Option<String>,
     /// The address of the dispatcher.
     pub dispatcher: Address,
+    /// The key of the laboratory, if it has one.
+    pub key: Option<Key>,
     /// The bridge's role in the laboratory.
     pub role: Role,
     /// The bridge's name there, and with the broker.
@@ -68,14 +76,14 @@ impl Map {
         Self::parse(&path.display().to_string(), &load_text(path)?)
     }
 
-    /// Reads the text of a file; messages call it `file`.
+    /// Reads the text of a file; messages call it `file`. The paths in it are relative to the folder of `file`.
     ///
     /// # Errors
     ///
     /// With every mistake in it.
     pub fn parse(file: &str, text: &str) -> Result<Self, Mistakes> {
         let mut collector = Collector::new(file, text);
-        let map = read_text(&mut collector, text, read);
+        let map = read_text(&mut collector, text, |root| read(file, root));
         match (collector.finish(), map) {
             (None, Some(map)) => Ok(map),
             (Some(mistakes), _) => Err(mistakes),
@@ -99,7 +107,7 @@ impl Map {
     }
 }
 
-fn read(mut root: Table<'_>) -> Option<Map> {
+fn read(file: &str, mut root: Table<'_>) -> Option<Map> {
     const CHANNEL: &str = "write [[channel]] tables with a channel and a topic";
 
     let mqtt = root.require("mqtt", "write an [mqtt] table with the broker");
@@ -109,12 +117,17 @@ fn read(mut root: Table<'_>) -> Option<Map> {
     );
     let list = root.require("channel", CHANNEL);
     root.finish();
-    let mqtt = mqtt.and_then(|value| read_mqtt(value.table("[mqtt]", "write an [mqtt] table")?));
+    let folder = Path::new(file).parent().unwrap_or(Path::new(""));
+    let mqtt =
+        mqtt.and_then(|value| read_mqtt(value.table("[mqtt]", "write an [mqtt] table")?, folder));
     let lab = lab.and_then(|value| {
-        read_dispatcher(value.table("[dispatcher]", "write a [dispatcher] table")?)
+        read_dispatcher(
+            value.table("[dispatcher]", "write a [dispatcher] table")?,
+            folder,
+        )
     });
     let channels = read_channels(&list?);
-    let ((broker, status), (dispatcher, role, name)) = (mqtt?, lab?);
+    let ((broker, access, status), (dispatcher, key, role, name)) = (mqtt?, lab?);
     let status = status.map(|(value, topic)| {
         if let Some(entry) = channels.iter().find(|entry| entry.topic == topic) {
             let what = format!("\"{topic}\" is the topic of {} as well", entry.channel);
@@ -124,28 +137,37 @@ fn read(mut root: Table<'_>) -> Option<Map> {
     });
     Some(Map {
         broker,
+        access,
         status,
         dispatcher,
+        key,
         role,
         name,
         channels,
     })
 }
 
-/// The broker's address, and the topic of the status with its position.
-fn read_mqtt(mut table: Table<'_>) -> Option<(Address, Option<(Value<'_>, String)>)> {
+/// The topic of the status, with its position.
+type Status<'a> = Option<(Value<'a>, String)>;
+
+fn read_mqtt<'a>(mut table: Table<'a>, folder: &Path) -> Option<(Address, Access, Status<'a>)> {
     let broker = table.require(
         "broker",
         "write where the broker listens, such as \"127.0.0.1:1883\"",
     );
     let status = table.take("status");
+    let access = Access::read(&mut table, folder);
     table.finish();
     let status = status.and_then(|value| topic(&value).map(|topic| (value, topic)));
-    Some((Address::read_dialled(&broker?)?, status))
+    Some((Address::read_dialled(&broker?)?, access?, status))
 }
 
-fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
+fn read_dispatcher(
+    mut table: Table<'_>,
+    folder: &Path,
+) -> Option<(Address, Option<Key>, Role, String)> {
     let address = table.take("address");
+    let key = table.take("key_file");
     let role = table.require(
         "role",
         "write \"VP\" for a process or \"VR\" for a controller",
@@ -170,7 +192,8 @@ fn read_dispatcher(mut table: Table<'_>) -> Option<(Address, Role, String)> {
         }
         Some(text.to_owned())
     });
-    Some((address?, role?, name?))
+    let key = key.map_or(Some(None), |value| key_of(&value, folder).map(Some));
+    Some((address?, key?, role?, name?))
 }
 
 /// A single topic, not a filter for several.

@@ -137,6 +137,7 @@ fn client(map: &Map) -> Result<Client, Mistake> {
         counts: map.counts(),
         cables: Vec::new(),
         alive: None,
+        key: map.key.clone(),
     };
     Client::new(profile, KEEP_ALIVE)
 }

@@ -14,6 +14,7 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_net::Host;
 
 use super::mapping::Mapping;
+use super::tls;
 use crate::link::Link;
 use crate::speaker::Speaker as _;
 
@@ -57,7 +58,7 @@ enum Heard {
 ///
 /// # Errors
 ///
-/// The system cannot wait for sockets, or has no more threads.
+/// The system cannot wait for sockets, or has no more threads. [`io::ErrorKind::InvalidInput`]: a certificate cannot be used.
 pub fn run(mapping: &mut Mapping, hosting: Hosting<'_>) -> io::Result<()> {
     let set = PollSet::new(hosting.stop);
     let broker = Broker::call(mapping, &hosting)?;
@@ -141,7 +142,7 @@ impl Between<'_, '_> {
                 let what = if self.is_connected {
                     "is lost"
                 } else {
-                    "does not answer"
+                    "is not reached"
                 };
                 let line = format!(
                     "the broker at {address} {what} ({why}); it is called again each second"
@@ -216,6 +217,16 @@ impl Broker {
         let mut options = MqttOptions::new(&map.name, host, map.broker.port);
         options.set_keep_alive(ALIVE.to_duration());
         options.set_max_packet_size(LONGEST, LONGEST);
+        if let Some(login) = &map.access.login {
+            options.set_credentials(&*login.user, &*login.password);
+        }
+        if let Some(tls) = &map.access.tls {
+            let transport = tls::transport(tls);
+            options.set_transport(
+                transport
+                    .map_err(|mistake| io::Error::new(io::ErrorKind::InvalidInput, mistake))?,
+            );
+        }
         if let Some(status) = &map.status {
             options.set_last_will(LastWill::new(status, OFFLINE, QoS::AtLeastOnce, true));
         }
@@ -283,7 +294,7 @@ impl Driver {
                 Ok(Event::Outgoing(_)) => true,
                 Err(_) if self.stop.is_stopped() => false,
                 Err(error) => {
-                    let goes_on = self.tell(Heard::Lost(error.to_string()));
+                    let goes_on = self.tell(Heard::Lost(tls::reason(&error)));
                     self.clock.wait_until(self.clock.now() + PAUSE, &self.stop);
                     goes_on
                 }

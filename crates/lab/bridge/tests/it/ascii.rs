@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 
 use tickbus_base::time::Nanos;
 use tickbus_bridge::{AsciiBridge, LineEnd, Speaker as _};
-use tickbus_dispatcher::{Dispatcher, Patch, Settings};
+use tickbus_dispatcher::{Dispatcher, Key, Patch, Settings};
 
 /// A bridge, a dispatcher, and clients that are connected with it directly.
 struct Lab {
@@ -530,4 +530,56 @@ proptest::proptest! {
         let heard = lab.serial("PING\r");
         proptest::prop_assert_eq!(heard.last().map(String::as_str), Some("OK PING"));
     }
+}
+
+#[test]
+fn the_bridge_states_the_key_in_its_clients_place() {
+    let key = |text: &str| Key::parse(text).expect("a key");
+    let with = |said: &str| {
+        let mut lab = Lab {
+            now: Nanos::ZERO,
+            dispatcher: Dispatcher::new(Settings::default(), Patch::new()),
+            bridge: AsciiBridge::new(LineEnd::Cr).with_key(Some(key(said))),
+            seat: None,
+        };
+        lab.dispatcher.require(key("0123456789abcdef"));
+        lab.connect();
+        lab
+    };
+    let mut lab = with("0123456789abcdef");
+    let heard = lab.serial("VR SCADA Q1 I1 V=2\r");
+    assert_eq!(heard[0], "OK VR", "and not OK KEY");
+    assert_eq!(lab.serial("PING\r"), ["OK PING"]);
+    let told = lab.serial("KEY 0123456789abcdef\r");
+    assert_eq!(
+        told,
+        ["ERR 400 the bridge states the key; start it with --key-file"]
+    );
+    // After a break it states the key again.
+    assert!(!lab.cut());
+    lab.told();
+    lab.connect();
+    assert_eq!(lab.settle(), None);
+    assert_eq!(lab.told()[0], "OK VR");
+
+    let mut lab = with("0123456789abcdeF");
+    lab.bridge.from_serial(lab.now, b"VR SCADA Q1 I1 V=2\r");
+    let why = lab.settle().expect("it is refused");
+    assert!(
+        why.starts_with("it answers ERR 403 the key is wrong"),
+        "{why}"
+    );
+    assert!(lab.told()[0].starts_with("ERR 403"));
+
+    // A bridge without the key says what the dispatcher wants.
+    let mut lab = Lab::new();
+    lab.cut();
+    lab.dispatcher.require(key("0123456789abcdef"));
+    lab.connect();
+    lab.bridge.from_serial(lab.now, b"VR SCADA Q1 I1 V=2\r");
+    let why = lab.settle().expect("it is refused");
+    assert!(
+        why.starts_with("it answers ERR 401 this laboratory has a key"),
+        "{why}"
+    );
 }

@@ -410,3 +410,79 @@ topic = \"f\"
         assert!(told.contains(part), "{part} in\n{told}");
     }
 }
+
+/// A map with these lines in its tables, in a folder with these files.
+fn map_with(mqtt: &str, dispatcher: &str) -> Result<Map, String> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| {
+        std::fs::write(folder.path().join(name), text).expect("a file");
+    };
+    write("password", "geheim\r\nnotes\n");
+    write("ca.pem", "-----BEGIN CERTIFICATE-----\n");
+    write("lab.key", "0123456789abcdef\n");
+    write("short.key", "short\n");
+    let text = MAP.replace(
+        "[dispatcher]\n",
+        &format!("{mqtt}[dispatcher]\n{dispatcher}"),
+    );
+    let file = folder.path().join("map.toml");
+    std::fs::write(&file, text).expect("a file");
+    Map::load(&file).map_err(|mistakes| {
+        let folder = format!("{}/", folder.path().display());
+        mistakes.to_string().replace(&folder, "")
+    })
+}
+
+#[test]
+fn user_certificates_and_key_are_read_from_files_beside_the_map() {
+    let map = map_with(
+        "user = \"hall\"\npassword_file = \"password\"\nca_file = \"ca.pem\"\ncertificate_file = \"ca.pem\"\n\
+         private_key_file = \"ca.pem\"\n",
+        "key_file = \"lab.key\"\n",
+    )
+    .expect("a right map");
+    let login = map.access.login.as_ref().expect("a user");
+    assert_eq!((&*login.user, &*login.password), ("hall", "geheim"));
+    assert!(map.access.tls.as_ref().is_some_and(|tls| tls.own.is_some()));
+    assert!(map.key.is_some());
+    let shown = format!("{map:?}");
+    assert!(
+        !shown.contains("geheim") && !shown.contains("0123"),
+        "{shown}"
+    );
+    for (mqtt, dispatcher, part) in [
+        (
+            "user = \"hall\"\n",
+            "",
+            "map.toml:4:8: \"user\" stands without a password",
+        ),
+        (
+            "password_file = \"password\"\n",
+            "",
+            "map.toml:4:17: there is a password and no user",
+        ),
+        (
+            "user = \"hall\"\npassword_file = \"no\"\n",
+            "",
+            "map.toml:5:17: no: there is no such file",
+        ),
+        (
+            "certificate_file = \"ca.pem\"\n",
+            "",
+            "map.toml:4:20: a certificate stands without \"ca_file\"",
+        ),
+        (
+            "ca_file = \"ca.pem\"\ncertificate_file = \"ca.pem\"\n",
+            "",
+            "map.toml:5:20: the other file is missing",
+        ),
+        (
+            "",
+            "key_file = \"short.key\"\n",
+            "map.toml:5:12: the key in short.key: the key has 5 characters",
+        ),
+    ] {
+        let told = map_with(mqtt, dispatcher).expect_err(part);
+        assert!(told.contains(part), "{part} in\n{told}");
+    }
+}

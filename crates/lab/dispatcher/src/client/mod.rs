@@ -9,6 +9,7 @@ use tickbus_base::time::Nanos;
 use crate::cable::Cable;
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::{Device, Role};
+use crate::key::Key;
 use crate::name::{LONGEST_NAME, is_name};
 use crate::number::Number;
 use crate::refusal::Code;
@@ -40,6 +41,8 @@ pub struct Profile {
     /// The client sends a line at least this often, 10 ms to 60 s; the dispatcher cuts its outputs off while it does not. `None`:
     /// the dispatcher does not supervise it.
     pub alive: Option<Nanos>,
+    /// The key of the laboratory, if it has one.
+    pub key: Option<Key>,
 }
 
 impl Profile {
@@ -147,6 +150,8 @@ pub struct Client {
 enum Progress {
     Apart,
     Connected,
+    /// The dispatcher has accepted the key.
+    Admitted,
     /// Accepted by the dispatcher, and between two requests.
     Idle,
     /// Awaiting the answer to this request. Others wait meanwhile, so each answer belongs to one request.
@@ -155,6 +160,7 @@ enum Progress {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Request {
+    Key,
     Identify,
     Connect(usize),
     List,
@@ -218,7 +224,10 @@ impl Client {
     pub fn is_identified(&self) -> bool {
         !matches!(
             self.progress,
-            Progress::Apart | Progress::Connected | Progress::Asking(Request::Identify)
+            Progress::Apart
+                | Progress::Connected
+                | Progress::Admitted
+                | Progress::Asking(Request::Key | Request::Identify)
         )
     }
 
@@ -313,6 +322,7 @@ impl Client {
             return Err(lines::nonsense(line, "nothing was asked"));
         };
         let expected = match request {
+            Request::Key => "KEY",
             Request::Identify => self.profile.role.keyword(),
             Request::Connect(_) => "CONNECT",
             Request::List => "LIST",
@@ -326,6 +336,7 @@ impl Client {
         }
         self.progress = Progress::Idle;
         match request {
+            Request::Key => self.progress = Progress::Admitted,
             Request::Identify => events(Event::Identified),
             Request::Connect(at) => {
                 self.wishes[at] = Wish::Granted;
@@ -357,7 +368,10 @@ impl Client {
         }
         let mut cable = None;
         match self.progress {
-            Progress::Apart | Progress::Connected | Progress::Asking(Request::Identify) => {
+            Progress::Apart
+            | Progress::Connected
+            | Progress::Admitted
+            | Progress::Asking(Request::Key | Request::Identify) => {
                 return Err(ClientError::Refused(if code == Code::Conflict.number() {
                     format!(
                         "the dispatcher has another client \"{name}\"; give this one a \"name\" of its own, or end the \
@@ -387,8 +401,13 @@ impl Client {
             return;
         }
         match self.progress {
-            Progress::Apart | Progress::Asking(Request::Identify) => return,
-            Progress::Connected => {
+            Progress::Apart | Progress::Asking(Request::Key | Request::Identify) => return,
+            Progress::Connected if let Some(key) = &self.profile.key => {
+                let line = key.line();
+                self.ask(now, Request::Key, &line);
+                return;
+            }
+            Progress::Connected | Progress::Admitted => {
                 let Profile {
                     role,
                     name,
@@ -499,7 +518,7 @@ impl Client {
     pub fn deadline(&self) -> Nanos {
         let mut deadline = self.given_up();
         match self.progress {
-            Progress::Connected => deadline = self.said,
+            Progress::Connected | Progress::Admitted => deadline = self.said,
             Progress::Idle => {
                 deadline = deadline.min(self.next_ping());
                 for wish in &self.wishes {

@@ -17,6 +17,7 @@ impl Bench {
                 .map(|text| Cable::parse(text).expect(text))
                 .collect(),
             alive: Some(Nanos::from_millis(250)),
+            key: None,
         };
         let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
         client.connected(Nanos::ZERO);
@@ -136,6 +137,7 @@ fn many_values_make_several_lines() {
         counts: Counts::new(256, 0, 256, 0),
         cables: Vec::new(),
         alive: None,
+        key: None,
     };
     let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
     let capacity = client.out.capacity();
@@ -384,6 +386,7 @@ fn a_profile_that_no_dispatcher_takes_is_a_mistake() {
             .map(|text| Cable::parse(text).expect(text))
             .collect(),
         alive: None,
+        key: None,
     };
     let some = Counts::new(1, 0, 0, 0);
     for (profile, part) in [

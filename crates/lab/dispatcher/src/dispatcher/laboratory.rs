@@ -70,7 +70,8 @@ impl Dispatcher {
 
     /// The next news for an operator, one line.
     pub fn next_news(&mut self) -> Option<String> {
-        self.federation.as_mut()?.news.pop_front()
+        let news = self.guard.next_news();
+        news.or_else(|| self.federation.as_mut()?.news.pop_front())
     }
 
     /// A letter from another dispatcher has arrived.

@@ -2,6 +2,7 @@
 
 use tickbus_base::time::Nanos;
 
+use super::guard::PATIENCE;
 use super::{Code, Dispatcher, Progress};
 use crate::board::OnLoss;
 
@@ -46,11 +47,11 @@ impl Dispatcher {
         if now < self.next_look {
             return;
         }
-        let idle = self.settings.idle;
         // If this process was held up, clients may have sent lines that were not read yet.
         let is_late = now - self.next_look > Nanos(self.promise.0 / 2);
         let (mut first, mut promise) = (Nanos::MAX, Nanos::MAX);
         for seat in 0..self.sessions.len() {
+            let idle = self.patience(seat);
             let Some(session) = self.sessions[seat]
                 .as_mut()
                 .filter(|it| it.progress != Progress::Closing)
@@ -86,10 +87,21 @@ impl Dispatcher {
         }
         self.promise = promise;
         // With many clients one is always due soon; check them together.
-        let soonest = now + Nanos((idle.0 / 600).min(promise.0 / 10));
+        let soonest = now + Nanos((self.settings.idle.0 / 600).min(promise.0 / 10));
         self.next_look = first.max(soonest);
         if first == Nanos::MAX {
             self.next_look = Nanos::MAX;
+        }
+    }
+
+    /// How long a client may send no line.
+    pub(super) fn patience(&self, seat: usize) -> Nanos {
+        let idle = self.settings.idle;
+        let is_stranger = self.session(seat).is_some_and(|it| !it.is_admitted);
+        if is_stranger {
+            idle.min(PATIENCE)
+        } else {
+            idle
         }
     }
 

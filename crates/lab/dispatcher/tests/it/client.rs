@@ -23,6 +23,7 @@ impl Seated {
                 .map(|text| Cable::parse(text).expect(text))
                 .collect(),
             alive: None,
+            key: None,
         };
         let mut client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
         client.connected(lab.now);

@@ -5,6 +5,7 @@ mod client;
 mod common;
 mod document;
 mod hosts;
+mod key;
 mod model;
 mod operator;
 mod paper;

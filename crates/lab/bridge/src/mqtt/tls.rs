@@ -1,0 +1,124 @@
+//! Encrypted connections with a broker.
+
+use std::error::Error;
+use std::io;
+use std::sync::Arc;
+
+use rumqttc::{ConnectReturnCode, ConnectionError, TlsError, Transport};
+use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, PrivateKeyDer};
+use rustls::{CertificateError, ClientConfig, RootCertStore};
+use tickbus_base::Mistake;
+
+use super::access::Tls;
+
+/// The transport with these certificates.
+///
+/// # Errors
+///
+/// A text is no certificate or no key.
+pub(super) fn transport(tls: &Tls) -> Result<Transport, Mistake> {
+    const RIGHT: &str = "name a file in PEM, which begins with -----BEGIN";
+
+    let wrong = |what: &str, error: &dyn std::fmt::Display| {
+        Mistake::new(format!("{what} cannot be used ({error})"), RIGHT)
+    };
+    let certificates = |text: &str, what: &str| {
+        let all: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(text.as_bytes()).collect();
+        match all {
+            Ok(all) if all.is_empty() => Err(wrong(what, &"it has no certificate")),
+            Ok(all) => Ok(all),
+            Err(error) => Err(wrong(what, &error)),
+        }
+    };
+    let mut roots = RootCertStore::empty();
+    for one in certificates(&tls.authorities, "ca_file")? {
+        let added = roots.add(one);
+        added.map_err(|error| wrong("ca_file", &error))?;
+    }
+    let provider = Arc::new(rustls::crypto::ring::default_provider());
+    let config = ClientConfig::builder_with_provider(provider)
+        .with_safe_default_protocol_versions()
+        .map_err(|error| wrong("TLS", &error))?
+        .with_root_certificates(roots);
+    let config = match &tls.own {
+        None => config.with_no_client_auth(),
+        Some((certificate, key)) => {
+            let chain = certificates(certificate, "certificate_file")?;
+            let key = PrivateKeyDer::from_pem_slice(key.as_bytes());
+            let key = key.map_err(|error| wrong("private_key_file", &error))?;
+            let config = config.with_client_auth_cert(chain, key);
+            config.map_err(|error| wrong("certificate_file with private_key_file", &error))?
+        }
+    };
+    Ok(Transport::tls_with_config(config.into()))
+}
+
+/// Why a connection failed, and what to do.
+pub(super) fn reason(error: &ConnectionError) -> String {
+    match error {
+        ConnectionError::ConnectionRefused(
+            ConnectReturnCode::BadUserNamePassword | ConnectReturnCode::NotAuthorized,
+        ) => "it refuses this client; check user and password_file, and that the user may connect"
+            .to_owned(),
+        ConnectionError::ConnectionRefused(ConnectReturnCode::BadClientId) => {
+            "it refuses the name of this client; give it another \"name\"".to_owned()
+        }
+        // Some of these come when the first bytes are read, inside of other errors.
+        other => rustls_error(other).map_or_else(|| of_others(other), of_tls),
+    }
+}
+
+/// The error of TLS behind an error.
+fn rustls_error(error: &ConnectionError) -> Option<&rustls::Error> {
+    let mut next: Option<&(dyn Error + 'static)> = Some(error);
+    while let Some(error) = next {
+        if let Some(found) = error.downcast_ref() {
+            return Some(found);
+        }
+        let inner = error
+            .downcast_ref::<io::Error>()
+            .and_then(io::Error::get_ref);
+        if let Some(found) = inner.and_then(|inner| inner.downcast_ref()) {
+            return Some(found);
+        }
+        next = error.source();
+    }
+    None
+}
+
+fn of_others(error: &ConnectionError) -> String {
+    match error {
+        ConnectionError::Tls(TlsError::Io(io)) => {
+            format!(
+                "it does not speak TLS at this port ({io}); name its port for TLS, usually 8883"
+            )
+        }
+        other => other.to_string(),
+    }
+}
+
+fn of_tls(error: &rustls::Error) -> String {
+    match error {
+        rustls::Error::InvalidCertificate(CertificateError::UnknownIssuer) => {
+            "its certificate is not signed by an authority of ca_file; name the right one"
+                .to_owned()
+        }
+        rustls::Error::InvalidCertificate(
+            CertificateError::NotValidForName | CertificateError::NotValidForNameContext { .. },
+        ) => {
+            "its certificate is for another name; write the name of the certificate into \"broker\""
+                .to_owned()
+        }
+        rustls::Error::InvalidCertificate(
+            CertificateError::Expired | CertificateError::ExpiredContext { .. },
+        ) => "its certificate has expired; renew it, or check this computer's clock".to_owned(),
+        rustls::Error::InvalidMessage(_) => {
+            "it does not speak TLS at this port; name its port for TLS, usually 8883".to_owned()
+        }
+        rustls::Error::AlertReceived(alert) => format!(
+            "it ends the connection ({alert:?}); it may want a certificate_file of this client that it trusts"
+        ),
+        other => other.to_string(),
+    }
+}

@@ -152,7 +152,7 @@ fn run(kinds: &'static Kinds) -> Outcome {
     tickbus_base::os::log_to_stderr(log::LevelFilter::Error);
     let outcome = match arguments.command {
         Command::Axes(arguments) => axes::run(&arguments, kinds),
-        Command::Bridge(arguments) => bridge::run(&arguments),
+        Command::Bridge(arguments) => bridge::run(&arguments, kinds),
         Command::Check(arguments) => check::run(&arguments, kinds),
         Command::Compare(arguments) => compare::run(&arguments, kinds),
         Command::Completions(arguments) => completions::run(&arguments),

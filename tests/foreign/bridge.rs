@@ -14,17 +14,22 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     #[cfg(unix)]
     ("mosquitto_says_when_the_bridge_is_gone", unix::gone),
     #[cfg(unix)]
+    (
+        "mosquitto_lets_in_users_over_tls_and_others_learn_why_not",
+        unix::secured,
+    ),
+    #[cfg(unix)]
     ("pyserial_takes_part_through_a_virtual_port", unix::pyserial),
 ];
 
 #[cfg(unix)]
 mod unix {
-    use std::io::{BufRead as _, BufReader, Lines, Read, Write as _};
-    use std::net::{TcpListener, TcpStream};
+    use std::io::{BufRead as _, BufReader, Lines, Read};
+    use std::net::TcpListener;
     use std::path::{Path, PathBuf};
     use std::process::{Child, Command, Stdio};
 
-    use crate::commands::{Running, bridge, dispatch};
+    use crate::commands::{LabClient, Running, bridge, dispatch};
     use crate::harness::{self, Absent};
 
     /// A foreign program, killed at the end.
@@ -162,11 +167,8 @@ off = \"shut\"
         }
 
         /// A tank, connected with the hall.
-        fn tank(&self) -> Tank {
-            let stream = TcpStream::connect(&*self.dispatcher).expect("it listens");
-            let mut tank = Tank(BufReader::new(stream));
-            tank.say("VP TANK AQ1 AI1 I1 V=2");
-            tank.until("END 2");
+        fn tank(&self) -> LabClient {
+            let mut tank = LabClient::connect(&self.dispatcher, "VP TANK AQ1 AI1 I1 V=2");
             tank.say("CONNECT AQ1:HALL:AI1 AI1:HALL:AQ1 I1:HALL:Q1");
             tank.until("OK CONNECT");
             tank
@@ -180,29 +182,6 @@ off = \"shut\"
         let mut broker = Peer::start_log(command);
         broker.until(" running");
         Ok(broker)
-    }
-
-    /// A client that is connected directly with the dispatcher.
-    struct Tank(BufReader<TcpStream>);
-
-    impl Tank {
-        fn say(&mut self, line: &str) {
-            let line = format!("{line}\n");
-            self.0
-                .get_mut()
-                .write_all(line.as_bytes())
-                .expect("it reads");
-        }
-
-        fn until(&mut self, begin: &str) -> String {
-            loop {
-                let mut line = String::new();
-                assert!(self.0.read_line(&mut line).expect("text") > 0, "no {begin}");
-                if line.starts_with(begin) {
-                    return line.trim_end().to_owned();
-                }
-            }
-        }
     }
 
     pub(super) fn exchange() -> Result<(), Absent> {
@@ -286,6 +265,131 @@ off = \"shut\"
         topics.until("hall/bridge 0 <online>");
         assert_eq!(bridge.interrupt().1, Some(0));
         topics.until("hall/bridge 0 <offline>");
+        Ok(())
+    }
+
+    /// An authority, a certificate for 127.0.0.1 and one for the bridge, by openssl.
+    fn make_certificates(folder: &Path) -> Result<(), Absent> {
+        const CURVE: &str = "-newkey ec -pkeyopt ec_paramgen_curve:prime256v1 -nodes -days 30";
+        harness::command_with("openssl", "version", "openssl")?;
+        for arguments in [
+            "-keyout ca.key -out ca.pem -subj /CN=authority",
+            "-keyout other.key -out other.pem -subj /CN=other",
+            "-CA ca.pem -CAkey ca.key -keyout broker.key -out broker.pem -subj /CN=broker \
+             -addext basicConstraints=CA:FALSE -addext subjectAltName=IP:127.0.0.1",
+            "-CA ca.pem -CAkey ca.key -keyout own.key -out own.pem -subj /CN=hall -addext basicConstraints=CA:FALSE",
+        ] {
+            let mut openssl = Command::new("openssl");
+            openssl.current_dir(folder).args(["req", "-x509"]);
+            openssl.args(CURVE.split(' ').chain(arguments.split_whitespace()));
+            let output = openssl.output().expect("it runs");
+            let told = String::from_utf8_lossy(&output.stderr);
+            assert!(output.status.success(), "{told}");
+        }
+        Ok(())
+    }
+
+    pub(super) fn secured() -> Result<(), Absent> {
+        let mut lab = Lab::new()?;
+        let folder = lab.folder.path().to_owned();
+        make_certificates(&folder)?;
+        let made = Command::new("mosquitto_passwd")
+            .current_dir(&folder)
+            .args(["-b", "-c", "users", "hall", "geheim"])
+            .status();
+        assert!(made.expect("it comes with mosquitto").success());
+        let free = || {
+            let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
+            listener.local_addr().expect("it is bound").port()
+        };
+        let (plain, mutual) = (lab.port, free());
+        lab.port = free();
+        let at = |name: &str| folder.join(name).display().to_string();
+        let tls = format!(
+            "cafile {}\ncertfile {}\nkeyfile {}\n",
+            at("ca.pem"),
+            at("broker.pem"),
+            at("broker.key")
+        );
+        let text = format!(
+            "allow_anonymous false\npassword_file {0}\npersistence false\nlog_dest stderr\nuser root\n\
+             listener {plain} 127.0.0.1\nlistener {1} 127.0.0.1\n{tls}listener {1} 127.0.0.2\n{tls}listener {mutual} 127.0.0.1\n{tls}require_certificate true\n",
+            at("users"),
+            lab.port
+        );
+        std::fs::write(folder.join("mosquitto.conf"), text).expect("a file");
+        drop(lab.broker);
+        lab.broker = start_broker(&folder)?;
+        std::fs::write(folder.join("right"), "geheim\n").expect("a file");
+        std::fs::write(folder.join("wrong"), "erraten\n").expect("a file");
+        let map = |broker: &str, keys: &str| {
+            let map = MAP.replace("DISPATCHER", &lab.dispatcher);
+            let map = map.replace("127.0.0.1:PORT", broker);
+            let text = map.replace("[mqtt]\n", &format!("[mqtt]\n{keys}"));
+            std::fs::write(folder.join("map.toml"), text).expect("a file");
+            bridge(&["mqtt", folder.join("map.toml").to_str().expect("text")])
+        };
+        const USER: &str = "user = \"hall\"\npassword_file = \"right\"\n";
+        const OWN: &str = "certificate_file = \"own.pem\"\nprivate_key_file = \"own.key\"\n";
+        let ca = format!("{USER}ca_file = \"ca.pem\"\n");
+        let here = format!("127.0.0.1:{}", lab.port);
+        for (broker, keys, why) in [
+            (
+                &*here,
+                ca.replace("right", "wrong"),
+                "it refuses this client; check user and password_file",
+            ),
+            (
+                &here,
+                "ca_file = \"ca.pem\"\n".to_owned(),
+                "it refuses this client",
+            ),
+            (
+                &here,
+                ca.replace("ca.pem", "other.pem"),
+                "not signed by an authority of ca_file",
+            ),
+            (
+                &format!("127.0.0.2:{}", lab.port),
+                ca.clone(),
+                "its certificate is for another name",
+            ),
+            (
+                &format!("127.0.0.1:{plain}"),
+                ca.clone(),
+                "it does not speak TLS at this port",
+            ),
+            (
+                &format!("127.0.0.1:{mutual}"),
+                ca.clone(),
+                "it may want a certificate_file",
+            ),
+        ] {
+            let mut refused = map(broker, &keys);
+            let told = refused.after("bridge: the broker at ");
+            assert!(told.contains(why), "{why} in {told}");
+        }
+        let broken = map(&here, &ca.replace("ca.pem", "right"));
+        assert_eq!(broken.end().1, Some(1), "the file has no certificate");
+        for (broker, keys) in [
+            (&*here, ca.clone()),
+            (&format!("127.0.0.1:{mutual}"), format!("{ca}{OWN}")),
+            (&format!("127.0.0.1:{plain}"), USER.to_owned()),
+        ] {
+            let mut running = map(broker, &keys);
+            running.after("bridge: connected with the broker at ");
+            running.after("bridge: connected with ");
+            let login = ["-u", "hall", "-P", "geheim"];
+            let mut topics = lab.command("mosquitto_sub", &["-t", "hall/#", "-F", "%t %r <%p>"]);
+            topics.args(login).arg("--cafile").arg(at("ca.pem"));
+            let mut topics = Peer::start(topics);
+            topics.until("<online>");
+            let mut tank = lab.tank();
+            tank.say("P AQ1=12.50");
+            topics.until("<12.5>");
+            assert_eq!(running.interrupt().1, Some(0));
+        }
+        lab.dispatch.interrupt();
         Ok(())
     }
 

@@ -4,7 +4,9 @@
 mod block;
 #[cfg(feature = "mqtt")]
 mod bridge;
-#[cfg(any(feature = "mqtt", feature = "page"))]
+#[cfg(unix)]
+mod bridge_bus;
+#[cfg(unix)]
 #[path = "../peers/commands.rs"]
 mod commands;
 #[path = "../it/fmi/fixture.rs"]
@@ -56,6 +58,8 @@ fn main() -> ExitCode {
         ("observer", observer::TESTS),
         #[cfg(feature = "mqtt")]
         ("bridge", bridge::TESTS),
+        #[cfg(unix)]
+        ("bridge_bus", bridge_bus::TESTS),
         #[cfg(feature = "page")]
         ("page", page::TESTS),
         ("gateway", gateway::TESTS),

@@ -321,10 +321,10 @@ fn pymodbus_meets_wrong_answers() -> Result<(), Absent> {
 }
 
 /// A running server of pymodbus, which ends when it is dropped.
-struct Server(Child);
+pub(crate) struct Server(Child);
 
 impl Server {
-    fn start(arguments: &[&str]) -> Result<Self, Absent> {
+    pub(crate) fn start(arguments: &[&str]) -> Result<Self, Absent> {
         let mut child = pymodbus("modbus_server.py")?
             .args(arguments)
             .stdin(Stdio::piped())

@@ -7,7 +7,8 @@ mod served;
 use std::path::{Path, PathBuf};
 
 use crate::harness::{self, Absent, Test, pcap};
-use device::{Device, IDENTITY, Peer, free_address, nodes, plc};
+use device::{Device, Peer, nodes};
+pub(crate) use device::{IDENTITY, free_address, plc};
 use serde_json::{Value, json};
 use tickbus::driver::Code;
 use tickbus::fieldbus::LinkState;

@@ -93,17 +93,21 @@ fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
 }
 
 /// A server of Snap7 with data blocks 1 and 2.
-struct Cpu {
+pub(crate) struct Cpu {
     process: Child,
     port: u16,
     out: BufReader<ChildStdout>,
 }
 
 impl Cpu {
-    fn start(mut python: Command, script: &str) -> Self {
+    fn start(python: Command, script: &str) -> Self {
         let free = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).expect("a free port");
         let port = free.local_addr().expect("it is bound").port();
         drop(free);
+        Self::start_at(python, script, port)
+    }
+
+    pub(crate) fn start_at(mut python: Command, script: &str, port: u16) -> Self {
         let path = format!(
             concat!(env!("CARGO_MANIFEST_DIR"), "/tests/peers/{}"),
             script

@@ -3,42 +3,14 @@
 #![allow(missing_docs, reason = "tests")]
 
 use std::io::{BufRead as _, BufReader, Write as _};
-use std::net::TcpStream;
 use std::os::unix::fs::symlink;
 use std::path::Path;
 
-use crate::commands::{Running, bridge, dispatch};
+use crate::commands::{LabClient, Running, bridge, dispatch};
 use tickbus::os::PseudoTerminal;
 
-/// A client that is connected directly with the dispatcher.
-struct Pump(BufReader<TcpStream>);
-
-impl Pump {
-    fn connect(address: &str) -> Self {
-        let stream = TcpStream::connect(address).expect("it listens");
-        let mut pump = Self(BufReader::new(stream));
-        pump.say("VP PUMP Q2 I2 V=2");
-        pump.until("END");
-        pump
-    }
-
-    fn say(&mut self, line: &str) {
-        let line = format!("{line}\n");
-        self.0
-            .get_mut()
-            .write_all(line.as_bytes())
-            .expect("it reads");
-    }
-
-    fn until(&mut self, begin: &str) -> String {
-        loop {
-            let mut line = String::new();
-            assert!(self.0.read_line(&mut line).expect("text") > 0, "no {begin}");
-            if line.starts_with(begin) {
-                return line.trim_end().to_owned();
-            }
-        }
-    }
+fn connect_pump(address: &str) -> LabClient {
+    LabClient::connect(address, "VP PUMP Q2 I2 V=2")
 }
 
 /// The far end of a serial line: the client's.
@@ -96,7 +68,7 @@ fn a_driver_at_a_serial_line_outlives_its_dispatcher_and_its_port() {
     running.after("bridge: connected with ");
     driver.say("VR SCADA Q2 I2 V=2\r");
     driver.until("END 1");
-    let mut pump = Pump::connect(&address);
+    let mut pump = connect_pump(&address);
     driver.say("CONNECT I1:PUMP:Q1 Q1:PUMP:I1\rP Q1=24\r");
     assert_eq!(pump.until("P "), "P I1=24");
     pump.say("P Q1=5");
@@ -117,7 +89,7 @@ fn a_driver_at_a_serial_line_outlives_its_dispatcher_and_its_port() {
     lab.after("dispatch: listening on ");
     running.after("bridge: connected with ");
     driver.until("END ");
-    let mut pump = Pump::connect(&address);
+    let mut pump = connect_pump(&address);
     assert_eq!(pump.until("P "), "P I1=3");
 
     // The port is pulled, and plugged in again.

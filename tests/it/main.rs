@@ -3,6 +3,7 @@
 
 mod axis;
 mod bridge;
+mod bridge_bus;
 mod c_api;
 mod check;
 mod codec;

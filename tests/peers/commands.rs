@@ -1,7 +1,8 @@
 //! `tickbus` commands as processes, with their lines read as they come.
 #![allow(dead_code, unreachable_pub, reason = "each test uses a part of it")]
 
-use std::io::{BufRead as _, BufReader, Lines};
+use std::io::{BufRead as _, BufReader, Lines, Write as _};
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Child, ChildStdout, Command, Stdio};
 
@@ -75,6 +76,63 @@ impl Running {
         // The command may have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+/// A client that is connected directly with the dispatcher.
+pub struct LabClient(BufReader<TcpStream>);
+
+impl LabClient {
+    /// A client with this first line, which asks for answers (`V=2` or `V=3`).
+    pub fn connect(address: &str, identification: &str) -> Self {
+        let mut client = Self::open(address);
+        client.say(identification);
+        client.until("END");
+        client
+    }
+
+    /// A client that has said nothing.
+    pub fn open(address: &str) -> Self {
+        let stream = TcpStream::connect(address).expect("it listens");
+        let patience = std::time::Duration::from_secs(60);
+        stream
+            .set_read_timeout(Some(patience))
+            .expect("it is a time");
+        Self(BufReader::new(stream))
+    }
+
+    /// Sends a line.
+    pub fn say(&mut self, line: &str) {
+        let line = format!("{line}\n");
+        let stream = self.0.get_mut();
+        stream.write_all(line.as_bytes()).expect("it reads");
+    }
+
+    /// Reads lines until one begins with `begin`.
+    pub fn until(&mut self, begin: &str) -> String {
+        self.find(begin, |line| line.starts_with(begin))
+    }
+
+    /// Reads lines of values until one has `value`, such as `AI1=5`.
+    pub fn until_values(&mut self, value: &str) {
+        self.find(value, |line| {
+            line.strip_prefix("P ")
+                .is_some_and(|values| values.split(' ').any(|one| one == value))
+        });
+    }
+
+    fn find(&mut self, what: &str, is_it: impl Fn(&str) -> bool) -> String {
+        let mut read = Vec::new();
+        loop {
+            let mut line = String::new();
+            let count = self.0.read_line(&mut line).unwrap_or(0);
+            assert!(count > 0, "no {what} in {read:?}");
+            let line = line.trim_end();
+            if is_it(line) {
+                return line.to_owned();
+            }
+            read.push(line.to_owned());
+        }
     }
 }
 

@@ -54,7 +54,7 @@ type    = "ULINT"
 "#;
 
 /// A Python program, controlled by lines of text.
-pub(super) struct Peer {
+pub(crate) struct Peer {
     pub(super) child: Child,
     pub(super) stdin: Option<ChildStdin>,
     pub(super) stdout: BufReader<ChildStdout>,
@@ -92,7 +92,7 @@ impl Peer {
     }
 
     #[track_caller]
-    pub(super) fn ask(&mut self, line: &Value) -> Value {
+    pub(crate) fn ask(&mut self, line: &Value) -> Value {
         let stdin = self.stdin.as_mut().expect("it lives");
         writeln!(stdin, "{line}").expect("it listens");
         let mut answer = String::new();
@@ -110,7 +110,7 @@ impl Drop for Peer {
 }
 
 /// A free port of this machine.
-pub(super) fn free_address() -> SocketAddr {
+pub(crate) fn free_address() -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a free port");
     listener.local_addr().expect("it is bound")
 }
@@ -125,7 +125,7 @@ pub(super) fn nodes() -> Value {
 }
 
 /// An asyncua server with those nodes.
-pub(super) fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
+pub(crate) fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
     let mut asked = json!({
         "url": format!("opc.tcp://{address}"), "security": ["None"], "nodes": nodes(),
     });
@@ -136,7 +136,7 @@ pub(super) fn plc(address: SocketAddr, more: &Value) -> Result<Peer, Absent> {
 }
 
 /// The identity of that server.
-pub(super) const IDENTITY: &str = "urn:test:plc ACME PLC";
+pub(crate) const IDENTITY: &str = "urn:test:plc ACME PLC";
 
 pub(super) struct Device {
     pub(super) end: End,

@@ -126,7 +126,7 @@ fn text_of(value: &Value<'_>, folder: &Path) -> Option<String> {
     match load_text(&file) {
         Ok(text) => Some(text),
         Err(mistakes) => {
-            for one in mistakes.iter() {
+            for one in &mistakes {
                 let what = format!("{}: {}", file.display(), one.mistake.what);
                 value.wrong(what, &*one.mistake.right);
             }

@@ -63,7 +63,7 @@ fn key_path(text: &str) -> Result<PathBuf, String> {
 
 /// Why the command ends early.
 enum Failed {
-    /// Its input is wrong: whole lines.
+    /// The input is wrong; the text is whole lines.
     Input(String),
     Bus(String),
 }
@@ -177,7 +177,7 @@ struct Bridge {
     passed: Passed,
 }
 
-/// What was reported of a line since it last ran. A device that is switched off for days is called again and again.
+/// The reports about a line since it last ran. A device that is switched off for days is called again and again.
 #[derive(Default)]
 struct Told {
     last: Option<Link>,

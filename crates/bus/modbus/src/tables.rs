@@ -99,7 +99,7 @@ impl Layout {
         }
     }
 
-    /// What these bits of the table carry.
+    /// The parts of the frames that these bits of the table carry.
     fn parts(&self, wires: Range<usize>) -> impl Iterator<Item = Part> {
         let first = self.ends.partition_point(|end| *end <= wires.start);
         let parts = self.parts[first..].iter();

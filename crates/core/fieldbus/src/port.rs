@@ -376,7 +376,7 @@ impl Port {
         spoilt.error
     }
 
-    /// What is wrong with the answer that was made last; only the first call returns it.
+    /// The way in which the answer that was made last is malformed; only the first call returns it.
     pub fn take_wrong(&mut self) -> Option<WrongAnswer> {
         self.spoilt.wrong.take()
     }

@@ -3,7 +3,7 @@
 use super::LineEffect;
 use tickbus_base::time::Nanos;
 
-/// What is wrong with the answers of a server.
+/// A fault of a server's answers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AnswerEffect {
     /// The station that answers so; `None` for all.
@@ -12,7 +12,7 @@ pub struct AnswerEffect {
     pub function: Option<u8>,
     /// How likely it is, from above 0 to 1.
     pub chance: f64,
-    /// What is wrong.
+    /// The trouble with these answers.
     pub trouble: AnswerTrouble,
 }
 
@@ -30,11 +30,11 @@ pub enum AnswerTrouble {
 /// A malformed answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WrongAnswer {
-    /// Its last byte is missing.
+    /// The answer lacks its last byte.
     Truncated,
-    /// It has the number of another request.
+    /// The answer has the number of another request.
     Transaction,
-    /// It comes from another unit.
+    /// The answer comes from another unit.
     Unit,
 }
 
@@ -70,7 +70,8 @@ impl Spoilt {
 }
 
 impl LineEffect {
-    /// What the effect does to an answer of `station` to a request with this function code, and how likely.
+    /// The trouble with an answer of `station` to a request with this function code, and how likely it is; `None` if this effect
+    /// does not change such answers.
     pub(super) fn on_answer(self, station: usize, function: u8) -> Option<(f64, AnswerTrouble)> {
         let Self::Answer(effect) = self else {
             return None;

@@ -125,13 +125,10 @@ fn length(pieces: &[Piece]) -> usize {
 fn serve(query: &Request, request: &[u8], receives: &mut [u8]) {
     const BEFORE: [u8; 0x1_0000] = [0x55; 0x1_0000];
     let mut holds = BEFORE.to_vec();
+    let map = Map::of_areas(Side::Sends, None, BEFORE.len(), BEFORE.len());
     let mut tables = Tables {
-        map: Map {
-            input: Side::Sends,
-            window: None,
-        },
+        map: &map,
         sends: &BEFORE,
-        holds_len: holds.len(),
         holds: &mut holds,
     };
     let mut reply = Vec::new();

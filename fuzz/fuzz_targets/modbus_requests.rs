@@ -16,20 +16,18 @@ fuzz_target!(|data: &[u8]| {
         return;
     };
     let [flags, window, sends, holds] = *header;
-    let map = Map {
-        input: if flags & 1 == 0 {
-            Side::Sends
-        } else {
-            Side::Holds
-        },
-        window: (flags & 2 != 0).then_some(usize::from(window) * 128),
+    let input = if flags & 1 == 0 {
+        Side::Sends
+    } else {
+        Side::Holds
     };
+    let window = (flags & 2 != 0).then_some(usize::from(window) * 128);
     let holds_len = usize::from(holds) * if flags & 4 == 0 { 1 } else { 257 };
+    let map = Map::of_areas(input, window, sends.into(), holds_len);
     let mut unit = Unit {
         map,
         sends: (0..sends).collect(),
         holds: vec![0; holds_len.next_multiple_of(2)],
-        holds_len,
     };
     if flags & 8 == 0 {
         tcp(&mut unit, stream);
@@ -42,7 +40,6 @@ struct Unit {
     map: Map,
     sends: Vec<u8>,
     holds: Vec<u8>,
-    holds_len: usize,
 }
 
 impl Unit {
@@ -50,10 +47,9 @@ impl Unit {
     fn ask(&mut self, pdu: &[u8]) {
         let before = self.holds.clone();
         let mut tables = Tables {
-            map: self.map,
+            map: &self.map,
             sends: &self.sends,
             holds: &mut self.holds,
-            holds_len: self.holds_len,
         };
         let mut reply = Vec::new();
         let identification = Identification::of_driver("fuzz");
@@ -77,22 +73,19 @@ impl Unit {
                 assert_eq!(function.writes(), wrote.is_some());
             }
         }
-        if let Some(bits) = read {
+        for bits in read.into_iter().flat_map(|elements| self.map.bits(Side::Sends, elements)) {
             assert!(bits.end <= self.sends.len() * 8);
         }
         // Nothing changes except the bits that were written.
-        let wrote = wrote.unwrap_or(0..0);
-        assert!(wrote.end <= self.holds.len() * 8);
-        let among = wrote.start / 8..wrote.end.div_ceil(8);
-        assert_eq!(before[..among.start], self.holds[..among.start], "a byte before those written");
-        assert_eq!(before[among.end..], self.holds[among.end..], "a byte after those written");
-        for at in among {
-            let mut mask = 0;
-            for bit in 0..8 {
-                mask |= u8::from(!wrote.contains(&(at * 8 + bit))) << bit;
+        let mut expected = before;
+        for bits in wrote.into_iter().flat_map(|elements| self.map.bits(Side::Holds, elements)) {
+            assert!(bits.end <= self.holds.len() * 8);
+            for bit in bits {
+                let mask = 1 << (bit % 8);
+                expected[bit / 8] = expected[bit / 8] & !mask | self.holds[bit / 8] & mask;
             }
-            assert_eq!(before[at] & mask, self.holds[at] & mask, "a bit beside those written");
         }
+        assert_eq!(expected, self.holds, "a bit beside those written");
     }
 }
 

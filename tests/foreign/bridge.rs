@@ -289,6 +289,9 @@ off = \"shut\"
         Ok(())
     }
 
+    const USER: &str = "user = \"hall\"\npassword_file = \"right\"\n";
+    const OWN: &str = "certificate_file = \"own.pem\"\nprivate_key_file = \"own.key\"\n";
+
     pub(super) fn secured() -> Result<(), Absent> {
         let mut lab = Lab::new()?;
         let folder = lab.folder.path().to_owned();
@@ -329,8 +332,6 @@ off = \"shut\"
             std::fs::write(folder.join("map.toml"), text).expect("a file");
             bridge(&["mqtt", folder.join("map.toml").to_str().expect("text")])
         };
-        const USER: &str = "user = \"hall\"\npassword_file = \"right\"\n";
-        const OWN: &str = "certificate_file = \"own.pem\"\nprivate_key_file = \"own.key\"\n";
         let ca = format!("{USER}ca_file = \"ca.pem\"\n");
         let here = format!("127.0.0.1:{}", lab.port);
         for (broker, keys, why) in [

@@ -151,9 +151,10 @@ fn a_file_that_no_bridge_can_use_is_refused_at_once() {
     let unknown = MIRROR.replace("\"loopback\"", "\"loopbak\"");
     let stepped = MIRROR.replace("scan = \"1ms\"", "scan = \"1ms\"\nmode = \"stepped\"");
     let (no_signals, _) = MIRROR.split_once("[[signal]]").expect("signals");
-    let many: String = (0..257)
+    let many: Vec<String> = (0..257)
         .map(|at| format!("[[signal]]\nname = \"{at}\"\naddress = \"%QB{at}\"\n"))
         .collect();
+    let many = many.concat();
     for (text, more, code, part) in [
         (&*unknown, &[][..], 1, "did you mean \"loopback\""),
         (no_signals, &[], 1, "the file has no [signal]"),

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use tickbus::testing::Suite;
+use tickbus_test_log as logged;
 
 fn repository() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -513,6 +514,7 @@ fn a_way_back_that_is_not_stated_follows_the_way_forth_when_that_is_fitted() {
 /// Rules, `set` and replies that write one signal: the same one wins in a model as in the driver of a test.
 #[test]
 fn a_model_gives_a_signal_to_the_same_writer_as_a_test_does() {
+    logged::expect("the simulation writes \"Height\" itself");
     let rules = [
         // A rule wins from its first value on that is not 0, and then for good.
         "[[machine.rule]]\nwhen = \"Run\"\nafter = \"2s\"\nset = { Height = 7.0 }\nelse = { Height = 0.0 }\n",

@@ -159,12 +159,8 @@ fn carry(arguments: &Arguments, kinds: &'static Kinds, stop: &Stop) -> Result<Pa
     seats.into_iter().for_each(Seat::close);
     let unmet = driver.has_only_failed().then(|| never_ran(&driver.link()));
     driver.close();
-    ended.map_err(failed_for_good)?;
+    ended.map_err(|reason| Failed::Bus(format!("the line failed: {reason}")))?;
     unmet.map_or(Ok(passed), |reason| Err(Failed::Bus(reason)))
-}
-
-fn failed_for_good(reason: String) -> Failed {
-    Failed::Bus(format!("the line failed: {reason}"))
 }
 
 /// The bus, and the clients that its stations are.

@@ -74,8 +74,8 @@ fn text(compared: &Compared, names: &[String; 2]) -> String {
         }
         Some(Parting::Hash { step }) => {
             lines.push(
-                "all values are equal, and the trace hashes are not: the clients have other multiples, or a NaN \
-                 has other bits"
+                "all values are equal, and the trace hashes are not: there are other clients, multiples or orders, or \
+                 a NaN has other bits"
                     .to_owned(),
             );
             format!("parted step={step} reason=\"trace hash\"")

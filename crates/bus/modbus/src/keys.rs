@@ -4,8 +4,9 @@ use tickbus_base::toml_text::{Key, Shape, names};
 use tickbus_net::serial;
 
 use crate::client::{PART_KEYS, PARTS};
+use crate::identity::IDENTITY_KEYS;
 use crate::line::{BAUDS, FRAMINGS, PARITIES};
-use crate::server::{IDENTITY_KEYS, RANGE_KEYS, RANGES};
+use crate::server::{RANGE_KEYS, RANGES};
 use crate::stations::IDENTITY_LIMIT;
 
 /// The line of both ends.

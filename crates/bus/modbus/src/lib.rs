@@ -35,10 +35,12 @@ mod client;
 mod element_address;
 mod function;
 mod identification;
+mod identity;
 mod keys;
 mod kind;
 mod line;
 pub mod mbap;
+mod piece;
 pub mod rtu;
 mod server;
 mod shown;
@@ -49,12 +51,13 @@ mod tag_address;
 
 pub use answer::{Done, answer, refuse};
 pub use client::{
-    AnswerError, Block, Capabilities, ClientOptions, ModbusClient, Piece, Region, Request, queries,
+    AnswerError, Block, Capabilities, ClientOptions, ModbusClient, Region, Request, queries,
 };
 pub use element_address::ElementAddress;
 pub use function::{Exception, Function, PDU_LIMIT};
 pub use identification::Identification;
 pub use line::{Line, Serial};
+pub use piece::Piece;
 pub use server::{ModbusServer, ServerOptions};
 pub use stations::Stations;
 pub use table::{Span, Table, put_bits, take_bits};

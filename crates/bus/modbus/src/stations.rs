@@ -1,7 +1,7 @@
 //! The units of the stations, from `[fieldbus]` and the `[[station]]` tables.
 
 use crate::Identification;
-use crate::server::read_identity;
+use crate::identity::read_identity;
 use tickbus_base::toml_text::{Table, Value};
 
 /// The longest identity, in characters.

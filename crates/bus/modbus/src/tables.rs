@@ -88,28 +88,51 @@ impl Layout {
         self.ends = ends.collect();
     }
 
-    /// Checks that consecutive elements exist.
-    fn check(&self, span: Span) -> Result<(), Exception> {
-        let place = (self.exist).partition_point(|range| range.end <= span.first);
+    /// The parts of the frames that consecutive elements carry, with the `width` of an element in bits.
+    fn find(&self, span: Span, width: usize) -> Result<Found<'_>, Exception> {
+        let place = count_while(&self.exist, |range| range.end <= span.first);
         let holds = |range: &Range<usize>| range.start <= span.first && span.end() <= range.end;
-        if self.exist.get(place).is_some_and(holds) {
-            Ok(())
-        } else {
-            Err(Exception::ILLEGAL_DATA_ADDRESS)
+        if !self.exist.get(place).is_some_and(holds) {
+            return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
+        let (from, end) = (span.first * width, span.end() * width);
+        let first = count_while(&self.ends, |before| *before <= from);
+        let count = count_while(&self.parts[first..], |part| part.wire < end);
+        Ok(Found {
+            parts: &self.parts[first..first + count],
+            from,
+            end,
+        })
     }
+}
 
-    /// The parts of the frames that these bits of the table carry.
-    fn parts(&self, wires: Range<usize>) -> impl Iterator<Item = Part> {
-        let first = self.ends.partition_point(|end| *end <= wires.start);
-        let parts = self.parts[first..].iter();
-        let parts = parts.take_while({
-            let end = wires.end;
-            move |part| part.wire < end
-        });
-        parts.filter_map(move |part| {
-            let wire = part.wire.max(wires.start);
-            let end = part.end().min(wires.end);
+/// The number of items at the beginning for which `is_before` is true. Images placed as a whole have one or two.
+#[inline]
+fn count_while<T>(list: &[T], is_before: impl Fn(&T) -> bool) -> usize {
+    const FEW: usize = 4;
+    if list.len() > FEW {
+        return list.partition_point(is_before);
+    }
+    let other = list.iter().position(|item| !is_before(item));
+    other.unwrap_or(list.len())
+}
+
+/// The parts of the frames that consecutive elements carry.
+#[derive(Clone, Copy, Debug)]
+struct Found<'a> {
+    /// Parts that reach into the elements or, if others overlap them, end before.
+    parts: &'a [Part],
+    /// The bits of the elements in the table.
+    from: usize,
+    end: usize,
+}
+
+impl<'a> Found<'a> {
+    /// The parts within the elements.
+    fn parts(self) -> impl Iterator<Item = Part> + use<'a> {
+        self.parts.iter().filter_map(move |part| {
+            let wire = part.wire.max(self.from);
+            let end = part.end().min(self.end);
             (wire < end).then(|| Part {
                 wire,
                 bit: part.bit + wire - part.wire,
@@ -117,6 +140,26 @@ impl Layout {
                 ..*part
             })
         })
+    }
+
+    /// The only part, if it carries all elements, and has whole bytes of its frame.
+    fn whole(self) -> Option<(Side, Range<usize>)> {
+        let [part] = self.parts else {
+            return None;
+        };
+        let bit = (part.bit + self.from).checked_sub(part.wire)?;
+        let bits = self.end - self.from;
+        let fits = part.wire <= self.from && self.end <= part.end();
+        let bytes = bit / 8..(bit + bits) / 8;
+        (fits && (bit | bits).is_multiple_of(8)).then_some((part.side, bytes))
+    }
+
+    fn has(self, side: Side) -> bool {
+        match self.parts {
+            // A single part reaches into the elements.
+            [part] => part.side == side,
+            _ => self.parts().any(|part| part.side == side),
+        }
     }
 }
 
@@ -194,10 +237,15 @@ impl Map {
         side: Side,
         (table, span): (Table, Span),
     ) -> impl Iterator<Item = Range<usize>> {
-        let parts = self
-            .parts(table, span)
-            .filter(move |part| part.side == side);
+        let found = self.find(table, span).into_iter();
+        let parts = found.flat_map(Found::parts);
+        let parts = parts.filter(move |part| part.side == side);
         parts.map(|part| part.bit..part.bit + part.bits)
+    }
+
+    /// Returns true if consecutive elements carry any bits of the frame on `side`.
+    pub(super) fn carries(&self, side: Side, (table, span): (Table, Span)) -> bool {
+        self.find(table, span).is_ok_and(|found| found.has(side))
     }
 
     /// Numbers for the bits of consecutive elements: two elements have a number in common if they are the same bits.
@@ -211,9 +259,8 @@ impl Map {
         bits.next().unwrap_or_default()
     }
 
-    fn parts(&self, table: Table, span: Span) -> impl Iterator<Item = Part> {
-        let width = table.width();
-        self.tables[table as usize].parts(span.first * width..span.end() * width)
+    fn find(&self, table: Table, span: Span) -> Result<Found<'_>, Exception> {
+        self.tables[table as usize].find(span, table.width())
     }
 }
 
@@ -236,7 +283,7 @@ impl Tables<'_> {
     ///
     /// The elements do not exist.
     pub fn check_read(&self, table: Table, span: Span) -> Result<(), Exception> {
-        self.map.tables[table as usize].check(span)
+        self.map.find(table, span).map(|_| ())
     }
 
     /// Checks that consecutive elements can be written.
@@ -245,8 +292,7 @@ impl Tables<'_> {
     ///
     /// The elements do not exist, or some are in the frame that this end writes.
     pub fn check_write(&self, table: Table, span: Span) -> Result<(), Exception> {
-        self.check_read(table, span)?;
-        if self.map.bits(Side::Sends, (table, span)).next().is_some() {
+        if self.map.find(table, span)?.has(Side::Sends) {
             return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
         Ok(())
@@ -259,11 +305,14 @@ impl Tables<'_> {
     ///
     /// The elements do not exist.
     pub fn read(&self, table: Table, span: Span, reply: &mut Vec<u8>) -> Result<(), Exception> {
-        self.check_read(table, span)?;
-        let width = table.width();
+        let found = self.map.find(table, span)?;
+        if let Some((side, bytes)) = found.whole() {
+            reply.extend_from_slice(&self.frame(side)[bytes]);
+            return Ok(());
+        }
         let begin = reply.len();
-        reply.resize(begin + (span.count * width).div_ceil(8), 0);
-        self.gather(table, span, &mut reply[begin..]);
+        reply.resize(begin + (found.end - found.from).div_ceil(8), 0);
+        self.gather(found, &mut reply[begin..]);
         Ok(())
     }
 
@@ -282,27 +331,36 @@ impl Tables<'_> {
         span: Span,
         write: impl FnOnce(&mut [u8]),
     ) -> Result<(), Exception> {
-        self.check_write(table, span)?;
-        let width = table.width();
+        let found = self.map.find(table, span)?;
+        if found.has(Side::Sends) {
+            return Err(Exception::ILLEGAL_DATA_ADDRESS);
+        }
+        if let Some((_, bytes)) = found.whole() {
+            write(&mut self.holds[bytes]);
+            return Ok(());
+        }
         let mut values = [0; VALUES];
-        let values = &mut values[..(span.count * width).div_ceil(8)];
-        self.gather(table, span, values);
+        let values = &mut values[..(found.end - found.from).div_ceil(8)];
+        self.gather(found, values);
         write(values);
-        for part in self.map.parts(table, span) {
-            let from = part.wire - span.first * width;
+        for part in found.parts() {
+            let from = part.wire - found.from;
             copy_bits(values, from, part.bits, self.holds, part.bit);
         }
         Ok(())
     }
 
-    fn gather(&self, table: Table, span: Span, values: &mut [u8]) {
-        let from = span.first * table.width();
-        for part in self.map.parts(table, span) {
-            let frame = match part.side {
-                Side::Sends => self.sends,
-                Side::Holds => &*self.holds,
-            };
-            copy_bits(frame, part.bit, part.bits, values, part.wire - from);
+    fn gather(&self, found: Found<'_>, values: &mut [u8]) {
+        for part in found.parts() {
+            let frame = self.frame(part.side);
+            copy_bits(frame, part.bit, part.bits, values, part.wire - found.from);
+        }
+    }
+
+    fn frame(&self, side: Side) -> &[u8] {
+        match side {
+            Side::Sends => self.sends,
+            Side::Holds => &*self.holds,
         }
     }
 }

@@ -5,6 +5,8 @@
 mod bus;
 mod diagnosis;
 
+use std::collections::BTreeMap;
+
 use tickbus_base::os::Characters;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Cause;
@@ -37,12 +39,8 @@ struct Observed {
     identity: Identity,
     /// The master that has exchanged data with it.
     master: Option<u8>,
-    /// The groups of the station, from its parameters.
-    group: Option<u8>,
-    /// The master is in CLEAR, by `Global_Control`.
-    is_cleared: bool,
-    /// A master in CLEAR sends it telegrams without outputs.
-    fail_safe: bool,
+    /// The words of each master to it: the station acknowledges the parameters of masters that it does not obey, too.
+    told: BTreeMap<u8, Told>,
     /// Why it is another device than expected, by its ident, and by its modules.
     other_device: Option<String>,
     other_modules: Option<String>,
@@ -54,6 +52,19 @@ struct Observed {
     diagnosis: Vec<u8>,
     /// The outputs of CLEAR.
     zeros: Vec<u8>,
+}
+
+/// The words of one master to a station. They count once the two exchange data.
+#[derive(Debug, Default)]
+struct Told {
+    /// The groups of the station, from its parameters.
+    group: u8,
+    /// A master in CLEAR sends it telegrams without outputs, by the parameters.
+    fail_safe: bool,
+    /// The ident in the parameters, until it is compared.
+    ident: Option<u16>,
+    /// The master is in CLEAR, by `Global_Control`.
+    is_cleared: bool,
 }
 
 /// News of an observed station.
@@ -80,9 +91,7 @@ impl Observer {
         let observed = |(address, identity): (u8, Identity)| Observed {
             address,
             master: None,
-            group: None,
-            is_cleared: false,
-            fail_safe: identity.fail_safe,
+            told: BTreeMap::new(),
             other_device: None,
             other_modules: None,
             wrong: None,
@@ -169,12 +178,13 @@ impl Observer {
         self.monitor.damaged() > self.damaged
     }
 
-    /// Says why no data of a station are observed, and what the cause is.
-    pub(crate) fn trouble(&self, station: usize) -> (String, Cause) {
+    /// Says why no data of a station are observed, and what the cause is. `exchanges`: data that cannot be read are still
+    /// exchanged.
+    pub(crate) fn trouble(&self, station: usize, exchanges: bool) -> (String, Cause) {
         let station = &self.stations[station];
         match &station.wrong {
-            Some(wrong) => (wrong.clone(), Cause::Refused),
-            None => (self.silence(station), Cause::Link),
+            Some(wrong) if exchanges => (wrong.clone(), Cause::Refused),
+            _ => (self.silence(station), Cause::Link),
         }
     }
 
@@ -221,18 +231,21 @@ impl Observed {
     /// A request, as far as it is `Global_Control` for this station.
     fn control(&mut self, request: &Frame<'_>, mut tell: impl FnMut(News<'_>)) {
         let is_mine = [BROADCAST, self.address].contains(&request.destination)
-            && self.master.is_none_or(|master| master == request.source)
             && request.dsap == Some(sap::GLOBAL_CONTROL)
             && !request.control.is_answered();
         let &[command, groups] = request.data else {
             return;
         };
-        let own = self.group.unwrap_or(0);
-        if !is_mine || groups != 0 && groups & own == 0 {
+        if !is_mine {
+            return;
+        }
+        let told = self.told.entry(request.source).or_default();
+        if groups != 0 && groups & told.group == 0 {
             return;
         }
         let is_cleared = command & 0x02 != 0;
-        if std::mem::replace(&mut self.is_cleared, is_cleared) != is_cleared {
+        let is_news = std::mem::replace(&mut told.is_cleared, is_cleared) != is_cleared;
+        if is_news && self.master == Some(request.source) {
             tell(News::Cleared(is_cleared));
         }
     }
@@ -280,12 +293,14 @@ impl Observed {
         if !parameters.lock {
             return;
         }
-        self.master = Some(request.source);
-        self.group = Some(parameters.group);
-        self.fail_safe = self.identity.fail_safe || parameters.fail_safe(self.identity.dpv1);
-        // A station that starts up waits for the next command.
-        self.is_cleared = false;
-        self.compare(parameters.ident);
+        let told = Told {
+            group: parameters.group,
+            fail_safe: parameters.fail_safe(self.identity.dpv1),
+            ident: Some(parameters.ident),
+            // A station that starts up waits for the next command.
+            is_cleared: false,
+        };
+        self.told.insert(request.source, told);
     }
 
     /// Compares the device's ident with the expected one.
@@ -323,9 +338,15 @@ impl Observed {
         }
         let master = request.source;
         self.master = Some(master);
+        let told = self.told.entry(master).or_default();
+        let (mut outputs, mut is_cleared) = (request.data, told.is_cleared);
+        // Who joined later has not heard the parameters, but sees that the master is in CLEAR.
+        let is_fail_safe = self.identity.fail_safe || told.fail_safe || is_cleared;
+        if let Some(ident) = told.ident.take() {
+            self.compare(ident);
+        }
         let modules = &self.identity.configuration;
-        let (mut outputs, mut is_cleared) = (request.data, self.is_cleared);
-        if outputs.is_empty() && self.fail_safe && !self.zeros.is_empty() {
+        if outputs.is_empty() && is_fail_safe && !self.zeros.is_empty() {
             (outputs, is_cleared) = (&self.zeros, true);
         }
         let fits = |received: &[u8], expected: usize| {

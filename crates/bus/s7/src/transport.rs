@@ -250,7 +250,7 @@ fn short(length: usize) -> u16 {
     u16::try_from(length).expect("packets are much shorter than 64 KiB")
 }
 
-/// Spoils the last packet in `bytes`, which begins at `begin`, if it has data: the answer to a job. Units do not exist here,
+/// Spoils the last message in `bytes`, whose packets begin at `begin`, if it has data: the answer to a job. Units do not exist here,
 /// so such an answer has the reference of another job in that case, too.
 pub fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
     /// The low byte of the job's reference, behind protocol, kind and two bytes that are 0.
@@ -260,9 +260,19 @@ pub fn spoil(bytes: &mut Vec<u8>, begin: usize, wrong: WrongAnswer) {
     }
     match wrong {
         WrongAnswer::Truncated => {
+            // A message longer than a TPDU is several packets, and its last byte is in the last one.
+            let mut last = begin;
+            loop {
+                let length = u16::from_be_bytes([bytes[last + 2], bytes[last + 3]]);
+                let next = last + usize::from(length);
+                if next >= bytes.len() {
+                    break;
+                }
+                last = next;
+            }
             bytes.pop();
-            let length = u16::try_from(bytes.len() - begin).expect("a packet is short");
-            bytes[begin + 2..begin + 4].copy_from_slice(&length.to_be_bytes());
+            let length = short(bytes.len() - last);
+            bytes[last + 2..last + TPKT].copy_from_slice(&length.to_be_bytes());
         }
         WrongAnswer::Transaction | WrongAnswer::Unit => {
             bytes[begin + REFERENCE] = bytes[begin + REFERENCE].wrapping_add(1);

@@ -1,5 +1,7 @@
 //! The errors of all buses.
 
+use std::net::SocketAddr;
+
 /// The reason why a bus cannot continue; the variant shows who is at fault.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BusError {
@@ -15,6 +17,19 @@ pub enum BusError {
     /// The peer understood the request, and refused it.
     #[error("refused: {0}")]
     Refused(String),
+}
+
+impl BusError {
+    /// The same error with the address of the peer in front of its text.
+    pub(crate) fn of_peer(&self, peer: SocketAddr) -> Self {
+        let named = |text: &str| format!("{peer}: {text}");
+        match self {
+            Self::Link(text) => Self::Link(named(text)),
+            Self::Left(text) => Self::Left(named(text)),
+            Self::Protocol(text) => Self::Protocol(named(text)),
+            Self::Refused(text) => Self::Refused(named(text)),
+        }
+    }
 }
 
 impl From<tickbus_net::Error> for BusError {

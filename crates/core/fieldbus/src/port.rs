@@ -368,7 +368,17 @@ impl Port {
     /// an injected fault; for buses that [have answers](super::BusOptions::has_answers). Whoever makes the answer's
     /// telegram then [takes](Self::take_wrong) what is wrong with it, and who sends it [holds it
     /// back](Self::take_lateness).
+    #[inline]
     pub fn answer(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
+        if self.faults.any() {
+            self.answer_by_faults(station, function, now)
+        } else {
+            None
+        }
+    }
+
+    #[cold]
+    fn answer_by_faults(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
         self.faults.attend(now, &mut self.image);
         let spoilt = self.faults.answer(station, function);
         self.spoilt.late = self.spoilt.late.max(spoilt.late);
@@ -377,11 +387,13 @@ impl Port {
     }
 
     /// The way in which the answer that was made last is malformed; only the first call returns it.
+    #[inline]
     pub fn take_wrong(&mut self) -> Option<WrongAnswer> {
         self.spoilt.wrong.take()
     }
 
     /// How much later the answer that was made last goes out; only the first call returns it.
+    #[inline]
     pub fn take_lateness(&mut self) -> Nanos {
         std::mem::take(&mut self.spoilt.late)
     }

@@ -15,6 +15,9 @@ use super::{Every, Options, Variables};
 /// The most steps that one tick catches up on. More steps are assumed to be a wrong time.
 const MOST_STEPS: i64 = 100_000;
 
+/// The same for a simulation whose ticks are of any length: the server takes them in some seconds, in one exchange.
+const MOST_STEPS_OF_A_TICK: i64 = 100_000_000;
+
 /// The statistic with the clients that the server waits for.
 const WAITS_FOR: &str = "sdsp.waits_for";
 
@@ -129,9 +132,14 @@ impl Sdsp {
             *due
         };
         let late = now - since;
-        if late > run.interval.times(MOST_STEPS) {
+        let most = if self.by_ticks {
+            MOST_STEPS_OF_A_TICK
+        } else {
+            MOST_STEPS
+        };
+        if late > run.interval.times(most) {
             return Err(run.give_up(&format!(
-                "its simulation time jumped from {due} to {now}, over more than {MOST_STEPS} steps; hand in the \
+                "its simulation time jumped from {due} to {now}, over more than {most} steps; hand in the \
                  nanoseconds since the simulation began, tick by tick"
             )));
         }
@@ -209,6 +217,7 @@ impl Stepped for Sdsp {
             Err(End::Broken(ended))
                 if matches!(self.state, State::Apart) && ended.cause == sdsp::Cause::Lost =>
             {
+                port.tell(WAITS_FOR, NOBODY);
                 Err(bus_error(&ended))
             }
             Err(end) => {

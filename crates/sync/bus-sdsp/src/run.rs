@@ -103,7 +103,8 @@ impl Run {
     /// planned.
     pub(super) fn finish(&mut self, writes: &[u64]) {
         self.connection.answer(writes);
-        self.timeout = self.timeout.min(FAREWELL);
+        // A server that is paused says so once a second, for ever.
+        self.connection.leave_within(self.timeout.min(FAREWELL));
         // The next request gets no answer.
         let _ = self.wait(&mut |_| {});
     }

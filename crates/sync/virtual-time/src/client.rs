@@ -196,6 +196,9 @@ pub(crate) trait Line: fmt::Debug + Send {
 
     /// Waits for the next frame, for `limit` at most, and returns it without its header.
     fn receive(&mut self, limit: Nanos) -> Result<&[u8], Ended>;
+
+    /// From now on, `receive` gives up after `limit` in all, even if the server says that it waits for others.
+    fn leave_within(&mut self, limit: Nanos);
 }
 
 /// A client that has joined a server, for a simulation that calls instead of being called: [`wait`](Self::wait) for a
@@ -276,6 +279,12 @@ impl Connection {
         self.line.send(self.client.frame());
     }
 
+    /// From now on, [`wait`](Self::wait) ends after `limit` of wall-clock time in all, even if the server says that it
+    /// waits for others: for a client that is about to leave.
+    pub fn leave_within(&mut self, limit: Nanos) {
+        self.line.leave_within(limit);
+    }
+
     /// Tells the server why this client gives up. The run ends for everyone; [`wait`](Self::wait) returns the end.
     pub fn give_up(&mut self, reason: &str) {
         self.client.give_up(reason);
@@ -306,6 +315,11 @@ impl Connection {
             self.answer_until(&writes, participant.next_update());
         }
     }
+}
+
+/// The time for leaving is over.
+pub(crate) fn closed() -> Ended {
+    Ended::before(Cause::Stopped, "it was closed")
 }
 
 /// The server has sent nothing for `limit`.

@@ -45,10 +45,10 @@ pub enum Parting {
         /// The number of its steps.
         steps: u64,
     },
-    /// All values up to this step are equal, and the trace hashes are not: the clients have other multiples or another
-    /// order, or values are NaN with other bits, which a recording does not keep.
+    /// All values that both have are equal, and the trace hashes are not: there are other clients, or they have other
+    /// multiples or another order, or values are NaN with other bits, which a recording does not keep.
     Hash {
-        /// The step.
+        /// The first step with other hashes.
         step: u64,
     },
 }
@@ -71,6 +71,7 @@ pub struct Difference {
 /// A file cannot be read or is no such recording, or the runs have no variable or another step in common.
 pub fn compare(paths: [&Path; 2]) -> Result<Compared, RecordingError> {
     let [mut a, mut b] = [Side::open(paths[0])?, Side::open(paths[1])?];
+    let mut are_over;
     let mut declared = Vec::new();
     let common = common(&a, &b, &mut declared);
     if common.is_empty() {
@@ -91,18 +92,30 @@ pub fn compare(paths: [&Path; 2]) -> Result<Compared, RecordingError> {
         parting: None,
     };
     let mut time = None;
+    // The first step with equal values and other hashes. Values, or the times of steps, may part later.
+    let mut unequal = None;
     // The hash of the last row that has one in any case.
     let mut block = TraceHash(0);
     loop {
         let more = [a.next()?, b.next()?];
+        are_over = more.map(|more| !more);
         // The first row has the initial values.
         let step = a.tick.number.max(b.tick.number).saturating_sub(1);
         if more != [true, true] {
+            for (side, path) in [&a, &b].into_iter().zip(paths) {
+                if side.tick.number == 0 {
+                    return Err(RecordingError::of_file(
+                        path,
+                        "this recording has not even the initial values",
+                        "record again",
+                    ));
+                }
+            }
             let steps = compared.steps;
             if more[0] != more[1] {
                 let shorter = usize::from(more[0]);
                 compared.parting = Some(Parting::End { shorter, steps });
-            } else if compared.declared.is_empty() && compared.hash.is_none() {
+            } else if compared.declared.is_empty() && compared.hash.is_none() && unequal.is_none() {
                 // A run that was stopped has no hash in its last row.
                 let ends =
                     [a.hash(), b.hash()].map(|hash| Some(hash).filter(|hash| *hash != block));
@@ -111,36 +124,23 @@ pub fn compare(paths: [&Path; 2]) -> Result<Compared, RecordingError> {
                     compared.parting = Some(Parting::Hash { step: steps });
                 }
             }
+            if let Some(step) = unequal {
+                compared.parting = Some(Parting::Hash { step });
+            }
             break;
         }
-        if (a.tick.number, a.tick.time) != (b.tick.number, b.tick.time) {
-            let Tick { number, time, .. } = b.tick;
-            return Err(RecordingError::of_file(
-                paths[1],
-                format!(
-                    "row {number} is at {time}, and in {} row {} is at {}",
-                    paths[0].display(),
-                    a.tick.number,
-                    a.tick.time
-                ),
-                "compare runs with the same step",
-            ));
-        }
-        let differs = |(one, two): &&(usize, usize)| a.tick.values[*one] != b.tick.values[*two];
-        let differences = common.iter().filter(differs).map(|(one, two)| {
-            let column = &a.columns()[*one];
-            Difference {
-                variable: column.name.clone(),
-                client: Some(column.station.clone()).filter(|client| !client.is_empty()),
-                values: [(&a, *one), (&b, *two)]
-                    .map(|(side, at)| text(&side.columns()[at], side.tick.values[at])),
-            }
-        });
-        let differences: Vec<Difference> = differences.collect();
+        check_times(&a, &b, paths)?;
+        let differences = differences(&a, &b, &common);
         let hashes = [a.hash(), b.hash()];
         if !differences.is_empty() {
             // Step n runs at the time at which the values of the step before it are read.
             let time = time.unwrap_or(Nanos::ZERO);
+            if let Some(from) = unequal {
+                compared.notes.push(format!(
+                    "the trace hashes differ from step {from} on: there are other clients, multiples or orders, \
+                     or a NaN has other bits"
+                ));
+            }
             compared.parting = Some(Parting::Values {
                 step,
                 time,
@@ -150,24 +150,59 @@ pub fn compare(paths: [&Path; 2]) -> Result<Compared, RecordingError> {
         }
         compared.steps = step;
         if step % BLOCK == 0 && compared.declared.is_empty() {
-            if hashes[0] != hashes[1] {
-                compared.parting = Some(Parting::Hash { step });
-                break;
+            if hashes[0] == hashes[1] {
+                block = hashes[0];
+                compared.hash = Some(block);
+            } else {
+                unequal.get_or_insert(step);
+                compared.hash = None;
             }
-            block = hashes[0];
-            compared.hash = Some(block);
         } else {
             compared.hash = None;
         }
         time = Some(a.tick.time);
     }
-    for (side, path) in [&a, &b].into_iter().zip(paths) {
-        if side.recording.is_cut() {
-            let ending = side.recording.ending();
+    for ((side, path), is_over) in [&a, &b].into_iter().zip(paths).zip(are_over) {
+        let ending = side.recording.ending();
+        // A recording that was closed has its counts; one whose disk was full says so.
+        if is_over && !ending.starts_with("ticks=") {
             compared.notes.push(format!("{}: {ending}", path.display()));
         }
     }
     Ok(compared)
+}
+
+/// Checks that the current rows have the same number and time.
+fn check_times(a: &Side, b: &Side, paths: [&Path; 2]) -> Result<(), RecordingError> {
+    if (a.tick.number, a.tick.time) == (b.tick.number, b.tick.time) {
+        return Ok(());
+    }
+    let Tick { number, time, .. } = b.tick;
+    Err(RecordingError::of_file(
+        paths[1],
+        format!(
+            "row {number} is at {time}, and in {} row {} is at {}",
+            paths[0].display(),
+            a.tick.number,
+            a.tick.time
+        ),
+        "compare runs with the same step",
+    ))
+}
+
+/// The variables that differ in the current rows; `common` has the columns of each in both.
+fn differences(a: &Side, b: &Side, common: &[(usize, usize)]) -> Vec<Difference> {
+    let differs = |(one, two): &&(usize, usize)| a.tick.values[*one] != b.tick.values[*two];
+    let differences = common.iter().filter(differs).map(|(one, two)| {
+        let column = &a.columns()[*one];
+        Difference {
+            variable: column.name.clone(),
+            client: Some(column.station.clone()).filter(|client| !client.is_empty()),
+            values: [(a, *one), (b, *two)]
+                .map(|(side, at)| text(&side.columns()[at], side.tick.values[at])),
+        }
+    });
+    differences.collect()
 }
 
 /// A recording and its current row.

@@ -235,7 +235,8 @@ impl Row<'_> {
                 } else {
                     self.wrong
                 };
-                let (data_type, address) = kind(self.cell(self.columns.kind), address, wrong)?;
+                let stated = self.cell(self.columns.kind);
+                let (data_type, address) = kind(stated, address, image.addressing, wrong)?;
                 return Some(Found {
                     area: address.area,
                     address: Some(address),
@@ -580,6 +581,7 @@ fn quoted(text: &str) -> String {
 fn kind(
     cell: Option<&Cell>,
     address: Address,
+    addressing: Addressing,
     wrong: &Collector<'_>,
 ) -> Option<(DataType, Address)> {
     let Some(cell) = cell.filter(|cell| !cell.text.is_empty()) else {
@@ -593,7 +595,8 @@ fn kind(
         return Some((data_type, address));
     }
     // TIA Portal has no size letter for 64-bit types and writes them like a bit.
-    if data_type.width() == Width::Long && address.width == Width::Bit && address.bit == 0 {
+    let is_plain = address.width == Width::Bit && address.bit == 0;
+    if data_type.width() == Width::Long && is_plain && addressing == Addressing::Bytes {
         let long = Address {
             width: Width::Long,
             ..address

@@ -1,11 +1,11 @@
 //! The place of a whole area of the image: `inputs` and `outputs` of a driver.cfg.
 
-use crate::ElementAddress;
 use crate::element_address::SHAPE;
 use crate::table::{ADDRESSES, Span, Table};
+use crate::{ElementAddress, Piece};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Key, Shape, Value};
-use tickbus_image::signal::Area;
+use tickbus_image::signal::{Area, Signal};
 
 /// The most parts that an area may have.
 pub(crate) const PARTS: usize = 100;
@@ -59,6 +59,22 @@ impl Block {
             first: self.first,
             count: self.table.elements(self.bytes),
         }
+    }
+}
+
+impl Piece {
+    /// The part of `signal` in `block`, for an area placed as a whole.
+    pub(super) fn of_block(signal: &Signal, block: &Block) -> Option<Self> {
+        let bits = signal.address().bits();
+        let begin = bits.start.max(block.byte * 8);
+        let end = bits.end.min((block.byte + block.bytes) * 8);
+        (begin < end).then(|| Self {
+            table: block.table,
+            wire: block.first * block.table.width() + begin - block.byte * 8,
+            bit: begin,
+            bits: end - begin,
+            fills: true,
+        })
     }
 }
 

@@ -5,8 +5,9 @@ use tickbus_fieldbus::At;
 use tickbus_fieldbus::{Role, both_ways};
 use tickbus_image::signal::{Signal, SignalTable};
 
+use super::ClientOptions;
 use super::area_mapping::nobody_writes;
-use super::{ClientOptions, Piece};
+use crate::Piece;
 
 impl ClientOptions {
     /// Takes the lines, and reports those that are invalid, do not fit their signals, or would make two signals write

@@ -3,7 +3,6 @@
 mod area_mapping;
 mod at;
 mod options;
-mod piece;
 mod plan;
 mod request;
 mod session;
@@ -19,7 +18,6 @@ use super::Line;
 pub use area_mapping::Block;
 pub(crate) use area_mapping::{PART_KEYS, PARTS};
 pub use options::ClientOptions;
-pub use piece::Piece;
 pub use plan::{Capabilities, queries};
 pub use request::{AnswerError, Region, Request};
 use session::{ClientSession, Framing, Station};

@@ -15,7 +15,8 @@ use tickbus_net::Address;
 
 use super::area_mapping::AreaMapping;
 use super::plan::{Capabilities, queries};
-use super::{Block, Piece, Request};
+use super::{Block, Request};
+use crate::Piece;
 
 /// The default address: the one at which our own server listens.
 const ADDRESS: Address = Address::local(1502);

@@ -7,8 +7,8 @@ use crate::function::{
 };
 use crate::table::{Span, Table};
 
-use super::Piece;
 use super::request::{Region, Request};
+use crate::Piece;
 
 /// The capabilities of a device, which determine the requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use crate::function::EXCEPTION_BIT;
 use crate::table::{Span, Table, copy_bits};
 use crate::{ElementAddress, Exception, Function, identification};
 
-use super::Piece;
+use crate::Piece;
 
 /// Consecutive elements of a table, and the bits of a frame that they carry.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! The bus `modbus-server`: clients read and write the image.
 
 mod at;
-mod identity;
 mod options;
+mod reserved;
 mod serial;
 mod tcp;
 mod units;
@@ -11,9 +11,8 @@ use tickbus_base::time::Stop;
 use tickbus_fieldbus::{BusError, BusSetup, Free, Medium, Port, tcp as many};
 
 use super::Line;
-pub(crate) use at::{RANGE_KEYS, RANGES};
-pub(crate) use identity::{IDENTITY_KEYS, read_identity};
 pub use options::ServerOptions;
+pub(crate) use reserved::{RANGE_KEYS, RANGES};
 use tcp::TcpService;
 use units::ServedUnits;
 

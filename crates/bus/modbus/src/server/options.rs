@@ -13,8 +13,8 @@ use tickbus_image::signal::SignalTable;
 use tickbus_net::Address;
 
 use super::super::element_address::SHAPE;
-use super::at::read_reserved;
-use super::read_identity;
+use super::reserved::read_reserved;
+use crate::identity::read_identity;
 
 /// The default address: reachable only from this machine, at a port that needs no privilege.
 const ADDRESS: Address = Address::local(1502);

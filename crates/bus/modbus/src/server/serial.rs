@@ -48,6 +48,7 @@ pub(super) fn serve(
         written: 0,
         carried: None,
         held_until: Nanos(i64::MIN),
+        turned: Nanos(i64::MIN),
     };
     call.run(&mut server, port, stop)
 }
@@ -66,6 +67,8 @@ struct Server<'a> {
     carried: Option<Carried>,
     /// Until when a fault holds the answer back.
     held_until: Nanos,
+    /// The time of the last turn.
+    turned: Nanos,
 }
 
 impl Server<'_> {
@@ -149,7 +152,14 @@ impl Caller for Server<'_> {
     }
 
     fn turn(&mut self, now: Nanos, port: &mut Port) -> Result<(), BusError> {
+        self.turned = now;
         self.attend(now, port);
+        // What would go out over a line that is down is lost.
+        let is_due = self.written == 0 && !self.reply.is_empty() && now >= self.held_until;
+        if is_due && !port.is_up(now) {
+            self.reply.clear();
+            self.carried = None;
+        }
         Ok(())
     }
 
@@ -174,8 +184,9 @@ impl Caller for Server<'_> {
 
     fn deadline(&self, port: &Port) -> Nanos {
         let stale = port.stale_at(port.clock().now());
-        let waits = self.written < self.reply.len();
-        let held = if waits { self.held_until } else { Nanos::MAX };
+        // Once it is due, an answer that the system does not accept waits for the system, and not for a time.
+        let is_held = self.written < self.reply.len() && self.turned < self.held_until;
+        let held = if is_held { self.held_until } else { Nanos::MAX };
         self.framer.deadline().min(stale).min(held)
     }
 

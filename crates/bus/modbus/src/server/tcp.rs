@@ -147,6 +147,7 @@ impl Service for TcpService<'_> {
     }
 
     fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
+        client.carried.clear();
         Renewal::lost_all(&mut client.source.renewals, now, port.max_age());
     }
 }

@@ -205,7 +205,7 @@ impl ServedUnits {
             }
         }
         let elements = read?;
-        let carries = unit.map.bits(Side::Sends, elements).next().is_some();
+        let carries = unit.map.carries(Side::Sends, elements);
         carries.then_some(Carried {
             station,
             generation: unit.generation,

@@ -74,6 +74,8 @@ struct Side {
     sizes: [usize; 2],
     /// When data were last exchanged, as long as they are.
     exchanged: Option<Nanos>,
+    /// When data that cannot be read were last exchanged.
+    unreadable: Option<Nanos>,
     /// The master is in CLEAR.
     is_cleared: bool,
     /// The last reason why none are, and its cause.
@@ -97,6 +99,7 @@ impl Side {
             outputs: setup.outputs.clone(),
             sizes: setup.sizes,
             exchanged: None,
+            unreadable: None,
             is_cleared: false,
             told: String::new(),
             cause: Cause::Waiting,
@@ -213,6 +216,7 @@ impl Listening<'_> {
                 News::Unreadable(why) => {
                     let side = &mut sides[index];
                     side.exchanged = None;
+                    side.unreadable = Some(now);
                     if side.told != why {
                         side.hears_nothing(why, Cause::Refused);
                         *next = now;
@@ -253,9 +257,12 @@ impl Listening<'_> {
             if self.sides[index].exchanged.is_some() {
                 continue;
             }
-            let (why, cause) = match &line {
-                Some((why, cause)) => (why.clone(), *cause),
-                None => self.observer.trouble(index),
+            let (why, cause) = if let Some((why, cause)) = &line {
+                (why.clone(), *cause)
+            } else {
+                let heard = self.sides[index].unreadable;
+                let exchanges = heard.is_some_and(|at| now - at <= limit);
+                self.observer.trouble(index, exchanges)
             };
             let side = &mut self.sides[index];
             if side.told != why {

@@ -154,6 +154,51 @@ fn clear_and_operate_of_the_stations_master_and_its_groups_are_told_and_those_of
 }
 
 #[test]
+fn what_another_master_tells_a_station_changes_nothing_for_its_own() {
+    let mut observer = observer();
+    let exchange = [request(&[1, 0, 2, 0]), answer(&[3, 0, 4, 0])];
+    let telegrams = [
+        // Before the first exchange, the observer does not know whose station it is.
+        &[frame(127, 3, 0x46, Some(58), &[2, 0])][..],
+        &exchange[..],
+        // The station acknowledges these parameters for another device, and does not obey.
+        &[
+            frame(8, 3, 0x5D, Some(61), &[0x88, 1, 10, 11, 0x0B, 0x1C, 0]),
+            vec![0xE5],
+        ],
+        &exchange[..],
+        &[frame(127, 2, 0x46, Some(58), &[2, 0])],
+        &exchange[..],
+    ];
+    let told = news(&mut observer, &telegrams.concat());
+    let expected = [
+        "[1, 0, 2, 0] [3, 0, 4, 0] false",
+        "[1, 0, 2, 0] [3, 0, 4, 0] false",
+        "cleared true",
+        "[1, 0, 2, 0] [3, 0, 4, 0] true",
+    ];
+    assert_eq!(told, expected);
+}
+
+#[test]
+fn a_master_that_is_known_to_be_in_clear_may_send_no_outputs() {
+    let telegrams = [
+        request(&[1, 0, 2, 0]),
+        answer(&[3, 0, 4, 0]),
+        frame(127, 2, 0x46, Some(58), &[2, 0]),
+        request(&[]),
+        answer(&[3, 0, 4, 0]),
+    ];
+    let told = news(&mut observer(), &telegrams);
+    let expected = [
+        "[1, 0, 2, 0] [3, 0, 4, 0] false",
+        "cleared true",
+        "[0, 0, 0, 0] [3, 0, 4, 0] true",
+    ];
+    assert_eq!(told, expected);
+}
+
+#[test]
 fn a_device_with_fail_safe_is_cleared_by_telegrams_without_outputs() {
     let safe = Identity {
         fail_safe: true,

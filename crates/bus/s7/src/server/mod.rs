@@ -195,13 +195,22 @@ impl tcp::Service for Service {
     }
 
     fn replied(&mut self, client: &mut Client, port: &mut Port) {
+        // While a fault held the answer back, another client may have taken newer values: what this one has of them is
+        // unknown, and is sent again.
+        let batch = self.memory.batch;
+        let is_newest = batch.is_some_and(|(number, _)| number == client.number);
         for receipt in client.receipts.drain(..) {
-            port.sent(&receipt);
+            if is_newest {
+                port.sent(&receipt);
+            }
         }
-        self.memory.batch = None;
+        if is_newest {
+            self.memory.batch = None;
+        }
     }
 
     fn unheard(&mut self, client: &mut Client, now: Nanos, port: &mut Port) {
+        client.receipts.clear();
         Renewal::lost_all(&mut client.renewals, now, port.max_age());
     }
 }
@@ -242,7 +251,9 @@ impl Jobs<'_> {
         function: u8,
     ) -> Result<(AreaRange, Range<usize>), ReturnCode> {
         let place = self.shared.map.place(object, self.station)?;
-        if let Some(code) = self.port.answer(place.station, function, self.now) {
+        if let Some(code) = self.port.answer(place.station, function, self.now)
+            && self.port.is_station_up(place.station, self.now)
+        {
             return Err(ReturnCode(code));
         }
         if range.end > place.length {

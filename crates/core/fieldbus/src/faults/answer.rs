@@ -1,6 +1,5 @@
 //! Faults of answers: a server answers a request late, with an error, or wrongly.
 
-use super::LineEffect;
 use tickbus_base::time::Nanos;
 
 /// A fault of a server's answers.
@@ -66,18 +65,5 @@ impl Spoilt {
             AnswerTrouble::Error(code) => self.error = self.error.or(Some(code)),
             AnswerTrouble::Wrong(wrong) => self.wrong = self.wrong.or(Some(wrong)),
         }
-    }
-}
-
-impl LineEffect {
-    /// The trouble with an answer of `station` to a request with this function code, and how likely it is; `None` if this effect
-    /// does not change such answers.
-    pub(super) fn on_answer(self, station: usize, function: u8) -> Option<(f64, AnswerTrouble)> {
-        let Self::Answer(effect) = self else {
-            return None;
-        };
-        let is_meant = effect.station.is_none_or(|meant| meant == station)
-            && effect.function.is_none_or(|meant| meant == function);
-        is_meant.then_some((effect.chance, effect.trouble))
     }
 }

@@ -74,6 +74,19 @@ pub enum LineEffect {
     Answer(AnswerEffect),
 }
 
+impl LineEffect {
+    /// The trouble with an answer of `station` to a request with this function code, and how likely it is; `None` if this effect
+    /// does not change such answers.
+    pub(super) fn on_answer(self, station: usize, function: u8) -> Option<(f64, AnswerTrouble)> {
+        let Self::Answer(effect) = self else {
+            return None;
+        };
+        let is_meant = effect.station.is_none_or(|meant| meant == station)
+            && effect.function.is_none_or(|meant| meant == function);
+        is_meant.then_some((effect.chance, effect.trouble))
+    }
+}
+
 /// The affected frames, as seen from this end.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {

@@ -59,7 +59,8 @@ pub trait Service {
     /// client. Not called for answers that had to wait for a slow client.
     fn replied(&mut self, client: &mut Self::Client, port: &mut Port);
 
-    /// Bytes of this client were lost at `now`, since the line was down: perhaps requests, and perhaps the client wrote.
+    /// Bytes from or to this client were lost at `now`, since the line was down: perhaps requests, and perhaps the client
+    /// wrote; perhaps answers, none of which counts as [`replied`](Self::replied) any more.
     fn unheard(&mut self, client: &mut Self::Client, now: Nanos, port: &mut Port);
 }
 
@@ -346,7 +347,9 @@ impl<S: Service> Server<'_, S> {
             &mut self.reply,
             port,
         );
-        self.clients.note_held(place);
+        if !client.held.is_empty() {
+            self.clients.note_held(place);
+        }
         let Some(client) = self.clients.places[place].as_mut() else {
             return Ok(());
         };
@@ -427,11 +430,13 @@ impl<S: Service> Server<'_, S> {
                 client.unsent.append(&mut self.reply);
             }
             self.clients.note_held(place);
-            // What would go out over a line that is down is lost.
-            if port.is_up(now)
-                && let Err(error) = self.send(place, now, port)
-            {
-                self.drop_client(place, &error, port);
+            if port.is_up(now) {
+                if let Err(error) = self.send(place, now, port) {
+                    self.drop_client(place, &error, port);
+                }
+            } else if let Some(client) = self.clients.places[place].as_mut() {
+                // What would go out over a line that is down is lost.
+                self.service.unheard(&mut client.state, now, port);
             }
         }
     }
@@ -608,7 +613,7 @@ impl<C> Client<C> {
             match service.telegram(&mut self.state, now, rest, reply, port) {
                 Ok(0) => break,
                 Ok(count) => rest = &rest[count..],
-                Err(error) => return Err((telegrams, of_peer(self.peer, &error))),
+                Err(error) => return Err((telegrams, error.of_peer(self.peer))),
             }
             telegrams += 1;
             let late = port.take_lateness();
@@ -680,17 +685,6 @@ impl<C> Client<C> {
             "{peer} does not read its answers: {} bytes have waited for {patience}",
             self.unsent.len()
         ))
-    }
-}
-
-/// The error of a service, with the client's address.
-fn of_peer(peer: SocketAddr, error: &BusError) -> BusError {
-    let named = |text: &str| format!("{peer}: {text}");
-    match error {
-        BusError::Link(text) => BusError::Link(named(text)),
-        BusError::Left(text) => BusError::Left(named(text)),
-        BusError::Protocol(text) => BusError::Protocol(named(text)),
-        BusError::Refused(text) => BusError::Refused(named(text)),
     }
 }
 

@@ -9,7 +9,7 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use super::layout;
 use super::mailbox::Mailbox;
 use super::patience::Patience;
-use crate::client::{Client, Connection, Line, client_of, silent};
+use crate::client::{Client, Connection, Line, client_of, closed, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a wait sleeps before it checks that the server is alive.
@@ -68,6 +68,7 @@ pub fn connect(name: &str, client: Client, stop: &Stop) -> Result<Connection, En
         memory,
         seat,
         stop: stop.clone(),
+        leaves: None,
         frame: Vec::new(),
     };
     Ok(Connection::join(client, line))
@@ -81,6 +82,8 @@ struct MemoryLine {
     up: Mailbox,
     down: Mailbox,
     stop: Stop,
+    /// When `receive` gives up in any case.
+    leaves: Option<Nanos>,
     frame: Vec<u8>,
 }
 
@@ -145,6 +148,9 @@ impl Line for MemoryLine {
                 return Err(Ended::before(Cause::Stopped, "this client was stopped"));
             }
             let now = Monotonic::shared().now();
+            if self.leaves.is_some_and(|by| now >= by) {
+                return Err(closed());
+            }
             let beats = self.memory.memory().word(layout::PULSE).load(Relaxed);
             if pulse.replace(beats) != Some(beats) {
                 until = None;
@@ -159,6 +165,10 @@ impl Line for MemoryLine {
             Ended::before(Cause::Protocol, reason)
         })?;
         Ok(&self.frame)
+    }
+
+    fn leave_within(&mut self, limit: Nanos) {
+        self.leaves = Some(Monotonic::shared().now() + limit);
     }
 }
 

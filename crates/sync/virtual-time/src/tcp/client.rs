@@ -8,7 +8,7 @@ use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
 use tickbus_net::{Address, prepare, reach_in};
 
 use super::is_later;
-use crate::client::{Client, Connection, Line, client_of, silent};
+use crate::client::{Client, Connection, Line, client_of, closed, silent};
 use crate::{Cause, Ended, Outcome, Participant, wire};
 
 /// How long a read blocks before it checks for a stop.
@@ -50,6 +50,7 @@ pub fn connect(
         stream,
         clock: Arc::clone(clock),
         stop: stop.clone(),
+        leaves: None,
         buffer: vec![0; 4096],
         start: 0,
         end: 0,
@@ -68,6 +69,8 @@ struct TcpLine {
     stream: BlockingStream,
     clock: Arc<dyn Clock>,
     stop: Stop,
+    /// When `receive` gives up in any case.
+    leaves: Option<Nanos>,
     buffer: Vec<u8>,
     start: usize,
     end: usize,
@@ -112,6 +115,9 @@ impl Line for TcpLine {
                         return Err(Ended::before(Cause::Stopped, "this client was stopped"));
                     }
                     let now = self.clock.now();
+                    if self.leaves.is_some_and(|by| now >= by) {
+                        return Err(closed());
+                    }
                     if now >= *until.get_or_insert(now + limit - LOOK) {
                         return Err(silent(limit));
                     }
@@ -119,5 +125,9 @@ impl Line for TcpLine {
                 Err(error) => return Err(lost(error)),
             }
         }
+    }
+
+    fn leave_within(&mut self, limit: Nanos) {
+        self.leaves = Some(self.clock.now() + limit);
     }
 }

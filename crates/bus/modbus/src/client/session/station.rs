@@ -4,11 +4,11 @@ use crate::table::Span;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::Receipt;
 
-use super::super::Piece;
 use super::super::plan::{Capabilities, queries};
 use super::super::request::{Region, Request};
 use super::Identity;
 use super::trouble::Trouble;
+use crate::Piece;
 
 /// The polling state of a station.
 #[derive(Debug)]

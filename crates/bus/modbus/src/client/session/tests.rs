@@ -3,7 +3,8 @@ mod stream;
 use std::sync::Arc;
 
 use super::*;
-use crate::client::{Capabilities, Piece};
+use crate::Piece;
+use crate::client::Capabilities;
 use crate::identification::READ_DEVICE_IDENTIFICATION;
 use crate::table::Table;
 use tickbus_base::time::Manual;

@@ -52,6 +52,7 @@ impl Service for Echo {
             return Ok(0);
         }
         *count += 1;
+        port.count("test.heard");
         if let Some(function) = bytes[..=length].get(1) {
             assert_eq!(port.answer(0, *function, now), None);
         }
@@ -458,7 +459,7 @@ fn answers_that_a_fault_holds_back_go_out_in_order_at_their_time() {
     assert_eq!(rest, [1, 7, 1, 2]);
     // What is held back when the line goes down is lost.
     client.write_all(&[1, 7]).expect("the server reads");
-    server.until(|server| server.clock.is_settled(1));
+    server.until(|server| server.fact("test.heard").as_deref() == Some("5"));
     let down = server.take_down();
     server.pass(Nanos::from_millis(60));
     server.until(|server| server.clock.is_settled(1));

@@ -134,7 +134,7 @@ public final class Client {
                         frames.expect(3 * Long.BYTES);
                         return new Outcome(in.getLong(), in.getLong(), in.getLong());
                     }
-                    case WAITING -> participant.waiting(frames.text(frames.left()));
+                    case WAITING -> waiting(frames.text(frames.left()));
                     case ENDED -> throw ended(in);
                     default -> throw new Frames.Violation(String.format("sent a message of the unknown kind 0x%02X", kind));
                 }
@@ -142,6 +142,17 @@ public final class Client {
         } catch (Frames.Violation e) {
             giveUp("the server violates the protocol: it " + e.getMessage());
             throw e;
+        }
+    }
+
+    private void waiting(String forWhom) throws IOException {
+        if (failure != null) {
+            return;
+        }
+        try {
+            participant.waiting(forWhom);
+        } catch (Throwable e) {
+            failed(e);
         }
     }
 
@@ -206,8 +217,14 @@ public final class Client {
     }
 
     private void done(long sequence) throws IOException {
+        long nanos;
+        try {
+            nanos = participant.nextUpdate();
+        } catch (Throwable e) {
+            failed(e);
+            return;
+        }
         ran = sequence;
-        long nanos = participant.nextUpdate();
         boolean asks = nanos != Participant.AS_DECLARED;
         ByteBuffer out = frames.begin(1 + Long.BYTES * ((asks ? 2 : 1) + writes.length), asks ? DONE_UNTIL : DONE);
         out.putLong(sequence);

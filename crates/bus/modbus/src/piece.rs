@@ -5,8 +5,6 @@ use crate::{ElementAddress, TagAddress};
 use tickbus_base::Mistake;
 use tickbus_image::signal::{DataType, Signal};
 
-use super::Block;
-
 /// Bits of a frame, and the bits of a table that carry them in the same order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
@@ -39,7 +37,7 @@ impl Piece {
     }
 
     /// The part of this piece within the bits `begin..end` of the table.
-    pub(super) fn within(self, begin: usize, end: usize) -> Option<Self> {
+    pub(crate) fn within(self, begin: usize, end: usize) -> Option<Self> {
         let from = self.wire.max(begin);
         let to = (self.wire + self.bits).min(end);
         (from < to).then(|| Self {
@@ -51,27 +49,13 @@ impl Piece {
     }
 
     /// The bits that writing the piece affects: whole registers if it fills them.
-    pub(super) fn claim(self) -> std::ops::Range<usize> {
+    pub(crate) fn claim(self) -> std::ops::Range<usize> {
         if self.fills {
             let (span, width) = (self.span(), self.table.width());
             span.first * width..span.end() * width
         } else {
             self.wire..self.wire + self.bits
         }
-    }
-
-    /// The part of `signal` in `block`, for an area placed as a whole.
-    pub(super) fn of_block(signal: &Signal, block: &Block) -> Option<Self> {
-        let bits = signal.address().bits();
-        let begin = bits.start.max(block.byte * 8);
-        let end = bits.end.min((block.byte + block.bytes) * 8);
-        (begin < end).then(|| Self {
-            table: block.table,
-            wire: block.first * block.table.width() + begin - block.byte * 8,
-            bit: begin,
-            bits: end - begin,
-            fills: true,
-        })
     }
 
     /// The piece of a `signal` with its own place `spot`.

@@ -428,7 +428,7 @@ fn map_with(mqtt: &str, dispatcher: &str) -> Result<Map, String> {
     let file = folder.path().join("map.toml");
     std::fs::write(&file, text).expect("a file");
     Map::load(&file).map_err(|mistakes| {
-        let folder = format!("{}/", folder.path().display());
+        let folder = format!("{}{}", folder.path().display(), std::path::MAIN_SEPARATOR);
         mistakes.to_string().replace(&folder, "")
     })
 }

@@ -2,8 +2,8 @@
 //! one run, each server a process.
 //!
 //! One client with prepared telegrams writes 64 registers and reads 64 (function 23): from a bare server that
-//! answers as many bytes, from ours, with the default `max_age` and with 90 ms, and from libmodbus,
-//! tokio-modbus and pymodbus if installed. Then 1,000 clients connect, and write one register each every
+//! answers as many bytes, from ours, with the default `max_age`, with 90 ms, and with 2,000 signals, in registers
+//! without and with gaps, and from libmodbus, tokio-modbus and pymodbus if installed. Then 1,000 clients connect, and write one register each every
 //! 100 ms. Medians over the rounds; prints one `rust NAME VALUE` per line on stdout.
 //!
 //! Pin it to one core from outside: waking another core costs more than everything measured here.
@@ -15,6 +15,7 @@ mod libmodbus;
 mod servers;
 mod signals;
 
+use std::fmt::Write as _;
 use std::io::{Read, Write};
 use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
@@ -34,6 +35,9 @@ const ANSWER: usize = 7 + 2 + 2 * REGISTERS as usize;
 
 /// The holding register at which %I begins.
 const WINDOW: u16 = 1024;
+
+/// The first of the scattered registers that are read.
+const SCATTERED: u16 = 4000;
 
 struct Extent {
     /// Many short rounds, so that other load on the machine affects all servers alike.
@@ -75,6 +79,39 @@ fn device(keys: &str) -> Server {
         "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"modbus-server\"\naddress = \"127.0.0.1:0\"\n\
          inputs = \"offset:{WINDOW}\"\ninput_bytes = {bytes}\noutput_bytes = {bytes}\n{keys}\n{signals}"
     ))
+}
+
+/// A device with 2,000 signals of a register each, half of them read and half of them written: in every second register, with
+/// reserved ones between them, or without a gap.
+fn large_device(is_scattered: bool) -> Server {
+    const EACH: usize = 1000;
+    let mut text = "[driver]\nid = 1\nname = \"bench\"\n[fieldbus]\nkind = \"modbus-server\"\n\
+                    address = \"127.0.0.1:0\"\n"
+        .to_owned();
+    if is_scattered {
+        let areas = [('Q', 0), ('I', usize::from(SCATTERED))];
+        let reserved =
+            areas.map(|(_, first)| format!("{{ at = \"4{:05}\", count = 2000 }}", first + 1));
+        let _ = writeln!(text, "reserved = [{}]\n[fieldbus.at]", reserved.join(", "));
+        for (area, first) in areas {
+            for index in 0..EACH {
+                let number = first + 2 * index + 1;
+                let _ = writeln!(text, "\"{area} {index}\" = \"4{number:05}\"");
+            }
+        }
+    } else {
+        let _ = writeln!(text, "inputs = \"offset:{WINDOW}\"");
+    }
+    for area in ['Q', 'I'] {
+        for index in 0..EACH {
+            let byte = 2 * index;
+            let _ = write!(
+                text,
+                "[[signal]]\nname = \"{area} {index}\"\naddress = \"%{area}W{byte}\"\ntype = \"WORD\"\n"
+            );
+        }
+    }
+    Server::device(&text)
 }
 
 /// Writes 64 registers from 0 on, and reads 64 from `reads` on.
@@ -121,6 +158,7 @@ fn libmodbus() -> Option<Server> {
 fn exchanges(extent: &Extent, measured: bool) {
     let bare = Server::own(&["--bare", &REQUEST.to_string(), &ANSWER.to_string()]);
     let (ours, quick) = (device(""), device("max_age = \"90ms\""));
+    let (dense, scattered) = (large_device(false), large_device(true));
     let others = if measured {
         [
             ("libmodbus", libmodbus()),
@@ -149,6 +187,8 @@ fn exchanges(extent: &Extent, measured: bool) {
         turn("modbus.fc23.bare", &bare, 0),
         turn("modbus.fc23", &ours, WINDOW),
         turn("modbus.fc23.max_age_90ms", &quick, WINDOW),
+        turn("modbus.fc23.dense_2000", &dense, WINDOW),
+        turn("modbus.fc23.scattered_2000", &scattered, SCATTERED),
     ];
     for ((what, server), name) in others.iter().zip(&names) {
         match server {

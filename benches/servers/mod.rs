@@ -24,30 +24,37 @@ impl Server {
     pub(crate) fn own(role: &[&str]) -> Self {
         let mut command = Command::new(std::env::current_exe().expect("this program has a file"));
         command.args(role).stderr(Stdio::inherit());
-        Self::started(command).expect("the server starts")
+        Self::started(command, None).expect("the server starts")
     }
 
     /// A device with this `driver.cfg`.
     pub(crate) fn device(text: &str) -> Self {
-        Self::own(&["--device", text])
+        let mut command = Command::new(std::env::current_exe().expect("this program has a file"));
+        command.arg("--device").stderr(Stdio::inherit());
+        Self::started(command, Some(text)).expect("the server starts")
     }
 
     /// A program whose first line is its address, or for one that was given an address, any line.
     pub(crate) fn of_others(mut command: Command, given: Option<String>) -> Option<Self> {
         command.stderr(Stdio::null());
-        let mut server = Self::started(command)?;
+        let mut server = Self::started(command, None)?;
         if let Some(given) = given {
             server.address = given;
         }
         Some(server)
     }
 
-    fn started(mut command: Command) -> Option<Self> {
+    /// The program gets `input` as the whole of its stdin; without it, a stdin that stays open.
+    fn started(mut command: Command, input: Option<&str>) -> Option<Self> {
         let mut process = command
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn()
             .ok()?;
+        if let Some(input) = input {
+            let mut stdin = process.stdin.take().expect("a pipe");
+            stdin.write_all(input.as_bytes()).ok()?;
+        }
         let told = process.stdout.take().expect("a pipe");
         let mut server = Self {
             process,
@@ -80,7 +87,7 @@ impl Drop for Server {
     }
 }
 
-/// Serves and does not return if the arguments say so: `--device TEXT`, `--bare REQUEST ANSWER...` with sizes in bytes, or
+/// Serves and does not return if the arguments say so: `--device` with a driver.cfg on stdin, `--bare REQUEST ANSWER...` with sizes in bytes, or
 /// one of these roles.
 pub(crate) fn serve_if_told(others: &[(&str, fn())]) {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -90,7 +97,12 @@ pub(crate) fn serve_if_told(others: &[(&str, fn())]) {
             .map(|size| size.parse().expect("bytes"))
     };
     match arguments.first().map(String::as_str) {
-        Some("--device") => serve_device(&arguments[1]),
+        Some("--device") => {
+            let mut text = String::new();
+            let read = std::io::stdin().read_to_string(&mut text);
+            read.expect("a driver.cfg on stdin");
+            serve_device(&text)
+        }
         Some("--bare") => serve_bare(&sizes().collect::<Vec<usize>>()),
         role => {
             if let Some((_, serve)) = others.iter().find(|(name, _)| role == Some(*name)) {

@@ -7,7 +7,7 @@
 use super::function::{
     EXCEPTION_BIT, READ_BITS, READ_REGISTERS, READ_WRITE_REGISTERS, WRITE_BITS, WRITE_REGISTERS,
 };
-use super::{Exception, Function, Identification, Span, Table, Tables, put_bits};
+use super::{Exception, Function, Identification, Span, Table, Tables};
 
 /// The effect of a request.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -128,13 +128,14 @@ fn act(
         }
         Function::MaskWriteRegister => {
             let [first, ..] = words::<3>(data)?;
-            let (and, or) = ([data[2], data[3]], [data[4], data[5]]);
             let span = Span { first, count: 1 };
-            let wrote = wrote(Table::HoldingRegisters, span, tables, |register| {
-                for (byte, (and, or)) in register.iter_mut().zip(and.into_iter().zip(or)) {
-                    *byte = (*byte & and) | (or & !and);
-                }
-            })?;
+            let before = reply.len();
+            tables.read(Table::HoldingRegisters, span, reply)?;
+            let is = [reply[before], reply[before + 1]];
+            reply.truncate(before);
+            let [and, or] = [2, 4].map(|at| [data[at], data[at + 1]]);
+            let new = [0, 1].map(|byte| (is[byte] & and[byte]) | (or[byte] & !and[byte]));
+            let wrote = write_registers(span, &new, tables)?;
             reply.extend_from_slice(data);
             Ok(wrote)
         }
@@ -205,29 +206,21 @@ fn read_counted(
 }
 
 fn write_bits(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
-    wrote(Table::Coils, span, tables, |coils| {
-        put_bits(values, span.count, coils, 0);
-    })
+    tables.put(Table::Coils, span, values)?;
+    Ok(wrote(Table::Coils, span))
 }
 
 fn write_registers(span: Span, values: &[u8], tables: &mut Tables<'_>) -> Result<Done, Exception> {
-    wrote(Table::HoldingRegisters, span, tables, |registers| {
-        registers.copy_from_slice(values);
-    })
+    tables.put(Table::HoldingRegisters, span, values)?;
+    Ok(wrote(Table::HoldingRegisters, span))
 }
 
-/// Lets `write` change elements.
-fn wrote(
-    table: Table,
-    span: Span,
-    tables: &mut Tables<'_>,
-    write: impl FnOnce(&mut [u8]),
-) -> Result<Done, Exception> {
-    tables.write(table, span, write)?;
-    Ok(Done {
+/// The effect of a request that wrote these elements.
+fn wrote(table: Table, span: Span) -> Done {
+    Done {
         wrote: Some((table, span)),
         ..Done::default()
-    })
+    }
 }
 
 fn read_write(

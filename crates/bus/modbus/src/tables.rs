@@ -5,9 +5,6 @@ use std::ops::Range;
 use super::table::{ADDRESSES, Span, Table, copy_bits};
 use super::{Exception, Piece};
 
-/// The most bytes of a request's values.
-const VALUES: usize = 256;
-
 /// One of the two frames of a unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Side {
@@ -34,6 +31,9 @@ struct Layout {
     parts: Vec<Part>,
     /// For each part, where it and those before it end in the table.
     ends: Vec<usize>,
+    /// For each part, the number of its run: parts that follow each other in the table, perhaps with gaps, and in the frame
+    /// without any.
+    runs: Vec<u32>,
 }
 
 /// Bits of a frame, and the bits of a table that carry them in the same order.
@@ -50,6 +50,12 @@ struct Part {
 impl Part {
     fn end(self) -> usize {
         self.wire + self.bits
+    }
+
+    /// True if this part continues another one in the frame, and comes behind it in the table.
+    fn follows(&self, other: &Self) -> bool {
+        let continues = self.side == other.side && self.bit == other.bit + other.bits;
+        continues && self.wire >= other.end()
     }
 }
 
@@ -86,9 +92,18 @@ impl Layout {
             Some(*end)
         });
         self.ends = ends.collect();
+        let mut run = 0;
+        let mut last: Option<&Part> = None;
+        let runs = self.parts.iter().map(|part| {
+            run += u32::from(last.is_some_and(|last| !part.follows(last)));
+            last = Some(part);
+            run
+        });
+        self.runs = runs.collect();
     }
 
     /// The parts of the frames that consecutive elements carry, with the `width` of an element in bits.
+    #[inline]
     fn find(&self, span: Span, width: usize) -> Result<Found<'_>, Exception> {
         let place = count_while(&self.exist, |range| range.end <= span.first);
         let holds = |range: &Range<usize>| range.start <= span.first && span.end() <= range.end;
@@ -98,8 +113,11 @@ impl Layout {
         let (from, end) = (span.first * width, span.end() * width);
         let first = count_while(&self.ends, |before| *before <= from);
         let count = count_while(&self.parts[first..], |part| part.wire < end);
+        let parts = &self.parts[first..first + count];
+        let is_one_run = count > 0 && self.runs[first] == self.runs[first + count - 1];
         Ok(Found {
-            parts: &self.parts[first..first + count],
+            parts,
+            is_one_run,
             from,
             end,
         })
@@ -118,10 +136,12 @@ fn count_while<T>(list: &[T], is_before: impl Fn(&T) -> bool) -> usize {
 }
 
 /// The parts of the frames that consecutive elements carry.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Found<'a> {
     /// Parts that reach into the elements or, if others overlap them, end before.
     parts: &'a [Part],
+    /// True if the parts follow each other in the frame.
+    is_one_run: bool,
     /// The bits of the elements in the table.
     from: usize,
     end: usize,
@@ -139,6 +159,20 @@ impl<'a> Found<'a> {
                 bits: end - wire,
                 ..*part
             })
+        })
+    }
+
+    /// All parts within the elements as one, if they follow each other in the frame. Its place in the table is that of the
+    /// first.
+    fn run(self) -> Option<Part> {
+        let (first, last) = (self.parts.first()?, self.parts.last()?);
+        let cut = self.from.saturating_sub(first.wire);
+        let end = last.bit + last.bits - last.end().saturating_sub(self.end);
+        self.is_one_run.then(|| Part {
+            wire: first.wire + cut,
+            bit: first.bit + cut,
+            bits: end - first.bit - cut,
+            ..*first
         })
     }
 
@@ -231,16 +265,23 @@ impl Map {
         map
     }
 
-    /// The bits of the frame on `side` that consecutive elements carry.
+    /// The bits of the frame on `side` that consecutive elements carry. Scattered elements that are neighbours in the frame
+    /// come as one range.
     pub fn bits(
         &self,
         side: Side,
         (table, span): (Table, Span),
     ) -> impl Iterator<Item = Range<usize>> {
-        let found = self.find(table, span).into_iter();
-        let parts = found.flat_map(Found::parts);
-        let parts = parts.filter(move |part| part.side == side);
-        parts.map(|part| part.bit..part.bit + part.bits)
+        let found = self.find(table, span).unwrap_or_default();
+        let run = found.run();
+        let singly = if run.is_some() {
+            Found::default()
+        } else {
+            found
+        };
+        let all = run.into_iter().chain(singly.parts());
+        all.filter(move |part| part.side == side)
+            .map(|part| part.bit..part.bit + part.bits)
     }
 
     /// Returns true if consecutive elements carry any bits of the frame on `side`.
@@ -316,7 +357,7 @@ impl Tables<'_> {
         Ok(())
     }
 
-    /// Lets `write` change consecutive elements, arranged as [`read`](Self::read) appends them.
+    /// Writes `values` into consecutive elements; they are arranged as [`read`](Self::read) appends them.
     ///
     /// # Errors
     ///
@@ -324,25 +365,17 @@ impl Tables<'_> {
     ///
     /// # Panics
     ///
-    /// If the elements have more than 256 bytes, which no request writes.
-    pub fn write(
-        &mut self,
-        table: Table,
-        span: Span,
-        write: impl FnOnce(&mut [u8]),
-    ) -> Result<(), Exception> {
+    /// If there are fewer values than elements.
+    pub fn put(&mut self, table: Table, span: Span, values: &[u8]) -> Result<(), Exception> {
         let found = self.map.find(table, span)?;
         if found.has(Side::Sends) {
             return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
         if let Some((_, bytes)) = found.whole() {
-            write(&mut self.holds[bytes]);
+            let length = bytes.len();
+            self.holds[bytes].copy_from_slice(&values[..length]);
             return Ok(());
         }
-        let mut values = [0; VALUES];
-        let values = &mut values[..(found.end - found.from).div_ceil(8)];
-        self.gather(found, values);
-        write(values);
         for part in found.parts() {
             let from = part.wire - found.from;
             copy_bits(values, from, part.bits, self.holds, part.bit);

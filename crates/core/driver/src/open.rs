@@ -180,7 +180,7 @@ pub(super) fn start(
     Ok(match bus {
         OpenBus::Free(bus) => {
             let own = (&*config.name, config.real_time);
-            let thread = BusThread::start(bus, port, timing, status.clone(), own);
+            let thread = BusThread::start(bus, port, table, timing, status.clone(), own);
             BusHandle::Free(thread.map_err(|source| DriverError::no_thread("the bus", source))?)
         }
         OpenBus::Stepped(bus) => BusHandle::Stepped {

@@ -10,6 +10,7 @@ use tickbus_base::thread::Thread;
 use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_driver_cfg::Timing;
 use tickbus_fieldbus::{BusError, Cause, Farewell, Free, LinkState, LinkStatus, Outputs, Port};
+use tickbus_image::signal::SignalTable;
 
 use super::real_time::begin;
 
@@ -34,11 +35,12 @@ pub(super) struct BusThread {
 }
 
 impl BusThread {
-    /// Starts a thread that serves `bus`. `timing` has the pauses between attempts (the last one repeats), and the
+    /// Starts a thread that serves `bus` with the signals in `table`. `timing` has the pauses between attempts (the last one repeats), and the
     /// settings for the outputs. `real_time` are the settings of the thread.
     pub(super) fn start(
         bus: Box<dyn Free>,
         mut port: Port,
+        table: &SignalTable,
         timing: &Timing,
         status: LinkStatus,
         (name, real_time): (&str, Option<RealTime>),
@@ -49,7 +51,7 @@ impl BusThread {
         }
         // A clock that stands still between two calls brings no further cycle.
         let is_due = timing.at_close == Outputs::FailSafe && port.clock().passes_alone();
-        let farewell = (is_due && cycles > 0).then(|| port.farewell(cycles));
+        let farewell = (is_due && cycles > 0).then(|| port.farewell(cycles, table));
         let reconnect = timing.reconnect.clone();
         let stop = Stop::new();
         let close_timeout = bus.close_timeout();

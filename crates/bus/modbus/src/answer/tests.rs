@@ -483,9 +483,7 @@ mod placed {
                 let mut reply = Vec::new();
                 let done = match write {
                     None => tables.read(Table::HoldingRegisters, span, &mut reply),
-                    Some(values) => tables.write(Table::HoldingRegisters, span, |all| {
-                        all.copy_from_slice(values);
-                    }),
+                    Some(values) => tables.put(Table::HoldingRegisters, span, values),
                 };
                 done.map(|()| reply)
             };

@@ -107,8 +107,9 @@ impl ServedUnits {
     ) -> Option<Carried> {
         // A fault that begins meanwhile meets the whole request or nothing of it.
         port.together(|port| {
-            if let Some(code) = port.answer(station, pdu[0], now)
-                && port.is_station_up(station, now)
+            // A station that is cut off answers nothing, and no fault of an answer counts.
+            if port.is_station_up(station, now)
+                && let Some(code) = port.answer(station, pdu[0], now)
             {
                 let exception = Exception(code);
                 refuse(pdu[0], exception, reply);

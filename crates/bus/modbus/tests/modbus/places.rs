@@ -1,6 +1,8 @@
 //! A server with the places of a device's manual, and a client that knows only those.
 
 use super::*;
+use conformance::rig::End;
+use tickbus_base::time::Monotonic;
 
 /// Two devices behind one address: a drive at unit 3, and remote I/O at unit 7 that has its image as a whole.
 const DEVICES: &str = r#"
@@ -122,6 +124,31 @@ fn a_pulse_waits_until_its_own_place_was_read() {
     device.until("the pulse is over", |_| {
         of_unit(&mut stream, 3, &[2, 0, 7, 0, 1]) == [2, 1, 0]
     });
+}
+
+#[test]
+fn a_client_that_reads_places_one_by_one_ends_the_wait_of_a_closing_device() {
+    let clock = Monotonic::shared();
+    let text = DEVICES
+        .replace("\"300ms\"", "\"20s\"\nat_close = \"fail_safe\"")
+        .replace("latch   = \"rising\"\n", "");
+    let end = End::open(&text, &clock, &KINDS);
+    let mut stream = client(end.address());
+    let reads = [[3, 0x21, 0x34, 0, 1], [2, 0, 7, 0, 1], [2, 0, 9, 0, 1]];
+    let mut poll = move || {
+        for read in reads {
+            let sent = stream.write_all(&request(1, 3, &read));
+            if sent.is_err() || stream.read(&mut [0; 64]).unwrap_or_default() == 0 {
+                return false;
+            }
+        }
+        true
+    };
+    assert!(poll());
+    // A log entry says that values were not confirmed: the test then fails.
+    let polling = std::thread::spawn(move || while poll() {});
+    end.driver.close();
+    polling.join().expect("it has lost its server");
 }
 
 /// Injects a fault into the devices, for as long as `during` runs.

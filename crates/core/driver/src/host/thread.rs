@@ -152,7 +152,8 @@ impl HostThread {
             Bus::Free(bus) => {
                 let timing = timing(config, is_own);
                 let (real_time, scanning) = (config.real_time, status.clone());
-                let bus = BusThread::start(bus, port, &timing, status, (name, real_time));
+                let bus =
+                    BusThread::start(bus, port, &config.table, &timing, status, (name, real_time));
                 let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                 let scans = move || {
                     real_time::begin(real_time, "the PLC program", &scanning, &*scanned.wall);

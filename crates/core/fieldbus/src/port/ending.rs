@@ -7,6 +7,7 @@ use std::sync::mpsc::{self, Receiver, Sender};
 
 use tickbus_base::thread::wait_for;
 use tickbus_base::time::{Clock, Nanos};
+use tickbus_image::signal::{Area, SignalTable};
 
 use super::{Port, Receipt};
 
@@ -75,8 +76,12 @@ pub(super) struct Ending {
 }
 
 /// The peer of a station, as a receiver of values.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Taker {
+    /// The bits of the frame that carry signals.
+    needed: BitSet,
+    /// The bits of the frame with the last values that the peer has got in parts.
+    got: BitSet,
     /// The number of cycles after which the peer has the last values; 0 for a station without outputs.
     missing: u32,
     /// True if the station's write guard permits writes.
@@ -86,21 +91,67 @@ struct Taker {
 }
 
 impl Taker {
-    fn is_owed(self) -> bool {
+    fn is_owed(&self) -> bool {
         self.may_write && self.missing > 0
+    }
+
+    /// The peer has these bits of the last values. Returns true if it thereby has those of all signals.
+    fn completes(&mut self, bits: Range<usize>) -> bool {
+        self.got.add(bits);
+        let is_complete = self.got.has_all(&self.needed);
+        if is_complete {
+            self.got.clear();
+        }
+        is_complete
+    }
+}
+
+/// Bits of a frame; bit n of byte k is 8k + n.
+#[derive(Clone, Debug, Default)]
+struct BitSet(Vec<u8>);
+
+impl From<Range<usize>> for BitSet {
+    fn from(bits: Range<usize>) -> Self {
+        let mut set = Self::default();
+        set.add(bits);
+        set
+    }
+}
+
+impl BitSet {
+    fn add(&mut self, bits: Range<usize>) {
+        self.0.resize(self.0.len().max(bits.end.div_ceil(8)), 0);
+        for bit in bits {
+            self.0[bit / 8] |= 1 << (bit % 8);
+        }
+    }
+
+    fn has_all(&self, others: &Self) -> bool {
+        let own = self.0.iter().copied().chain(std::iter::repeat(0));
+        others
+            .0
+            .iter()
+            .zip(own)
+            .all(|(other, own)| other & !own == 0)
+    }
+
+    fn clear(&mut self) {
+        self.0.fill(0);
     }
 }
 
 impl Ending {
-    fn new(missing: impl Iterator<Item = u32>) -> (Self, Farewell) {
+    fn new(stations: impl Iterator<Item = (u32, BitSet)>) -> (Self, Farewell) {
         let (sender, done) = mpsc::channel();
         let shared = Arc::<Shared>::default();
         let ending = Self {
             shared: Arc::clone(&shared),
             is_begun: false,
-            stations: missing
-                .map(|missing| Taker {
+            stations: stations
+                .map(|(missing, needed)| Taker {
                     missing,
+                    needed,
+                    got: BitSet::default(),
                     may_write: true,
                     is_offered: false,
                 })
@@ -164,13 +215,21 @@ impl Port {
     }
 
     /// Lets another thread end the exchange with the fail-safe values, which reach the peer of each station after this
-    /// many `cycles`.
-    pub fn farewell(&mut self, cycles: u32) -> Farewell {
-        let missing = (0..self.stations()).map(|station| match self.sizes(station).0 {
-            0 => 0,
-            _ => cycles,
+    /// many `cycles`. A peer that gets its frame in parts has a cycle's values when it has those of all signals in
+    /// `table`, or the whole frame if there are no signals.
+    pub fn farewell(&mut self, cycles: u32, table: &SignalTable) -> Farewell {
+        let (sent, _) = self.role().areas();
+        let stations = (0..self.stations()).map(|station| match self.sizes(station).0 {
+            0 => (0, BitSet::default()),
+            bytes => {
+                let signals = bits_of_signals(table, station, sent);
+                (
+                    cycles,
+                    signals.unwrap_or_else(|| BitSet::from(0..8 * bytes)),
+                )
+            }
         });
-        let (ending, farewell) = Ending::new(missing);
+        let (ending, farewell) = Ending::new(stations);
         self.image.ending = Some(ending);
         farewell
     }
@@ -229,13 +288,16 @@ impl Port {
 
     #[cold]
     fn had_last(&mut self, receipt: &Receipt) {
-        let stations = receipt.stations.clone();
-        let is_whole = receipt.bits.as_ref().is_none_or(|bits| {
-            let size = self.sizes(stations.start).0;
-            bits.start == 0 && bits.end >= 8 * size
-        });
-        if is_whole {
-            stations.for_each(|station| self.has_last(station));
+        for station in receipt.stations.clone() {
+            let completes = match (&receipt.bits, &mut self.image.ending) {
+                (Some(bits), Some(ending)) if self.faults.gives_newest(station) => {
+                    ending.stations[station].completes(bits.clone())
+                }
+                (bits, _) => bits.is_none(),
+            };
+            if completes {
+                self.has_last(station);
+            }
         }
     }
 
@@ -248,9 +310,21 @@ impl Port {
     }
 }
 
+/// The bits of a station's frame in `area` that carry signals; `None` without signals.
+fn bits_of_signals(table: &SignalTable, station: usize, area: Area) -> Option<BitSet> {
+    let mut bits = BitSet::default();
+    for signal in &table.signals {
+        if signal.station == station && signal.area == area {
+            bits.add(signal.address().bits());
+        }
+    }
+    (!bits.0.is_empty()).then_some(bits)
+}
+
 #[cfg(all(test, not(loom)))]
 mod tests {
     use tickbus_base::time::{Manual, Nanos};
+    use tickbus_image::signal::{DataType, Signal};
     use tickbus_image::{StationStreams, image};
 
     use super::*;
@@ -272,6 +346,10 @@ mod tests {
         Port::new(end, clock, Role::Controller, None, status)
     }
 
+    fn no_signals() -> SignalTable {
+        SignalTable::of_one_station(0, 0, Vec::new())
+    }
+
     fn send(port: &mut Port, station: usize) {
         let frames = port.take(station..station + 1, Nanos::ZERO);
         let mut frames = frames.expect("the line is up");
@@ -283,7 +361,7 @@ mod tests {
     #[test]
     fn a_station_that_nothing_is_written_to_keeps_no_other_one_from_its_last_values() {
         let mut port = port(&[1, 1]);
-        let farewell = port.farewell(1);
+        let farewell = port.farewell(1, &no_signals());
         port.set_may_write(0..1, false);
         send(&mut port, 1);
         assert!(farewell.begin(), "the second one takes values");
@@ -298,7 +376,7 @@ mod tests {
     #[test]
     fn old_values_are_left_until_a_frame_has_the_last_ones() {
         let mut port = port(&[1]);
-        let farewell = port.farewell(2);
+        let farewell = port.farewell(2, &no_signals());
         send(&mut port, 0);
         assert!(!port.leaves_old_values(), "they are meant");
         assert!(farewell.begin());
@@ -311,7 +389,7 @@ mod tests {
     #[test]
     fn who_reads_first_when_a_driver_closes_gets_the_last_values() {
         let mut port = port(&[1]);
-        let farewell = port.farewell(1);
+        let farewell = port.farewell(1, &no_signals());
         assert!(!farewell.begin(), "nobody has got anything");
         assert!(!port.leaves_old_values());
         let frames = port.take(0..1, Nanos::ZERO);
@@ -319,9 +397,36 @@ mod tests {
     }
 
     #[test]
+    fn a_peer_that_reads_in_parts_has_the_last_values_when_it_has_those_of_all_signals() {
+        let mut port = port(&[4]);
+        let signals = [0, 2]
+            .map(|byte| Signal::new(format!("Out {byte}"), Area::Output, byte, DataType::Byte));
+        let table = SignalTable::of_one_station(0, 4, signals.into());
+        let farewell = port.farewell(1, &table);
+        let read = |port: &mut Port, bits| {
+            let frames = port.take(0..1, Nanos::ZERO);
+            let mut frames = frames.expect("the line is up");
+            frames.frame(0);
+            let receipt = frames.receipt();
+            port.sent(&receipt.bits(0, bits));
+        };
+        let is_done = || farewell.wait(&*Manual::new(), Nanos::ZERO);
+        read(&mut port, 0..8);
+        assert!(farewell.begin());
+        // Not those that were read before, and not the bytes between the signals.
+        read(&mut port, 16..24);
+        read(&mut port, 8..16);
+        assert!(!is_done());
+        read(&mut port, 0..4);
+        assert!(!is_done());
+        read(&mut port, 4..8);
+        assert!(is_done());
+    }
+
+    #[test]
     fn nobody_waits_where_nothing_is_sent() {
         let mut port = port(&[1, 0]);
-        let farewell = port.farewell(1);
+        let farewell = port.farewell(1, &no_signals());
         send(&mut port, 0);
         assert!(farewell.is_due());
         port.set_may_write(0..1, false);

@@ -403,7 +403,9 @@ fn a_peer_has_the_last_values_when_no_fault_keeps_them_from_it() {
         LineEffect::Duplicate(1.0, Direction::Out),
     ] {
         let mut rig = Rig::new();
-        let farewell = rig.port.farewell(1);
+        let farewell = rig
+            .port
+            .farewell(1, &SignalTable::of_one_station(0, 0, Vec::new()));
         rig.tick.write(Nanos(0), |_, bytes| bytes[0] = 2);
         assert_eq!(send(&mut rig, 0), [2, 2]);
         let fault = rig.inject(effect);

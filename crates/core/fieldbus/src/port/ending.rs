@@ -200,7 +200,7 @@ impl Ending {
     }
 
     fn end_if_none_is_owed(&self) {
-        if !self.stations.iter().any(|taker| taker.is_owed()) {
+        if !self.stations.iter().any(Taker::is_owed) {
             // A closer that has stopped waiting needs no message.
             let _ = self.done.send(());
         }

@@ -150,10 +150,9 @@ impl HostThread {
         let (scanned, stopped) = (Arc::clone(&counters), stop.clone());
         let (bus, mut scans): (_, Box<dyn FnMut() -> Result<(), String> + Send>) = match bus {
             Bus::Free(bus) => {
-                let timing = timing(config, is_own);
+                let (table, timing) = (&config.table, timing(config, is_own));
                 let (real_time, scanning) = (config.real_time, status.clone());
-                let bus =
-                    BusThread::start(bus, port, &config.table, &timing, status, (name, real_time));
+                let bus = BusThread::start(bus, port, table, &timing, status, (name, real_time));
                 let bus = bus.map_err(|source| DriverError::no_thread("the bus", source))?;
                 let scans = move || {
                     real_time::begin(real_time, "the PLC program", &scanning, &*scanned.wall);

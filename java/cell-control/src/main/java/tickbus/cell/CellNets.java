@@ -12,13 +12,13 @@ import tickbus.petri.net.PetriNet;
 /** The nets of the transport and of the whole cell, and all nets together. */
 final class CellNets {
     /** Stops along the belt; at stop 2 no station is on the bus. */
-    private static final int STOPS = 4;
+    static final int STOPS = 4;
     private static final long MS = 1_000_000;
 
     private CellNets() {
     }
 
-    /** The nets of stations 1, 3 and 4, of the transport and of the cell, bound to the signals of plc/cell/cell.cfg. */
+    /** The nets of the plan, of stations 1, 3 and 4, of the transport and of the cell, bound to the signals of plc/cell/cell.cfg. */
     static BoundNet[] all(Heads heads) {
         return all(heads, 1, 3, 4);
     }
@@ -29,13 +29,16 @@ final class CellNets {
     }
 
     private static BoundNet[] all(Heads heads, int... pallets) {
-        return new BoundNet[] {StationNets.one(new Plan(), heads.one()), StationNets.three(heads.three()),
+        Plan plan = new Plan();
+        return new BoundNet[] {plan.net(), StationNets.one(plan, heads.one()), StationNets.three(heads.three()),
             StationNets.four(heads.four()), transport(pallets), cell(pallets)};
     }
 
     /** The composition of all nets, with pallets that come to these stops at first. */
     static PetriNet composition(int... pallets) {
-        return Composition.of("manufacturing cell", all(Heads.none(), pallets));
+        // No net waits for the plan.
+        return Composition.of("manufacturing cell", Arrays.stream(all(Heads.none(), pallets))
+            .filter(one -> !one.net().name().equals(Plan.NAME)).toArray(BoundNet[]::new));
     }
 
     private static int after(int stop) {
@@ -102,7 +105,7 @@ final class CellNets {
         return bound;
     }
 
-    private static boolean isStation(int stop) {
+    static boolean isStation(int stop) {
         return stop != 2;
     }
 }

@@ -2,6 +2,7 @@ package tickbus.cell;
 
 import java.time.LocalDateTime;
 import java.util.function.Supplier;
+import java.util.function.UnaryOperator;
 import tickbus.identification.IdentificationHead;
 import tickbus.identification.PalletRecord;
 
@@ -26,7 +27,11 @@ final class StationHead {
     private final Supplier<LocalDateTime> clock;
     private State state = State.IDLE;
     private boolean writing;
-    private PalletRecord toWrite;
+    /** True if the current command reads, perhaps to write after that. */
+    private boolean reading;
+    private UnaryOperator<PalletRecord> toWrite;
+    /** True if a record has been read since the program began. */
+    private boolean known;
     private PalletRecord record = PalletRecord.BLANK;
     private RuntimeException trouble;
     private long now;
@@ -50,13 +55,23 @@ final class StationHead {
     /** Begins to read the record of the pallet. */
     void read() {
         writing = false;
+        reading = true;
         begin();
     }
 
     /** Begins to write a record, with the current time. */
     void write(PalletRecord wanted) {
         writing = true;
-        toWrite = wanted.at(clock.get());
+        reading = false;
+        toWrite = record -> wanted;
+        begin();
+    }
+
+    /** Begins to write a changed record, with the current time; reads it first if it has not been read since the start. */
+    void change(UnaryOperator<PalletRecord> to) {
+        writing = true;
+        reading = !known;
+        toWrite = to;
         begin();
     }
 
@@ -126,10 +141,10 @@ final class StationHead {
         now = nanos;
         if (state == State.WANTED && head.isDone() && (head.isPresent() || nanos - since >= ARRIVAL_NANOS)) {
             state = State.ASKED;
-            if (writing) {
-                head.writePallet(toWrite);
-            } else {
+            if (reading) {
                 head.readPallet();
+            } else {
+                head.writePallet(toWrite.apply(record).at(clock.get()));
             }
         }
     }
@@ -142,6 +157,10 @@ final class StationHead {
             if (state == State.DONE) {
                 failures = 0;
                 takeRecord();
+                if (reading && writing) {
+                    reading = false;
+                    begin();
+                }
             }
         } else if ((state == State.ASKED || state == State.WANTED) && now - since >= PATIENCE_NANOS) {
             trouble = new IllegalStateException(name + " has had no answer for " + PATIENCE_NANOS / 1_000_000_000
@@ -150,9 +169,10 @@ final class StationHead {
     }
 
     private void takeRecord() {
-        if (!writing) {
+        if (reading) {
             try {
                 record = head.pallet();
+                known = true;
             } catch (IllegalArgumentException e) {
                 trouble = new IllegalStateException(name + ": " + e.getMessage(), e);
             }

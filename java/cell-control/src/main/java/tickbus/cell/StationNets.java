@@ -13,26 +13,26 @@ import tickbus.petri.net.PetriNet;
 final class StationNets {
     private static final long MS = 1_000_000;
     /** The contents of a pallet after station 1, and after station 3. */
-    private static final Set<Content> SLEEVE = Set.of(Content.SLEEVE, Content.PIECE);
-    private static final Set<Content> CLOSED =
+    static final Set<Content> SLEEVE = Set.of(Content.SLEEVE, Content.PIECE);
+    static final Set<Content> CLOSED =
         Set.of(Content.SLEEVE, Content.PISTON, Content.SPRING, Content.HEAD, Content.PIECE);
-    private static final Set<Piece> CAPPED = Set.of(Piece.BLACK_WITH_CAP, Piece.RED_WITH_CAP, Piece.METALLIC_WITH_CAP);
+    static final Set<Piece> CAPPED = Set.of(Piece.BLACK_WITH_CAP, Piece.RED_WITH_CAP, Piece.METALLIC_WITH_CAP);
 
     private StationNets() {
     }
 
     /** A transition from one place to another. */
-    private static void step(NetBuilder net, String name, String from, String to) {
+    static void step(NetBuilder net, String name, String from, String to) {
         net.transition(name).input(from).output(to);
     }
 
     /** Retries a failed step in its place, after a moment. */
-    private static void retry(NetBuilder net, String name, String place) {
+    static void retry(NetBuilder net, String name, String place) {
         net.transition(name).delay(Delay.fixed(100 * MS)).input(place).output(place);
     }
 
     /** The head works while the place is marked, and again when {@code retry} fires. */
-    private static BoundNet works(BoundNet bound, StationHead head, String place, Runnable begin, String retry) {
+    static BoundNet works(BoundNet bound, StationHead head, String place, Runnable begin, String retry) {
         // The answer is forgotten when the net leaves the place: conditions on it are tested before the next entry.
         return bound.entry(place).run((in, out) -> begin.run()).exit(place).run((in, out) -> head.rest())
             .firing(retry).run((in, out) -> head.again());
@@ -44,7 +44,7 @@ final class StationNets {
             .place("supply", 1).place("loading").place("freeing").place("looking").delay(60 * MS).place("no sleeve")
             .place("advancing").place("fetching").place("closing").delay(70 * MS).place("lifting").place("sleeve ready")
             .place("waiting", 1).place("reader out").place("reading").place("drawing back").place("pallet empty")
-            .place("swinging").place("lowering").place("opening").delay(50 * MS).place("raising").place("writing").place("going back")
+            .place("swinging").place("lowering").place("writing").place("opening").delay(50 * MS).place("raising").place("going back")
             .place("done");
         step(net, "feed", "supply", "loading");
         // Fires before the time is over, even if a scan comes late.
@@ -69,11 +69,12 @@ final class StationNets {
         net.transition("pass, no sleeve").input("pallet empty").test("no sleeve", 1).output("going back");
         net.transition("pass, stopped").input("pallet empty").test("supply", 1).output("going back");
         step(net, "over the pallet", "swinging", "lowering");
-        step(net, "on the pallet", "lowering", "opening");
-        step(net, "let go", "opening", "raising");
-        step(net, "raised", "raising", "writing");
-        net.transition("written").input("writing").output("going back", "supply");
+        // The record is written before the sleeve is let go: a carrier never has less than its pallet.
+        step(net, "on the pallet", "lowering", "writing");
+        step(net, "written", "writing", "opening");
         retry(net, "write again", "writing");
+        step(net, "let go", "opening", "raising");
+        net.transition("raised").input("raising").output("going back", "supply");
         step(net, "back", "going back", "done");
         step(net, "rest", "done", "waiting");
         BoundNet bound = BoundNet.of(net.build())
@@ -100,7 +101,6 @@ final class StationNets {
             .when("write again").that(in -> head.hasFailed())
             .when("back").on("S1 reader back").on("S1 arm left")
             .when("rest").unmarked("cell", "working 1")
-            .firing("sleeve known").run((in, out) -> plan.decide(in))
             .during("loading").set("S1 loader")
             .during("advancing").set("S1 belt advance")
             .during("fetching").set("S1 arm lower")
@@ -109,11 +109,11 @@ final class StationNets {
             .during("sleeve ready").set("S1 gripper")
             .during("swinging").set("S1 gripper").set("S1 arm out")
             .during("lowering").set("S1 gripper").set("S1 arm lower")
+            .during("writing").set("S1 gripper").set("S1 arm lower")
             .during("opening").set("S1 arm lower")
-            .during("writing").set("S1 arm in")
             .during("going back").set("S1 arm in");
-        for (String place : new String[] {"reader out", "reading", "pallet empty", "swinging", "lowering", "opening",
-                "raising", "writing"}) {
+        for (String place : new String[] {"reader out", "reading", "pallet empty", "swinging", "lowering", "writing",
+                "opening"}) {
             bound.during(place).set("S1 reader");
         }
         works(bound, head, "reading", head::read, "carrier missed");
@@ -170,7 +170,7 @@ final class StationNets {
             .during("feeding head").set("S3 head feeder")
             .during("pressing head").set("S3 head feeder").set("S3 press");
         works(bound, head, "reading", head::read, "read again");
-        return works(bound, head, "writing", () -> head.write(new PalletRecord(null, head.record().piece(), CLOSED)),
+        return works(bound, head, "writing", () -> head.change(record -> new PalletRecord(null, record.piece(), CLOSED)),
             "write again");
     }
 
@@ -178,8 +178,8 @@ final class StationNets {
     static BoundNet four(StationHead head) {
         NetBuilder net = PetriNet.named("station 4")
             .place("waiting", 1).place("reading").place("cap wanted").place("no caps").place("feeding cap").place("pressing cap")
-            .place("press rising").place("lowering").place("sucking").place("lifting").place("swinging")
-            .place("putting down").place("letting go").place("raising").place("returning").place("writing").place("done");
+            .place("press rising").place("lowering").place("sucking").place("lifting").place("writing").place("swinging")
+            .place("putting down").place("letting go").place("raising").place("returning").place("done");
         step(net, "begin", "waiting", "reading");
         step(net, "cap to be put on", "reading", "cap wanted");
         step(net, "no cap", "reading", "lowering");
@@ -193,15 +193,16 @@ final class StationNets {
         step(net, "capped", "press rising", "lowering");
         step(net, "at the piece", "lowering", "sucking");
         step(net, "sucked", "sucking", "lifting");
-        step(net, "lifted", "lifting", "swinging");
+        // The record is cleared while the piece is in the gripper: what the gripper lets go is on no pallet's record.
+        step(net, "lifted", "lifting", "writing");
+        step(net, "written", "writing", "swinging");
+        retry(net, "write again", "writing");
         step(net, "vacuum lost", "lifting", "lowering");
         step(net, "over the exit", "swinging", "putting down");
         step(net, "at the exit", "putting down", "letting go");
         step(net, "let go", "letting go", "raising");
         step(net, "raised", "raising", "returning");
-        step(net, "back", "returning", "writing");
-        step(net, "written", "writing", "done");
-        retry(net, "write again", "writing");
+        step(net, "back", "returning", "done");
         step(net, "rest", "done", "waiting");
         BoundNet bound = BoundNet.of(net.build())
             .when("begin").marked("cell", "working 4")
@@ -233,10 +234,12 @@ final class StationNets {
             .during("lowering").set("S4 arm lower")
             .during("sucking").set("S4 arm lower").set("S4 vacuum valve")
             .during("lifting").set("S4 vacuum valve")
+            .during("writing").set("S4 vacuum valve")
             .during("swinging").set("S4 vacuum valve").set("S4 arm out")
             .during("putting down").set("S4 vacuum valve").set("S4 arm out").set("S4 arm lower")
             .during("letting go").set("S4 arm out").set("S4 arm lower")
-            .during("raising").set("S4 arm out");
+            .during("raising").set("S4 arm out")
+            .during("returning").set("S4 arm in");
         works(bound, head, "reading", head::read, "read again");
         return works(bound, head, "writing", () -> head.write(PalletRecord.BLANK), "write again");
     }

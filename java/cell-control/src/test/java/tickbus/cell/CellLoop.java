@@ -3,6 +3,8 @@ package tickbus.cell;
 import static org.junit.jupiter.api.Assertions.assertEquals;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import java.io.IOException;
+import java.io.UncheckedIOException;
 import java.nio.file.Path;
 import java.time.LocalDateTime;
 import java.util.ArrayList;
@@ -23,7 +25,7 @@ import tickbus.petri.control.NetController;
 /** The nets and the cell, over a bus in simulation time; a test opens it, and closes it at its end. */
 abstract class CellLoop {
     private static final AtomicInteger LINKS = new AtomicInteger();
-    private static final long STEP = 5_000_000;
+    static final long STEP = 5_000_000;
     static final int PARTS = 20;
 
     ManufacturingCell cell;
@@ -34,7 +36,10 @@ abstract class CellLoop {
     LoopReader reader;
     Heads heads;
     private int link;
+    CellProgram program;
     NetController nets;
+    /** Where the control keeps its markings; null to keep none. */
+    Path file;
     List<Signal> written;
     private List<Signal> read;
     private int[] writes;
@@ -59,17 +64,31 @@ abstract class CellLoop {
         stuck = null;
         link = LINKS.incrementAndGet();
         machine = link("cell.cfg", "device");
-        plc = link("cell.cfg", "controller");
         readerEnd = link("identification.cfg", "device");
-        headsEnd = link("identification.cfg", "controller");
         reader = new LoopReader(readerEnd, cell);
+        openControl();
+        fill();
+    }
+
+    /** Opens the control's ends, and its nets. */
+    void openControl() {
+        plc = link("cell.cfg", "controller");
+        headsEnd = link("identification.cfg", "controller");
         heads = Heads.on(headsEnd, () -> LocalDateTime.of(2004, 3, 9, 16, 5, 59));
         BoundNet[] all = CellNets.all(heads);
         for (BoundNet one : all) {
             one.listener((scan, at, transition, choices) ->
                 fired.merge(one.net().name() + "." + one.net().transition(transition).name(), 1, Integer::sum));
         }
-        nets = CellNets.controller(plc, all);
+        try {
+            program = new CellProgram(plc, heads, all, HomingNets.all(heads), file, 1);
+        } catch (IOException e) {
+            throw new UncheckedIOException(e);
+        }
+        nets = program.nets();
+    }
+
+    private void fill() {
         written = machine.signals().stream().filter(Signal::isWritten).toList();
         read = machine.signals().stream().filter(signal -> !signal.isWritten()).toList();
         writes = written.stream().mapToInt(signal -> cell.outputs().indexOf(signal.name())).toArray();
@@ -84,9 +103,14 @@ abstract class CellLoop {
 
     @AfterEach
     void close() {
-        for (Tickbus bus : List.of(headsEnd, readerEnd, plc, machine)) {
-            bus.close();
-        }
+        closeControl();
+        readerEnd.close();
+        machine.close();
+    }
+
+    void closeControl() {
+        headsEnd.close();
+        plc.close();
     }
 
     void tick() {
@@ -94,6 +118,14 @@ abstract class CellLoop {
         for (int i = 0; i < reads.length; i++) {
             cell.input(reads[i], read.get(i).get());
         }
+        move();
+        heads.exchange(nanos);
+        program.scan(nanos);
+        nanos += STEP;
+    }
+
+    /** The cell's step with the outputs that it has, and what its sensors see. */
+    void move() {
         cell.step(STEP);
         for (int i = 0; i < writes.length; i++) {
             Signal one = written.get(i);
@@ -101,9 +133,6 @@ abstract class CellLoop {
         }
         machine.send();
         reader.tick(nanos);
-        heads.exchange(nanos);
-        nets.scan(nanos);
-        nanos += STEP;
     }
 
     void until(String what, BooleanSupplier so) {
@@ -119,7 +148,10 @@ abstract class CellLoop {
         for (String net : List.of("station 1", "station 3", "station 4", "transport", "cell")) {
             markings.add(net + " " + nets.coordinator(net).marking());
         }
-        return markings + ", delivered " + cell.delivered().size() + ", " + nets.stops();
+        for (String net : List.of(HomingNets.station(1), HomingNets.station(3), HomingNets.station(4), HomingNets.TRANSPORT)) {
+            markings.add(net + " " + program.homing().coordinator(net).marking());
+        }
+        return markings + ", homing because: " + program.why() + ", delivered " + cell.delivered().size() + ", " + program.stops();
     }
 
     void delivers(int count) {

@@ -51,6 +51,16 @@ final class LoopReader {
         heads.forEach(head -> head.hangs = true);
     }
 
+    /** The program that asks has begun again: its commands count from 0. */
+    void restart() {
+        bus.receive(nanos);
+        for (Head head : heads) {
+            head.at("%IB0").setLong(0);
+            head.asked = -1;
+        }
+        bus.send();
+    }
+
     private final class Head {
         private final String name;
         private final byte[] octets = new byte[CodeCarrier.BYTES];

@@ -51,6 +51,9 @@ public final class ManufacturingCell implements Machine {
     private boolean partsLamp;
     private boolean capsLamp;
     private boolean runningLamp;
+    private boolean rearmLamp;
+    /** The number of the last marking whose outputs arrived; kept while there is no control, whose number is 0 then. */
+    private double markingNumber;
 
     /** A cell with three pallets and empty magazines. */
     public ManufacturingCell() {
@@ -65,6 +68,11 @@ public final class ManufacturingCell implements Machine {
         in("Belt", on -> transport.forward = on);
         in("Belt back", on -> transport.backward = on);
         in("Running lamp", on -> runningLamp = on);
+        in("Rearm lamp", on -> rearmLamp = on);
+        inputs.add("Marking number");
+        sinks.add(value -> markingNumber = value > 0 ? value : markingNumber);
+        outputs.add("Marking held");
+        sources.add(() -> markingNumber);
         declareFaults();
         declareCounts();
         head(1, one.head);
@@ -92,6 +100,7 @@ public final class ManufacturingCell implements Machine {
         out("S1 reader forward", one.reader::isForward);
         out("S1 reader back", one.reader::isBack);
         out("S1 reader optical", one::seesPallet);
+        out("S1 sleeve held", one::isHolding);
         in("S1 belt advance", on -> one.beltForward = on);
         in("S1 belt return", on -> one.beltBackward = on);
         in("S1 arm out", on -> one.armOut = on);
@@ -111,6 +120,8 @@ public final class ManufacturingCell implements Machine {
         out("S3 press up", three.press::isBack);
         out("S3 parts there", () -> three.parts.stock() > 0);
         out("S3 heads there", () -> three.heads.stock() > 0);
+        out("S3 piston in", () -> three.piston);
+        out("S3 head on", () -> three.closed);
         in("S3 parts feeder", on -> three.parts.valve = on);
         in("S3 head feeder", on -> three.heads.valve = on);
         in("S3 press", on -> three.pressValve = on);
@@ -129,9 +140,11 @@ public final class ManufacturingCell implements Machine {
         out("S4 arm down", four.lift::isForward);
         out("S4 vacuum", four::hasVacuum);
         out("S4 exit", four::seesExit);
+        out("S4 cap on", () -> four.capped);
         in("S4 cap feeder", on -> four.caps.valve = on);
         in("S4 press", on -> four.pressValve = on);
         in("S4 arm out", on -> four.armOut = on);
+        in("S4 arm in", on -> four.armIn = on);
         in("S4 arm lower", on -> four.armLower = on);
         in("S4 vacuum valve", on -> four.vacuumValve = on);
         in("S4 empty lamp", on -> capsLamp = on);
@@ -366,6 +379,11 @@ public final class ManufacturingCell implements Machine {
     /** True if the cell shows that it works. */
     public boolean showsRunning() {
         return runningLamp;
+    }
+
+    /** True if the control waits for Rearm before it moves anything. */
+    public boolean asksForRearm() {
+        return rearmLamp;
     }
 
     /** True if something is stuck at this moment. */

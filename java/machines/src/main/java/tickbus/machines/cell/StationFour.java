@@ -24,7 +24,10 @@ final class StationFour {
     private long exitNanos;
     private boolean willLose;
     boolean pressValve;
+    /** The gauge beside the press sees a cap on the piece at the stop. */
+    boolean capped;
     boolean armOut;
+    boolean armIn;
     boolean armLower;
     boolean vacuumValve;
 
@@ -45,24 +48,30 @@ final class StationFour {
     }
 
     void step(Pallet pallet, long nanos) {
-        capReady |= caps.step(nanos);
+        boolean below = capReady;
+        boolean comes = caps.step(nanos);
+        if (below && comes) {
+            counters.wasted++;
+        }
+        capReady |= comes;
         boolean wasDown = press.isForward();
         press.step(pressValve, nanos);
         if (press.isForward() && !wasDown && capReady) {
             capReady = false;
-            if (pallet == null || pallet.piece == null) {
+            if (pallet == null || pallet.piece == null || pallet.piece.has(Part.CAP)) {
                 counters.wasted++;
             } else {
                 pallet.piece.add(Part.CAP);
             }
         }
-        if (!lift.isBack() && (armOut ? !arm.isForward() : !arm.isBack())) {
+        if (!lift.isBack() && (armOut && !arm.isForward() || armIn && !arm.isBack())) {
             counters.collisions++;
         }
-        arm.step(armOut, nanos);
+        arm.step(armOut, armIn, nanos);
         lift.step(armLower, nanos);
         suck(pallet, nanos);
         exitNanos = Math.max(0, exitNanos - nanos);
+        capped = pallet != null && pallet.piece != null && pallet.piece.has(Part.CAP);
         head.step(pallet == null ? null : pallet.carrier());
     }
 

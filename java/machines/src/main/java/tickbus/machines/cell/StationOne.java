@@ -70,6 +70,9 @@ final class StationOne {
         } else if (held != null && !fingers.isForward()) {
             if (lift.isForward() && arm.isForward() && pallet != null && pallet.piece == null) {
                 pallet.piece = held;
+            } else if (lift.isForward() && arm.isBack() && onBelt == null) {
+                onBelt = held;
+                beltNanos = BELT_NANOS;
             } else {
                 counters.fallen++;
             }
@@ -92,6 +95,11 @@ final class StationOne {
 
     boolean isAtFront() {
         return onBelt != null && beltNanos == BELT_NANOS;
+    }
+
+    /** True if a sleeve keeps the gripper's fingers apart. */
+    boolean isHolding() {
+        return held != null;
     }
 
     /** True if the sleeve at the belt's back end has at least this colour, so that the sensor for it responds. */

@@ -9,6 +9,9 @@ final class StationThree {
     final ReadWriteHead head = new ReadWriteHead();
     private boolean partsReady;
     private boolean headReady;
+    /** The gauge beside the press sees a piston, or the head above it, in the piece at the stop. */
+    boolean piston;
+    boolean closed;
     boolean pressValve;
 
     StationThree(Counters counters) {
@@ -16,12 +19,18 @@ final class StationThree {
     }
 
     void step(Pallet pallet, long nanos) {
-        partsReady |= parts.step(nanos);
-        headReady |= heads.step(nanos);
+        boolean below = partsReady || headReady;
+        boolean partsCome = parts.step(nanos);
+        boolean headComes = heads.step(nanos);
+        if (below && (partsCome || headComes)) {
+            counters.wasted++;
+        }
+        partsReady |= partsCome;
+        headReady |= headComes;
         boolean wasDown = press.isForward();
         press.step(pressValve, nanos);
         if (press.isForward() && !wasDown && (partsReady || headReady)) {
-            if (pallet == null || pallet.piece == null) {
+            if (pallet == null || pallet.piece == null || pallet.piece.has(partsReady ? Part.PISTON : Part.HEAD)) {
                 counters.wasted++;
             } else if (partsReady) {
                 pallet.piece.add(Part.PISTON);
@@ -32,6 +41,8 @@ final class StationThree {
             partsReady = false;
             headReady = false;
         }
+        piston = pallet != null && pallet.piece != null && pallet.piece.has(Part.PISTON);
+        closed = pallet != null && pallet.piece != null && pallet.piece.has(Part.HEAD);
         head.step(pallet == null ? null : pallet.carrier());
     }
 }

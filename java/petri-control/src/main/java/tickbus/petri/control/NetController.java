@@ -1,7 +1,6 @@
 package tickbus.petri.control;
 
 import java.io.IOException;
-import java.io.UncheckedIOException;
 import java.nio.file.Path;
 import java.time.Duration;
 import java.util.ArrayList;
@@ -16,7 +15,6 @@ import java.util.function.BooleanSupplier;
 import tickbus.Signal;
 import tickbus.Status;
 import tickbus.Tickbus;
-import tickbus.petri.format.MarkingFile;
 import tickbus.petri.net.Marking;
 import tickbus.petri.run.Action;
 import tickbus.petri.run.Coordinator;
@@ -38,6 +36,7 @@ import tickbus.petri.run.Stop;
  */
 public final class NetController {
     private static final long NANOS_TO_END = 1_000_000_000;
+    private static final String WAITING = "the nets wait until their markings are found";
     private static final String STALE = "the line is stale: no net is scanned";
 
     private final Tickbus bus;
@@ -50,9 +49,10 @@ public final class NetController {
     private int stopsClock = -1;
     private long stoodNanos;
     private final Safety safety;
-    private Path file;
-    /** True if the marking has changed since the last save. */
-    private boolean unsaved = true;
+    private final SavedMarkings saved;
+    /** Asked in the first scan with fresh inputs; null if that is over. */
+    private BooleanSupplier begins;
+    private boolean waiting;
     /** True if the JVM is ending. */
     private volatile boolean ending;
     private long scans;
@@ -102,6 +102,7 @@ public final class NetController {
         conditions.forEach(Conditions::connect);
         order = coordinators.values().toArray(Coordinator[]::new);
         watch = NetWatch.of(List.of(order));
+        saved = new SavedMarkings(order);
         safety = new Safety(latch, nets.stream().flatMap(one -> one.outputs().stream()).map(bus::signal).toList());
     }
 
@@ -162,13 +163,65 @@ public final class NetController {
     /**
      * Saves the markings of all nets in a file, in the first scan and then in each scan that changes them, before its
      * outputs are sent. Each save replaces the whole file. The file survives the end of the process; a power failure at that
-     * moment can lose it. A scan that saves allocates. A scan that cannot save throws an {@link UncheckedIOException}.
+     * moment can lose it. A scan that saves allocates. A scan that cannot save throws an {@link java.io.UncheckedIOException}.
      *
      * @return this
      */
     public NetController keepMarkings(Path in) {
-        file = in;
+        saved.keep(in);
         return this;
+    }
+
+    /**
+     * Numbers the saved markings, in the file and on an output that the machine keeps. A control that resumes compares {@link
+     * #markingNumber} with the number that the machine has: a marking that was saved earlier than the last one has another number.
+     * Call this before {@link #resume}.
+     *
+     * @param output of at least 32 bits, written by no net; the machine must keep its last value that is not 0
+     * @param first the number before the first save, from 1, such as the seconds of a clock; {@link #resume} replaces it
+     * @return this
+     * @throws IllegalArgumentException if there is no such output, or if {@code first} is below 1
+     */
+    public NetController numberMarkings(String output, int first) {
+        Signal signal = bus.signal(output);
+        if (!signal.isWritten()) {
+            throw new IllegalArgumentException("signal '" + output + "' is an input; expected an output");
+        }
+        if (first < 1) {
+            throw new IllegalArgumentException("the first number is " + first + "; expected 1 or more");
+        }
+        saved.number(signal, first);
+        return this;
+    }
+
+    /** The number of the markings saved or resumed last; without {@link #numberMarkings} 0. */
+    public int markingNumber() {
+        return saved.number();
+    }
+
+    /**
+     * Asks, in the first scan with fresh inputs, whether the nets may begin with their markings. If not, no net is scanned and
+     * the outputs keep their fail-safe values until {@link #begin}.
+     *
+     * @param fits can use the values of the driver's signals
+     * @return this
+     */
+    public NetController beginIf(BooleanSupplier fits) {
+        begins = fits;
+        return this;
+    }
+
+    /** True while the nets wait for {@link #begin}, because {@link #beginIf} did not let them begin. */
+    public boolean isWaiting() {
+        return waiting;
+    }
+
+    /** Lets nets that wait begin with these markings, and the other nets with those that they have. */
+    public void begin(List<Marking> markings) {
+        for (Marking one : markings) {
+            coordinator(one.net().name()).resume(one);
+        }
+        waiting = false;
     }
 
     /**
@@ -181,24 +234,8 @@ public final class NetController {
      * @throws tickbus.petri.net.NetException if it is not of these nets
      */
     public NetController resume(Path from) throws IOException {
-        List<Marking> markings = MarkingFile.read(from, Arrays.stream(order).map(Coordinator::net).toList());
-        for (int i = 0; i < order.length; i++) {
-            order[i].resume(markings.get(i));
-        }
+        saved.read(from);
         return this;
-    }
-
-    private void save(int fired) {
-        unsaved |= fired > 0;
-        if (file == null || !unsaved) {
-            return;
-        }
-        try {
-            MarkingFile.write(file, Arrays.stream(order).map(Coordinator::marking).toList());
-        } catch (IOException e) {
-            throw new UncheckedIOException("the markings cannot be saved in " + file + ": " + e, e);
-        }
-        unsaved = false;
     }
 
     /** Outputs that are on exactly while a place is marked. */
@@ -297,13 +334,19 @@ public final class NetController {
             stoodNanos += latest - lastNanos;
         }
         if (!stale && !held) {
-            for (Coordinator coordinator : order) {
-                fired += coordinator.scan(nanos - stoodNanos);
+            if (begins != null) {
+                waiting = !begins.getAsBoolean();
+                begins = null;
             }
-            save(fired);
+            if (!waiting) {
+                for (Coordinator coordinator : order) {
+                    fired += coordinator.scan(nanos - stoodNanos);
+                }
+                saved.save(fired);
+            }
         }
         bus.send();
-        watch.offer(stale ? STALE : held ? safety.note() : "");
+        watch.offer(stale ? STALE : held ? safety.note() : waiting ? WAITING : "");
         lastNanos = latest;
         return fired;
     }

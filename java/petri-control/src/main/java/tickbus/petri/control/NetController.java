@@ -175,7 +175,8 @@ public final class NetController {
     /**
      * Numbers the saved markings, in the file and on an output that the machine keeps. A control that resumes compares {@link
      * #markingNumber} with the number that the machine has: a marking that was saved earlier than the last one has another number.
-     * Call this before {@link #resume}.
+     * The file then also has whether an emergency stop waits for Rearm, and a control that resumes waits for it, too. Call this
+     * before {@link #resume}.
      *
      * @param output of at least 32 bits, written by no net; the machine must keep its last value that is not 0
      * @param first the number before the first save, from 1, such as the seconds of a clock; {@link #resume} replaces it
@@ -235,6 +236,9 @@ public final class NetController {
      */
     public NetController resume(Path from) throws IOException {
         saved.read(from);
+        if (saved.isStopped()) {
+            safety.hold();
+        }
         return this;
     }
 
@@ -342,8 +346,12 @@ public final class NetController {
                 for (Coordinator coordinator : order) {
                     fired += coordinator.scan(nanos - stoodNanos);
                 }
+                saved.stopped(false);
                 saved.save(fired);
             }
+        } else if (!stale && begins == null && !waiting) {
+            saved.stopped(true);
+            saved.save(0);
         }
         bus.send();
         watch.offer(stale ? STALE : held ? safety.note() : waiting ? WAITING : "");

@@ -34,6 +34,11 @@ final class Safety {
         untilNote = "the outputs are fail-safe until '" + rearmName + "' goes on";
     }
 
+    /** Holds from the beginning, as an earlier control did. */
+    void hold() {
+        holding = true;
+    }
+
     boolean isHolding() {
         return holding;
     }

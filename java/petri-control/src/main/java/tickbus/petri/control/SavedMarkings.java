@@ -13,8 +13,8 @@ import tickbus.petri.run.Coordinator;
 
 /** The file with a controller's markings, and the number of the last save, which the machine also gets. */
 final class SavedMarkings {
-    /** Carries the number in the file. */
-    private static final PetriNet NUMBER = PetriNet.named("number of the markings").place("number").build();
+    /** Carries the number in the file, and whether an emergency stop held the outputs. */
+    private static final PetriNet NUMBER = PetriNet.named("number of the markings").place("number").place("stopped").build();
 
     private final Coordinator[] order;
     private Path file;
@@ -22,6 +22,7 @@ final class SavedMarkings {
     private int number;
     /** True if the marking has changed since the last save. */
     private boolean unsaved = true;
+    private boolean stopped;
 
     SavedMarkings(Coordinator[] order) {
         this.order = order;
@@ -54,7 +55,18 @@ final class SavedMarkings {
         }
         if (output != null) {
             number = markings.get(order.length).get(0);
+            stopped = markings.get(order.length).get(1) > 0;
         }
+    }
+
+    /** True if an emergency stop held the outputs, and nobody has pressed Rearm since. */
+    boolean isStopped() {
+        return stopped;
+    }
+
+    void stopped(boolean now) {
+        unsaved |= output != null && now != stopped;
+        stopped = now;
     }
 
     /** Saves the markings if a transition has fired since the last save, and lets the machine know the number of the save. */
@@ -69,7 +81,7 @@ final class SavedMarkings {
         }
         if (output != null) {
             number = number == Integer.MAX_VALUE ? 1 : number + 1;
-            markings.add(NUMBER.marking(new int[] {number}));
+            markings.add(NUMBER.marking(new int[] {number, stopped ? 1 : 0}));
         }
         try {
             MarkingFile.write(file, markings);

@@ -20,10 +20,10 @@ import tickbus.petri.run.FiringLog;
 import tickbus.petri.run.Stop;
 
 /**
- * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]}. The arguments are
+ * The cell's control as a process: {@code CellControl CONFIG TABLES IDENTIFICATION FOLDER [--markings FILE] [HOST:PORT]}. The arguments are
  * the cell's driver.cfg, the tables that make it the PLC's end ({@link Tickbus#open(Path, String)}), the driver.cfg of the
  * line to the reader of code carriers, a folder for the results (each net with its marking, and its firings), and optionally
- * the address of a live page about the nets.
+ * a file for the markings ({@link CellProgram}) and the address of a live page about the nets.
  *
  * <p>Until a signal ends the process, or nobody reads its output any more, it prints its counts every 100 ms as lines {@code
  * key=value}, and an empty line.
@@ -38,22 +38,38 @@ public final class CellControl {
 
     private final List<FiringLog> logs = new ArrayList<>();
     private final List<Coordinator> coordinators = new ArrayList<>();
+    private final CellProgram program;
     private final NetController nets;
     private final Heads heads;
+    private final List<StationTimes> times = new ArrayList<>();
+    private boolean homed;
     private final CompletableFuture<Proof> proof = new CompletableFuture<>();
 
-    private CellControl(Tickbus bus, Tickbus reader) {
+    private CellControl(Tickbus bus, Tickbus reader, Path markings) throws IOException {
         heads = Heads.on(reader, LocalDateTime::now);
         BoundNet[] all = CellNets.all(heads);
+        BoundNet[] before = HomingNets.all(heads);
+        // The milliseconds of the clock: another number in each run.
+        program = new CellProgram(bus, heads, log(all), log(before), markings, (int) (System.currentTimeMillis() & Integer.MAX_VALUE) | 1);
+        nets = program.nets();
+        for (BoundNet one : all) {
+            coordinators.add(nets.coordinator(one.net().name()));
+        }
+        for (BoundNet one : before) {
+            coordinators.add(program.homing().coordinator(one.net().name()));
+        }
+        for (int station : new int[] {1, 3, 4}) {
+            times.add(new StationTimes(nets, station));
+        }
+    }
+
+    private BoundNet[] log(BoundNet... all) {
         for (BoundNet one : all) {
             FiringLog log = new FiringLog(one.net(), LOGGED);
             logs.add(log);
             one.listener(log);
         }
-        nets = CellNets.controller(bus, all);
-        for (BoundNet one : all) {
-            coordinators.add(nets.coordinator(one.net().name()));
-        }
+        return all;
     }
 
     /**
@@ -62,8 +78,10 @@ public final class CellControl {
      * @param args the command line
      */
     public static void main(String[] args) {
-        if (args.length != 4 && args.length != 5) {
-            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER [HOST:PORT]");
+        boolean keeps = args.length > 5 && args[4].equals("--markings");
+        int page = keeps ? 6 : 4;
+        if (args.length < 4 || args.length > page + 1 || args.length > page && args[page].startsWith("-")) {
+            System.err.println("usage: CellControl CONFIG TABLES IDENTIFICATION FOLDER [--markings FILE] [HOST:PORT]");
             System.exit(USAGE);
         }
         CountDownLatch ending = new CountDownLatch(1);
@@ -78,10 +96,10 @@ public final class CellControl {
         }, "end of the nets"));
         boolean failed = false;
         try (Tickbus bus = Tickbus.open(Path.of(args[0]), args[1]); Tickbus reader = Tickbus.open(Path.of(args[2]))) {
-            CellControl control = new CellControl(bus, reader);
+            CellControl control = new CellControl(bus, reader, keeps ? Path.of(args[5]) : null);
             control.prove();
-            if (args.length == 5) {
-                control.runWithPage(args[4], ending, System.out);
+            if (args.length > page) {
+                control.runWithPage(args[page], ending, System.out);
             } else {
                 control.run(ending, System.out);
             }
@@ -112,7 +130,7 @@ public final class CellControl {
     }
 
     private void runWithPage(String address, CountDownLatch ending, PrintStream out) throws IOException {
-        try (NetPage page = NetPage.open(address, "The manufacturing cell", nets.watch())) {
+        try (NetPage page = NetPage.open(address, "The manufacturing cell", nets.watch(), program.homing().watch())) {
             out.println("nets: live at " + page.address());
             run(ending, out);
         }
@@ -120,11 +138,32 @@ public final class CellControl {
 
     private void run(CountDownLatch ending, PrintStream out) {
         long start = System.nanoTime();
-        nets.run(SCAN_NANOS, () -> {
-            heads.exchange(System.nanoTime() - start);
-            return (nets.scans() % SCANS_PER_REPORT != 0 || print(out)) && ending.getCount() > 0;
-        });
+        nets.run(SCAN_NANOS, () -> goesOn(nets, start, ending, out) && !program.isHoming());
+        if (program.isHoming() && ending.getCount() > 0) {
+            homed = true;
+            out.println("nets: homing after Rearm, because " + program.why());
+            NetController homing = program.homing();
+            homing.scan(System.nanoTime() - start);
+            homing.run(SCAN_NANOS, () -> {
+                program.takeOver();
+                return goesOn(homing, start, ending, out) && program.isHoming();
+            });
+            if (!program.isHoming()) {
+                out.println("nets: homed");
+                nets.scan(System.nanoTime() - start);
+                nets.run(SCAN_NANOS, () -> goesOn(nets, start, ending, out));
+            }
+        }
         print(out);
+    }
+
+    private boolean goesOn(NetController running, long start, CountDownLatch ending, PrintStream out) {
+        long now = System.nanoTime() - start;
+        heads.exchange(now);
+        if (!program.isHoming()) {
+            times.forEach(one -> one.count(now));
+        }
+        return (running.scans() % SCANS_PER_REPORT != 0 || print(out)) && ending.getCount() > 0;
     }
 
     /** Prints the counts; false if the reader was killed. */
@@ -135,16 +174,18 @@ public final class CellControl {
 
     private String report() {
         StringBuilder text = new StringBuilder();
-        line(text, "plc.scans", nets.scans());
-        line(text, "stale_scans", nets.staleScans());
-        line(text, "loader_freed", count(0, "try again"));
-        line(text, "pallet_freed", count(3, "free before 1") + count(3, "free before 2") + count(3, "free before 3")
-            + count(3, "free before 4"));
-        line(text, "vacuum_lost", count(2, "vacuum lost"));
+        line(text, "plc.scans", nets.scans() + program.homing().scans());
+        line(text, "stale_scans", nets.staleScans() + program.homing().staleScans());
+        line(text, "homed", homed && !program.isHoming() ? 1 : 0);
+        line(text, "loader_freed", count("station 1", "try again"));
+        line(text, "pallet_freed", count("transport", "free before 1") + count("transport", "free before 2") + count("transport", "free before 3")
+            + count("transport", "free before 4"));
+        line(text, "vacuum_lost", count("station 4", "vacuum lost"));
         line(text, "unread", heads.failures());
-        line(text, "refilled", count(0, "magazine filled") + count(1, "parts filled") + count(1, "heads filled")
-            + count(2, "caps filled"));
-        List<Stop> stops = nets.stops();
+        line(text, "refilled", count("station 1", "magazine filled") + count("station 3", "parts filled") + count("station 3", "heads filled")
+            + count("station 4", "caps filled"));
+        times.forEach(one -> text.append(one.lines()));
+        List<Stop> stops = program.stops();
         line(text, "stops", stops.size());
         if (!stops.isEmpty()) {
             line(text, "stop", stops.get(0).message().replace('\n', ' '));
@@ -165,8 +206,8 @@ public final class CellControl {
         text.append(key).append('=').append(value).append('\n');
     }
 
-    private long count(int net, String transition) {
-        Coordinator one = coordinators.get(net);
+    private long count(String net, String transition) {
+        Coordinator one = nets.coordinator(net);
         return one.firings(one.net().transition(transition).index());
     }
 

@@ -90,6 +90,7 @@ final class HomingNets {
             .when("sleeve of the next pallet").that(in -> head.isDone() && !isForPallet(in, head))
             .when("over the belt").on("S1 arm left")
             .when("on the belt").on("S1 arm down")
+            .when("let go").off("S1 sleeve held")
             .when("risen").on("S1 arm up")
             .when("arm is back").on("S1 arm left")
             .when("a sleeve").on("S1 belt back")

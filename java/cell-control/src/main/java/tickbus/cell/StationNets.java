@@ -86,6 +86,8 @@ final class StationNets {
             .when("magazine filled").on("S1 rearm").rising()
             .when("at the front").on("S1 belt front").on("S1 arm left").on("S1 arm up")
             .when("at the sleeve").on("S1 arm down")
+            // After an emergency stop the air comes back later than the nets' clock.
+            .when("closed").on("S1 sleeve held")
             .when("lifted").on("S1 arm up")
             .when("begin").marked("cell", "working 1")
             .when("pallet seen").on("S1 reader forward").on("S1 reader optical")
@@ -96,6 +98,7 @@ final class StationNets {
             .when("pass, stopped").unmarked("cell", "running")
             .when("over the pallet").on("S1 arm right")
             .when("on the pallet").on("S1 arm down")
+            .when("let go").off("S1 sleeve held")
             .when("raised").on("S1 arm up")
             .when("written").that(in -> head.isDone())
             .when("write again").that(in -> head.hasFailed())

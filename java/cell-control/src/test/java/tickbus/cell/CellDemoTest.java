@@ -97,11 +97,12 @@ class CellDemoTest {
     void netsMakeFourCylindersOverModbusAndFreeAJammedLoader() throws IOException {
         assertEquals(0, demo(nets(), "--cylinders", "4"), () -> output);
         assertTrue(verdict().matches("demo-cell: ok cylinders=4 kinds=\\S+ deadlocks=0 markings=\\d+ jams=1 recovered=1"
-            + " vacuum_lost=0 missed=1 refills=0 ticks=\\d+ report=.*"), verdict());
+            + " vacuum_lost=0 missed=1 refills=0 emergency_stops=0 restarts=0 ticks=\\d+ report=.*"), verdict());
         assertFalse(output.contains("no row of the control table"), output);
         String report = Files.readString(folder.resolve("demo/report.txt"));
         for (String part : List.of("the loader will jam", "head 1 will miss a carrier", "station 1: ", " firings, now {",
-                "all_markings", "Cylinders", "Statistics of driver 1998", "Statistics of driver 1999")) {
+                "all_markings", "Cylinders", "after the last", "The stations while the cell ran", "starved",
+                "the control that begins", "nets: homed", "Statistics of driver 1998", "Statistics of driver 1999")) {
             assertTrue(report.contains(part), report);
         }
         for (String net : List.of("station-1", "station-3", "station-4", "transport", "cell")) {
@@ -249,7 +250,7 @@ class CellDemoTest {
             HttpResponse<String> state = HttpClient.newHttpClient().send(HttpRequest.newBuilder(URI.create(page + "state")).build(),
                 HttpResponse.BodyHandlers.ofString());
             assertEquals(200, state.statusCode());
-            assertEquals(5, state.body().split("\"phases\":").length - 1, state.body());
+            assertEquals(6, state.body().split("\"phases\":").length - 1, state.body());
             // Process.destroy() would close the stream that the verdict comes from.
             demo.toHandle().destroy();
             List<String> rest = out.lines().toList();

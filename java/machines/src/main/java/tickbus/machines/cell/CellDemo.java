@@ -6,9 +6,11 @@ import java.io.PrintStream;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
+import java.util.HashMap;
 import java.util.List;
 import java.util.Map;
 import java.util.TreeMap;
+import java.util.regex.Pattern;
 import java.util.stream.Stream;
 import tickbus.machines.demo.DemoFailure;
 import tickbus.machines.demo.DemoRun;
@@ -41,6 +43,9 @@ public final class CellDemo {
     /** The interval of the reports of the nets' process. */
     private static final long REPORT_NANOS = 100_000_000L;
     private static final int TICKS_PER_LOOK_AT_NETS = 25;
+    /** The counts of the nets' process that begin at 0 again when it is started again. */
+    private static final Pattern COUNTS = Pattern.compile("(plc|stale)[._]scans|loader_freed|pallet_freed|vacuum_lost|unread|refilled"
+            + "|homed|station\\d\\..*");
 
     private final CellOptions options;
     private final Timeline timeline;
@@ -49,6 +54,8 @@ public final class CellDemo {
     private final CellOperator operator;
     private Simulator simulator;
     private Map<String, String> nets = Map.of();
+    /** The last counts of earlier processes of the nets, added up. */
+    private final Map<String, Long> earlier = new HashMap<>();
     /** When the current round of cylinders began. */
     private long roundNanos;
     /** The result of the last complete round; null in the first one. */
@@ -60,7 +67,7 @@ public final class CellDemo {
         this.options = options;
         timeline = new Timeline(event -> out.println(event.line()));
         stalls = new Stalls(TimeSource.system(), options.stepNanos());
-        operator = new CellOperator(cell, timeline, options.cylinders());
+        operator = new CellOperator(cell, timeline, options.cylinders(), options.page() == null);
         notes.forEach(note -> timeline.add(0, "note", note));
     }
 
@@ -177,7 +184,8 @@ public final class CellDemo {
         System.getProperties().stringPropertyNames().stream().filter(name -> name.startsWith("tickbus."))
                 .forEach(name -> command.add("-D" + name + "=" + System.getProperty(name)));
         command.addAll(List.of("tickbus.cell.CellControl", cfg.toString(), client,
-                options.identification().toString(), CellPage.nets(options).toString()));
+                options.identification().toString(), CellPage.nets(options).toString(), "--markings",
+                CellPage.nets(options).resolve("markings").toString()));
         if (options.page() != null) {
             command.add(options.page());
         }
@@ -198,7 +206,7 @@ public final class CellDemo {
             }
             if (simulator.ticks() % TICKS_PER_LOOK_AT_NETS == 0) {
                 Verdict.unlessInterrupted(guard, plc::check);
-                nets = plc.statistics();
+                nets = statistics(plc);
                 plc.news().forEach(line -> timeline.add(simulator.simulationNanos(), "nets", line));
                 if (nets.containsKey("stop")) {
                     throw new DemoFailure("a net has stopped: " + nets.get("stop"));
@@ -208,6 +216,9 @@ public final class CellDemo {
                 }
             }
             operator.act(simulator.simulationNanos());
+            if (operator.wantsRestart()) {
+                restart(plc);
+            }
             boolean over = operator.done() && !cell.showsRunning() && nets.containsKey("markings");
             if (!over && simulator.simulationNanos() - roundNanos >= options.timeLimitNanos()) {
                 throw new DemoFailure("the time limit of " + Durations.text(options.timeLimitNanos())
@@ -215,7 +226,7 @@ public final class CellDemo {
                         + " cylinders" + (nets.containsKey("markings") ? "" : "; the analysis of the nets is not done"));
             }
             if (over && options.page() != null) {
-                nets = plc.statistics();
+                nets = statistics(plc);
                 lastRound = check();
                 timeline.add(simulator.simulationNanos(), "round", lastRound + "; the next one begins, until Ctrl-C");
                 roundNanos = simulator.simulationNanos();
@@ -227,7 +238,29 @@ public final class CellDemo {
         if (lastRound == null && !operator.done()) {
             throw new DemoFailure("interrupted");
         }
-        nets = plc.statistics();
+        nets = statistics(plc);
+    }
+
+    /** Kills the nets' process, and starts it again: it finds its markings in the file. */
+    private void restart(PlcProcess plc) {
+        plc.kill();
+        plc.statistics().forEach((key, value) -> {
+            if (COUNTS.matcher(key).matches()) {
+                earlier.merge(key, Long.parseLong(value), Long::sum);
+            }
+        });
+        timeline.add(simulator.simulationNanos(), "operator", plc.name() + " of the nets is killed, and started again");
+        plc.start();
+    }
+
+    /** The counts of the current process of the nets, and those of earlier ones. */
+    private Map<String, String> statistics(PlcProcess plc) {
+        Map<String, String> all = new HashMap<>(plc.statistics());
+        if (!all.isEmpty()) {
+            earlier.forEach((key, before) -> all.merge(key, before.toString(),
+                    (now, more) -> String.valueOf(Long.parseLong(now) + Long.parseLong(more))));
+        }
+        return all;
     }
 
     /** The verdict when all cylinders are out. */
@@ -263,7 +296,7 @@ public final class CellDemo {
                 + nets.get("markings") + " jams=" + (counters.loaderJams() + counters.palletJams()) + " recovered="
                 + (number("loader_freed") + number("pallet_freed")) + " vacuum_lost=" + counters.vacuumLosses() + " missed="
                 + counters.carriersMissed() + " refills="
-                + operator.refills() + " ticks=" + simulator.ticks() + " report=" + options.report());
+                + operator.refills() + " emergency_stops=" + operator.emergencies() + " restarts=" + operator.restarts() + " ticks=" + simulator.ticks() + " report=" + options.report());
     }
 
     private long number(String key) {

@@ -14,6 +14,10 @@ final class CellOperator {
     private static final int LOADER_JAMS_AFTER = 2;
     private static final int PALLET_JAMS_AFTER = 4;
     private static final int VACUUM_IS_LOST_AFTER = 6;
+    private static final int EMERGENCY_AFTER = 8;
+    private static final int CONTROL_ENDS_AFTER = 10;
+    /** How long the emergency stop is pressed. */
+    private static final long EMERGENCY_NANOS = 1_000_000_000;
     /** The first filling of station 3's magazine, which is too small, and how long the operator then lets it wait. */
     private static final int FIRST_PARTS = 7;
     private static final long WALK_NANOS = 500_000_000;
@@ -25,6 +29,7 @@ final class CellOperator {
     private final ManufacturingCell cell;
     private final Timeline timeline;
     private final int cylinders;
+    private final boolean restartable;
     private int delivered;
     private int mishaps;
     private int refills;
@@ -35,8 +40,19 @@ final class CellOperator {
     private int rounds;
     private int refillsBefore;
     private long rearmAt = Long.MAX_VALUE;
+    private boolean refillRearms;
+    private long releaseAt = Long.MAX_VALUE;
+    private int emergencies;
+    private int restarts;
+    private boolean restartWanted;
 
-    CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders) {
+    /**
+     * An operator.
+     *
+     * @param restartable true if the control can be killed and started again
+     */
+    CellOperator(ManufacturingCell cell, Timeline timeline, int cylinders, boolean restartable) {
+        this.restartable = restartable;
         this.cell = cell;
         this.timeline = timeline;
         this.cylinders = cylinders;
@@ -49,6 +65,21 @@ final class CellOperator {
 
     int refills() {
         return refills;
+    }
+
+    int emergencies() {
+        return emergencies;
+    }
+
+    int restarts() {
+        return restarts;
+    }
+
+    /** True once each time that the operator wants the control killed and started again. */
+    boolean wantsRestart() {
+        boolean wanted = restartWanted;
+        restartWanted = false;
+        return wanted;
     }
 
     boolean done() {
@@ -73,6 +104,7 @@ final class CellOperator {
             begun = true;
             begin(nanos);
         }
+        release(nanos);
         rearm(nanos);
         List<Workpiece> out = cell.delivered();
         for (; delivered < out.size(); delivered++) {
@@ -102,7 +134,7 @@ final class CellOperator {
             // Later rounds begin with the rest of the refill.
             cell.fillParts(FIRST_PARTS);
         } else {
-            rearmAt = nanos + REARM_AFTER_NANOS;
+            pressRearm(nanos + REARM_AFTER_NANOS, true);
         }
         cell.fillHeads(cylinders);
         cell.fillCaps(cylinders);
@@ -114,10 +146,29 @@ final class CellOperator {
         if (rearmAt != Long.MAX_VALUE && nanos >= rearmAt + PRESS_NANOS) {
             cell.rearm(false);
             rearmAt = Long.MAX_VALUE;
-            refills++;
-            refillsBefore++;
+            if (refillRearms) {
+                refills++;
+                refillsBefore++;
+            }
         } else if (nanos >= rearmAt) {
             cell.rearm(true);
+        } else if (rearmAt == Long.MAX_VALUE && cell.asksForRearm()) {
+            timeline.add(nanos, "operator", "Rearm, for the control that begins");
+            pressRearm(nanos + WALK_NANOS, false);
+        }
+    }
+
+    private void pressRearm(long at, boolean refill) {
+        rearmAt = at;
+        refillRearms = refill;
+    }
+
+    private void release(long nanos) {
+        if (nanos >= releaseAt) {
+            releaseAt = Long.MAX_VALUE;
+            cell.emergency(false);
+            timeline.add(nanos, "operator", "the emergency stop is released; Rearm follows");
+            pressRearm(nanos + WALK_NANOS, false);
         }
     }
 
@@ -130,6 +181,14 @@ final class CellOperator {
             mishap(nanos, "a pallet will get stuck", cell::jamPallet);
         } else if (count == VACUUM_IS_LOST_AFTER && count + 1 < cylinders) {
             mishap(nanos, "station 4 will lose its vacuum", cell::loseVacuum);
+        } else if (count == EMERGENCY_AFTER && count + 1 < cylinders) {
+            emergencies++;
+            cell.emergency(true);
+            releaseAt = nanos + EMERGENCY_NANOS;
+            timeline.add(nanos, "operator", "the emergency stop is pressed");
+        } else if (restartable && count == CONTROL_ENDS_AFTER && count + 1 < cylinders) {
+            restarts++;
+            restartWanted = true;
         }
     }
 

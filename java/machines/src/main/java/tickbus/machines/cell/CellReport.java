@@ -1,10 +1,14 @@
 package tickbus.machines.cell;
 
 import controlinterface.ControlInterfaceDeviceDriver;
+import java.util.ArrayList;
+import java.util.Arrays;
+import java.util.List;
 import java.util.Locale;
 import java.util.Map;
 import java.util.TreeMap;
 import java.util.stream.Collectors;
+import java.util.stream.Stream;
 import tickbus.machines.demo.Timeline;
 import tickbus.simulator.Simulator;
 import tickbus.simulator.text.Columns;
@@ -40,6 +44,7 @@ final class CellReport {
         report.heading("Timeline, in simulation time");
         timeline.events().forEach(event -> report.text.append("  ").append(event.line()).append('\n'));
         report.cylinders(cell);
+        report.stations(nets);
         report.counters(cell.counters());
         report.heading("The nets at the end");
         report.text.append(markings.isEmpty() ? "  none\n" : markings.replaceAll("(?m)^([^=]*)=", "  $1: "));
@@ -73,13 +78,40 @@ final class CellReport {
 
     private void cylinders(ManufacturingCell cell) {
         heading("Cylinders");
-        Columns table = new Columns(">sleeve", "kind", ">code", "complete");
+        Columns table = new Columns(">sleeve", "kind", ">code", "complete", ">begun", ">out", ">took", ">after the last");
+        long last = 0;
         for (Workpiece piece : cell.delivered()) {
             PieceKind kind = PieceKind.of(piece);
             table.row(piece.number(), kind.name().toLowerCase(Locale.ROOT).replace('_', ' '),
-                    String.format(Locale.ROOT, "%02x", kind.code()), piece.isComplete() ? "yes" : "no");
+                    String.format(Locale.ROOT, "%02x", kind.code()), piece.isComplete() ? "yes" : "no",
+                    seconds(piece.begunNanos()), seconds(piece.deliveredNanos()), seconds(piece.deliveredNanos() - piece.begunNanos()),
+                    last == 0 ? "" : seconds(piece.deliveredNanos() - last));
+            last = piece.deliveredNanos();
         }
         text.append(table.text("  "));
+    }
+
+    private static String seconds(long nanos) {
+        return String.format(Locale.ROOT, "%.2f s", nanos * 1e-9);
+    }
+
+    /** Shares of the time in which the cell ran, from the markings of the nets. */
+    private void stations(Map<String, String> nets) {
+        heading("The stations while the cell ran");
+        Columns table = new Columns("station", ">pallets", ">a pallet", ">working", ">short of parts", ">blocked", ">starved",
+                ">leaving");
+        for (int station : new int[] {1, 3, 4}) {
+            String key = "station" + station + ".";
+            double[] times = Stream.of("working", "short", "blocked", "starved", "leaving")
+                    .mapToDouble(state -> Double.parseDouble(nets.getOrDefault(key + state + "_ms", "0"))).toArray();
+            double all = Arrays.stream(times).sum();
+            long pallets = Long.parseLong(nets.getOrDefault(key + "pallets", "0"));
+            List<Object> row = new ArrayList<>(List.of("station " + station, pallets, pallets == 0 ? "" : seconds((long) (times[0] / pallets * 1e6))));
+            Arrays.stream(times).forEach(one -> row.add(all == 0 ? "" : String.format(Locale.ROOT, "%.1f %%", 100 * one / all)));
+            table.row(row.toArray());
+        }
+        text.append(table.text("  "));
+        text.append("\n  blocked: done, and the next stop has no room. starved: no pallet. short of parts: a pallet, and no sleeve or part.\n");
     }
 
     private void counters(Counters counters) {

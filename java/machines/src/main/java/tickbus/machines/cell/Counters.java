@@ -2,6 +2,8 @@ package tickbus.machines.cell;
 
 /** The counted events of the cell. */
 public final class Counters {
+    /** The time that the cell has been simulated. */
+    long nanos;
     int begun;
     int fallen;
     int wasted;

@@ -266,6 +266,7 @@ public final class ManufacturingCell implements Machine {
         if (nanos < 0) {
             throw new IllegalArgumentException("a step of " + nanos + " ns; expected 0 or more");
         }
+        counters.nanos += nanos;
         if (!hasPower(nanos)) {
             return;
         }

@@ -91,6 +91,7 @@ final class StationFour {
             if (arm.isBack() && pallet != null) {
                 pallet.piece = held;
             } else if (arm.isForward() && lift.isForward()) {
+                held.deliver(counters.nanos);
                 delivered.add(held);
                 exitNanos = EXIT_NANOS;
             } else {

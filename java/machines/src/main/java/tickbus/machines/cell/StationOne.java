@@ -49,7 +49,7 @@ final class StationOne {
     void step(Pallet pallet, long nanos) {
         loader.step(loaderValve, nanos);
         if (loader.isForward() && !loaded && onBelt == null && !magazine.isEmpty()) {
-            onBelt = new Workpiece(++counters.begun, magazine.remove());
+            onBelt = new Workpiece(++counters.begun, magazine.remove(), counters.nanos);
             beltNanos = 0;
             loaded = true;
         }

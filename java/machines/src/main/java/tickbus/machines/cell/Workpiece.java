@@ -9,7 +9,11 @@ public final class Workpiece {
     private final Colour colour;
     private final Set<Part> parts = EnumSet.of(Part.SLEEVE, Part.PIECE);
 
-    Workpiece(int number, Colour colour) {
+    private final long begunNanos;
+    private long deliveredNanos;
+
+    Workpiece(int number, Colour colour, long nanos) {
+        begunNanos = nanos;
         this.number = number;
         this.colour = colour;
     }
@@ -22,6 +26,20 @@ public final class Workpiece {
     /** The material of the piece's sleeve. */
     public Colour colour() {
         return colour;
+    }
+
+    /** When its sleeve came out of the magazine, in nanoseconds of the cell's time. */
+    public long begunNanos() {
+        return begunNanos;
+    }
+
+    /** When it came out of the cell; 0 before that. */
+    public long deliveredNanos() {
+        return deliveredNanos;
+    }
+
+    void deliver(long nanos) {
+        deliveredNanos = nanos;
     }
 
     /** True if the piece has this part. */

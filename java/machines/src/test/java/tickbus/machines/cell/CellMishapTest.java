@@ -77,7 +77,7 @@ class CellMishapTest {
         Counters counters = new Counters();
         StationFour station = new StationFour(counters);
         Pallet pallet = new Pallet(1, 0);
-        pallet.piece = new Workpiece(1, Colour.RED);
+        pallet.piece = new Workpiece(1, Colour.RED, 0);
         take(station, pallet);
         station.armOut = true;
         run(station, pallet);
@@ -91,8 +91,9 @@ class CellMishapTest {
         station.armLower = false;
         run(station, pallet);
         station.armOut = false;
+        station.armIn = true;
         run(station, pallet);
-        pallet.piece = new Workpiece(2, Colour.RED);
+        pallet.piece = new Workpiece(2, Colour.RED, 0);
         take(station, pallet);
         assertFalse(station.hasVacuum());
         assertEquals(1, counters.vacuumLosses());

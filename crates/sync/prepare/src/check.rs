@@ -294,9 +294,9 @@ pub(crate) fn check_statements(
     }
 }
 
-const MEASURE: &str = "measure with a TON, whose ET is virtual time";
+pub(crate) const MEASURE: &str = "measure with a TON, whose ET is virtual time";
 
-fn reads_clock(name: &str) -> String {
+pub(crate) fn reads_clock(name: &str) -> String {
     format!("{}() reads the clock of the PLC", shown(name))
 }
 

@@ -19,6 +19,7 @@ mod branches;
 mod chart;
 mod check;
 mod code;
+mod diagram;
 mod duration;
 mod edit;
 mod interface;
@@ -236,6 +237,33 @@ fn timer(name: &str) -> Mistake {
         what,
         "leave it out: it is replaced by a timer on virtual time",
     )
+}
+
+/// A project as `PLCopen` XML in one file of Structured Text, with its diagrams as statements.
+///
+/// # Errors
+///
+/// The file is no such project, or has charts or types that cannot be written, with their positions.
+pub fn structured_text(source: &Source) -> Result<String, Mistakes> {
+    let (text, _) = decode(&source.bytes);
+    let lines = with_lines(&text);
+    let wrong = Collector::new(&source.name, &lines);
+    let made = xml::structured_text(&text, &wrong);
+    match (made, wrong.finish()) {
+        (Some(made), None) => Ok(made),
+        (_, Some(mistakes)) => Err(mistakes),
+        // Nothing is refused without a reason.
+        (None, None) => Err(Mistakes::of_file(
+            &source.name,
+            "this project cannot be written as text",
+            "export the project again from its editor",
+        )),
+    }
+}
+
+/// True if a source is XML.
+pub fn is_xml(source: &Source) -> bool {
+    xml::is_xml(&decode(&source.bytes).0)
 }
 
 /// Reverts the changes of [`prepare`]; other changes made since then stay.

@@ -41,6 +41,20 @@ pub(crate) fn variables(element: &str, variables: &[Variable<'_>]) -> String {
     text(xml)
 }
 
+/// Statements as the body of a unit.
+pub(crate) fn statements(statements: &str) -> String {
+    let mut xml = Writer::new(Vec::new());
+    let write = |xml: &mut Xml| {
+        within(xml, "ST", |xml| {
+            let element = xml.create_element("xhtml").with_attribute(("xmlns", XHTML));
+            element.write_text_content(BytesText::new(statements))?;
+            Ok(())
+        })
+    };
+    write(&mut xml).expect("memory takes all");
+    text(xml)
+}
+
 fn text(xml: Xml) -> String {
     String::from_utf8(xml.into_inner()).expect("it was made of text")
 }
@@ -166,8 +180,11 @@ fn write_variables(xml: &mut Xml, element: &str, variables: &[Variable<'_>]) -> 
                 }
                 element.write_inner_content(|xml| {
                     within(xml, "type", |xml| {
-                        if words::is_elementary(kind) {
-                            xml.create_element(*kind).write_empty()?;
+                        if matches!(*kind, "STRING" | "WSTRING") {
+                            // The only types in small letters.
+                            xml.create_element(kind.to_lowercase()).write_empty()?;
+                        } else if words::is_elementary(kind) {
+                            xml.create_element(plcopen_type(kind)).write_empty()?;
                         } else {
                             let derived = xml.create_element("derived");
                             derived.with_attribute(("name", *kind)).write_empty()?;
@@ -186,6 +203,15 @@ fn write_variables(xml: &mut Xml, element: &str, variables: &[Variable<'_>]) -> 
                 Ok(())
             })
     })
+}
+
+/// The element of an elementary type: the schema has the short names only.
+fn plcopen_type(kind: &str) -> &str {
+    match kind {
+        "TIME_OF_DAY" => "TOD",
+        "DATE_AND_TIME" => "DT",
+        other => other,
+    }
 }
 
 fn within(

@@ -1,13 +1,19 @@
 //! Prepares projects as `PLCopen` XML whose statements are in Structured Text.
 
+mod declared;
+mod drawn;
 mod mask;
+mod nodes;
+mod text;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 
+use drawn::drawn;
 use mask::mask;
+use nodes::{child, first_tag, inner, named, named_attribute, program, signal, variable_names};
 use roxmltree::{Document, Node, ParsingOptions};
 
 use super::addresses;
@@ -16,6 +22,7 @@ use super::check::{
     check_words,
 };
 use super::code::{Code, line_end};
+use super::diagram::{Library, Written};
 use super::edit::{Edits, Marks};
 use super::lexer::Kind;
 use super::library::{self, SCHEDULE, TASK};
@@ -43,6 +50,32 @@ pub(crate) fn prepare(
     settings: &Settings,
     wrong: &Collector<'_>,
 ) -> Option<(String, Vec<String>)> {
+    with_project(text, wrong, |project| {
+        let mut world = project.world();
+        world.vouch(&settings.no_clock);
+        project.check_types(&world);
+        let mut shared = project.check_addresses(settings);
+        let bodies = project.bodies(&world, settings, &mut shared);
+        let (plan, note) = project.plan(&world)?;
+        if !wrong.is_empty() {
+            return None;
+        }
+        let made = project.edited(&world, &plan, settings, &bodies)?;
+        Some((made, note.into_iter().chain(shared).collect()))
+    })
+}
+
+/// A project as one file of Structured Text; `None` if mistakes were reported.
+pub(crate) fn structured_text(text: &str, wrong: &Collector<'_>) -> Option<String> {
+    let made = with_project(text, wrong, |project| Some(project.structured_text()))?;
+    wrong.is_empty().then_some(made)
+}
+
+fn with_project<T>(
+    text: &str,
+    wrong: &Collector<'_>,
+    then: impl FnOnce(&Project<'_, '_>) -> Option<T>,
+) -> Option<T> {
     let options = ParsingOptions {
         nodes_limit: NODES,
         ..ParsingOptions::default()
@@ -65,30 +98,34 @@ pub(crate) fn prepare(
         );
         return None;
     }
-    let project = Project { text, root, wrong };
-    let mut world = project.world();
-    world.vouch(&settings.no_clock);
-    project.check_types(&world);
-    let mut shared = project.check_addresses(settings);
-    let bodies = project.bodies(&world, settings, &mut shared);
-    let (plan, note) = project.plan(&world)?;
-    if !wrong.is_empty() {
-        return None;
-    }
-    let made = project.edited(&world, &plan, settings, &bodies)?;
-    Some((made, note.into_iter().chain(shared).collect()))
+    let library = declared::library(root);
+    then(&Project {
+        text,
+        root,
+        wrong,
+        library,
+    })
 }
 
 struct Project<'a, 'i> {
     text: &'i str,
     root: Node<'a, 'i>,
     wrong: &'a Collector<'i>,
+    library: Library,
 }
 
-/// The statements of a program, at these bytes of the file.
+/// The statements of a program.
 struct Body<'a, 'i> {
     unit: Node<'a, 'i>,
-    bytes: Range<usize>,
+    form: Form<'a, 'i>,
+}
+
+/// The form in which statements are kept.
+enum Form<'a, 'i> {
+    /// Text at these bytes of the file.
+    Text(Range<usize>),
+    /// A diagram, and its statements as text.
+    Drawn(Node<'a, 'i>, Written),
 }
 
 impl<'a, 'i> Project<'a, 'i> {
@@ -182,12 +219,21 @@ impl<'a, 'i> Project<'a, 'i> {
             let actions = named(unit, "action").filter_map(|node| node.attribute("name"));
             known.extend(actions.map(str::to_uppercase));
             for body in named(unit, "body") {
-                for language in ["IL", "LD", "FBD", "SFC"] {
+                for language in ["IL", "SFC"] {
                     if let Some(node) = child(body, language) {
                         let what = format!("these statements are in {language}");
-                        let right = "write them in Structured Text, or export the project as text";
+                        let right = "write them in Structured Text, LD or FBD, or export the project as text";
                         self.wrong.report(node.range().start, what, right);
                     }
+                }
+                if let Some(diagram) = drawn(body) {
+                    self.check_drawn(diagram, &known, world, &|name| run.contains(name));
+                    let is_program = body.parent() == Some(unit) && self.is_run(unit, &run);
+                    if is_program && let Some(written) = self.written(unit, diagram) {
+                        let form = Form::Drawn(diagram, written);
+                        found.push(Body { unit, form });
+                    }
+                    continue;
                 }
                 let Some(statements) = child(body, "ST") else {
                     continue;
@@ -212,16 +258,23 @@ impl<'a, 'i> Project<'a, 'i> {
                 check_statements(&code, &all, &known, world, self.wrong);
                 check_callers(&code, &all, &known, |name| run.contains(name), self.wrong);
                 if let (true, Some(bytes)) = (body.parent() == Some(unit), code.bytes(&all)) {
-                    found.push(Body { unit, bytes });
+                    let form = Form::Text(bytes);
+                    found.push(Body { unit, form });
                 }
             }
         }
         found
     }
 
+    /// True if a task runs a unit.
+    fn is_run(&self, unit: Node<'_, '_>, run: &HashSet<String>) -> bool {
+        let name = unit.attribute("name").unwrap_or_default();
+        unit.attribute("pouType") == Some("program") && run.contains(&name.to_uppercase())
+    }
+
     /// The text of statements with blanks in place of markup, so that each byte keeps its position; and the start of
     /// that text.
-    fn masked(&self, statements: Node<'a, 'i>) -> Option<(String, usize)> {
+    fn masked(&self, statements: Node<'_, '_>) -> Option<(String, usize)> {
         let texts = || statements.descendants().filter(Node::is_text);
         let holders: BTreeSet<_> = texts()
             .filter(|node| !node.text().unwrap_or_default().trim().is_empty())
@@ -331,20 +384,24 @@ impl<'a, 'i> Project<'a, 'i> {
             let name = node.attribute("name").unwrap_or_default();
             if world.is_timer(name) {
                 timers.insert(name.to_uppercase());
-                let value = node.attribute_node("name")?.range_value();
-                let whole = node.range();
-                let prefix = words::PREFIX;
-                let new = format!(
-                    "{}{prefix}{}{}",
-                    &self.text[whole.start..value.start],
-                    name.to_uppercase(),
-                    &self.text[value.end..whole.end]
-                );
-                edits.replace(whole, new, Marks::Xml);
+                let tag = first_tag(self.text, node);
+                let rest = &self.text[tag.end..node.range().end];
+                let new = self.timer(node, "name")? + rest;
+                edits.replace(node.range(), new, Marks::Xml);
             }
         }
         for body in bodies {
             self.control(body, plan, &mut edits)?;
+        }
+        for block in self.named("block") {
+            let name = block.attribute("typeName").unwrap_or_default();
+            let is_replaced = bodies.iter().any(|body| match &body.form {
+                Form::Drawn(diagram, _) => diagram.range().contains(&block.range().start),
+                Form::Text(_) => false,
+            });
+            if world.is_timer(name) && !is_replaced {
+                edits.replace(first_tag(self.text, block), self.timer(block, "typeName")?, Marks::Xml);
+            }
         }
         let timers: Vec<&str> = timers.iter().map(String::as_str).collect();
         let blocks = library::text(&timers, &plan.signals, &settings.addresses);
@@ -372,14 +429,34 @@ impl<'a, 'i> Project<'a, 'i> {
         let Some(signal) = signal(unit, plan) else {
             return Some(());
         };
-        let (header, footer) = header_and_footer(self.text, &body.bytes, signal);
-        edits.insert(body.bytes.start, header, Marks::StructuredText);
-        edits.insert(body.bytes.end, footer, Marks::StructuredText);
         let external = [
             ("tickbus_simulated", None, "BOOL", None),
             (signal.as_str(), None, "BOOL", None),
         ];
-        let external = plcopen::variables("externalVars", &external);
+        let mut external = plcopen::variables("externalVars", &external);
+        match &body.form {
+            Form::Text(bytes) => {
+                let (header, footer) = header_and_footer(self.text, bytes, signal);
+                edits.insert(bytes.start, header, Marks::StructuredText);
+                edits.insert(bytes.end, footer, Marks::StructuredText);
+            }
+            Form::Drawn(_, written) if written.statements.is_empty() => return Some(()),
+            Form::Drawn(diagram, written) => {
+                let statements = format!(
+                    "IF {} THEN\n{}END_IF;",
+                    library::condition(signal),
+                    written.statements
+                );
+                let statements = self.lines(&plcopen::statements(&statements));
+                edits.replace(diagram.range(), statements, Marks::Xml);
+                let own: Vec<plcopen::Variable<'_>> = (written.variables.iter())
+                    .map(|(name, kind)| (name.as_str(), None, kind.as_str(), None))
+                    .collect();
+                if !own.is_empty() {
+                    external.extend(["\n", &plcopen::variables("localVars", &own)]);
+                }
+            }
+        }
         if let Some(interface) = child(unit, "interface") {
             return self.insert_first(interface, &external, edits);
         }
@@ -444,6 +521,20 @@ impl<'a, 'i> Project<'a, 'i> {
         Some(())
     }
 
+    /// The first tag of an element, with the replacement of the timer in its attribute `name`.
+    fn timer(&self, node: Node<'a, 'i>, name: &str) -> Option<String> {
+        let value = node.attribute_node(name)?;
+        let tag = first_tag(self.text, node);
+        let place = value.range_value();
+        Some(format!(
+            "{}{}{}{}",
+            &self.text[tag.start..place.start],
+            words::PREFIX,
+            value.value().to_uppercase(),
+            &self.text[place.end..tag.end]
+        ))
+    }
+
     fn lines(&self, text: &str) -> String {
         text.replace('\n', line_end(self.text))
     }
@@ -462,67 +553,6 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         Some(())
     }
-}
-
-/// Elements called `name` within a node, in any namespace: versions of `PLCopen` XML differ only in that.
-fn named<'a, 'i>(
-    node: Node<'a, 'i>,
-    name: &'static str,
-) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
-    node.descendants()
-        .filter(move |node| node.is_element() && node.tag_name().name() == name)
-}
-
-fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
-    let mut children = node.children().filter(Node::is_element);
-    children.find(|child| child.tag_name().name() == name)
-}
-
-fn variable_names<'a, 'i>(list: Node<'a, 'i>) -> impl Iterator<Item = String> + use<'a, 'i> {
-    let names = named(list, "variable").filter_map(|node| node.attribute("name"));
-    names.map(str::to_uppercase)
-}
-
-fn named_attribute(node: Node<'_, '_>, name: &str) -> Option<Named> {
-    let attribute = node.attribute_node(name)?;
-    let text = attribute.value().to_owned();
-    let at = attribute.range_value().start;
-    (!text.is_empty()).then_some(Named { text, at })
-}
-
-/// The signal of the task that runs a unit.
-fn signal<'p>(unit: Node<'_, '_>, plan: &'p Plan) -> Option<&'p String> {
-    let name = unit.attribute("name").unwrap_or_default();
-    let is_program = unit.attribute("pouType") == Some("program");
-    let found = plan.programs.get(&name.to_uppercase());
-    found.filter(|_| is_program)
-}
-
-/// The program of an instance. CODESYS leaves its type empty: there a program is its own instance.
-fn program(instance: Node<'_, '_>) -> Named {
-    let named = named_attribute(instance, "typeName").or_else(|| named_attribute(instance, "name"));
-    named.unwrap_or_else(|| Named {
-        text: String::new(),
-        at: instance.range().start,
-    })
-}
-
-/// The bytes between the tags of an element; `None` if it has only one tag.
-fn inner(text: &str, node: Node<'_, '_>) -> Option<Range<usize>> {
-    let whole = node.range();
-    let mut quote = None;
-    let tag = text[whole.clone()].bytes().position(|byte| {
-        match (quote, byte) {
-            (None, b'"' | b'\'') => quote = Some(byte),
-            (Some(open), byte) if open == byte => quote = None,
-            (None, b'>') => return true,
-            _ => {}
-        }
-        false
-    })?;
-    let start = whole.start + tag + 1;
-    let end = whole.start + text[whole.clone()].rfind("</")?;
-    (start <= end && text.as_bytes()[start - 2] != b'/').then_some(start..end)
 }
 
 /// A file in XML together with other files.

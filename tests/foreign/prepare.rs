@@ -337,6 +337,7 @@ fn prepared_with(program: &str, (go_end, done_end): (Option<String>, Option<Stri
         addresses,
         // The body of this program is a pragma.
         no_clock: vec!["three".to_owned()],
+        ..Settings::default()
     };
     let made = prepare(&[source(program.as_bytes().to_vec())], &settings);
     let made = made.unwrap_or_else(|mistakes| panic!("{}", mistakes[0]));

@@ -7,11 +7,13 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::Outcome;
 use tickbus_base::toml_text::Mistakes;
-use tickbus_prepare::{Addresses, Settings, Source, is_prepared, prepare, undo};
+use tickbus_prepare::{
+    Addresses, Settings, Source, is_prepared, is_xml, prepare, structured_text, undo,
+};
 
 /// Put a PLC program on virtual time, so that it runs in lock-step with a simulation; --undo takes it off again, byte for byte.
 ///
-/// Takes the sources in Structured Text of one PLC together, or a project as PLCopen XML. docs/virtual-time-plc.md has the steps for an engineer.
+/// Takes the sources in Structured Text of one PLC together, or a project as PLCopen XML in Structured Text, LD and FBD. docs/virtual-time-plc.md has the steps for an engineer.
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The sources of the program.
@@ -57,6 +59,23 @@ pub(super) struct Arguments {
     /// A type or function of a library that uses no clock; may be repeated.
     #[arg(long, value_name = "NAME")]
     no_clock: Vec<String>,
+
+    /// Where a comment ends that has another one in it: at the first *), or at its own [default: whichever makes sense of the source].
+    #[arg(long, value_name = "HOW")]
+    comments: Option<Comments>,
+
+    /// Write a project as PLCopen XML as one file of Structured Text, and prepare nothing: ladder and function block diagrams become statements [default --out: beside it, "text"].
+    #[arg(long, conflicts_with_all = ["undo", "in_place", "go", "ms", "done", "go_end", "done_end", "no_clock", "comments"])]
+    text: bool,
+}
+
+/// The reading of comments within comments.
+#[derive(Clone, Copy, Debug, clap::ValueEnum)]
+enum Comments {
+    /// At the first *), as iec2c does without options.
+    Flat,
+    /// At its own *), as iec2c -n does.
+    Nested,
 }
 
 /// Parses an address of 32 bits, and returns it as the program needs it.
@@ -127,6 +146,15 @@ fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
             Err(wrong)
         };
     }
+    if arguments.text {
+        let (files, wrong) = split(sources.iter().map(as_text));
+        let notes = Vec::new();
+        return if wrong.is_empty() {
+            Ok(Made { files, notes })
+        } else {
+            Err(wrong)
+        };
+    }
     let settings = Settings {
         addresses: Addresses {
             go: arguments.go.clone(),
@@ -136,12 +164,24 @@ fn changed(arguments: &Arguments) -> Result<Made, Vec<Mistakes>> {
             done_end: arguments.done_end.clone(),
         },
         no_clock: arguments.no_clock.clone(),
+        comments: arguments.comments.map(|comments| match comments {
+            Comments::Flat => tickbus_prepare::Comments::Flat,
+            Comments::Nested => tickbus_prepare::Comments::Nested,
+        }),
     };
     let made = prepare(&sources, &settings)?;
     Ok(Made {
         files: made.files,
         notes: made.notes,
     })
+}
+
+fn as_text(source: &Source) -> Result<Vec<u8>, Mistakes> {
+    if is_xml(source) {
+        return structured_text(source).map(String::into_bytes);
+    }
+    let right = "name a project as PLCopen XML, or leave --text out";
+    Err(Mistakes::of_file(&source.name, "this is not XML", right))
 }
 
 fn split<T>(results: impl Iterator<Item = Result<T, Mistakes>>) -> (Vec<T>, Vec<Mistakes>) {
@@ -175,14 +215,21 @@ fn write(arguments: &Arguments, made: Made) -> Result<(Vec<PathBuf>, Vec<String>
     let paths = if arguments.in_place {
         arguments.files.clone()
     } else {
-        let default = if arguments.undo {
-            "original"
-        } else {
-            "prepared"
+        let default = match (arguments.undo, arguments.text) {
+            (true, _) => "original",
+            (_, true) => "text",
+            _ => "prepared",
         };
         let folder = arguments.out.clone();
         let folder = folder.unwrap_or_else(|| arguments.files[0].with_file_name(default));
-        let name = |path: &PathBuf| folder.join(path.file_name().unwrap_or_default());
+        let name = |path: &PathBuf| {
+            let path = folder.join(path.file_name().unwrap_or_default());
+            if arguments.text {
+                path.with_extension("st")
+            } else {
+                path
+            }
+        };
         let paths: Vec<PathBuf> = arguments.files.iter().map(name).collect();
         let sources = arguments.files.iter().map(fs::canonicalize);
         let sources: BTreeSet<PathBuf> = sources.filter_map(Result::ok).collect();

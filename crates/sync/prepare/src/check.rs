@@ -6,6 +6,7 @@ use std::ops::Range;
 use super::addresses;
 use super::chart::{Chart, chart, is_chart};
 use super::code::Code;
+use super::cycle;
 use super::lexer::Kind;
 use super::library::Addresses;
 use super::outline::{Outline, Unit, UnitKind, declared};
@@ -84,8 +85,12 @@ pub(crate) fn check(code: &Code<'_>, outline: &Outline, world: &World, wrong: &C
             check_pragma(text, code.base + pragma.start, function, world, wrong);
         }
     }
+    let cycled = cycle::types(code, outline);
     for inner in all_declarations(outline) {
         for at in declared(code, inner).types {
+            if cycled.contains(&at) && !world.types.contains(&code.capitals(at)) {
+                continue;
+            }
             check_type(code.word(at), code.start(at), world, wrong);
         }
     }
@@ -130,17 +135,17 @@ pub(crate) fn check_pragma(
     }
 }
 
-/// Reports nested comments, and reserved names.
+/// Reports comments within comments that can be read in two ways, and reserved names.
 pub(crate) fn check_words(code: &Code<'_>, wrong: &Collector<'_>) {
     for token in &code.all {
         let text = &code.text[token.range()];
         match token.kind {
-            Kind::Comment if text.len() > 2 && text.starts_with("(*") => {
+            Kind::Comment if code.is_in_doubt && text.len() > 2 && text.starts_with("(*") => {
                 if let Some(at) = text[2..].find("(*") {
                     wrong.report(
                         code.base + token.start + 2 + at,
-                        "a comment begins within a comment",
-                        "some compilers end the outer one at the first *), others do not; take out the (*",
+                        "a comment begins within a comment, and compilers disagree where the outer one ends",
+                        "take out the (*, or say how your compiler reads it: --comments flat ends it at the first *), --comments nested at its own",
                     );
                 }
             }
@@ -188,8 +193,8 @@ pub(crate) fn check_type(name: &str, at: usize, world: &World, wrong: &Collector
             at,
             format!("{} runs on a clock of its own", shown(name)),
             format!(
-                "use TON, TOF, TP or RTC, or a block of your own that is built from them; if that of your library takes its \
-                 cycle as an input, name it: --no-clock {}",
+                "use TON, TOF, TP or RTC, or a block of your own that is built from them; a PID whose calls set CYCLE is \
+                 accepted; another block that takes its cycle as an input has to be named: --no-clock {}",
                 shown(name)
             ),
         );

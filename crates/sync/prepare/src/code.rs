@@ -1,6 +1,6 @@
 //! The significant tokens of a source, and their text.
 
-use super::lexer::{Kind, Token, tokens};
+use super::lexer::{Comments, Kind, Token, reading, tokens};
 use std::ops::Range;
 
 /// A source, its tokens, and the significant ones: those that are neither blanks, comments nor pragmas. Ranges and
@@ -12,6 +12,10 @@ pub(crate) struct Code<'t> {
     pub(crate) base: usize,
     pub(crate) all: Vec<Token>,
     pub(crate) tokens: Vec<Token>,
+    /// The reading of comments within comments.
+    pub(crate) comments: Comments,
+    /// True if there are comments within comments, and both readings or none of them can be right.
+    pub(crate) is_in_doubt: bool,
 }
 
 impl<'t> Code<'t> {
@@ -21,7 +25,14 @@ impl<'t> Code<'t> {
 
     /// A part of a file, at this byte.
     pub(crate) fn part(text: &'t str, base: usize) -> Self {
-        let all = tokens(text);
+        Self::with(text, base, None)
+    }
+
+    /// A part of a file, whose comments the compiler reads in this way.
+    pub(crate) fn with(text: &'t str, base: usize, comments: Option<Comments>) -> Self {
+        let (comments, is_in_doubt) =
+            comments.map_or_else(|| reading(text), |comments| (comments, false));
+        let all = tokens(text, comments);
         let has_meaning = |token: &&Token| !token.kind.is_trivia() && token.kind != Kind::Pragma;
         let tokens = all.iter().filter(has_meaning).copied().collect();
         Self {
@@ -29,6 +40,8 @@ impl<'t> Code<'t> {
             base,
             all,
             tokens,
+            comments,
+            is_in_doubt,
         }
     }
 

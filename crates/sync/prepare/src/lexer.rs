@@ -48,13 +48,50 @@ impl Token {
 
 const BYTE_ORDER_MARK: &[u8] = "\u{FEFF}".as_bytes();
 
+/// The end of a comment that has the begin of another one in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Comments {
+    /// At the first `*)`, as in `iec2c` without options.
+    Flat,
+    /// At the `*)` of its own, as in `iec2c -n`.
+    Nested,
+}
+
+/// The reading of a source's comments under which it can be a program, and true if that is in doubt: a `(*` without its
+/// own `*)` makes a source endless in one reading, and one with it leaves a stray `*)` in the other.
+pub(crate) fn reading(source: &str) -> (Comments, bool) {
+    let flat = tokens(source, Comments::Flat);
+    let holds_another = |token: &Token| {
+        let text = &source[token.range()];
+        token.kind == Kind::Comment && text.starts_with("(*") && text[2..].contains("(*")
+    };
+    if !flat.iter().any(holds_another) {
+        return (Comments::Flat, false);
+    }
+    let nested = tokens(source, Comments::Nested);
+    match [&flat, &nested].map(|tokens| is_sound(source, tokens)) {
+        [true, false] => (Comments::Flat, false),
+        [false, true] => (Comments::Nested, false),
+        _ => (Comments::Flat, true),
+    }
+}
+
+/// True if every comment has its end, and there is no end without a comment.
+fn is_sound(source: &str, tokens: &[Token]) -> bool {
+    let is_end = |pair: &[Token]| {
+        let text = &source[pair[0].start..pair[1].end];
+        pair.iter().all(|token| token.kind == Kind::Symbol) && text == "*)"
+    };
+    tokens.iter().all(|token| token.kind != Kind::Endless) && !tokens.windows(2).any(is_end)
+}
+
 /// The tokens of a whole source.
-pub(crate) fn tokens(source: &str) -> Vec<Token> {
+pub(crate) fn tokens(source: &str, comments: Comments) -> Vec<Token> {
     let bytes = source.as_bytes();
     let mut found = Vec::new();
     let mut start = 0;
     while start < bytes.len() {
-        let (kind, length) = first(&bytes[start..]);
+        let (kind, length) = first(&bytes[start..], comments);
         let end = start + length;
         found.push(Token { kind, start, end });
         start = end;
@@ -63,11 +100,12 @@ pub(crate) fn tokens(source: &str) -> Vec<Token> {
 }
 
 /// The first token of a text that is not empty, and its length.
-fn first(text: &[u8]) -> (Kind, usize) {
+fn first(text: &[u8], comments: Comments) -> (Kind, usize) {
     let second = text.get(1).copied().unwrap_or_default();
     match text[0] {
         _ if text.starts_with(BYTE_ORDER_MARK) => (Kind::Space, BYTE_ORDER_MARK.len()),
         byte if is_space(byte) => (Kind::Space, run(text, is_space)),
+        b'(' if second == b'*' && comments == Comments::Nested => nested(text),
         b'(' if second == b'*' => until(text, 2, b"*)", Kind::Comment),
         b'/' if second == b'*' => until(text, 2, b"*/", Kind::Comment),
         b'/' if second == b'/' => (
@@ -118,6 +156,26 @@ fn until(text: &[u8], begin: usize, end: &[u8], kind: Kind) -> (Kind, usize) {
         Some(at) => (kind, begin + at + end.len()),
         None => (Kind::Endless, text.len()),
     }
+}
+
+/// A comment with the comments in it.
+fn nested(text: &[u8]) -> (Kind, usize) {
+    let (mut at, mut depth) = (0, 0_usize);
+    while at + 1 < text.len() {
+        match &text[at..at + 2] {
+            b"(*" => depth += 1,
+            b"*)" => depth -= 1,
+            _ => {
+                at += 1;
+                continue;
+            }
+        }
+        at += 2;
+        if depth == 0 {
+            return (Kind::Comment, at);
+        }
+    }
+    (Kind::Endless, text.len())
 }
 
 /// A text in quotes, in which `$` escapes the next character.
@@ -172,7 +230,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn read(source: &str) -> Vec<(Kind, &str)> {
-        tokens(source)
+        tokens(source, Comments::Flat)
             .into_iter()
             .filter(|token| token.kind != Kind::Space)
             .map(|token| (token.kind, &source[token.range()]))
@@ -219,20 +277,39 @@ mod tests {
     #[test]
     fn what_has_no_end_is_seen() {
         for source in ["(* ", "'a\n'", "\"", "{", "/* *", "(*)", "'$"] {
-            assert_eq!(tokens(source)[0].kind, Kind::Endless, "{source}");
+            assert_eq!(tokens(source, Comments::Flat)[0].kind, Kind::Endless, "{source}");
+        }
+    }
+
+    #[test]
+    fn comments_within_comments_are_read_so_that_the_source_is_sound() {
+        use Comments::{Flat, Nested};
+        for (source, right) in [
+            ("(* a *) x (* b *)", (Flat, false)),
+            ("(* a (* b *) x := 1;", (Flat, false)),
+            ("(* a (* b *) c *) x := 1;", (Nested, false)),
+            ("(* a (* b *) c '*)' x := 1;", (Flat, true)),
+            ("(* a (* b *) c", (Flat, false)),
+            ("(* a // (* b *) '(*' {p *) }", (Nested, false)),
+            ("s := '(* a (* b'; x := 2 *(3);", (Flat, false)),
+            ("(* (* *) *) *)", (Flat, true)),
+        ] {
+            assert_eq!(reading(source), right, "{source}");
         }
     }
 
     proptest! {
         #[test]
         fn the_tokens_are_the_source(source in "(\\PC|[(*)'\"$#%{}/\r\n.:=TD19ä]){0,60}") {
-            let mut end = 0;
-            for token in tokens(&source) {
-                prop_assert!(token.start == end && token.end > end);
-                prop_assert!(source.is_char_boundary(token.end.min(source.len())));
-                end = token.end;
+            for comments in [Comments::Flat, Comments::Nested] {
+                let mut end = 0;
+                for token in tokens(&source, comments) {
+                    prop_assert!(token.start == end && token.end > end);
+                    prop_assert!(source.is_char_boundary(token.end.min(source.len())));
+                    end = token.end;
+                }
+                prop_assert_eq!(end, source.len());
             }
-            prop_assert_eq!(end, source.len());
         }
     }
 }

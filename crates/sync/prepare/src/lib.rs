@@ -19,6 +19,7 @@ mod branches;
 mod chart;
 mod check;
 mod code;
+mod cycle;
 mod diagram;
 mod duration;
 mod edit;
@@ -41,6 +42,7 @@ use std::collections::BTreeSet;
 
 use check::World;
 use code::Code;
+use lexer::Kind;
 use outline::Outline;
 use structured_text::{Preparation, plan};
 use tickbus_base::Mistake;
@@ -49,6 +51,7 @@ use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
 pub use block::{Block, NoBlock, Wrapped};
 pub use branches::Branch;
 pub use interface::{Direction, Variable, unfit};
+pub use lexer::Comments;
 pub use library::{Addresses, SOURCES};
 pub use wrapper::Wired;
 
@@ -68,6 +71,8 @@ pub struct Settings {
     pub addresses: Addresses,
     /// Names of types and functions of libraries that use no clock.
     pub no_clock: Vec<String>,
+    /// The compiler's reading of comments within comments; `None`: the one under which a source can be a program.
+    pub comments: Option<Comments>,
 }
 
 /// A prepared program.
@@ -158,7 +163,9 @@ fn prepared(
         let (made, notes) = xml::prepare(text, settings, wrong)?;
         return Some((vec![made], notes));
     }
-    let codes: Vec<Code<'_>> = texts.iter().map(|(text, _)| Code::new(text)).collect();
+    let codes: Vec<Code<'_>> = (texts.iter())
+        .map(|(text, _)| Code::with(text, 0, settings.comments))
+        .collect();
     let mut outlines: Vec<Outline> = Vec::new();
     for (code, wrong) in codes.iter().zip(wrong) {
         match outline::outline(code) {
@@ -196,8 +203,22 @@ fn prepared(
     }
     let (home, configuration) = found?;
     let (plan, note) = plan(&codes[home], configuration, &wrong[home]);
+    let mut remarks = Vec::new();
     for (code, (outline, wrong)) in codes.iter().zip(outlines.iter().zip(wrong)) {
+        if code.comments == Comments::Nested && settings.comments.is_none() {
+            let first = code.all.iter().find(|token| {
+                let text = &code.text[token.range()];
+                token.kind == Kind::Comment && text.get(2..).is_some_and(|text| text.contains("(*"))
+            });
+            let at = first.map_or(0, |token| token.start);
+            let remark = "a comment is within a comment: compile with the option for that (-n of iec2c)";
+            remarks.push(placed_remark(wrong, at, remark));
+        }
         for unit in &outline.units {
+            if let Some(interval) = plan.interval(&code.capitals(unit.name)) {
+                let found = cycle::differing(code, &unit.body, interval).into_iter();
+                remarks.extend(found.map(|(at, remark)| placed_remark(wrong, at, &remark)));
+            }
             let known = check::variables(code, unit);
             let is_run = |name: &str| plan.programs.contains_key(name);
             check::check_callers(code, &unit.body, &known, is_run, wrong);
@@ -228,7 +249,14 @@ fn prepared(
     let blocks = library::text(&timers, &plan.signals, &settings.addresses);
     let files = parts.iter().enumerate();
     let files = files.map(|(index, part)| part.text((index == home).then_some(blocks.as_str())));
-    Some((files.collect(), note.into_iter().chain(shared).collect()))
+    let notes = note.into_iter().chain(shared).chain(remarks);
+    Some((files.collect(), notes.collect()))
+}
+
+/// A remark with its place.
+pub(crate) fn placed_remark(wrong: &Collector<'_>, at: usize, remark: &str) -> String {
+    let (line, column) = wrong.place(at);
+    format!("{}:{line}:{column}: {remark}", wrong.file())
 }
 
 fn timer(name: &str) -> Mistake {

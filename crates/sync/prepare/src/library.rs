@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::code::Code;
-use super::lexer::{Kind, tokens};
+use super::lexer::{Comments, Kind, tokens};
 use super::outline::{Outline, outline};
 use super::words;
 
@@ -139,7 +139,7 @@ fn unit_text(code: &Code<'_>, read: &Outline, name: usize) -> String {
     let unit = read.units.iter().find(|unit| unit.name == name);
     let unit = unit.expect("it is one of them");
     let text = &code.text[code.start(name - 1)..code.end(unit.body.end)];
-    let kept = tokens(text).into_iter();
+    let kept = tokens(text, Comments::Flat).into_iter();
     let kept = kept.filter(|token| token.kind != Kind::Comment);
     let kept: String = kept.map(|token| &text[token.range()]).collect();
     let lines = kept.lines().map(str::trim_end);

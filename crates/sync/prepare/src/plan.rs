@@ -17,6 +17,15 @@ pub(crate) struct Plan {
     pub(crate) cycle: u32,
 }
 
+impl Plan {
+    /// The interval in milliseconds of a program, by its name in capitals, if a task runs it.
+    pub(crate) fn interval(&self, program: &str) -> Option<u32> {
+        let name = self.programs.get(program)?;
+        let signal = self.signals.iter().find(|signal| signal.name == *name)?;
+        signal.interval
+    }
+}
+
 /// A word of a configuration, and its byte offset.
 #[derive(Clone, Debug)]
 pub(crate) struct Named {

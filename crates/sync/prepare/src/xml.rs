@@ -1,5 +1,6 @@
 //! Prepares projects as `PLCopen` XML whose statements are in Structured Text.
 
+mod cycle;
 mod declared;
 mod drawn;
 mod mask;
@@ -24,9 +25,10 @@ use super::check::{
 use super::code::{Code, line_end};
 use super::diagram::{Library, Written};
 use super::edit::{Edits, Marks};
-use super::lexer::Kind;
+use super::lexer::{Comments, Kind};
 use super::library::{self, SCHEDULE, TASK};
 use super::outline;
+use super::pragma;
 use super::plan::{self, Named, Plan};
 use super::structured_text::header_and_footer;
 use super::words;
@@ -60,6 +62,7 @@ pub(crate) fn prepare(
         if !wrong.is_empty() {
             return None;
         }
+        shared.extend(project.cycles(&plan, &bodies));
         let made = project.edited(&world, &plan, settings, &bodies)?;
         Some((made, note.into_iter().chain(shared).collect()))
     })
@@ -126,6 +129,8 @@ enum Form<'a, 'i> {
     Text(Range<usize>),
     /// A diagram, and its statements as text.
     Drawn(Node<'a, 'i>, Written),
+    /// The pragma at these bytes of the file reads a clock; its replacement.
+    Clock(Range<usize>, String),
 }
 
 impl<'a, 'i> Project<'a, 'i> {
@@ -154,6 +159,9 @@ impl<'a, 'i> Project<'a, 'i> {
     fn check_types(&self, world: &World) {
         for node in self.named("derived") {
             let name = node.attribute("name").unwrap_or_default();
+            if self.is_cycled(node) && !world.types.contains(&name.to_uppercase()) {
+                continue;
+            }
             check_type(name, node.range().start, world, self.wrong);
         }
         for element in ["pou", "dataType"] {
@@ -241,17 +249,27 @@ impl<'a, 'i> Project<'a, 'i> {
                 let Some((masked, start)) = self.masked(statements) else {
                     continue;
                 };
-                let code = Code::part(&masked, start);
+                let code = Code::with(&masked, start, settings.comments);
                 if let Some(token) = outline::endless(&code) {
                     let what = "the comment or text that begins here has no end";
                     self.wrong.report(start + token.start, what, "end it");
                     continue;
                 }
                 check_words(&code, self.wrong);
-                let name = unit.attribute("name");
+                let name = unit.attribute("name").unwrap_or_default();
+                if code.comments == Comments::Nested && settings.comments.is_none() {
+                    let remark = format!("{name} has a comment within a comment: compile with the option for that (-n of iec2c)");
+                    shared.insert(super::placed_remark(self.wrong, start, &remark));
+                }
                 for pragma in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
                     let text = &masked[pragma.range()];
-                    check_pragma(text, start + pragma.start, name, world, self.wrong);
+                    let at = start + pragma.start;
+                    if let Some(ours) = pragma::on_virtual_time(name, text) {
+                        let form = Form::Clock(at..at + text.len(), ours);
+                        found.push(Body { unit, form });
+                    } else {
+                        check_pragma(text, at, Some(name), world, self.wrong);
+                    }
                 }
                 shared.extend(check_addresses(&code, &settings.addresses, self.wrong));
                 let all = 0..code.tokens.len();
@@ -391,13 +409,17 @@ impl<'a, 'i> Project<'a, 'i> {
             }
         }
         for body in bodies {
-            self.control(body, plan, &mut edits)?;
+            if let Form::Clock(bytes, ours) = &body.form {
+                edits.replace(bytes.clone(), ours, Marks::StructuredText);
+            } else {
+                self.control(body, plan, &mut edits)?;
+            }
         }
         for block in self.named("block") {
             let name = block.attribute("typeName").unwrap_or_default();
             let is_replaced = bodies.iter().any(|body| match &body.form {
                 Form::Drawn(diagram, _) => diagram.range().contains(&block.range().start),
-                Form::Text(_) => false,
+                Form::Text(_) | Form::Clock(..) => false,
             });
             if world.is_timer(name) && !is_replaced {
                 edits.replace(first_tag(self.text, block), self.timer(block, "typeName")?, Marks::Xml);
@@ -440,6 +462,7 @@ impl<'a, 'i> Project<'a, 'i> {
                 edits.insert(bytes.start, header, Marks::StructuredText);
                 edits.insert(bytes.end, footer, Marks::StructuredText);
             }
+            Form::Clock(..) => return Some(()),
             Form::Drawn(_, written) if written.statements.is_empty() => return Some(()),
             Form::Drawn(diagram, written) => {
                 let statements = format!(

@@ -123,6 +123,11 @@ impl<'t> Collector<'t> {
         }
     }
 
+    /// The file's name.
+    pub fn file(&self) -> &str {
+        &self.file
+    }
+
     /// The text.
     pub(super) fn text(&self) -> &'t str {
         self.text

@@ -288,9 +288,9 @@ mod tests {
             ("(* a *) x (* b *)", (Flat, false)),
             ("(* a (* b *) x := 1;", (Flat, false)),
             ("(* a (* b *) c *) x := 1;", (Nested, false)),
-            ("(* a (* b *) c '*)' x := 1;", (Flat, true)),
+            ("(* a (* b *) x := 1; // *)", (Flat, true)),
             ("(* a (* b *) c", (Flat, false)),
-            ("(* a // (* b *) '(*' {p *) }", (Nested, false)),
+            ("(* a // (* b *) '(*' {p *) }", (Flat, false)),
             ("s := '(* a (* b'; x := 2 *(3);", (Flat, false)),
             ("(* (* *) *) *)", (Flat, true)),
         ] {

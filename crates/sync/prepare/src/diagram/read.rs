@@ -377,7 +377,9 @@ impl Reader<'_> {
                 || word == ";"
                 || (matches!(word, ":=" | "=>" | ":") && depth == 0)
                 || matches!(token.kind, Token::Endless);
-            if end.is_some_and(|end| end != token.start) {
+            // In XML the two parts of <> and >= are apart: their references are longer.
+            let is_split = made.ends_with(['<', '>']) && matches!(word, "=" | ">");
+            if end.is_some_and(|end| end != token.start) && !is_split {
                 made.push(' ');
             }
             made.push_str(word);

@@ -54,7 +54,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
         ),
         (
             line("VAR control : PID; END_VAR", "control();"),
-            "takes its cycle as an input, name it: --no-clock PID",
+            "takes its cycle as an input has to be named: --no-clock PID",
         ),
         (
             saying("LD n\nADD 1\nST n"),
@@ -65,7 +65,7 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             "line.st:3:1: these statements are in IL",
         ),
         (
-            saying("n := 1; (* a (* b *) c *)"),
+            saying("n := 1; (* a (* b *) n := 2; // *)"),
             "line.st:3:14: a comment begins within a comment",
         ),
         (

@@ -213,8 +213,8 @@ fn what_cannot_be_prepared_is_told_with_its_place() {
             "these statements hold other elements",
         ),
         (
-            plain.replace("<ST><xhtml", "<LD/><ST><xhtml"),
-            "plc.xml:24:15: these statements are in LD",
+            plain.replace("<ST><xhtml", "<SFC/><ST><xhtml"),
+            "plc.xml:24:15: these statements are in SFC",
         ),
         (
             plain.replace("\"start\"", "\"tickbus_execute_x\""),

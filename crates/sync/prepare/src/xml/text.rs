@@ -90,9 +90,9 @@ impl Project<'_, '_> {
                 *text += &written.statements;
             }
         } else if let Some(statements) = child(body, "ST").or_else(|| child(body, "IL")) {
-            if let Some((statements, _)) = self.masked(statements) {
-                let _ = writeln!(text, "\n{}", statements.trim_matches(['\n', '\r']));
-            }
+            let texts = statements.descendants().filter(Node::is_text);
+            let statements: String = texts.filter_map(|node| node.text()).collect();
+            let _ = writeln!(text, "\n{}", statements.trim_matches(['\n', '\r']));
         } else {
             let what = format!("{} is neither Structured Text nor a diagram", shown(name));
             let right = "write it in Structured Text, LD or FBD, or let its editor write the text";

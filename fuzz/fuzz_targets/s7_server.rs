@@ -38,17 +38,20 @@ impl Memory for Bytes {
         all.get(range).ok_or(ReturnCode::ADDRESS)
     }
 
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode> {
-        match object {
-            Object::Outputs | Object::Block(1) => self.outputs.get_mut(range).ok_or(ReturnCode::ADDRESS),
-            Object::Inputs => Err(ReturnCode::ACCESS),
-            _ => Err(ReturnCode::MISSING),
-        }
+    fn write(&mut self, object: Object, first: usize, values: &[u8]) -> Result<(), ReturnCode> {
+        let outputs = match object {
+            Object::Outputs | Object::Block(1) => &mut self.outputs,
+            Object::Inputs => return Err(ReturnCode::ACCESS),
+            _ => return Err(ReturnCode::MISSING),
+        };
+        outputs.get_mut(first..first + values.len()).ok_or(ReturnCode::ADDRESS)?.copy_from_slice(values);
+        Ok(())
     }
 
-    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, ReturnCode> {
+    fn write_bit(&mut self, object: Object, byte: usize, bit: u8, on: bool) -> Result<(), ReturnCode> {
         assert!(bit < 8);
-        Ok(&mut self.write(object, byte..byte + 1)?[0])
+        let before = *self.outputs.get(byte).ok_or(ReturnCode::ADDRESS)?;
+        self.write(object, byte, &[before & !(1 << bit) | u8::from(on) << bit])
     }
 
     fn done(&mut self) {}

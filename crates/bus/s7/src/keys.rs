@@ -4,6 +4,7 @@ use tickbus_base::toml_text::{Key, Shape};
 use tickbus_image::signal::AREA_LIMIT;
 
 use crate::client::IDENTITY_LIMIT;
+use crate::identity::IDENTITY_KEYS;
 use crate::length::{LEAST, LONGEST};
 use crate::tsap::{RACK, SLOT};
 
@@ -29,10 +30,11 @@ pub(crate) const SERVER: &[Key] = &[
         Shape::List(&Shape::Table(BLOCK), 0, usize::MAX),
         "The data blocks, and the bytes that they have",
     ),
+    IDENTITY,
     Key::new(
         "m_bytes",
         Shape::Whole(0, AREA_END),
-        "The bytes of M, scratch memory that nothing else uses",
+        "The bytes of M, scratch memory unless [fieldbus.at] places signals there",
     )
     .or("256"),
     PDU,
@@ -51,10 +53,10 @@ const BLOCK: &[Key] = &[
         Shape::Whole(1, 65_535),
         "The number of the data block",
     ),
-    Key::required(
+    Key::new(
         "area",
         Shape::Choice(&["%I", "%Q"]),
-        "The area whose bytes it has",
+        "The area whose bytes it has; without it the block has signals of [fieldbus.at], and needs its length",
     ),
     Key::new(
         "station",
@@ -82,7 +84,14 @@ pub(crate) const SERVED_STATION: &[Key] = &[
         "The rack of the CPU; 0 by default",
     ),
     Key::new("slot", Shape::whole(&SLOT), "The slot of the CPU"),
+    IDENTITY,
 ];
+
+const IDENTITY: Key = Key::new(
+    "identity",
+    Shape::Table(IDENTITY_KEYS),
+    "How the CPU names itself; order number \"tickbus\" and the driver's name by default",
+);
 
 /// The client's own.
 pub(crate) const CLIENT: &[Key] = &[

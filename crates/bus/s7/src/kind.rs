@@ -9,7 +9,7 @@ use tickbus_fieldbus::{
 };
 use tickbus_image::signal::{Signal, SignalTable};
 
-use super::{ClientOptions, S7Client, S7Server, ServerOptions, keys};
+use super::{ClientOptions, S7Client, S7Server, ServerOptions, Variable, keys};
 
 impl BusKind for ServerOptions {
     const NAME: &'static str = "s7-server";
@@ -17,8 +17,8 @@ impl BusKind for ServerOptions {
     const KEYS: &'static [&'static [Key]] = &[keys::SERVER, Writers::KEYS];
     const STATION_KEYS: &'static [Key] = keys::SERVED_STATION;
 
-    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
-        Self::read(table)
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        Self::read(role, table)
     }
 }
 
@@ -34,6 +34,9 @@ impl BusOptions for ServerOptions {
                 "DB{} is {}{of} from byte {}",
                 block.number, block.area, block.offset
             ));
+        }
+        if !self.variables.is_empty() {
+            parts.push("has the variables of [fieldbus.at]".to_owned());
         }
         parts
     }
@@ -59,8 +62,21 @@ impl BusOptions for ServerOptions {
         self.read_station(count, table);
     }
 
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
     fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
+        let variable = self.variables.get(&signal.name);
+        variable.map_or_else(String::new, Variable::to_string)
     }
 }
 

@@ -25,11 +25,11 @@
 //!         }
 //!     }
 //!
-//!     fn write(&mut self, _: Object, _: Range<usize>) -> Result<&mut [u8], ReturnCode> {
+//!     fn write(&mut self, _: Object, _: usize, _: &[u8]) -> Result<(), ReturnCode> {
 //!         Err(ReturnCode::ACCESS)
 //!     }
 //!
-//!     fn write_bit(&mut self, _: Object, _: usize, _: u8) -> Result<&mut u8, ReturnCode> {
+//!     fn write_bit(&mut self, _: Object, _: usize, _: u8, _: bool) -> Result<(), ReturnCode> {
 //!         Err(ReturnCode::ACCESS)
 //!     }
 //!
@@ -58,7 +58,9 @@
 //! # Ok::<(), tickbus_bus_s7::ProtocolError>(())
 //! ```
 
+mod bits;
 mod client;
+mod identity;
 pub mod item;
 mod keys;
 mod kind;

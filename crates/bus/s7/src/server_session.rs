@@ -39,19 +39,25 @@ pub trait Memory {
         Ok(self.read(object, byte..byte + 1)?[0])
     }
 
-    /// Bytes of an object that a job writes.
+    /// A job writes bytes of an object, from the byte `first` on.
     ///
     /// # Errors
     ///
     /// The code of the item.
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode>;
+    fn write(&mut self, object: Object, first: usize, values: &[u8]) -> Result<(), ReturnCode>;
 
-    /// A byte of an object of which a job writes one bit.
+    /// A job writes one bit of a byte of an object.
     ///
     /// # Errors
     ///
     /// The code of the item.
-    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, ReturnCode>;
+    fn write_bit(
+        &mut self,
+        object: Object,
+        byte: usize,
+        bit: u8,
+        on: bool,
+    ) -> Result<(), ReturnCode>;
 
     /// A job has been processed, successfully or not.
     fn done(&mut self);
@@ -328,13 +334,9 @@ fn write_item(item: &Item, bytes: &[u8], memory: &mut impl Memory) -> Result<(),
         return Err(ReturnCode::INCONSISTENT);
     }
     match item.element {
-        Element::Bit => {
-            let byte = memory.write_bit(item.object, item.byte, item.bit)?;
-            *byte = *byte & !(1 << item.bit) | u8::from(bytes[0] != 0) << item.bit;
-        }
-        _ => memory.write(item.object, range)?.copy_from_slice(bytes),
+        Element::Bit => memory.write_bit(item.object, item.byte, item.bit, bytes[0] != 0),
+        _ => memory.write(item.object, range.start, bytes),
     }
-    Ok(())
 }
 
 /// Appends the refusal of a whole job or userdata request.

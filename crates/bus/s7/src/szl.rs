@@ -4,7 +4,8 @@ use super::pdu::error;
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::PlcState;
 
-/// The identity of a CPU, as in its system status lists.
+/// The identity of a CPU, as in its system status lists. A client learns order number, firmware, name, plant and serial
+/// number.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Identity {
     /// Order number of the module, at most 20 characters.
@@ -13,10 +14,16 @@ pub struct Identity {
     pub firmware: [u8; 3],
     /// Name of the module, at most 24 characters.
     pub name: String,
+    /// Name of the automation system, at most 24 characters.
+    pub system: String,
     /// Identification of the plant, at most 32 characters.
     pub plant: String,
     /// Serial number of the module, at most 24 characters.
     pub serial: String,
+    /// Type of the module, at most 32 characters.
+    pub module: String,
+    /// Copyright notice, at most 26 characters.
+    pub copyright: String,
 }
 
 impl Identity {
@@ -31,6 +38,9 @@ impl Identity {
                 number(env!("CARGO_PKG_VERSION_PATCH")),
             ],
             name: cut(name, NAME).to_owned(),
+            system: cut(name, NAME).to_owned(),
+            module: "tickbus, a simulated machine".to_owned(),
+            copyright: "MIT OR Apache-2.0".to_owned(),
             ..Self::default()
         }
     }
@@ -68,9 +78,9 @@ impl Facts {
 }
 
 /// Lengths of texts in the lists.
-const ORDER: usize = 20;
-const NAME: usize = 24;
-const LONG_NAME: usize = 32;
+pub(crate) const ORDER: usize = 20;
+pub(crate) const NAME: usize = 24;
+pub(crate) const LONG_NAME: usize = 32;
 
 /// Length of a record of list 0x001C: an index, and a field of 32 bytes.
 const COMPONENT: usize = 2 + LONG_NAME;
@@ -155,12 +165,12 @@ fn components(identity: &Identity) -> Vec<Vec<u8>> {
         record
     };
     [
-        (1, identity.name.as_str(), NAME),
+        (1, identity.system.as_str(), NAME),
         (2, &identity.name, NAME),
         (3, &identity.plant, LONG_NAME),
-        (4, "MIT OR Apache-2.0", 26),
+        (4, &identity.copyright, 26),
         (5, &identity.serial, NAME),
-        (7, "tickbus, a simulated machine", LONG_NAME),
+        (7, &identity.module, LONG_NAME),
     ]
     .map(record)
     .to_vec()
@@ -405,6 +415,7 @@ mod tests {
             name: "PLC_1".to_owned(),
             plant: "Hall 7".to_owned(),
             serial: "S C-X4U421302009".to_owned(),
+            ..Identity::default()
         };
         let facts = Facts {
             identity: told.clone(),

@@ -28,6 +28,11 @@ pub struct Variable {
 }
 
 impl Variable {
+    /// The remedy where an address is expected.
+    pub(super) const RIGHT: &str = "write it as TIA Portal does, such as \"%DB10.DBX0.3\", \"%DB10.DBW2\", \"%MD20\" \
+        or \"%I0.0\", with a type behind it if you like, \"%DB10.DBD4:REAL\"; \"DB10,REAL4\" and, for a LOGO!, \
+        \"VW20\" will do, too";
+
     /// Checks that `signal` can have this place.
     ///
     /// # Errors

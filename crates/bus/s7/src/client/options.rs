@@ -81,15 +81,12 @@ impl ClientOptions {
 
     /// Takes the lines of `[fieldbus.at]`.
     pub fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
-        const RIGHT: &str = "write it as TIA Portal does, such as \"%DB10.DBX0.3\", \"%DB10.DBW2\", \"%MD20\" or \
-            \"%I0.0\", with a type behind it if you like, \"%DB10.DBD4:REAL\"; \"DB10,REAL4\" and, for a LOGO!, \
-            \"VW20\" will do, too";
         for line in lines {
             let signal = &table.signals[line.signal];
             let variable: Variable = match line.text.parse() {
                 Ok(variable) => variable,
                 Err(what) => {
-                    line.wrong(what, RIGHT);
+                    line.wrong(what, Variable::RIGHT);
                     continue;
                 }
             };

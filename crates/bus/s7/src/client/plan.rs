@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use crate::bits::carry;
 use crate::item::{self, Item, Object};
 use crate::pdu;
 
@@ -73,17 +74,6 @@ impl Piece {
         for run in &self.runs {
             carry(data, run.data, frame, run.frame, run.bits);
         }
-    }
-}
-
-fn carry(from: &[u8], at: usize, to: &mut [u8], into: usize, bits: usize) {
-    if bits == 1 {
-        let bit = from[at / 8] >> (at % 8) & 1;
-        let byte = &mut to[into / 8];
-        *byte = *byte & !(1 << (into % 8)) | bit << (into % 8);
-    } else {
-        let (at, into, count) = (at / 8, into / 8, bits / 8);
-        to[into..into + count].copy_from_slice(&from[at..at + count]);
     }
 }
 

@@ -3,6 +3,7 @@
 use tickbus_image::signal::{Area, SignalTable};
 
 use super::ServerOptions;
+use super::layout::PlacedObject;
 use crate::Tsap;
 use crate::item::{Object, ReturnCode};
 
@@ -15,12 +16,27 @@ pub(super) struct AreaRange {
     pub(super) length: usize,
 }
 
+/// The place of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Place {
+    /// A range of a station's area.
+    Area(AreaRange),
+    /// Memory of its own: the position in the list of [placed objects](super::layout::objects).
+    Object(usize),
+    /// The scratch memory that the flags of all other stations are.
+    Scratch,
+}
+
 /// The places of a server's objects.
 #[derive(Debug)]
 pub(super) struct Map {
-    /// The data blocks in order of their numbers, and their lengths for clients that ask.
+    /// The data blocks that are parts of images, in order of their numbers.
     blocks: Vec<(u16, AreaRange)>,
-    lengths: Vec<(u16, usize)>,
+    /// The objects of placed stations, in the order of the list.
+    objects: Vec<(Option<usize>, Object)>,
+    /// The data blocks of each station and their lengths, for clients that ask; last those for a client that connects to
+    /// no station.
+    lengths: Vec<Vec<(u16, usize)>>,
     stations: Vec<Cpu>,
 }
 
@@ -31,11 +47,17 @@ struct Cpu {
     outputs: usize,
     /// The rack and slot.
     slot: Option<(u8, u8)>,
+    /// True if `[fieldbus.at]` places its signals.
+    is_placed: bool,
 }
 
 impl Map {
-    /// The map for `options`, which must [fit](ServerOptions::fit) the table.
-    pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
+    /// The map for `options`, which must [fit](ServerOptions::fit) the table, with the objects of its placed stations.
+    pub(super) fn new(
+        options: &ServerOptions,
+        table: &SignalTable,
+        objects: &[PlacedObject],
+    ) -> Self {
         let stations = table
             .stations
             .iter()
@@ -44,6 +66,7 @@ impl Map {
                 inputs: station.input_bytes,
                 outputs: station.output_bytes,
                 slot: options.slots.get(index).copied().flatten(),
+                is_placed: options.is_placed(table, index),
             });
         let blocks = options.blocks.iter().filter_map(|block| {
             let station = block.station_in(table)?;
@@ -58,9 +81,32 @@ impl Map {
         });
         let mut blocks: Vec<_> = blocks.collect();
         blocks.sort_by_key(|(number, _)| *number);
-        let lengths = blocks.iter().map(|(number, place)| (*number, place.length));
+        let lengths = |station: Option<usize>| {
+            let found = objects
+                .iter()
+                .filter(|placed| placed.cpu.is_none() || placed.cpu == station);
+            let found = found.filter_map(|placed| match placed.object {
+                // The CPU's own hides a common one.
+                Object::Block(number) => Some((number, placed.cpu.is_none(), placed.bytes.len())),
+                _ => None,
+            });
+            let images = blocks
+                .iter()
+                .map(|(number, place)| (*number, true, place.length));
+            let mut all: Vec<_> = found.chain(images).collect();
+            all.sort_unstable();
+            all.dedup_by_key(|(number, ..)| *number);
+            all.iter()
+                .map(|(number, _, length)| (*number, *length))
+                .collect()
+        };
+        let clients = (0..table.stations.len()).map(Some).chain([None]);
         Self {
-            lengths: lengths.collect(),
+            lengths: clients.map(lengths).collect(),
+            objects: objects
+                .iter()
+                .map(|placed| (placed.cpu, placed.object))
+                .collect(),
             blocks,
             stations: stations.collect(),
         }
@@ -82,15 +128,24 @@ impl Map {
         &self,
         object: Object,
         station: Option<usize>,
-    ) -> Result<AreaRange, ReturnCode> {
+    ) -> Result<Place, ReturnCode> {
+        // The image of a station that is not placed hides what others have in common.
+        let has_image = station.is_some_and(|station| !self.stations[station].is_placed)
+            && matches!(object, Object::Inputs | Object::Outputs);
+        let common = (!has_image).then_some(None);
+        for cpu in [Some(station), common].into_iter().flatten() {
+            if let Ok(at) = self.objects.binary_search(&(cpu, object)) {
+                return Ok(Place::Object(at));
+            }
+        }
         let area = match object {
             Object::Inputs => Area::Input,
             Object::Outputs => Area::Output,
-            Object::Flags => return Err(ReturnCode::MISSING),
+            Object::Flags => return Ok(Place::Scratch),
             Object::Block(number) => {
                 let found = self.blocks.binary_search_by_key(&number, |block| block.0);
                 return found
-                    .map(|index| self.blocks[index].1)
+                    .map(|index| Place::Area(self.blocks[index].1))
                     .map_err(|_| ReturnCode::MISSING);
             }
         };
@@ -98,7 +153,7 @@ impl Map {
         let Cpu {
             inputs, outputs, ..
         } = self.stations[station];
-        Ok(AreaRange {
+        Ok(Place::Area(AreaRange {
             station,
             area,
             offset: 0,
@@ -106,10 +161,12 @@ impl Map {
                 Area::Input => inputs,
                 Area::Output => outputs,
             },
-        })
+        }))
     }
 
-    pub(super) fn blocks(&self) -> &[(u16, usize)] {
-        &self.lengths
+    /// The data blocks and their lengths, for a client connected to `station`.
+    pub(super) fn blocks(&self, station: Option<usize>) -> &[(u16, usize)] {
+        let other = self.lengths.len() - 1;
+        &self.lengths[station.unwrap_or(other)]
     }
 }

@@ -1,5 +1,7 @@
 //! The bus of kind `s7-server`: acts as a CPU whose memory clients read and write.
 
+mod at;
+mod layout;
 mod map;
 mod options;
 
@@ -15,14 +17,19 @@ use tickbus_net::Address;
 
 use super::item::{Object, ReturnCode};
 use super::pdu::function;
-use super::szl::{Facts, Identity};
+use super::place::LAST;
+use super::szl::Facts;
 use super::{Memory, ProtocolError, ServerSession, transport};
 
-use map::{AreaRange, Map};
+use layout::{Part, PlacedObject};
+use map::{AreaRange, Map, Place};
 pub use options::{Block, ServerOptions};
 
 /// How long a client may take to complete a packet, or to read an answer.
 const PATIENCE: Nanos = Nanos::from_secs(5);
+
+/// The bits of the largest object.
+const OBJECT_BITS: usize = (LAST + 1) * 8;
 
 /// The bus of kind `s7-server`.
 #[derive(Debug)]
@@ -36,6 +43,16 @@ impl S7Server {
     pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
         let (table, role) = (setup.table, setup.role);
         let (sends, receives) = role.areas();
+        let mut objects = layout::objects(options, table);
+        for placed in &mut objects {
+            let PlacedObject { bytes, .. } = placed;
+            let mut bytes = std::mem::take(bytes);
+            for part in placed.parts() {
+                let frame = fail_safe_frame(table, part.station, part.area);
+                part.gather(&frame, &mut bytes);
+            }
+            placed.bytes = bytes;
+        }
         let stations = (0..table.stations.len()).map(|station| StationMemory {
             written: fail_safe_frame(table, station, receives),
             outgoing: fail_safe_frame(table, station, sends),
@@ -46,19 +63,20 @@ impl S7Server {
             has_writer: false,
             writers: Writers::new(options.is_single_writer),
         });
-        let facts = Facts {
-            identity: Identity::of_driver(setup.name),
+        let facts = (0..table.stations.len()).map(|station| Facts {
+            identity: options.identity(station, setup.name),
             pdu: options.pdu,
             clients: u16::try_from(options.clients).unwrap_or(u16::MAX),
             epoch: Facts::NEVER_SET,
-        };
+        });
         Self {
             address: options.address.clone(),
             service: Service {
-                facts,
+                facts: facts.collect(),
                 clients: options.clients,
                 memory: Shared {
-                    map: Map::new(options, table),
+                    map: Map::new(options, table, &objects),
+                    objects: objects.into(),
                     role,
                     stations: stations.collect(),
                     flags: vec![0; options.flags].into(),
@@ -74,7 +92,9 @@ impl S7Server {
 impl Free for S7Server {
     fn run(&mut self, port: &mut Port, stop: &Stop) -> Result<(), BusError> {
         if let Some(epoch) = port.clock().epoch() {
-            self.service.facts.epoch = epoch;
+            for facts in &mut self.service.facts {
+                facts.epoch = epoch;
+            }
         }
         port.carried_by(Medium::Tcp);
         tcp::serve(&self.address, &mut self.service, port, stop)
@@ -84,7 +104,8 @@ impl Free for S7Server {
 /// The protocol, over the image.
 #[derive(Debug)]
 struct Service {
-    facts: Facts,
+    /// By station.
+    facts: Box<[Facts]>,
     clients: usize,
     memory: Shared,
     /// The number of clients so far.
@@ -95,6 +116,7 @@ struct Service {
 #[derive(Debug)]
 struct Shared {
     map: Map,
+    objects: Box<[PlacedObject]>,
     role: Role,
     stations: Box<[StationMemory]>,
     flags: Box<[u8]>,
@@ -169,19 +191,22 @@ impl tcp::Service for Service {
         let begin = reply.len();
         // A fault that begins meanwhile meets all jobs of the packet or none.
         port.together(|port| {
+            let station = self.memory.map.station_of(client.conversation.called());
+            let facts = &self.facts[station.unwrap_or_default()];
             let mut jobs = Jobs {
-                station: self.memory.map.station_of(client.conversation.called()),
+                station,
                 shared: &mut self.memory,
                 renewals: &mut client.renewals,
                 writer: &client.writer,
                 receipts: &mut client.receipts,
                 port,
                 now,
+                refusals: Vec::new(),
                 lost: false,
             };
             let taken = client
                 .conversation
-                .packet(now, bytes, &self.facts, &mut jobs, reply)
+                .packet(now, bytes, facts, &mut jobs, reply)
                 .map_err(ProtocolError::into_error)?;
             if jobs.lost {
                 reply.truncate(begin);
@@ -239,61 +264,143 @@ struct Jobs<'a> {
     receipts: &'a mut Vec<Receipt>,
     port: &'a mut Port,
     now: Nanos,
+    /// The stations that the job has addressed so far, and the code with which a fault refuses it.
+    refusals: Vec<(usize, Option<u8>)>,
     /// The answer is lost.
     lost: bool,
 }
 
 impl Jobs<'_> {
-    fn place(
-        &mut self,
-        object: Object,
-        range: &Range<usize>,
-        function: u8,
-    ) -> Result<(AreaRange, Range<usize>), ReturnCode> {
-        let place = self.shared.map.place(object, self.station)?;
-        if let Some(code) = self.port.answer(place.station, function, self.now)
-            && self.port.is_station_up(place.station, self.now)
-        {
+    /// The job addresses something of a station.
+    fn address(&mut self, station: usize, function: u8) -> Result<(), ReturnCode> {
+        // A fault with a chance meets the whole job or nothing of it.
+        let known = self.refusals.iter().find(|(of, _)| *of == station);
+        let known = known.map(|(_, code)| *code);
+        let code = known.unwrap_or_else(|| {
+            let code = self.port.answer(station, function, self.now);
+            let code = code.filter(|_| self.port.is_station_up(station, self.now));
+            self.refusals.push((station, code));
+            code
+        });
+        if let Some(code) = code {
             return Err(ReturnCode(code));
         }
+        self.shared.stations[station].addressed = true;
+        Ok(())
+    }
+
+    /// The place of an object that is a range of a station's area, and the bytes in that area.
+    fn in_area(
+        &mut self,
+        place: AreaRange,
+        range: &Range<usize>,
+        function: u8,
+    ) -> Result<Range<usize>, ReturnCode> {
         if range.end > place.length {
             return Err(ReturnCode::ADDRESS);
         }
-        self.shared.stations[place.station].addressed = true;
+        self.address(place.station, function)?;
         let begin = place.offset + range.start;
-        Ok((place, begin..begin + range.len()))
+        Ok(begin..begin + range.len())
     }
 
-    /// The bytes that a job writes; only `bits` of them change.
+    /// The parts of a placed object within `bits`; they count as addressed.
+    fn parts(
+        &mut self,
+        at: usize,
+        bits: &Range<usize>,
+        function: u8,
+    ) -> Result<Vec<Part>, ReturnCode> {
+        let placed = &self.shared.objects[at];
+        if bits.end > placed.bytes.len() * 8 {
+            return Err(ReturnCode::ADDRESS);
+        }
+        let found = placed.find(bits);
+        let parts: Vec<Part> = found.filter_map(|at| placed.part(at, bits)).collect();
+        if parts.is_empty() {
+            self.address(placed.owner, function)?;
+        }
+        for part in &parts {
+            self.address(part.station, function)?;
+        }
+        Ok(parts)
+    }
+
+    /// A job writes bits of an object: `put` changes the bytes that have them.
     fn change(
         &mut self,
         object: Object,
         range: Range<usize>,
         bits: Range<usize>,
-    ) -> Result<&mut [u8], ReturnCode> {
-        if object == Object::Flags {
-            return self.shared.flags.get_mut(range).ok_or(ReturnCode::ADDRESS);
-        }
-        let (place, range) = self.place(object, &range, function::WRITE)?;
+        put: impl FnOnce(&mut [u8]),
+    ) -> Result<(), ReturnCode> {
         let (sends, _) = self.shared.role.areas();
-        if place.area == sends {
-            return Err(ReturnCode::ACCESS);
+        match self.shared.map.place(object, self.station)? {
+            Place::Scratch => {
+                let flags = self.shared.flags.get_mut(range);
+                put(flags.ok_or(ReturnCode::ADDRESS)?);
+            }
+            Place::Area(place) => {
+                let range = self.in_area(place, &range, function::WRITE)?;
+                if place.area == sends {
+                    return Err(ReturnCode::ACCESS);
+                }
+                self.check_up(place.station)?;
+                let first = range.start * 8;
+                let changed = first + bits.start..first + bits.end;
+                self.check_writer(place.station, changed.clone())?;
+                let station = &mut self.shared.stations[place.station];
+                station.changed.push(changed);
+                put(&mut station.written[range]);
+            }
+            Place::Object(at) => {
+                let first = range.start * 8;
+                let bits = first + bits.start..first + bits.end;
+                let parts = self.parts(at, &bits, function::WRITE)?;
+                if parts.iter().any(|part| part.area == sends) {
+                    return Err(ReturnCode::ACCESS);
+                }
+                let owner = self.shared.objects[at].owner;
+                if parts.is_empty() {
+                    self.check_up(owner)?;
+                }
+                // Two signals can have the same bits of the object, and not of a frame.
+                let base = at * OBJECT_BITS;
+                for part in &parts {
+                    self.check_up(part.station)?;
+                    let bits = part.bits();
+                    self.check_writer(part.station, base + bits.start..base + bits.end)?;
+                }
+                let bytes = &mut self.shared.objects[at].bytes;
+                put(&mut bytes[range]);
+                for part in &parts {
+                    let station = &mut self.shared.stations[part.station];
+                    part.scatter(bytes, &mut station.written);
+                    station.changed.push(part.frame());
+                }
+            }
         }
-        // A station that is cut off hears and answers nothing, as if its client were silent.
-        if !self.port.is_station_up(place.station, self.now) {
-            self.lost = true;
-            self.renewals[place.station].lost(self.now, self.port.max_age());
-            return Err(ReturnCode::ACCESS);
+        Ok(())
+    }
+
+    /// A station that is cut off hears and answers nothing, as if its client were silent.
+    fn check_up(&mut self, station: usize) -> Result<(), ReturnCode> {
+        if self.port.is_station_up(station, self.now) {
+            return Ok(());
         }
-        let station = &mut self.shared.stations[place.station];
-        let first = range.start * 8;
-        let changed = first + bits.start..first + bits.end;
+        self.lost = true;
+        self.renewals[station].lost(self.now, self.port.max_age());
+        Err(ReturnCode::ACCESS)
+    }
+
+    /// Refuses a second writer of these bits, which have numbers of their own in the station.
+    fn check_writer(&mut self, station: usize, bits: Range<usize>) -> Result<(), ReturnCode> {
         let found = (&*self.port, "s7.second_writer");
-        if !(station.writers).may_write(self.writer, changed.clone(), self.now, found) {
-            return Err(ReturnCode::ACCESS);
+        let writers = &mut self.shared.stations[station].writers;
+        if writers.may_write(self.writer, bits, self.now, found) {
+            return Ok(());
         }
-        station.changed.push(changed);
-        Ok(&mut station.written[range])
+        Err(ReturnCode::ACCESS)
     }
 
     /// The bytes that a job reads; only `bits` of them are sent.
@@ -303,35 +410,48 @@ impl Jobs<'_> {
         range: Range<usize>,
         bits: Range<usize>,
     ) -> Result<&[u8], ReturnCode> {
-        if object == Object::Flags {
-            return self.shared.flags.get(range).ok_or(ReturnCode::ADDRESS);
-        }
-        let (place, range) = self.place(object, &range, function::READ)?;
         let (sends, _) = self.shared.role.areas();
-        let station = &mut self.shared.stations[place.station];
-        if place.area != sends {
-            return Ok(&station.written[range]);
+        match self.shared.map.place(object, self.station)? {
+            Place::Scratch => self.shared.flags.get(range).ok_or(ReturnCode::ADDRESS),
+            Place::Area(place) => {
+                let range = self.in_area(place, &range, function::READ)?;
+                if place.area != sends {
+                    return Ok(&self.shared.stations[place.station].written[range]);
+                }
+                let first = range.start * 8;
+                self.send(place.station, first + bits.start..first + bits.end);
+                Ok(&self.shared.stations[place.station].outgoing[range])
+            }
+            Place::Object(at) => {
+                let first = range.start * 8;
+                let bits = first + bits.start..first + bits.end;
+                for part in self.parts(at, &bits, function::READ)? {
+                    if part.area == sends {
+                        self.send(part.station, part.frame());
+                        let frame = &self.shared.stations[part.station].outgoing;
+                        part.gather(frame, &mut self.shared.objects[at].bytes);
+                    }
+                }
+                Ok(&self.shared.objects[at].bytes[range])
+            }
         }
-        if !station.is_taken {
-            station.is_taken = true;
-            let only = place.station..place.station + 1;
-            let frames = self.port.take(only, self.now);
-            station.receipt = frames.map(|mut frames| {
-                station
-                    .outgoing
-                    .copy_from_slice(frames.frame(place.station));
+    }
+
+    /// The answer carries these bits of a station's outgoing frame.
+    fn send(&mut self, station: usize, bits: Range<usize>) {
+        let memory = &mut self.shared.stations[station];
+        if !memory.is_taken {
+            memory.is_taken = true;
+            let frames = self.port.take(station..station + 1, self.now);
+            memory.receipt = frames.map(|mut frames| {
+                memory.outgoing.copy_from_slice(frames.frame(station));
                 frames.receipt()
             });
         }
-        match &station.receipt {
+        match &memory.receipt {
             None => self.lost = true,
-            Some(receipt) => {
-                let first = range.start * 8;
-                let bits = first + bits.start..first + bits.end;
-                self.receipts.push(receipt.bits(place.station, bits));
-            }
+            Some(receipt) => self.receipts.push(receipt.bits(station, bits)),
         }
-        Ok(&station.outgoing[range])
     }
 }
 
@@ -347,15 +467,23 @@ impl Memory for Jobs<'_> {
         Ok(bytes[0])
     }
 
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode> {
-        let bits = 0..range.len() * 8;
-        self.change(object, range, bits)
+    fn write(&mut self, object: Object, first: usize, values: &[u8]) -> Result<(), ReturnCode> {
+        let bits = 0..values.len() * 8;
+        let range = first..first + values.len();
+        self.change(object, range, bits, |bytes| bytes.copy_from_slice(values))
     }
 
-    fn write_bit(&mut self, object: Object, byte: usize, bit: u8) -> Result<&mut u8, ReturnCode> {
-        let bit = usize::from(bit);
-        let bytes = self.change(object, byte..byte + 1, bit..bit + 1)?;
-        Ok(&mut bytes[0])
+    fn write_bit(
+        &mut self,
+        object: Object,
+        byte: usize,
+        bit: u8,
+        on: bool,
+    ) -> Result<(), ReturnCode> {
+        let bits = usize::from(bit)..usize::from(bit) + 1;
+        self.change(object, byte..byte + 1, bits, |bytes| {
+            bytes[0] = bytes[0] & !(1 << bit) | u8::from(on) << bit;
+        })
     }
 
     fn done(&mut self) {
@@ -387,6 +515,6 @@ impl Memory for Jobs<'_> {
     }
 
     fn blocks(&self) -> &[(u16, usize)] {
-        self.shared.map.blocks()
+        self.shared.map.blocks(self.station)
     }
 }

@@ -1,9 +1,15 @@
 //! The options of the bus `s7-server` in a driver.cfg.
 
+use std::collections::BTreeMap;
+
+use crate::Variable;
+use crate::identity::{StatedIdentity, read_identity};
 use crate::length::{LONGEST, read_length};
+use crate::szl::Identity;
 use crate::tsap::{RACK, SLOT};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Table, Value, did_you_mean, shown};
+use tickbus_fieldbus::Role;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_image::signal::{AREA_LIMIT, Area, SignalTable};
 use tickbus_net::Address;
@@ -22,10 +28,16 @@ const CLIENTS: usize = 64;
 pub struct ServerOptions {
     /// Where to listen.
     pub address: Address,
-    /// The data blocks.
+    /// The data blocks that are parts of images.
     pub blocks: Vec<Block>,
+    /// The stated lengths of data blocks that have the signals of `[fieldbus.at]`.
+    pub(super) lengths: Vec<BlockLength>,
+    /// The places of single signals, by name: the lines of `[fieldbus.at]`.
+    pub variables: BTreeMap<String, Variable>,
     /// The number of bytes of flags.
     pub flags: usize,
+    /// True if the driver.cfg states that number.
+    pub(super) are_flags_stated: bool,
     /// The longest PDU that is agreed to.
     pub pdu: u16,
     /// The most clients at the same time.
@@ -34,6 +46,12 @@ pub struct ServerOptions {
     pub is_single_writer: bool,
     /// Rack and slot of each station; empty if there are no `[[station]]` tables.
     pub slots: Vec<Option<(u8, u8)>>,
+    /// The identity in `[fieldbus]`, and those of the `[[station]]` tables.
+    pub(super) identity: StatedIdentity,
+    pub(super) identities: Vec<Option<StatedIdentity>>,
+    pub(super) role: Role,
+    /// The offset of the `[fieldbus]` table in the text, for mistakes.
+    pub(super) at: usize,
 }
 
 /// A data block: a range of an area of a station.
@@ -50,7 +68,41 @@ pub struct Block {
     /// The number of bytes; `None` to the end of the area.
     pub length: Option<usize>,
     /// The offset in the text, for mistakes.
-    at: usize,
+    pub(super) at: usize,
+}
+
+/// The stated length of a data block that has signals of `[fieldbus.at]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct BlockLength {
+    pub(super) number: u16,
+    /// The name of the station that is the CPU with the block.
+    pub(super) station: Option<String>,
+    /// The number of bytes.
+    pub(super) length: usize,
+    /// The offset in the text, for mistakes.
+    pub(super) at: usize,
+}
+
+/// An entry of `db`.
+enum Entry {
+    Block(Block),
+    Length(BlockLength),
+}
+
+impl Entry {
+    fn number(&self) -> u16 {
+        match self {
+            Self::Block(block) => block.number,
+            Self::Length(length) => length.number,
+        }
+    }
+
+    fn station(&self) -> Option<&str> {
+        match self {
+            Self::Block(block) => block.station.as_deref(),
+            Self::Length(length) => length.station.as_deref(),
+        }
+    }
 }
 
 impl Block {
@@ -78,17 +130,20 @@ impl ServerOptions {
         Ok(())
     }
 
-    /// Reads `address`, `db`, `m_bytes`, `pdu`, `clients` and `writers`.
-    pub fn read(table: &mut Table<'_>) -> Option<Self> {
+    /// Reads `address`, `db`, `m_bytes`, `pdu`, `clients`, `identity` and `writers`.
+    pub fn read(role: Role, table: &mut Table<'_>) -> Option<Self> {
+        let at = table.at();
         let address = table.take("address");
         let blocks = table.take("db");
         let flags = table.take("m_bytes");
         let unit = table.take("pdu");
         let clients = table.take("clients");
+        let identity = table.take("identity");
         let is_single_writer = Writers::read(table);
 
         let address = address.as_ref().map_or(Some(ADDRESS), Address::read);
-        let blocks = blocks.as_ref().map_or(Some(Vec::new()), read_blocks);
+        let entries = blocks.as_ref().map_or(Some(Vec::new()), read_blocks);
+        let are_flags_stated = flags.is_some();
         let flags = flags
             .as_ref()
             .map_or(Some(FLAGS), |value| size(value, 0..=65_536));
@@ -96,20 +151,39 @@ impl ServerOptions {
         let clients = clients
             .as_ref()
             .map_or(Some(CLIENTS), |value| size(value, 1..=1_000));
+        let identity = identity.as_ref();
+        let identity = identity.map_or(Some(StatedIdentity::default()), read_identity);
+        let (mut blocks, mut lengths) = (Vec::new(), Vec::new());
+        for entry in entries? {
+            match entry {
+                Entry::Block(block) => blocks.push(block),
+                Entry::Length(length) => lengths.push(length),
+            }
+        }
         Some(Self {
             address: address?,
-            blocks: blocks?,
+            blocks,
+            lengths,
+            variables: BTreeMap::new(),
             flags: flags?,
+            are_flags_stated,
             pdu: unit?,
             clients: clients?,
             is_single_writer: is_single_writer?,
             slots: Vec::new(),
+            identity: identity?,
+            identities: Vec::new(),
+            role,
+            at,
         })
     }
 
-    /// Reads `slot` and `rack` of the next of `count` `[[station]]` tables.
+    /// Reads `slot`, `rack` and `identity` of the next of `count` `[[station]]` tables.
     pub fn read_station(&mut self, count: usize, table: &mut Table<'_>) {
         let (rack, slot) = (table.take("rack"), table.take("slot"));
+        let identity = table.take("identity");
+        self.identities
+            .push(identity.as_ref().and_then(read_identity));
         if let (Some(rack), None) = (&rack, &slot) {
             rack.wrong(
                 "\"rack\" stands without \"slot\"",
@@ -177,13 +251,20 @@ impl ServerOptions {
                 );
             }
         }
+        self.fit_places(table, collector);
+    }
+
+    /// The identity of a station in a driver with this name.
+    pub(super) fn identity(&self, station: usize, driver: &str) -> Identity {
+        let own = self.identities.get(station).and_then(Option::as_ref);
+        own.unwrap_or(&self.identity).complete(driver)
     }
 }
 
-fn read_blocks(value: &Value<'_>) -> Option<Vec<Block>> {
+fn read_blocks(value: &Value<'_>) -> Option<Vec<Entry>> {
     const SHAPE: &str = "write a list of tables, such as db = [{ number = 1, area = \"%Q\" }]";
     let list = value.list(SHAPE)?;
-    let mut blocks: Vec<Block> = Vec::new();
+    let mut blocks: Vec<Entry> = Vec::new();
     let mut right = true;
     for element in &list {
         let Some(block) = element
@@ -193,9 +274,15 @@ fn read_blocks(value: &Value<'_>) -> Option<Vec<Block>> {
             right = false;
             continue;
         };
-        if blocks.iter().any(|other| other.number == block.number) {
+        // Two CPUs can have a block of the same number each.
+        let is_same = |other: &Entry| {
+            let both = [other, &block].map(|entry| matches!(entry, Entry::Length(_)));
+            other.number() == block.number()
+                && (both != [true; 2] || other.station() == block.station())
+        };
+        if blocks.iter().any(is_same) {
             element.wrong(
-                format!("data block {} is there twice", block.number),
+                format!("data block {} is there twice", block.number()),
                 "give each data block a number of its own",
             );
             right = false;
@@ -205,24 +292,35 @@ fn read_blocks(value: &Value<'_>) -> Option<Vec<Block>> {
     right.then_some(blocks)
 }
 
-fn read_block(mut table: Table<'_>) -> Option<Block> {
+fn read_block(mut table: Table<'_>) -> Option<Entry> {
     let at = table.at();
     let number = table.require(
         "number",
         "write the number of the data block, such as number = 1",
     );
-    let area = table.require(
-        "area",
-        "write the area whose bytes it has: area = \"%Q\" or \"%I\"",
-    );
+    let length = table.take("length");
+    // A length alone is that of a block with the signals of [fieldbus.at].
+    let area = match &length {
+        Some(_) => table.take("area"),
+        None => table.require(
+            "area",
+            "write the area whose bytes it has: area = \"%Q\" or \"%I\"",
+        ),
+    };
     let station = table.take("station");
     let offset = table.take("offset");
-    let length = table.take("length");
     table.finish();
 
     let number = number.and_then(|value| value.whole(1..=65_535));
+    let is_length = area.is_none() && length.is_some();
     let area =
         area.and_then(|value| value.choice("areas", &[("%I", Area::Input), ("%Q", Area::Output)]));
+    if let (true, Some(offset)) = (is_length, &offset) {
+        offset.wrong(
+            "\"offset\" stands without \"area\"",
+            "add the area whose bytes the block has, or remove \"offset\"",
+        );
+    }
     let most = i128::try_from(AREA_LIMIT).unwrap_or(i128::MAX);
     let station = station.map(|value| {
         let name = value.text("write the name of a [[station]]");
@@ -230,20 +328,31 @@ fn read_block(mut table: Table<'_>) -> Option<Block> {
     });
     let offset = offset.map_or(Some(0), |value| size(&value, 0..=most));
     let length = length.map(|value| size(&value, 1..=most));
-    Some(Block {
-        number: u16::try_from(number?).ok()?,
+    let number = u16::try_from(number?).ok()?;
+    let station = match station {
+        None => None,
+        Some(station) => Some(station?),
+    };
+    let length = match length {
+        None => None,
+        Some(length) => Some(length?),
+    };
+    if let (true, Some(length)) = (is_length, length) {
+        return Some(Entry::Length(BlockLength {
+            number,
+            station,
+            length,
+            at,
+        }));
+    }
+    Some(Entry::Block(Block {
+        number,
         area: area?,
-        station: match station {
-            None => None,
-            Some(station) => Some(station?),
-        },
+        station,
         offset: offset?,
-        length: match length {
-            None => None,
-            Some(length) => Some(length?),
-        },
+        length,
         at,
-    })
+    }))
 }
 
 fn size(value: &Value<'_>, range: std::ops::RangeInclusive<i128>) -> Option<usize> {

@@ -21,18 +21,28 @@ impl Memory for Bytes {
         all.get(range).ok_or(ReturnCode::ADDRESS)
     }
 
-    fn write(&mut self, object: Object, range: Range<usize>) -> Result<&mut [u8], ReturnCode> {
-        match object {
-            Object::Outputs | Object::Block(1) => {
-                self.outputs.get_mut(range).ok_or(ReturnCode::ADDRESS)
-            }
-            Object::Inputs => Err(ReturnCode::ACCESS),
-            _ => Err(ReturnCode::MISSING),
-        }
+    fn write(&mut self, object: Object, first: usize, values: &[u8]) -> Result<(), ReturnCode> {
+        let outputs = match object {
+            Object::Outputs | Object::Block(1) => &mut self.outputs,
+            Object::Inputs => return Err(ReturnCode::ACCESS),
+            _ => return Err(ReturnCode::MISSING),
+        };
+        let outputs = outputs.get_mut(first..first + values.len());
+        outputs.ok_or(ReturnCode::ADDRESS)?.copy_from_slice(values);
+        Ok(())
     }
 
-    fn write_bit(&mut self, object: Object, byte: usize, _bit: u8) -> Result<&mut u8, ReturnCode> {
-        Ok(&mut self.write(object, byte..byte + 1)?[0])
+    fn write_bit(
+        &mut self,
+        object: Object,
+        byte: usize,
+        bit: u8,
+        on: bool,
+    ) -> Result<(), ReturnCode> {
+        let before = self.outputs.get(byte).copied();
+        let before = before.ok_or(ReturnCode::ADDRESS)?;
+        let value = before & !(1 << bit) | u8::from(on) << bit;
+        self.write(object, byte, &[value])
     }
 
     fn done(&mut self) {

@@ -7,6 +7,7 @@
 )]
 
 mod ends;
+mod places;
 mod state;
 
 use std::net::{Ipv4Addr, SocketAddr};

@@ -21,6 +21,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         python_snap7_reads_writes_and_asks_the_server,
     ),
     (
+        "python_snap7_finds_places_and_names",
+        python_snap7_finds_places_and_names,
+    ),
+    (
         "our_client_reads_and_writes_a_server_of_python_snap7",
         our_client_reads_and_writes_a_server_of_python_snap7,
     ),
@@ -89,6 +93,34 @@ fn python_snap7_reads_writes_and_asks_the_server() -> Result<(), Absent> {
         (end.get("run"), end.get("speed"), end.get("torque")),
         (1.0, 1234.0, 2.5)
     );
+    Ok(())
+}
+
+/// A CPU whose program has its variables in blocks of its own, with the names that a real one reports.
+const PLACES: &str = "kind = \"s7-server\"\naddress = \"127.0.0.1:0\"\nmax_age = \"1h\"\n\
+    db = [{ number = 10, length = 100 }]\n\
+    [fieldbus.identity]\norder = \"6ES7 315-2EH14-0AB0\"\nfirmware = \"V3.2.6\"\nname = \"PLC_1\"\n\
+    system = \"S7-300 station_1\"\nmodule = \"CPU 315-2 PN/DP\"\nserial = \"S C-X4U421302009\"\n\
+    copyright = \"Original Siemens Equipment\"\n\
+    [fieldbus.at]\nrun = \"DB500.DBX0.7\"\nspeed = \"DB10.DBW20\"\ntorque = \"%QD8:REAL\"\n\
+    sensor = \"%M100.3\"\nposition = \"DB10,INT4\"\npressure = \"DB65535.DBD1000\"\n";
+
+fn python_snap7_finds_places_and_names() -> Result<(), Absent> {
+    for _ in 0..2 {
+        let python = harness::python_with("main", &["snap7"])?;
+        let mut end = open(PLACES);
+        end.set("sensor", 1.0);
+        end.set("position", -2.0);
+        end.set("pressure", 1.5);
+        let port = end.address().port().to_string();
+        let told = run(&mut end, python, "snap7_places.py", &[port]);
+        assert!(told.contains("snap7_places: ok\n"), "{told}");
+        end.tick();
+        assert_eq!(
+            (end.get("run"), end.get("speed"), end.get("torque")),
+            (1.0, 1234.0, 2.5)
+        );
+    }
     Ok(())
 }
 

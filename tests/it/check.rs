@@ -241,6 +241,7 @@ fn the_faults_of_the_documentation_are_right() {
         table: &rig.table,
         has_diagnosis: true,
         has_answers: true,
+        codes: tickbus::faults::AnswerCodes::BYTE,
     };
     for block in blocks {
         let faults = tickbus::faults::read_file("faults.md", block, scope);

@@ -376,3 +376,16 @@ fn a_program_to_host_is_refused_where_it_would_not_compile_or_not_run() {
     );
     assert!(told.contains("this file has several stations"), "{told}");
 }
+
+#[test]
+fn a_server_with_the_places_of_a_real_device_is_refused_with_the_cure() {
+    let sections = "[[signal]]\nname = \"Run\"\naddress = \"%QX0.0\"\n";
+    for (bus, at) in [("modbus-server", "coil:5"), ("s7-server", "DB20.DBX0.0")] {
+        let places = format!("kind = \"{bus}\"\n[fieldbus.at]\n\"Run\" = \"{at}\"");
+        let config = config(&places, sections);
+        for target in Target::ALL {
+            let told = export(&config, target).expect_err(bus).to_string();
+            assert!(told.contains("use that project as it is"), "{told}");
+        }
+    }
+}

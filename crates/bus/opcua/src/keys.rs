@@ -2,6 +2,8 @@
 
 use tickbus_base::toml_text::{Key, Shape};
 
+use crate::identity::IDENTITY_KEYS;
+use crate::namespaces::NAMESPACES;
 use crate::options::IDENTITY_LIMIT;
 use crate::security::POLICIES;
 
@@ -60,4 +62,14 @@ pub(crate) const SERVER: &[Key] = &[
         "A policy, or a list of them; the three that protect by default",
     ),
     Key::new("anonymous", Shape::Boolean, "true: everybody can log in"),
+    Key::new(
+        "namespaces",
+        NAMESPACES,
+        "The URIs of the device's namespaces, from number 2 on, for [fieldbus.at]",
+    ),
+    Key::new(
+        "identity",
+        Shape::Table(IDENTITY_KEYS),
+        "How the server names itself; \"tickbus\" and the driver's name by default",
+    ),
 ];

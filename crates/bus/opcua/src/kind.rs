@@ -1,7 +1,7 @@
 //! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
 
 use tickbus_base::Mistake;
-use tickbus_base::toml_text::{Collector, Key, Table};
+use tickbus_base::toml_text::{Collector, Key, Table, shown};
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
@@ -91,6 +91,23 @@ impl BusOptions for ServerOptions {
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
+    }
+
+    fn has_addresses(&self) -> bool {
+        true
+    }
+
+    fn place_signals(&mut self, lines: &[At<'_>], table: &SignalTable) {
+        self.place_signals(lines, table);
+    }
+
+    fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        self.fit(table, collector);
+    }
+
+    fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
+        let node = self.nodes.get(&signal.name);
+        node.map_or_else(String::new, |node| shown(&node.to_string()))
     }
 }
 

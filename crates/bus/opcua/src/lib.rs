@@ -3,8 +3,11 @@
 //! Every build reads their options in a driver.cfg. The buses themselves use the crate `async-opcua` and are
 //! only built with the cargo feature `opcua`.
 
+mod at;
+mod identity;
 mod keys;
 mod kind;
+mod namespaces;
 mod node;
 mod options;
 mod security;
@@ -29,6 +32,7 @@ mod values;
 
 #[cfg(feature = "opcua")]
 pub use client::Client;
+pub use identity::Identity;
 pub use node::{Identifier, Namespace, NodeName, Pattern};
 pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};

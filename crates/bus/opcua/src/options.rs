@@ -10,6 +10,8 @@ use tickbus_fieldbus::{At, OBSERVES, Role};
 use tickbus_image::signal::{Signal, SignalTable, Station};
 use tickbus_net::{Address, Host};
 
+use super::identity::{Identity, read_identity};
+use super::namespaces::read_namespaces;
 use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};
 
@@ -72,6 +74,16 @@ pub struct ServerOptions {
     pub anonymous: bool,
     /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
+    /// The nodes of the signals, by the signals' names: the lines of `[fieldbus.at]`.
+    pub nodes: BTreeMap<String, NodeName>,
+    /// The URIs of the device's namespaces, from number 2 on.
+    pub namespaces: Vec<String>,
+    /// The offset of the key `namespaces`, if stated.
+    pub(super) namespaces_at: Option<usize>,
+    /// How the server names itself.
+    pub identity: Identity,
+    /// The offset of the `[fieldbus]` table in the text, for mistakes.
+    pub(super) at: usize,
 }
 
 impl ClientOptions {
@@ -272,6 +284,9 @@ impl ServerOptions {
             (Some(login), false) => format!("for user \"{}\"", shown(&login.user)),
             (None, false) => "for nobody".to_owned(),
         });
+        if !self.nodes.is_empty() {
+            parts.push("has the nodes of [fieldbus.at]".to_owned());
+        }
         parts
     }
 
@@ -281,6 +296,9 @@ impl ServerOptions {
         let host = table.take("host");
         let keys = Keys::take(table);
         let anonymous = table.take("anonymous");
+        let namespaces = table.take("namespaces");
+        let identity = table.take("identity");
+        let at = table.at();
         let is_single_writer = Writers::read(table);
         if !keys.has_user() && anonymous.is_none() {
             table.require_one_of(
@@ -298,6 +316,11 @@ impl ServerOptions {
             .as_ref()
             .map_or_else(|| Some(Policy::SECURE.to_vec()), read_policies);
         let credentials = keys.read();
+        let namespaces_at = namespaces.as_ref().map(Value::at);
+        let namespaces = namespaces.as_ref();
+        let namespaces = namespaces.map_or(Some(Vec::new()), read_namespaces);
+        let identity = identity.as_ref();
+        let identity = identity.map_or(Some(Identity::default()), read_identity);
         let allowed = anonymous.as_ref().map_or(Some(false), Value::boolean);
         if let (Some(value), Some(false)) = (&anonymous, allowed)
             && whole
@@ -315,6 +338,11 @@ impl ServerOptions {
             credentials: credentials?,
             anonymous: allowed?,
             is_single_writer: is_single_writer?,
+            nodes: BTreeMap::new(),
+            namespaces: namespaces?,
+            namespaces_at,
+            identity: identity?,
+            at,
         })
     }
 }

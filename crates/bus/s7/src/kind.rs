@@ -3,6 +3,7 @@
 use tickbus_base::Mistake;
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
+use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{
     At, Bus, BusKind, BusOptions, BusSetup, CYCLE, NamedFile, OBSERVES, OpenError, Role,
@@ -52,6 +53,14 @@ impl BusOptions for ServerOptions {
 
     fn has_answers(&self) -> bool {
         true
+    }
+
+    fn answer_codes(&self) -> AnswerCodes {
+        // 255 is the code of an item that is done.
+        AnswerCodes {
+            range: (1, 0xFE),
+            ..AnswerCodes::BYTE
+        }
     }
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {

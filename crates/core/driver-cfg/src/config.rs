@@ -132,6 +132,7 @@ impl Config {
             table: &self.table,
             has_diagnosis: self.bus.has_diagnosis(),
             has_answers: self.bus.has_answers(),
+            codes: self.bus.answer_codes(),
         }
     }
 
@@ -321,6 +322,7 @@ fn read(path: &Path, mut root: Table<'_>, given: Given) -> Option<Config> {
         // Mistakes in the bus table have been reported already.
         has_diagnosis: bus.is_none_or(|bus| bus.has_diagnosis()),
         has_answers: bus.is_none_or(|bus| bus.has_answers()),
+        codes: bus.map_or(faults::AnswerCodes::ANY, |bus| bus.answer_codes()),
     });
     if is_observers {
         for value in faults.iter().chain(&fault_file) {

@@ -11,6 +11,7 @@ use tickbus_base::time::{Clock, Nanos, Stop};
 use tickbus_base::toml_text::{Collector, Key, Table};
 use tickbus_image::signal::{Signal, SignalTable};
 
+use super::faults::AnswerCodes;
 use super::{At, Bus, Events, Role};
 
 /// The facts about its driver that a bus gets when it opens.
@@ -167,6 +168,11 @@ pub trait BusOptions: AnyOptions {
     /// Returns true if the bus answers requests of its peer; injected faults can change these answers.
     fn has_answers(&self) -> bool {
         false
+    }
+
+    /// The codes with which the bus can refuse a request, for a bus that [has answers](Self::has_answers).
+    fn answer_codes(&self) -> AnswerCodes {
+        AnswerCodes::BYTE
     }
 
     /// Takes the lines of `[fieldbus.at]`, and reports invalid addresses; for buses that [have

@@ -370,6 +370,14 @@ impl Port {
     /// back](Self::take_lateness).
     #[inline]
     pub fn answer(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
+        let code = self.answer_status(station, function, now)?;
+        // A bus whose codes are bytes reads no others.
+        u8::try_from(code).ok()
+    }
+
+    /// As [`answer`](Self::answer), for a bus whose codes are longer.
+    #[inline]
+    pub fn answer_status(&mut self, station: usize, function: u8, now: Nanos) -> Option<u32> {
         if self.faults.any() {
             self.answer_by_faults(station, function, now)
         } else {
@@ -378,7 +386,7 @@ impl Port {
     }
 
     #[cold]
-    fn answer_by_faults(&mut self, station: usize, function: u8, now: Nanos) -> Option<u8> {
+    fn answer_by_faults(&mut self, station: usize, function: u8, now: Nanos) -> Option<u32> {
         self.faults.attend(now, &mut self.image);
         let spoilt = self.faults.answer(station, function);
         self.spoilt.late = self.spoilt.late.max(spoilt.late);

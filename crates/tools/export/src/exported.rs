@@ -40,12 +40,7 @@ impl<'a> Exported<'a> {
             .map(|_| Self::Loopback);
         found
             .or_else(|| options.downcast_ref().map(Self::Socket))
-            .or_else(|| {
-                // The PLC's project addresses the places of a real device already.
-                let server = options.downcast_ref::<modbus::ServerOptions>();
-                let server = server.filter(|options| options.at.is_empty());
-                server.map(Self::ModbusServer)
-            })
+            .or_else(|| options.downcast_ref().map(Self::ModbusServer))
             .or_else(|| options.downcast_ref().map(Self::ModbusClient))
             .or_else(|| options.downcast_ref().map(Self::S7Server))
             .or_else(|| options.downcast_ref().map(Self::S7Client))
@@ -55,5 +50,14 @@ impl<'a> Exported<'a> {
             })
             .or_else(|| options.downcast_ref().map(Self::OpcuaServer))
             .unwrap_or(Self::ByHand)
+    }
+
+    /// Returns true for a server with the places of a real device.
+    pub(crate) fn is_device(self) -> bool {
+        match self {
+            Self::ModbusServer(options) => !options.at.is_empty(),
+            Self::S7Server(options) => !options.variables.is_empty(),
+            _ => false,
+        }
     }
 }

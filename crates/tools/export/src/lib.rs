@@ -99,6 +99,13 @@ pub fn export(config: &Config, target: Target) -> Result<Export, Mistakes> {
             "export from a driver.cfg for each PLC, with the signals of its station",
         ));
     }
+    if Exported::of(&config.bus).is_device() {
+        return Err(Mistakes::of_file(
+            &file,
+            "[fieldbus.at] puts the signals where a real device has them, for a PLC project that is there already",
+            "use that project as it is; to have one made, remove [fieldbus.at]",
+        ));
+    }
     // TIA Portal has its own import format for tags.
     let mut export = match target {
         Target::S71500 => return Ok(s7::export(config, s7::Cpu::S71500)),

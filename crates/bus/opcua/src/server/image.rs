@@ -14,7 +14,7 @@ use tickbus_image::Event;
 use tickbus_image::signal::{Plan, RawValues, Scale, Signal, SignalTable, Slot};
 
 use super::manager::Nodes;
-use super::space;
+use super::space::Places;
 use super::watched::{Variable, Watched};
 use super::writers::Writers;
 
@@ -105,15 +105,16 @@ impl Image {
     /// An image whose nodes have no values yet.
     pub(super) fn new(
         table: &Arc<SignalTable>,
+        ids: &Places,
         role: Role,
         port: &Port,
         show: Show,
         every_write: bool,
     ) -> Self {
         let (tx, rx) = role.areas();
-        let place = |signal: &Signal| PublishedSignal {
-            node: space::node(&signal.name),
-            scaled: space::scaled(table, signal),
+        let place = |signal: usize| PublishedSignal {
+            node: ids.node(signal).clone(),
+            scaled: ids.scaled(table, signal),
             shown: None,
             since: Nanos::ZERO,
             written: false,
@@ -135,7 +136,7 @@ impl Image {
             role,
             sends: RawValues::new(table, tx),
             receives,
-            places: table.signals.iter().map(place).collect(),
+            places: (0..table.signals.len()).map(place).collect(),
             frames,
             show,
             every_write,

@@ -25,10 +25,11 @@ use tickbus_base::time::{Nanos, WallClock};
 use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
-use super::space::{self, NAMESPACE, NAMESPACE_URI};
+use super::space::Places;
 use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
 use super::writers::Writers;
+use crate::namespaces::FIRST;
 
 /// A sampling interval that holds back no change, in milliseconds; the crate does not accept zero.
 const UNFILTERED: f64 = 0.001;
@@ -55,6 +56,8 @@ pub(super) type Nodes = InMemoryNodeManager<Signals>;
 /// The signals, as a node manager of the crate's server.
 pub(super) struct Signals {
     table: Arc<SignalTable>,
+    /// The URIs of the namespaces from number 2 on.
+    uris: Vec<String>,
     by_node: HashMap<NodeId, Variable>,
     own: Own,
     /// The results of checking sessions' applications, the latest last.
@@ -83,20 +86,21 @@ impl fmt::Debug for Signals {
 
 impl Signals {
     /// The signals of `table`.
-    pub(super) fn new(table: Arc<SignalTable>, own: Own) -> Self {
+    pub(super) fn new(table: Arc<SignalTable>, places: &Places, own: Own) -> Self {
         let mut by_node = HashMap::new();
-        for (index, signal) in table.signals.iter().enumerate() {
+        for index in 0..table.signals.len() {
             let variable = |is_scaled| Variable {
                 signal: index,
                 is_scaled,
             };
-            if let Some((scaled, _)) = space::scaled(&table, signal) {
+            if let Some((scaled, _)) = places.scaled(&table, index) {
                 by_node.insert(scaled, variable(true));
             }
-            by_node.insert(space::node(&signal.name), variable(false));
+            by_node.insert(places.node(index).clone(), variable(false));
         }
         Self {
             table,
+            uris: places.uris.clone(),
             by_node,
             own,
             judged: Mutex::default(),
@@ -187,7 +191,7 @@ impl InMemoryNodeManagerImpl for Signals {
     }
 
     fn namespaces(&self) -> Vec<NamespaceMetadata> {
-        vec![namespace()]
+        namespaces(&self.uris)
     }
 
     async fn read_values(
@@ -356,13 +360,15 @@ impl InMemoryNodeManagerImpl for Signals {
     }
 }
 
-/// The metadata of the signals' namespace.
-pub(super) fn namespace() -> NamespaceMetadata {
-    NamespaceMetadata {
-        namespace_uri: NAMESPACE_URI.to_owned(),
-        namespace_index: NAMESPACE,
+/// The metadata of the signals' namespaces, whose URIs are those from number 2 on.
+fn namespaces(uris: &[String]) -> Vec<NamespaceMetadata> {
+    let all = uris.iter().zip(FIRST..);
+    let all = all.map(|(uri, namespace_index)| NamespaceMetadata {
+        namespace_uri: uri.clone(),
+        namespace_index,
         ..NamespaceMetadata::default()
-    }
+    });
+    all.collect()
 }
 
 /// The rhythm of an item with a sampling interval in milliseconds and a queue. With a queue the client sees

@@ -32,6 +32,7 @@ use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
 use manager::{Own, Visit};
 use peers::{Peers, Seen};
+use space::Places;
 use visitor::Visitor;
 use watched::Watched;
 use writers::Writers;
@@ -56,6 +57,7 @@ pub struct Server {
     pki: Pki,
     name: String,
     table: Arc<SignalTable>,
+    places: Arc<Places>,
     role: Role,
     cycle: Nanos,
     events: Events,
@@ -66,10 +68,18 @@ impl Server {
     pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
         let mut pki = Pki::new(&options.credentials, setup);
         pki.host.clone_from(&options.host);
+        let identity = &options.identity;
+        if let Some(name) = &identity.application {
+            pki.application.clone_from(name);
+        }
+        if let Some(uri) = &identity.uri {
+            pki.uri.clone_from(uri);
+        }
         Self {
             options: options.clone(),
             pki,
             name: setup.name.to_owned(),
+            places: Arc::new(Places::new(options, setup.table)),
             table: Arc::new(setup.table.clone()),
             role: setup.role,
             cycle: setup.cycle.unwrap_or(CYCLE),
@@ -115,7 +125,7 @@ impl Server {
             checks_applications: self.pki.trust == Trust::Listed,
             tasks_alone: Arc::clone(&tasks_alone),
         };
-        let signals = manager::Signals::new(Arc::clone(&self.table), own);
+        let signals = manager::Signals::new(Arc::clone(&self.table), &self.places, own);
         let login = self.pki.login()?;
         let (server, handle) =
             reactor.within(|| setup::build(self, max_age, login, bound, signals))?;
@@ -231,6 +241,7 @@ impl Free for Server {
                 None => service.insert(Service {
                     image: Image::new(
                         &self.table,
+                        &self.places,
                         self.role,
                         port,
                         show,

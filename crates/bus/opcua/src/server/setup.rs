@@ -1,6 +1,7 @@
 //! Sets up the crate's server as a driver.cfg describes.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 
 use opcua::crypto::X509Data;
 use opcua::types::{BuildInfo, DateTime, MessageSecurityMode};
@@ -11,12 +12,13 @@ use opcua_server::{
     ANONYMOUS_USER_TOKEN_ID, Server, ServerBuilder, ServerEndpoint, ServerHandle, ServerUserToken,
 };
 
+use crate::namespaces::FIRST;
 use crate::pki::{PRODUCT, PRODUCT_URI, security_policy};
 use crate::{Mode, Policy, Trust};
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::BusError;
 
-use super::manager::{self, Signals};
+use super::manager::Signals;
 use super::standard::Standard;
 use super::{SESSIONS, space};
 
@@ -53,6 +55,7 @@ pub(super) fn build(
         // The crate would create folders at any path; below a file it cannot.
         std::env::current_exe().unwrap_or_default().join("none")
     };
+    let identity = &options.identity;
     let rhythm = rhythm(of.cycle);
     let host = match &options.host {
         Some(host) => host.clone(),
@@ -61,7 +64,7 @@ pub(super) fn build(
     let mut builder = ServerBuilder::new()
         .application_name(&pki.application)
         .application_uri(&pki.uri)
-        .product_uri(PRODUCT_URI)
+        .product_uri(stated(identity.product_uri.as_ref(), PRODUCT_URI))
         .pki_dir(folder)
         .certificate_path(&pki.certificate)
         .private_key_path(&pki.key)
@@ -74,11 +77,11 @@ pub(super) fn build(
         .subscription_poll_interval_ms(rhythm)
         .max_sessions(SESSIONS)
         .build_info(BuildInfo {
-            product_uri: PRODUCT_URI.into(),
-            manufacturer_name: PRODUCT.into(),
-            product_name: PRODUCT.into(),
-            software_version: env!("CARGO_PKG_VERSION").into(),
-            build_number: "0".into(),
+            product_uri: stated(identity.product_uri.as_ref(), PRODUCT_URI).into(),
+            manufacturer_name: stated(identity.manufacturer.as_ref(), PRODUCT).into(),
+            product_name: stated(identity.product.as_ref(), PRODUCT).into(),
+            software_version: stated(identity.version.as_ref(), env!("CARGO_PKG_VERSION")).into(),
+            build_number: stated(identity.build.as_ref(), "0").into(),
             build_date: DateTime::null(),
         });
     let limits = &mut builder.limits_mut().subscriptions;
@@ -113,19 +116,20 @@ pub(super) fn build(
         let endpoint = ServerEndpoint::new("/", security_policy(*policy), mode, &users);
         builder = builder.add_endpoint(policy.name(), endpoint);
     }
+    let places = Arc::clone(&of.places);
     let (table, name, reads) = (of.table.clone(), of.name.clone(), of.role.areas().1);
     let nodes = move |context: ServerContext, address_space: &mut _| {
-        let namespace = manager::namespace();
-        let uri = &namespace.namespace_uri;
-        let index = context
-            .type_tree
-            .write()
-            .namespaces_mut()
-            .add_namespace(uri);
-        debug_assert_eq!(index, space::NAMESPACE, "node ids promise it");
         let address_space: &mut opcua_server::address_space::AddressSpace = address_space;
-        address_space.add_namespace(uri, index);
-        space::build(address_space, &name, &table, reads);
+        for (uri, promised) in places.uris.iter().zip(FIRST..) {
+            let index = context
+                .type_tree
+                .write()
+                .namespaces_mut()
+                .add_namespace(uri);
+            debug_assert_eq!(index, promised, "node ids promise it");
+            address_space.add_namespace(uri, index);
+        }
+        space::build(address_space, &places, &name, &table, reads);
         signals
     };
     let wall = pki.wall;
@@ -136,6 +140,11 @@ pub(super) fn build(
         .with_node_manager(InMemoryNodeManagerBuilder::new(nodes))
         .build();
     built.map_err(|error| BusError::Refused(format!("there can be no server ({error})")))
+}
+
+/// A stated name, or the usual one.
+fn stated<'n>(name: Option<&'n String>, usual: &'n str) -> &'n str {
+    name.map_or(usual, String::as_str)
 }
 
 /// The host announced to clients: the address to listen on, or the machine's name if that is a wildcard.

@@ -11,12 +11,8 @@ use crate::values::{data_type_id, variant};
 use tickbus_image::signal::{Area, Scale, Signal, SignalTable};
 
 use super::units::unit;
-
-/// The namespace of the signals; 0 and 1 are the crate's.
-pub(super) const NAMESPACE: u16 = 2;
-
-/// The URI of that namespace.
-pub(super) const NAMESPACE_URI: &str = "urn:tickbus:signals";
+use crate::namespaces::FIRST;
+use crate::{Identifier, ServerOptions};
 
 /// The suffix of a node with a scaled signal's value in engineering units.
 const SCALED: &str = ".scaled";
@@ -25,28 +21,70 @@ const SCALED: &str = ".scaled";
 const FOLDERS: usize = 1;
 const PROPERTIES: usize = 1_000_000;
 
-/// The node of a signal.
-pub(super) fn node(name: &str) -> NodeId {
-    NodeId::new(NAMESPACE, name)
+/// The node ids of a server.
+#[derive(Debug)]
+pub(super) struct Places {
+    /// The URIs of the namespaces from number 2 on; 0 and 1 are the crate's.
+    pub(super) uris: Vec<String>,
+    /// The number of the last one, which has all nodes without an id in the driver.cfg.
+    own: u16,
+    /// By signal.
+    nodes: Vec<NodeId>,
 }
 
-/// The node with a signal's value in engineering units, if it has one.
-pub(super) fn scaled(table: &SignalTable, signal: &Signal) -> Option<(NodeId, Scale)> {
-    let name = format!("{}{SCALED}", signal.name);
-    // A signal of that name takes precedence.
-    let scale = signal.scale.filter(|_| table.position(&name).is_none())?;
-    Some((node(&name), scale))
+impl Places {
+    /// The node ids of the signals in `table`.
+    pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
+        let device = options.device_nodes();
+        let own = usize::from(FIRST) + device.uris.len() - 1;
+        let own = u16::try_from(own).expect("a device has fewer namespaces");
+        let node = |signal: &Signal| match device.nodes.get(&signal.name) {
+            Some((index, Identifier::Number(number))) => NodeId::new(*index, *number),
+            Some((index, Identifier::Text(text))) => NodeId::new(*index, text.as_str()),
+            None => NodeId::new(own, signal.name.as_str()),
+        };
+        Self {
+            own,
+            nodes: table.signals.iter().map(node).collect(),
+            uris: device.uris,
+        }
+    }
+
+    /// The node of a signal.
+    pub(super) fn node(&self, signal: usize) -> &NodeId {
+        &self.nodes[signal]
+    }
+
+    /// The node with a signal's value in engineering units, if it has one.
+    pub(super) fn scaled(&self, table: &SignalTable, signal: usize) -> Option<(NodeId, Scale)> {
+        let signal = &table.signals[signal];
+        let name = format!("{}{SCALED}", signal.name);
+        // A signal of that name takes precedence.
+        let scale = signal.scale.filter(|_| table.position(&name).is_none())?;
+        Some((NodeId::new(self.own, name), scale))
+    }
+
+    fn number(&self, number: usize) -> NodeId {
+        let number = u32::try_from(number).expect("tables hold fewer than 2^31 signals");
+        NodeId::new(self.own, number)
+    }
 }
 
 /// Creates the nodes; `reads` is the area that clients write.
-pub(super) fn build(space: &mut AddressSpace, driver: &str, table: &SignalTable, reads: Area) {
-    let top = number(FOLDERS);
+pub(super) fn build(
+    space: &mut AddressSpace,
+    places: &Places,
+    driver: &str,
+    table: &SignalTable,
+    reads: Area,
+) {
+    let top = places.number(FOLDERS);
     folder(space, &top, driver, ObjectId::ObjectsFolder.into());
     for (index, station) in table.stations.iter().enumerate() {
         if !station.name.is_empty() {
             folder(
                 space,
-                &number(FOLDERS + 1 + index),
+                &places.number(FOLDERS + 1 + index),
                 &station.name,
                 top.clone(),
             );
@@ -56,23 +94,19 @@ pub(super) fn build(space: &mut AddressSpace, driver: &str, table: &SignalTable,
         let parent = if table.stations[signal.station].name.is_empty() {
             top.clone()
         } else {
-            number(FOLDERS + 1 + signal.station)
+            places.number(FOLDERS + 1 + signal.station)
         };
-        variable(space, table, index, parent, reads);
+        variable(space, places, table, index, parent, reads);
     }
 }
 
-fn number(number: usize) -> NodeId {
-    let number = u32::try_from(number).expect("tables hold fewer than 2^31 signals");
-    NodeId::new(NAMESPACE, number)
-}
-
-fn browse(name: &str) -> QualifiedName {
-    QualifiedName::new(NAMESPACE, name)
+/// The browse name of a node.
+fn browse(id: &NodeId, name: &str) -> QualifiedName {
+    QualifiedName::new(id.namespace, name)
 }
 
 fn folder(space: &mut AddressSpace, id: &NodeId, name: &str, parent: NodeId) {
-    let made = ObjectBuilder::new(id, browse(name), name)
+    let made = ObjectBuilder::new(id, browse(id, name), name)
         .is_folder()
         .organized_by(parent)
         .insert(space);
@@ -81,21 +115,22 @@ fn folder(space: &mut AddressSpace, id: &NodeId, name: &str, parent: NodeId) {
 
 fn variable(
     space: &mut AddressSpace,
+    places: &Places,
     table: &SignalTable,
     index: usize,
     parent: NodeId,
     reads: Area,
 ) {
     let signal = &table.signals[index];
-    let id = node(&signal.name);
-    let scaled = scaled(table, signal);
+    let id = places.node(index).clone();
+    let scaled = places.scaled(table, index);
     // The unit belongs to the value in engineering units.
     let own_unit = signal.unit.as_deref().filter(|_| signal.scale.is_none());
     let kind = match own_unit {
         Some(_) => VariableTypeId::AnalogUnitType,
         None => VariableTypeId::BaseDataVariableType,
     };
-    let builder = VariableBuilder::new(&id, browse(&signal.name), &*signal.name)
+    let builder = VariableBuilder::new(&id, browse(&id, &signal.name), &*signal.name)
         .description(LocalizedText::from(&*description(signal)))
         .data_type(data_type_id(signal.data_type))
         .value_rank(-1)
@@ -111,12 +146,12 @@ fn variable(
     builder.insert(space);
     let first = PROPERTIES + 4 * index;
     if let Some(name) = own_unit {
-        units(space, first, name, &id);
+        units(space, &places.number(first), name, &id);
     }
     let Some((value, _)) = scaled else {
         return;
     };
-    VariableBuilder::new(&value, browse("Scaled"), "Scaled")
+    VariableBuilder::new(&value, browse(&value, "Scaled"), "Scaled")
         .description(LocalizedText::from("the value in engineering units"))
         .data_type(DataTypeId::Double)
         .value_rank(-1)
@@ -130,7 +165,7 @@ fn variable(
         .insert(space);
     units(
         space,
-        first + 1,
+        &places.number(first + 1),
         signal.unit.as_deref().unwrap_or_default(),
         &value,
     );
@@ -139,7 +174,7 @@ fn variable(
         let range = ExtensionObject::from_message(Range { low, high });
         property(
             space,
-            first + 2,
+            &places.number(first + 2),
             "EURange",
             DataTypeId::Range,
             range,
@@ -148,7 +183,7 @@ fn variable(
     }
 }
 
-fn units(space: &mut AddressSpace, at: usize, name: &str, of: &NodeId) {
+fn units(space: &mut AddressSpace, at: &NodeId, name: &str, of: &NodeId) {
     let unit = ExtensionObject::from_message(unit(name));
     let kind = DataTypeId::EUInformation;
     property(space, at, "EngineeringUnits", kind, unit, of);
@@ -156,13 +191,13 @@ fn units(space: &mut AddressSpace, at: usize, name: &str, of: &NodeId) {
 
 fn property(
     space: &mut AddressSpace,
-    at: usize,
+    at: &NodeId,
     name: &str,
     kind: DataTypeId,
     value: ExtensionObject,
     of: &NodeId,
 ) {
-    VariableBuilder::new(&number(at), QualifiedName::new(0, name), name)
+    VariableBuilder::new(at, QualifiedName::new(0, name), name)
         .data_type(kind)
         .value_rank(-1)
         .value(Variant::from(value))

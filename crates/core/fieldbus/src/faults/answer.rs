@@ -21,9 +21,32 @@ pub enum AnswerTrouble {
     /// The request is carried out, and its answer goes out this much later.
     Late(Nanos),
     /// The request is not carried out, and refused with this code of the protocol.
-    Error(u8),
+    Error(u32),
     /// The request is carried out, and its answer is malformed.
     Wrong(WrongAnswer),
+}
+
+/// The codes with which a server can refuse a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AnswerCodes {
+    /// The lowest and the highest code.
+    pub range: (u32, u32),
+    /// Names of some codes, which a driver.cfg can have instead.
+    pub names: &'static [(&'static str, u32)],
+}
+
+impl AnswerCodes {
+    /// Any code, by number or by name: those of a bus that is not known.
+    pub const ANY: Self = Self {
+        range: (1, u32::MAX),
+        names: &[],
+    };
+
+    /// One byte without names, as in Modbus.
+    pub const BYTE: Self = Self {
+        range: (1, 0xFF),
+        names: &[],
+    };
 }
 
 /// A malformed answer.
@@ -52,7 +75,7 @@ pub struct Spoilt {
     /// How much later it goes out.
     pub late: Nanos,
     /// The code with which the request is refused.
-    pub error: Option<u8>,
+    pub error: Option<u32>,
     /// How it is malformed.
     pub wrong: Option<WrongAnswer>,
 }

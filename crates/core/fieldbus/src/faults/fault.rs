@@ -243,6 +243,8 @@ fn answered(answer: AnswerEffect, table: &SignalTable) -> String {
     });
     let trouble = match answer.trouble {
         AnswerTrouble::Late(by) => format!("are {by} late"),
+        // Codes of four bytes are written as their standard has them.
+        AnswerTrouble::Error(code @ 0x100..) => format!("are the error 0x{code:08X}"),
         AnswerTrouble::Error(code) => format!("are the error {code}"),
         AnswerTrouble::Wrong(WrongAnswer::Truncated) => "lack their last byte".to_owned(),
         AnswerTrouble::Wrong(WrongAnswer::Transaction) => {

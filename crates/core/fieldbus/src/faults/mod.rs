@@ -24,7 +24,7 @@ mod section;
 mod signal_fault;
 mod tick_time;
 
-pub use answer::{AnswerEffect, AnswerTrouble, Spoilt, WrongAnswer};
+pub use answer::{AnswerCodes, AnswerEffect, AnswerTrouble, Spoilt, WrongAnswer};
 pub use board::FaultBoard;
 pub use cell::{FaultStatus, Phase};
 pub use condition::{Condition, unknown};

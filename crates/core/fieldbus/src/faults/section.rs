@@ -6,7 +6,7 @@ mod keys;
 pub use self::effect::model_value;
 use self::effect::read_effect;
 pub use self::keys::{FAULT_KEYS, FAULT_KINDS};
-use super::{Begin, Condition, Effect, Fault, Lasts};
+use super::{AnswerCodes, Begin, Condition, Effect, Fault, Lasts};
 use tickbus_base::toml_text::{Collector, Mistakes, Table, TableKind, Value, read_text, shown};
 use tickbus_image::signal::SignalTable;
 use tickbus_image::signal::section::NAME_LIMIT;
@@ -23,6 +23,8 @@ pub struct Scope<'a> {
     pub has_diagnosis: bool,
     /// True if the driver's bus [has answers](crate::BusOptions::has_answers).
     pub has_answers: bool,
+    /// The [codes](crate::BusOptions::answer_codes) with which the bus can refuse a request.
+    pub codes: AnswerCodes,
 }
 
 /// The scope of a driver whose bus has no diagnosis and gives no answers.
@@ -32,6 +34,7 @@ impl<'a> From<&'a SignalTable> for Scope<'a> {
             table,
             has_diagnosis: false,
             has_answers: false,
+            codes: AnswerCodes::BYTE,
         }
     }
 }
@@ -247,7 +250,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
     {
         value.wrong(
             "this bus answers no requests that tickbus can answer wrongly",
-            "remove the fault; \"modbus-server\" and \"s7-server\" do",
+            "remove the fault; \"modbus-server\", \"s7-server\" and \"opcua-server\" do",
         );
     }
     let begin = read_begin(&keys, table);
@@ -262,7 +265,7 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
             .whole(0..=u64::MAX.into())
             .and_then(|seed| u64::try_from(seed).ok()),
     };
-    let effect = known.and_then(|kind| read_effect(kind.name, &keys, table, whole));
+    let effect = known.and_then(|kind| read_effect(kind.name, &keys, scope, whole));
     let (begin, lasts) = (begin?, lasts?);
     let times = read_times(&keys, &begin, lasts)?;
     let (effect, name) = (effect?, name?);

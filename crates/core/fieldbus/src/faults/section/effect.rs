@@ -1,13 +1,13 @@
 //! The effect of a fault: the keys of its kind.
 
-use super::Keys;
 use super::keys::{DIAGNOSIS_LIMIT, DIRECTIONS, SIGNAL};
+use super::{Keys, Scope};
 use crate::faults::condition::unknown;
 use crate::faults::diagnosis::OCTET_LIMIT;
 use crate::faults::fault::MODEL;
 use crate::faults::{
-    AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Finding, LineEffect,
-    Octets, SignalEffect, WrongAnswer, measure,
+    AnswerCodes, AnswerEffect, AnswerTrouble, ChannelError, Diagnosis, Direction, Effect, Finding,
+    LineEffect, Octets, SignalEffect, WrongAnswer, measure,
 };
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Value, did_you_mean, short_number, shown};
@@ -22,9 +22,10 @@ const LONGEST: Nanos = Nanos::from_secs(60);
 pub(super) fn read_effect(
     kind: &str,
     keys: &Keys<'_>,
-    table: Option<&SignalTable>,
+    scope: Option<Scope<'_>>,
     whole: bool,
 ) -> Option<Effect> {
+    let table = scope.map(|scope| scope.table);
     let line = |trouble| Some(Effect::Line(trouble));
     match kind {
         "delay" => line(LineEffect::Delay(read_hold(keys)?)),
@@ -39,8 +40,8 @@ pub(super) fn read_effect(
         }
         "answer-late" => read_answer(keys, table, || read_hold(keys).map(AnswerTrouble::Late)),
         "answer-error" => read_answer(keys, table, || {
-            let code = keys.code.as_ref()?.whole(1..=255)?;
-            u8::try_from(code).ok().map(AnswerTrouble::Error)
+            let codes = scope.map_or(AnswerCodes::ANY, |scope| scope.codes);
+            read_code(keys.code.as_ref()?, codes).map(AnswerTrouble::Error)
         }),
         "answer-wrong" => read_answer(keys, table, || {
             let how = keys
@@ -90,6 +91,19 @@ fn read_answer(
         chance: chance?,
         trouble: trouble?,
     })))
+}
+
+/// Reads the code of an error, as a number or by its name.
+fn read_code(value: &Value<'_>, codes: AnswerCodes) -> Option<u32> {
+    if !codes.names.is_empty() && value.as_text().is_some() {
+        return value.choice("codes of errors that tickbus knows", codes.names);
+    }
+    if codes == AnswerCodes::ANY && value.as_text().is_some() {
+        return None;
+    }
+    let (least, most) = codes.range;
+    let code = value.whole(least.into()..=most.into())?;
+    u32::try_from(code).ok()
 }
 
 /// Reads the value of a fault of the model; 1 if none is stated. Reports a mistake.

@@ -34,6 +34,9 @@ const BY_TIME: RequiredKey = key(
 pub(super) const CODE: &str =
     "write the error of the protocol, such as code = 6 for a busy Modbus device";
 
+/// The code of an error: a number, or the name of an OPC UA status.
+const CODES: Shape = Shape::Any(&[Shape::Whole(1, u32::MAX as i128), Shape::Text]);
+
 /// Which answers are wrong.
 const OF_ANSWERS: &[&str] = &["chance", "station", "function", "seed"];
 
@@ -63,11 +66,7 @@ pub const FAULT_KINDS: [TableKind; 15] = [
     ),
     kind("duplicate", &[], &["chance", "direction", "seed"]),
     kind("answer-late", &[BY_TIME], OF_ANSWERS),
-    kind(
-        "answer-error",
-        &[key("code", Shape::Whole(1, 255), CODE)],
-        OF_ANSWERS,
-    ),
+    kind("answer-error", &[key("code", CODES, CODE)], OF_ANSWERS),
     kind(
         "answer-wrong",
         &[key(
@@ -160,8 +159,8 @@ pub const FAULT_KEYS: &[Key] = &[
     ),
     Key::new(
         "code",
-        Shape::Whole(1, 255),
-        "answer-error: the exception of Modbus; the return code of an item of S7",
+        CODES,
+        "answer-error: the exception of Modbus; the return code of an item of S7; the status of OPC UA, or its name",
     ),
     Key::new(
         "how",

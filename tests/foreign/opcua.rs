@@ -2,6 +2,7 @@
 #![allow(clippy::float_cmp, reason = "the values are small whole numbers")]
 
 mod device;
+mod places;
 mod served;
 
 use std::path::{Path, PathBuf};
@@ -56,6 +57,14 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ),
     ("a_plc_in_stop_is_stale_until_it_runs_again", in_stop),
     ("the_nodes_of_fieldbus_at_are_read_and_written", placed),
+    (
+        "asyncua_finds_a_device_at_its_own_node_ids",
+        places::finds_a_device,
+    ),
+    (
+        "asyncua_meets_answers_late_and_in_error",
+        places::meets_faults,
+    ),
     (
         "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
         served::ages_apart,

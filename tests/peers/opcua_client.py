@@ -12,6 +12,9 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"properties": node}             {name: value as text}
     {"status": true}                 {"start", "time"}, of the structure ServerStatus, in seconds
     {"endpoints": true}              {"urls": […]}, as the server announces them
+    {"nodes": true}                  {"nodes": {node id: browse name}} of namespaces from 2 on
+    {"names": true}                  {"namespaces", "application", "build"}, as the server names itself
+    {"timed": node}                  {"millis"}: how long a Read took
     {"stop": true}                   and at the end of stdin
 """
 
@@ -20,6 +23,7 @@ import json
 import logging
 import socket
 import sys
+import time
 from pathlib import Path
 
 from asyncua import Client, ua
@@ -56,9 +60,12 @@ async def lines():
 async def serve(client):
     changes, subscription = Changes(), None
 
+    def identifier(name):
+        return ua.NodeId.from_string(name) if name.startswith("ns=") else ua.NodeId(name, 2)
+
     def node(name):
         standard = getattr(ua.ObjectIds, name, None)
-        return client.get_node(ua.NodeId(standard) if standard else ua.NodeId(name, 2))
+        return client.get_node(ua.NodeId(standard) if standard else identifier(name))
 
     async for line in lines():
         answer = {}
@@ -87,7 +94,7 @@ async def serve(client):
                 for kind, value in line["write"].values()
             ]
             statuses = await client.uaclient.write_attributes(
-                [ua.NodeId(name, 2) for name in names], values
+                [identifier(name) for name in names], values
             )
             answer["statuses"] = [status.name for status in statuses]
         if "subscribe" in line:
@@ -110,6 +117,30 @@ async def serve(client):
             answer = {"start": status.StartTime.timestamp(), "time": status.CurrentTime.timestamp()}
         if "endpoints" in line:
             answer["urls"] = [one.EndpointUrl for one in await client.get_endpoints()]
+        if "nodes" in line:
+            found, to_do = {}, [client.nodes.objects]
+            while to_do:
+                for child in await to_do.pop().get_children():
+                    if child.nodeid.NamespaceIndex > 1:
+                        name = await child.read_browse_name()
+                        found[child.nodeid.to_string()] = f"{name.NamespaceIndex}:{name.Name}"
+                        to_do.append(child)
+            answer["nodes"] = found
+        if "names" in line:
+            status = await client.get_node(ua.NodeId(ua.ObjectIds.Server_ServerStatus)).read_value()
+            server = (await client.get_endpoints())[0].Server
+            answer = {
+                "namespaces": await client.get_namespace_array(),
+                "application": [server.ApplicationName.Text, server.ApplicationUri, server.ProductUri],
+                "build": [
+                    status.BuildInfo.ManufacturerName, status.BuildInfo.ProductName,
+                    status.BuildInfo.SoftwareVersion, status.BuildInfo.BuildNumber,
+                ],
+            }
+        if "timed" in line:
+            begin = time.monotonic()
+            await client.uaclient.read_attributes([identifier(line["timed"])], ua.AttributeIds.Value)
+            answer["millis"] = (time.monotonic() - begin) * 1000
         if "stop" in line:
             return
         print(json.dumps(answer, default=str), flush=True)

@@ -380,7 +380,14 @@ fn a_program_to_host_is_refused_where_it_would_not_compile_or_not_run() {
 #[test]
 fn a_server_with_the_places_of_a_real_device_is_refused_with_the_cure() {
     let sections = "[[signal]]\nname = \"Run\"\naddress = \"%QX0.0\"\n";
-    for (bus, at) in [("modbus-server", "coil:5"), ("s7-server", "DB20.DBX0.0")] {
+    for (bus, at) in [
+        ("modbus-server", "coil:5"),
+        ("s7-server", "DB20.DBX0.0"),
+        (
+            "opcua-server\"\nanonymous = true\nhost = \"localhost",
+            "ns=2;i=1",
+        ),
+    ] {
         let places = format!("kind = \"{bus}\"\n[fieldbus.at]\n\"Run\" = \"{at}\"");
         let config = config(&places, sections);
         for target in Target::ALL {

@@ -2,10 +2,12 @@
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
+use tickbus_fieldbus::faults::AnswerCodes;
 use tickbus_fieldbus::tcp::Writers;
 use tickbus_fieldbus::{At, Bus, BusKind, BusOptions, BusSetup, NamedFile, OpenError, Role};
 use tickbus_image::signal::{Signal, SignalTable};
 
+use super::codes::CODES;
 use super::{ClientOptions, ServerOptions, keys, options, security};
 
 impl BusKind for ClientOptions {
@@ -91,6 +93,14 @@ impl BusOptions for ServerOptions {
 
     fn set_address(&mut self, address: &str) -> Option<Result<(), Mistake>> {
         Some(self.set_address(address))
+    }
+
+    fn has_answers(&self) -> bool {
+        true
+    }
+
+    fn answer_codes(&self) -> AnswerCodes {
+        CODES
     }
 
     fn has_addresses(&self) -> bool {

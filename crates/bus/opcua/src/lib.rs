@@ -4,6 +4,7 @@
 //! only built with the cargo feature `opcua`.
 
 mod at;
+mod codes;
 mod identity;
 mod keys;
 mod kind;

@@ -57,6 +57,7 @@ impl<'a> Exported<'a> {
         match self {
             Self::ModbusServer(options) => !options.at.is_empty(),
             Self::S7Server(options) => !options.variables.is_empty(),
+            Self::OpcuaServer(options) => !options.nodes.is_empty(),
             _ => false,
         }
     }

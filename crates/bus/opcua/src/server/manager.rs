@@ -4,6 +4,7 @@ use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
@@ -38,8 +39,11 @@ const UNFILTERED: f64 = 0.001;
 pub(super) enum Visit {
     /// Values written in one request. A signal written twice in it starts a new list.
     Written(Visitor, Vec<Vec<(usize, u64)>>),
-    /// These signals are about to be read: their nodes must be updated first.
-    Reads(Visitor, Vec<usize>, oneshot::Sender<()>),
+    /// These signals are about to be read: their nodes must be updated first. With `true` by a Read, whose answer faults
+    /// can change.
+    Reads(Visitor, Vec<usize>, bool, oneshot::Sender<Verdict>),
+    /// These signals are about to be written.
+    Writes(Vec<usize>, oneshot::Sender<Verdict>),
     /// The first client writes what the second one wrote within `max_age`.
     SecondWriter(String, String),
     /// A client was refused because its certificate belongs to another application; the text says so.
@@ -48,6 +52,39 @@ pub(super) enum Visit {
     Rejected(Vec<String>, usize),
     /// The server has ended.
     Ended(String),
+}
+
+/// By how much a timer of the runtime can be late: it counts whole milliseconds, and so does the wait of the system
+/// below it.
+const TIMER: Duration = Duration::from_millis(4);
+
+/// How faults change the answer to a request.
+#[derive(Debug, Default)]
+pub(super) struct Verdict {
+    /// The stations that refuse the request, with this status.
+    pub(super) refused: Vec<(usize, StatusCode)>,
+    /// How much later the answer goes out.
+    pub(super) late: Duration,
+}
+
+impl Verdict {
+    /// The status with which a signal of `station` is refused.
+    fn status(&self, station: usize) -> Option<StatusCode> {
+        let found = self.refused.iter().find(|(of, _)| *of == station);
+        found.map(|(_, status)| *status)
+    }
+
+    /// Holds the answer to a request that came at `since` back.
+    async fn hold(&self, since: Instant) {
+        if self.late.is_zero() {
+            return;
+        }
+        let due = since + self.late;
+        tokio::time::sleep(self.late.saturating_sub(TIMER)).await;
+        while Instant::now() < due {
+            tokio::task::yield_now().await;
+        }
+    }
 }
 
 /// The nodes and their values.
@@ -142,11 +179,50 @@ impl Signals {
         verdict(is_good)
     }
 
+    /// The values of nodes, brought up to date; `is_read` if the client reads them, so that faults can change the
+    /// answer.
+    async fn look(
+        &self,
+        context: &RequestContext,
+        address_space: &RwLock<AddressSpace>,
+        (nodes, max_age, timestamps): (&[&ParsedReadValueId], f64, TimestampsToReturn),
+        is_read: bool,
+    ) -> Vec<DataValue> {
+        let refused = |status: StatusCode| DataValue {
+            status: Some(status),
+            ..DataValue::default()
+        };
+        if let Err(status) = self.admits(context) {
+            return vec![refused(status); nodes.len()];
+        }
+        let signal = |id: &NodeId| self.by_node.get(id).map(|variable| variable.signal);
+        let signals = nodes.iter().filter_map(|node| signal(&node.node_id));
+        let signals = signals.collect();
+        let since = Instant::now();
+        let (done, ready) = oneshot::channel();
+        let visit = Visit::Reads(Visitor::of(context), signals, is_read, done);
+        self.own.inbox.push(visit);
+        // Fails if the bus has stopped; the nodes then keep their values.
+        let verdict = ready.await.unwrap_or_default();
+        let read = {
+            let space = address_space.read();
+            let read = nodes.iter().map(|node| {
+                let station = signal(&node.node_id).map(|at| self.table.signals[at].station);
+                let status = station.and_then(|station| verdict.status(station));
+                status.map_or_else(|| space.read(context, node, max_age, timestamps), refused)
+            });
+            read.collect()
+        };
+        verdict.hold(since).await;
+        read
+    }
+
     /// Checks one value that a client writes; returns its signal and its bits.
     fn judge(
         &self,
         space: &AddressSpace,
         write: &ParsedWriteValue,
+        verdict: &Verdict,
     ) -> Result<(usize, u64), StatusCode> {
         let Some(&variable) = self.by_node.get(&write.node_id) else {
             return Err(if space.node_exists(&write.node_id) {
@@ -156,6 +232,9 @@ impl Signals {
             });
         };
         let signal = &self.table.signals[variable.signal];
+        if let Some(status) = verdict.status(signal.station) {
+            return Err(status);
+        }
         if write.attribute_id != AttributeId::Value || variable.is_scaled {
             return Err(StatusCode::BadNotWritable);
         }
@@ -172,6 +251,74 @@ impl Signals {
         let value = write.value.value.as_ref();
         let bits = value.and_then(|value| values::bits(signal.data_type, value));
         Ok((variable.signal, bits.ok_or(StatusCode::BadTypeMismatch)?))
+    }
+
+    /// Writes what may be written.
+    fn carry_out(
+        &self,
+        context: &RequestContext,
+        address_space: &RwLock<AddressSpace>,
+        nodes_to_write: &mut [&mut WriteNode],
+        verdict: &Verdict,
+    ) {
+        let (writers, session) = (&self.own.writers, context.session_id);
+        writers.begin(session, || Visitor::of(context));
+        let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
+        let mut space = address_space.write();
+        let now = date((self.own.wall)());
+        let judged: Vec<_> = nodes_to_write
+            .iter()
+            .map(|node| self.judge(&space, node.value(), verdict))
+            .collect();
+        let indices = judged.iter().flatten().map(|&(index, _)| index);
+        let refused = writers.refuses(session, indices);
+        let is_refused = refused.is_some();
+        let mut second = refused;
+        for (node, judged) in nodes_to_write.iter_mut().zip(judged) {
+            let (index, bits) = match judged {
+                Ok(judged) => judged,
+                Err(status) => {
+                    node.set_status(status);
+                    continue;
+                }
+            };
+            if is_refused {
+                node.set_status(StatusCode::BadUserAccessDenied);
+                continue;
+            }
+            if let Some(other) = writers.write(session, index) {
+                second.get_or_insert(other);
+            }
+            node.set_status(StatusCode::Good);
+            let written = &node.value().value;
+            let value = DataValue {
+                value: written.value.clone(),
+                status: Some(StatusCode::Good),
+                source_timestamp: written.source_timestamp.or(Some(now)),
+                server_timestamp: Some(now),
+                ..DataValue::default()
+            };
+            let id = &node.value().node_id;
+            if let Some(NodeType::Variable(variable)) = space.find_mut(id) {
+                variable.set_data_value(value.clone());
+            }
+            let variable = self.by_node[id];
+            let watched = &self.own.watched;
+            watched.tell(&context.subscriptions, id, variable, &value);
+            let last = lists.last_mut().expect("there is always one");
+            if last.iter().any(|(other, _)| *other == index) {
+                lists.push(vec![(index, bits)]);
+            } else {
+                last.push((index, bits));
+            }
+        }
+        let inbox = &self.own.inbox;
+        if let Some(other) = second {
+            inbox.push(Visit::SecondWriter(Visitor::of(context).name, other));
+        }
+        if !lists[0].is_empty() {
+            inbox.push(Visit::Written(Visitor::of(context), lists));
+        }
     }
 }
 
@@ -202,28 +349,8 @@ impl InMemoryNodeManagerImpl for Signals {
         max_age: f64,
         timestamps: TimestampsToReturn,
     ) -> Vec<DataValue> {
-        if let Err(status) = self.admits(context) {
-            let refused = DataValue {
-                status: Some(status),
-                ..DataValue::default()
-            };
-            return vec![refused; nodes.len()];
-        }
-        let variables = nodes
-            .iter()
-            .filter_map(|node| self.by_node.get(&node.node_id));
-        let signals = variables.map(|variable| variable.signal).collect();
-        let (done, ready) = oneshot::channel();
-        self.own
-            .inbox
-            .push(Visit::Reads(Visitor::of(context), signals, done));
-        // Fails if the bus has stopped; the nodes then keep their values.
-        let _ = ready.await;
-        let space = address_space.read();
-        let read = nodes
-            .iter()
-            .map(|node| space.read(context, node, max_age, timestamps));
-        read.collect()
+        let wanted = (nodes, max_age, timestamps);
+        self.look(context, address_space, wanted, true).await
     }
 
     async fn create_value_monitored_items(
@@ -239,10 +366,8 @@ impl InMemoryNodeManagerImpl for Signals {
             return;
         }
         let wanted: Vec<_> = items.iter().map(|item| item.item_to_monitor()).collect();
-        let both = TimestampsToReturn::Both;
-        let values = self
-            .read_values(context, address_space, &wanted, 0.0, both)
-            .await;
+        let wanted = (&wanted[..], 0.0, TimestampsToReturn::Both);
+        let values = self.look(context, address_space, wanted, false).await;
         for (item, value) in items.iter_mut().zip(values) {
             let first = value.source_timestamp;
             if value.status() != StatusCode::BadAttributeIdInvalid {
@@ -298,64 +423,16 @@ impl InMemoryNodeManagerImpl for Signals {
     ) -> Result<(), StatusCode> {
         // If a service fails, every node gets its status.
         self.admits(context)?;
-        let (writers, session) = (&self.own.writers, context.session_id);
-        writers.begin(session, || Visitor::of(context));
-        let mut lists: Vec<Vec<(usize, u64)>> = vec![Vec::new()];
-        let mut space = address_space.write();
-        let now = date((self.own.wall)());
-        let judged: Vec<_> = nodes_to_write
-            .iter()
-            .map(|node| self.judge(&space, node.value()))
-            .collect();
-        let indices = judged.iter().flatten().map(|&(index, _)| index);
-        let refused = writers.refuses(session, indices);
-        let is_refused = refused.is_some();
-        let mut second = refused;
-        for (node, judged) in nodes_to_write.iter_mut().zip(judged) {
-            let (index, bits) = match judged {
-                Ok(judged) => judged,
-                Err(status) => {
-                    node.set_status(status);
-                    continue;
-                }
-            };
-            if is_refused {
-                node.set_status(StatusCode::BadUserAccessDenied);
-                continue;
-            }
-            if let Some(other) = writers.write(session, index) {
-                second.get_or_insert(other);
-            }
-            node.set_status(StatusCode::Good);
-            let written = &node.value().value;
-            let value = DataValue {
-                value: written.value.clone(),
-                status: Some(StatusCode::Good),
-                source_timestamp: written.source_timestamp.or(Some(now)),
-                server_timestamp: Some(now),
-                ..DataValue::default()
-            };
-            let id = &node.value().node_id;
-            if let Some(NodeType::Variable(variable)) = space.find_mut(id) {
-                variable.set_data_value(value.clone());
-            }
-            let variable = self.by_node[id];
-            let watched = &self.own.watched;
-            watched.tell(&context.subscriptions, id, variable, &value);
-            let last = lists.last_mut().expect("there is always one");
-            if last.iter().any(|(other, _)| *other == index) {
-                lists.push(vec![(index, bits)]);
-            } else {
-                last.push((index, bits));
-            }
-        }
-        let inbox = &self.own.inbox;
-        if let Some(other) = second {
-            inbox.push(Visit::SecondWriter(Visitor::of(context).name, other));
-        }
-        if !lists[0].is_empty() {
-            inbox.push(Visit::Written(Visitor::of(context), lists));
-        }
+        let nodes = nodes_to_write.iter();
+        let signals = nodes.filter_map(|node| self.by_node.get(&node.value().node_id));
+        let signals = signals.map(|variable| variable.signal).collect();
+        let since = Instant::now();
+        let (done, ready) = oneshot::channel();
+        self.own.inbox.push(Visit::Writes(signals, done));
+        // Fails if the bus has stopped.
+        let verdict = ready.await.unwrap_or_default();
+        self.carry_out(context, address_space, nodes_to_write, &verdict);
+        verdict.hold(since).await;
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ use std::net::TcpListener;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use opcua::types::{VariableId, Variant};
+use opcua::types::{StatusCode, VariableId, Variant};
 use opcua_server::ServerHandle;
 use socket2::SockRef;
 use tokio::sync::Notify;
@@ -30,7 +30,7 @@ use super::reactor::{Inbox, Reactor};
 use super::rejects::Rejects;
 use super::{Policy, ServerOptions, Trust};
 use image::{Image, Show};
-use manager::{Own, Visit};
+use manager::{Own, Verdict, Visit};
 use peers::{Peers, Seen};
 use space::Places;
 use visitor::Visitor;
@@ -42,6 +42,10 @@ const FAREWELL: std::time::Duration = std::time::Duration::from_millis(200);
 
 /// How often the folder of rejected certificates is checked, in real time.
 const LOOK: std::time::Duration = std::time::Duration::from_secs(1);
+
+/// The function codes by which faults of answers distinguish the services Read and Write.
+const READ: u8 = 4;
+const WRITE: u8 = 5;
 
 /// The most sessions at the same time.
 const SESSIONS: usize = 100;
@@ -335,7 +339,17 @@ impl Service<'_> {
                 let stations = written.map(|(signal, _)| table.signals[*signal].station);
                 self.meet(port, visitor, stations);
             }
-            Visit::Reads(visitor, signals, done) => {
+            Visit::Reads(visitor, mut signals, is_read, done) => {
+                let mut verdict = Verdict::default();
+                if is_read {
+                    verdict = self.judge(port, now, &signals, READ);
+                    // What is refused is not shown, and a pulse in it waits.
+                    let is_refused = |signal: &usize| {
+                        let station = self.table.signals[*signal].station;
+                        verdict.refused.iter().any(|(of, _)| *of == station)
+                    };
+                    signals.retain(|signal| !is_refused(signal));
+                }
                 self.image.show_to_reader(port, now, &signals);
                 // If no station is writable, the reading clients are the peers.
                 let stations = signals.iter().map(|at| self.table.signals[*at].station);
@@ -346,7 +360,12 @@ impl Service<'_> {
                     self.meet(port, visitor, fed);
                 }
                 // The reader may have gone.
-                let _ = done.send(());
+                let _ = done.send(verdict);
+            }
+            Visit::Writes(signals, done) => {
+                let verdict = self.judge(port, now, &signals, WRITE);
+                // The writer may have gone.
+                let _ = done.send(verdict);
             }
             Visit::SecondWriter(writer, other) => {
                 let clients = (&writer as _, &other as _);
@@ -382,6 +401,24 @@ impl Service<'_> {
             }
         }
         Ok(())
+    }
+
+    /// How faults change the answer to a request that concerns these signals.
+    fn judge(&self, port: &mut Port, now: Nanos, signals: &[usize], function: u8) -> Verdict {
+        let stations = signals.iter().map(|at| self.table.signals[*at].station);
+        let mut stations: Vec<usize> = stations.collect();
+        stations.sort_unstable();
+        stations.dedup();
+        let refused = stations.into_iter().filter_map(|station| {
+            let code = port.answer_status(station, function, now)?;
+            Some((station, StatusCode::from(code)))
+        });
+        let refused = refused.collect();
+        let late = u64::try_from(port.take_lateness().0).unwrap_or(0);
+        Verdict {
+            refused,
+            late: std::time::Duration::from_nanos(late),
+        }
     }
 
     /// From now on a client is a peer of these stations.

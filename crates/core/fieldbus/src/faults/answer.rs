@@ -33,6 +33,8 @@ pub struct AnswerCodes {
     pub range: (u32, u32),
     /// Names of some codes, which a driver.cfg can have instead.
     pub names: &'static [(&'static str, u32)],
+    /// True if answers can be malformed, too.
+    pub wrong: bool,
 }
 
 impl AnswerCodes {
@@ -40,12 +42,14 @@ impl AnswerCodes {
     pub const ANY: Self = Self {
         range: (1, u32::MAX),
         names: &[],
+        wrong: true,
     };
 
     /// One byte without names, as in Modbus.
     pub const BYTE: Self = Self {
         range: (1, 0xFF),
         names: &[],
+        wrong: true,
     };
 }
 

@@ -253,6 +253,16 @@ fn read(mut section: Table<'_>, scope: Option<Scope<'_>>) -> Option<Fault> {
             "remove the fault; \"modbus-server\", \"s7-server\" and \"opcua-server\" do",
         );
     }
+    if let (Some(kind), Some(value), Some(scope)) = (known, &keys.kind, scope)
+        && kind.name == "answer-wrong"
+        && scope.has_answers
+        && !scope.codes.wrong
+    {
+        value.wrong(
+            "the telegrams of this bus are made by a library that makes no malformed ones",
+            "write kind = \"answer-late\" or kind = \"answer-error\"",
+        );
+    }
     let begin = read_begin(&keys, table);
     let lasts = read_lasts(&keys);
     let name = match &keys.name {

@@ -1,0 +1,170 @@
+//! asyncua as a client of a server with the node ids and the names of a real device, and of one whose answers are late.
+
+use serde_json::json;
+
+use super::device::{Device, Peer};
+use crate::harness::Absent;
+
+const OPEN: &str = r#"address = "127.0.0.1:0"
+security = "None"
+anonymous = true
+cycle = "5ms"
+namespaces = ["http://opcfoundation.org/UA/DI/", "http://acme.example/press/"]
+identity = { application = "Press 7", uri = "urn:acme:press:7", manufacturer = "ACME", product = "PX", product_uri = "urn:acme:px", version = "2.1", build = "77" }
+
+[fieldbus.at]
+run         = "ns=4;s=Press.Run"
+speed       = "nsu=http://acme.example/press/;i=6001"
+torque      = "ns=3;i=6002"
+sensor      = "ns=4;i=6001"
+position    = "ns=3;s=Press;Position"
+temperature = "nsu=http://acme.example/oven/;i=1"
+count       = "ns=2;i=7"
+"#;
+
+fn open() -> Result<(Device, Peer), Absent> {
+    let device = Device::open("opcua-server", OPEN);
+    let url = format!("opc.tcp://{}", device.address());
+    let client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
+    Ok((device, client))
+}
+
+pub(super) fn finds_a_device() -> Result<(), Absent> {
+    let (mut device, mut client) = open()?;
+    let names = client.ask(&json!({"names": true}));
+    assert_eq!(
+        names["namespaces"].as_array().expect("a list")[1..],
+        [
+            "urn:acme:press:7",
+            "http://opcfoundation.org/UA/DI/",
+            "http://acme.example/press/",
+            "urn:tickbus:namespace:4",
+            "http://acme.example/oven/",
+            "urn:tickbus:signals"
+        ]
+    );
+    assert_eq!(
+        names["application"],
+        json!(["Press 7", "urn:acme:press:7", "urn:acme:px"])
+    );
+    assert_eq!(names["build"], json!(["ACME", "PX", "2.1", "77"]));
+
+    let nodes = client.ask(&json!({"nodes": true}));
+    for (node, name) in [
+        ("ns=4;s=Press.Run", "4:run"),
+        ("ns=3;i=6001", "3:speed"),
+        ("ns=3;i=6002", "3:torque"),
+        ("ns=4;i=6001", "4:sensor"),
+        ("ns=3;s=Press;Position", "3:position"),
+        ("ns=6;s=position.scaled", "6:Scaled"),
+        ("ns=5;i=1", "5:temperature"),
+        ("ns=2;i=7", "2:count"),
+    ] {
+        assert_eq!(nodes["nodes"][node], name, "{node} of {nodes}");
+    }
+    let unit = client.ask(&json!({"properties": "ns=5;i=1"}));
+    assert!(
+        unit["EngineeringUnits"].to_string().contains("°C"),
+        "{unit}"
+    );
+    let range = client.ask(&json!({"properties": "ns=6;s=position.scaled"}));
+    assert!(
+        range["EURange"].to_string().contains("High=276.48"),
+        "{range}"
+    );
+
+    device.end.set("position", 138.24);
+    device.end.tick();
+    let read = client.ask(&json!({"read": "ns=3;s=Press;Position"}));
+    assert_eq!(
+        (&read["value"], &read["type"]),
+        (&json!(13824), &json!("Int16"))
+    );
+    let wrote = client.ask(&json!({"write": {
+        "ns=3;i=6001": ["Int16", 77], "ns=3;i=6002": ["Float", 1.5], "ns=4;s=Press.Run": ["Boolean", true],
+        "ns=4;i=6001": ["Boolean", true], "ns=3;i=6003": ["Int16", 1], "ns=2;s=speed": ["Int16", 1],
+    }}));
+    // In the order of their names.
+    // In the order of the node ids.
+    assert_eq!(
+        wrote["statuses"],
+        json!([
+            "BadNodeIdUnknown",
+            "Good",
+            "Good",
+            "BadNodeIdUnknown",
+            "BadUserAccessDenied",
+            "Good"
+        ])
+    );
+    device.until("all of them", |end| {
+        (end.get("speed"), end.get("torque"), end.get("run")) == (77.0, 1.5, 1.0)
+    });
+    let unknown = client.ask(&json!({"read": "ns=77;i=1"}));
+    assert_eq!(unknown["status"], "BadNodeIdUnknown");
+    Ok(())
+}
+
+/// How long Reads take, in milliseconds: the median of some.
+fn millis(client: &mut Peer) -> f64 {
+    let mut took: Vec<f64> = (0..15)
+        .map(|_| {
+            client.ask(&json!({"timed": "ns=4;i=6001"}))["millis"]
+                .as_f64()
+                .expect("a number")
+        })
+        .collect();
+    took.sort_by(f64::total_cmp);
+    took[took.len() / 2]
+}
+
+pub(super) fn meets_faults() -> Result<(), Absent> {
+    let (mut device, mut client) = open()?;
+    device.end.set("count", 5.0);
+    device.end.tick();
+    let read = |client: &mut Peer| client.ask(&json!({"read": "ns=2;i=7"}))["status"].take();
+    let write = |client: &mut Peer| {
+        client.ask(&json!({"write": {"ns=3;i=6001": ["Int16", 9]}}))["statuses"][0].take()
+    };
+    let inject = |device: &mut Device, fault: &str| {
+        let fault = device.end.driver.inject_text(fault).expect("a right fault");
+        device.end.tick();
+        fault
+    };
+    let busy = inject(
+        &mut device,
+        "kind = \"answer-error\"\ncode = \"BadTooManyOperations\"\nfunction = 5",
+    );
+    assert_eq!(read(&mut client), "Good");
+    assert_eq!(write(&mut client), "BadTooManyOperations");
+    assert!(device.end.driver.end_fault(busy));
+    let broken = inject(
+        &mut device,
+        "kind = \"answer-error\"\ncode = 0x808B0000\nfunction = 4",
+    );
+    assert_eq!(read(&mut client), "BadDeviceFailure");
+    assert!(device.end.driver.end_fault(broken));
+    device.end.tick();
+    assert_eq!(
+        device.end.get("speed"),
+        -1.0,
+        "what was refused has no effect"
+    );
+    assert_eq!(
+        (read(&mut client), write(&mut client)),
+        (json!("Good"), json!("Good"))
+    );
+    device.until("it is there", |end| end.get("speed") == 9.0);
+
+    let usual = millis(&mut client);
+    let late = inject(&mut device, "kind = \"answer-late\"\nby = \"150ms\"");
+    let by = millis(&mut client) - usual;
+    println!("opcua answer-late: by=150ms median={by:.2}ms");
+    assert!((149.0..190.0).contains(&by), "{by}");
+    assert!(device.end.driver.end_fault(late));
+    device.end.tick();
+    assert!(millis(&mut client) < 100.0);
+    let counted = device.end.statistic("fault.answers");
+    assert!(counted.parse::<u32>().expect("a number") >= 17, "{counted}");
+    Ok(())
+}

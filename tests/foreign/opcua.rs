@@ -66,6 +66,10 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
         places::meets_faults,
     ),
     (
+        "asyncua_finds_the_address_space_of_a_nodeset",
+        places::has_an_address_space,
+    ),
+    (
         "each_station_has_an_age_of_its_own_and_what_was_just_written_is_good",
         served::ages_apart,
     ),

@@ -15,6 +15,8 @@ has a session, or "refused WHY", then obeys a line of JSON from stdin at a time,
     {"nodes": true}                  {"nodes": {node id: browse name}} of namespaces from 2 on
     {"names": true}                  {"namespaces", "application", "build"}, as the server names itself
     {"timed": node}                  {"millis"}: how long a Read took
+    {"call": [object, method]}       {"status"}
+    {"compare": file, "namespace": uri}  {"nodes", "differ": [texts]}: asyncua's own import of the file beside the server
     {"stop": true}                   and at the end of stdin
 """
 
@@ -25,8 +27,9 @@ import socket
 import sys
 import time
 from pathlib import Path
+from xml.etree import ElementTree
 
-from asyncua import Client, ua
+from asyncua import Client, Server, ua
 from asyncua.crypto.cert_gen import setup_self_signed_certificate
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
@@ -46,6 +49,54 @@ async def make_certificate(folder, uri):
         [ExtendedKeyUsageOID.CLIENT_AUTH],
         {"countryName": "EU", "stateOrProvinceName": "x", "localityName": "x", "organizationName": "ACME"},
     )
+
+
+async def compare(client, file, uri):
+    """Reads every node of the file's namespace from the server, and from asyncua's own import of the file."""
+    own = Server()
+    await own.init()
+    await own.import_xml(file)
+    here, there = await own.get_namespace_index(uri), await client.get_namespace_index(uri)
+    attributes = [ua.AttributeIds.NodeClass, ua.AttributeIds.BrowseName, ua.AttributeIds.DisplayName]
+    differ, count = [], 0
+    own_uris, uris = await own.get_namespace_array(), await client.get_namespace_array()
+
+    def theirs(index):
+        return uris.index(own_uris[index]) if index else 0
+
+    # asyncua adds some nodes of its own.
+    listed = {element.get("NodeId") for element in ElementTree.parse(file).getroot()} - {None}
+    listed = {ua.NodeId.from_string(id) for id in listed}
+    listed = {(id.Identifier, id.NodeIdType) for id in listed if id.NamespaceIndex == 1}
+    for id in list(own.iserver.aspace._nodes):
+        if id.NamespaceIndex != here or (id.Identifier, id.NodeIdType) not in listed:
+            continue
+        count += 1
+        mine = own.get_node(id)
+        other = client.get_node(ua.NodeId(id.Identifier, there, id.NodeIdType))
+        try:
+            for attribute in attributes:
+                a, b = [(await one.read_attribute(attribute)).Value.Value for one in (mine, other)]
+                if attribute == ua.AttributeIds.BrowseName:
+                    a = ua.QualifiedName(a.Name, theirs(a.NamespaceIndex))
+                if attribute == ua.AttributeIds.DisplayName:
+                    a, b = a.Text, b.Text
+                if a != b:
+                    differ.append(f"{id.to_string()} {attribute.name}: {a} and {b}")
+            found = []
+            for one, change in ((mine, theirs), (other, lambda index: index)):
+                references = await one.get_references()
+                found.append({
+                    (r.ReferenceTypeId.to_string() if r.ReferenceTypeId.NamespaceIndex == 0
+                     else (change(r.ReferenceTypeId.NamespaceIndex), r.ReferenceTypeId.Identifier), r.IsForward,
+                     change(r.NodeId.NamespaceIndex), str(r.NodeId.Identifier))
+                    for r in references
+                })
+            if found[0] != found[1]:
+                differ.append(f"{id.to_string()} references: {sorted(map(str, found[0] ^ found[1]))[:4]}")
+        except Exception as error:
+            differ.append(f"{id.to_string()}: {type(error).__name__} {error}")
+    return {"nodes": count, "differ": differ}
 
 
 async def lines():
@@ -137,6 +188,15 @@ async def serve(client):
                     status.BuildInfo.SoftwareVersion, status.BuildInfo.BuildNumber,
                 ],
             }
+        if "call" in line:
+            on, method = line["call"]
+            try:
+                await node(on).call_method(ua.NodeId.from_string(method))
+                answer["status"] = "Good"
+            except ua.UaError as error:
+                answer["status"] = type(error).__name__
+        if "compare" in line:
+            answer = await compare(client, line["compare"], line["namespace"])
         if "timed" in line:
             begin = time.monotonic()
             await client.uaclient.read_attributes([identifier(line["timed"])], ua.AttributeIds.Value)

@@ -168,3 +168,85 @@ pub(super) fn meets_faults() -> Result<(), Absent> {
     assert!(counted.parse::<u32>().expect("a number") >= 17, "{counted}");
     Ok(())
 }
+
+/// The signals of the model in tests/peers/press.NodeSet2.xml.
+const PRESS: &str = r#"
+[fieldbus.at]
+force    = "nsu=http://acme.example/press/;i=6001"
+setpoint = "ns=2;i=6003"
+start    = "nsu=http://acme.example/press/;i=7001"
+
+[[signal]]
+name    = "force"
+address = "%ID0"
+type    = "REAL"
+
+[[signal]]
+name    = "setpoint"
+address = "%QW0"
+type    = "INT"
+
+[[signal]]
+name    = "start"
+address = "%QX2.0"
+latch   = "rising"
+"#;
+
+pub(super) fn has_an_address_space() -> Result<(), Absent> {
+    let model = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/peers/press.NodeSet2.xml"
+    );
+    let keys = format!(
+        "address = \"127.0.0.1:0\"\nsecurity = \"None\"\nanonymous = true\ncycle = \"5ms\"\nnodeset = {model:?}\n"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut device = Device::open_with(folder, "opcua-server", &keys, PRESS);
+    let url = format!("opc.tcp://{}", device.address());
+    let mut client = Peer::ready("opcua_client.py", &json!({"url": url}))?;
+    let nodes = client.ask(&json!({"nodes": true}));
+    assert_eq!(
+        nodes["nodes"],
+        json!({
+            "ns=2;s=Press": "2:Press", "ns=2;i=6001": "2:Force", "ns=2;i=6002": "0:EURange",
+            "ns=2;i=6003": "2:Setpoint", "ns=2;i=6004": "2:SerialNumber", "ns=2;i=7001": "2:Start",
+            "ns=2;i=7002": "2:Stop",
+        })
+    );
+    let like = json!({"compare": model, "namespace": "http://acme.example/press/"});
+    let differ = client.ask(&like);
+    assert_eq!(differ, json!({"nodes": 9, "differ": []}));
+    let range = client.ask(&json!({"properties": "ns=2;i=6001"}));
+    assert!(range["EURange"].to_string().contains("High=250"), "{range}");
+    let serial = client.ask(&json!({"read": "ns=2;i=6004"}));
+    assert_eq!(serial["value"], "P-7");
+
+    device.end.set("force", 7.5);
+    device.end.tick();
+    let force = client.ask(&json!({"read": "ns=2;i=6001"}));
+    assert_eq!(
+        (&force["value"], &force["type"]),
+        (&json!(7.5), &json!("Float"))
+    );
+    let wrote = client.ask(&json!({"write": {
+        "ns=2;i=6001": ["Float", 1.0], "ns=2;i=6003": ["Int16", 9], "ns=2;i=6004": ["String", "x"],
+    }}));
+    assert_eq!(
+        wrote["statuses"],
+        json!(["BadUserAccessDenied", "Good", "BadNotWritable"])
+    );
+    device.until("it is there", |end| end.get("setpoint") == 9.0);
+
+    for _ in 0..3 {
+        device.end.tick();
+        assert_eq!(
+            client.ask(&json!({"call": ["ns=2;s=Press", "ns=2;i=7001"]}))["status"],
+            "Good"
+        );
+        device.until("a pulse", |end| end.get("start") == 1.0);
+        device.until("its end", |end| end.get("start") == 0.0);
+    }
+    let stop = client.ask(&json!({"call": ["ns=2;s=Press", "ns=2;i=7002"]}));
+    assert_eq!(stop["status"], "BadNotImplemented");
+    Ok(())
+}

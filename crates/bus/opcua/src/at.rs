@@ -7,7 +7,7 @@ use tickbus_fieldbus::At;
 use tickbus_image::signal::SignalTable;
 
 use super::namespaces::{FIRST, LAST, UA};
-use super::{Identifier, Namespace, NodeName, ServerOptions};
+use super::{Identifier, Namespace, Node, NodeName, ServerOptions};
 
 /// The URI of the nodes that tickbus itself adds.
 pub(crate) const OWN: &str = "urn:tickbus:signals";
@@ -50,12 +50,13 @@ impl ServerOptions {
                 ),
                 _ => {
                     let name = &table.signals[line.signal].name;
-                    self.nodes.insert(name.clone(), node);
+                    let at = line.at();
+                    self.nodes.insert(name.clone(), Node { name: node, at });
                     placed.push((name, line));
                 }
             }
         }
-        let device = self.device_nodes();
+        let device = self.device_nodes(&[]);
         let mut taken: HashMap<&(u16, Identifier), (&String, &At<'_>)> = HashMap::new();
         for (name, line) in &placed {
             let Some(node) = device.nodes.get(*name) else {
@@ -75,7 +76,7 @@ impl ServerOptions {
     /// Reports signals without a line beside some that have one, and keys without effect.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
         if self.nodes.is_empty() {
-            if let Some(at) = self.namespaces_at {
+            if let (Some(at), true) = (self.namespaces_at, self.nodesets.is_empty()) {
                 collector.report(
                     at,
                     "\"namespaces\" stands without [fieldbus.at]",
@@ -103,13 +104,19 @@ impl ServerOptions {
         }
     }
 
-    /// The nodes of the server, if `[fieldbus.at]` names them; without such lines only the [own](OWN) namespace.
-    pub(crate) fn device_nodes(&self) -> DeviceNodes {
+    /// The nodes of the server that `[fieldbus.at]` names, and its namespaces: those of the key, of `NodeSet2` files and of
+    /// lines, and its [own](OWN).
+    pub(crate) fn device_nodes(&self, of_files: &[String]) -> DeviceNodes {
         let mut uris = self.namespaces.clone();
-        let indices = self.nodes.values().filter_map(|node| match node.namespace {
-            Namespace::Index(index) => Some(index),
-            Namespace::Uri(_) => None,
-        });
+        let further = of_files.iter().filter(|uri| !self.namespaces.contains(uri));
+        uris.extend(further.cloned());
+        let indices = self
+            .nodes
+            .values()
+            .filter_map(|node| match node.name.namespace {
+                Namespace::Index(index) => Some(index),
+                Namespace::Uri(_) => None,
+            });
         // A device that is addressed by numbers has as many namespaces before.
         let last = indices.max().unwrap_or(FIRST - 1);
         while uris.len() < usize::from(last + 1 - FIRST) {
@@ -120,7 +127,7 @@ impl ServerOptions {
         }
         let mut nodes = BTreeMap::new();
         for (name, node) in &self.nodes {
-            let index = match &node.namespace {
+            let index = match &node.name.namespace {
                 Namespace::Index(index) => *index,
                 Namespace::Uri(uri) => {
                     let known = uris.iter().position(|known| known == uri);
@@ -132,9 +139,8 @@ impl ServerOptions {
                     u16::try_from(at).map_or(u16::MAX, |at| at.saturating_add(FIRST))
                 }
             };
-            nodes.insert(name.clone(), (index, node.identifier.clone()));
+            nodes.insert(name.clone(), (index, node.name.identifier.clone()));
         }
-        uris.retain(|uri| uri != OWN || self.nodes.is_empty());
         uris.push(OWN.to_owned());
         DeviceNodes { uris, nodes }
     }

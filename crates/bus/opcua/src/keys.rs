@@ -3,7 +3,7 @@
 use tickbus_base::toml_text::{Key, Shape};
 
 use crate::identity::IDENTITY_KEYS;
-use crate::namespaces::NAMESPACES;
+use crate::namespaces::{NAMESPACES, NODESET};
 use crate::options::IDENTITY_LIMIT;
 use crate::security::POLICIES;
 
@@ -66,6 +66,11 @@ pub(crate) const SERVER: &[Key] = &[
         "namespaces",
         NAMESPACES,
         "The URIs of the device's namespaces, from number 2 on, for [fieldbus.at]",
+    ),
+    Key::new(
+        "nodeset",
+        NODESET,
+        "The NodeSet2 file with the device's address space, or a list, each after those that it requires",
     ),
     Key::new(
         "identity",

@@ -1,5 +1,8 @@
 //! The kinds `opcua-client` and `opcua-server`, for the list of bus kinds.
 
+#[cfg(feature = "opcua")]
+use std::path::Path;
+
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Key, Table, shown};
 use tickbus_fieldbus::faults::AnswerCodes;
@@ -67,8 +70,8 @@ impl BusKind for ServerOptions {
     const KEYS: &'static [&'static [Key]] = &[keys::SERVER, security::KEYS, Writers::KEYS];
     const ONE_OF: &'static [&'static str] = &options::LOGINS;
 
-    fn read(_role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
-        Self::read(table)
+    fn read(role: Role, _moved: bool, table: &mut Table<'_>) -> Option<Self> {
+        Self::read(role, table)
     }
 }
 
@@ -78,12 +81,16 @@ impl BusOptions for ServerOptions {
     }
 
     fn files(&self) -> Vec<NamedFile> {
-        self.credentials.files(&self.security)
+        let nodesets = self.nodesets.iter().cloned();
+        let mut files = self.credentials.files(&self.security);
+        files.extend(nodesets.map(|file| NamedFile::Plain(file.into())));
+        files
     }
 
     #[cfg(feature = "opcua")]
     fn open(&self, setup: &BusSetup<'_>) -> Result<Bus, OpenError> {
-        Ok(Bus::Free(Box::new(super::Server::new(self, setup))))
+        let server = super::Server::new(self, setup).map_err(OpenError::Config)?;
+        Ok(Bus::Free(Box::new(server)))
     }
 
     #[cfg(not(feature = "opcua"))]
@@ -115,9 +122,16 @@ impl BusOptions for ServerOptions {
         self.fit(table, collector);
     }
 
+    #[cfg(feature = "opcua")]
+    fn check_files(&self, folder: &Path, table: &SignalTable, collector: &Collector<'_>) {
+        for (at, mistake) in super::check_nodesets(self, folder, table) {
+            collector.collect(at, mistake);
+        }
+    }
+
     fn place(&self, signal: &Signal, _table: &SignalTable) -> String {
         let node = self.nodes.get(&signal.name);
-        node.map_or_else(String::new, |node| shown(&node.to_string()))
+        node.map_or_else(String::new, |node| shown(&node.name.to_string()))
     }
 }
 

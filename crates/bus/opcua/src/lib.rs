@@ -39,4 +39,6 @@ pub use options::{ClientOptions, Node, ServerOptions};
 pub use security::{Credentials, Login, Mode, Policy, Secret, Trust};
 #[cfg(feature = "opcua")]
 pub use server::Server;
+#[cfg(feature = "opcua")]
+use server::check_nodesets;
 pub use url::Url;

@@ -19,6 +19,38 @@ const URI: Shape = Shape::Label(LONGEST);
 /// The shape of the key.
 pub(crate) const NAMESPACES: Shape = Shape::List(&URI, 1, (LAST - FIRST + 1) as usize);
 
+/// The most `NodeSet2` files.
+const FILES: usize = 50;
+
+/// The longest path of one.
+const PATH: usize = 500;
+
+const FILE: Shape = Shape::Label(PATH);
+
+/// The shape of the key `nodeset`.
+pub(crate) const NODESET: Shape = Shape::Any(&[FILE, Shape::List(&FILE, 1, FILES)]);
+
+/// Reads one path, or a list of them.
+pub(crate) fn read_nodesets(value: &Value<'_>) -> Option<Vec<String>> {
+    const RIGHT: &str =
+        "write the name of a file, such as \"machine.NodeSet2.xml\", or a list of them";
+    if value.as_text().is_some() {
+        return value.label(PATH, RIGHT).map(|name| vec![name.to_owned()]);
+    }
+    let list = value.list(RIGHT)?;
+    if !(1..=FILES).contains(&list.len()) {
+        value.wrong(
+            format!("there are {} files", list.len()),
+            format!("write 1 to {FILES}"),
+        );
+        return None;
+    }
+    let names = list
+        .iter()
+        .map(|name| name.label(PATH, RIGHT).map(str::to_owned));
+    names.collect::<Vec<_>>().into_iter().collect()
+}
+
 /// Reads the URIs.
 pub(crate) fn read_namespaces(value: &Value<'_>) -> Option<Vec<String>> {
     const RIGHT: &str =

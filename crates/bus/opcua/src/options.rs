@@ -11,7 +11,7 @@ use tickbus_image::signal::{Signal, SignalTable, Station};
 use tickbus_net::{Address, Host};
 
 use super::identity::{Identity, read_identity};
-use super::namespaces::read_namespaces;
+use super::namespaces::{read_namespaces, read_nodesets};
 use super::security::{Credentials, Keys, Mode, Policy};
 use super::{NodeName, Pattern, Url};
 
@@ -56,7 +56,7 @@ pub struct Node {
     /// The name.
     pub name: NodeName,
     /// The offset in the text.
-    at: usize,
+    pub(super) at: usize,
 }
 
 /// The options of a server.
@@ -75,13 +75,18 @@ pub struct ServerOptions {
     /// True if a client may not write data that another client has written recently.
     pub is_single_writer: bool,
     /// The nodes of the signals, by the signals' names: the lines of `[fieldbus.at]`.
-    pub nodes: BTreeMap<String, NodeName>,
+    pub nodes: BTreeMap<String, Node>,
     /// The URIs of the device's namespaces, from number 2 on.
     pub namespaces: Vec<String>,
+    /// The `NodeSet2` files with the maker's address space, each after those that it requires.
+    pub nodesets: Vec<String>,
+    /// The offset of the key `nodeset`, if stated.
+    pub(super) nodeset_at: Option<usize>,
     /// The offset of the key `namespaces`, if stated.
     pub(super) namespaces_at: Option<usize>,
     /// How the server names itself.
     pub identity: Identity,
+    pub(super) role: Role,
     /// The offset of the `[fieldbus]` table in the text, for mistakes.
     pub(super) at: usize,
 }
@@ -284,19 +289,22 @@ impl ServerOptions {
             (Some(login), false) => format!("for user \"{}\"", shown(&login.user)),
             (None, false) => "for nobody".to_owned(),
         });
-        if !self.nodes.is_empty() {
-            parts.push("has the nodes of [fieldbus.at]".to_owned());
+        match (&self.nodesets[..], self.nodes.is_empty()) {
+            ([], true) => {}
+            ([], false) => parts.push("has the nodes of [fieldbus.at]".to_owned()),
+            (files, _) => parts.push(format!("has the nodes of {}", shown(&files.join(", ")))),
         }
         parts
     }
 
-    /// Reads the keys of a server.
-    pub fn read(table: &mut Table<'_>) -> Option<Self> {
+    /// Reads the keys of a server, for the end with `role`.
+    pub fn read(role: Role, table: &mut Table<'_>) -> Option<Self> {
         let address = table.take("address");
         let host = table.take("host");
         let keys = Keys::take(table);
         let anonymous = table.take("anonymous");
         let namespaces = table.take("namespaces");
+        let nodeset = table.take("nodeset");
         let identity = table.take("identity");
         let at = table.at();
         let is_single_writer = Writers::read(table);
@@ -319,6 +327,8 @@ impl ServerOptions {
         let namespaces_at = namespaces.as_ref().map(Value::at);
         let namespaces = namespaces.as_ref();
         let namespaces = namespaces.map_or(Some(Vec::new()), read_namespaces);
+        let nodeset_at = nodeset.as_ref().map(Value::at);
+        let nodesets = nodeset.as_ref().map_or(Some(Vec::new()), read_nodesets);
         let identity = identity.as_ref();
         let identity = identity.map_or(Some(Identity::default()), read_identity);
         let allowed = anonymous.as_ref().map_or(Some(false), Value::boolean);
@@ -340,8 +350,11 @@ impl ServerOptions {
             is_single_writer: is_single_writer?,
             nodes: BTreeMap::new(),
             namespaces: namespaces?,
+            nodesets: nodesets?,
+            nodeset_at,
             namespaces_at,
             identity: identity?,
+            role,
             at,
         })
     }

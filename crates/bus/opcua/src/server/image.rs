@@ -79,10 +79,11 @@ impl Show {
 
     /// Sets a node's value and reports it to subscribers.
     fn put(&self, node: &NodeId, variable: Variable, value: &DataValue) {
-        if let Some(NodeType::Variable(shown)) = self.nodes.address_space().write().find_mut(node) {
-            shown.set_data_value(value.clone());
-        } else {
-            debug_assert!(false, "every signal has its nodes: {node}");
+        match self.nodes.address_space().write().find_mut(node) {
+            Some(NodeType::Variable(shown)) => shown.set_data_value(value.clone()),
+            // A method has no value.
+            Some(NodeType::Method(_)) => return,
+            _ => debug_assert!(false, "every signal has its nodes: {node}"),
         }
         self.watched
             .tell(&self.subscriptions, node, variable, value);

@@ -13,8 +13,8 @@ use opcua_server::address_space::{AddressSpace, NodeType};
 use opcua_server::diagnostics::NamespaceMetadata;
 use opcua_server::node_manager::memory::{InMemoryNodeManager, InMemoryNodeManagerImpl};
 use opcua_server::node_manager::{
-    MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue, RequestContext,
-    ServerContext, WriteNode,
+    MethodCall, MonitoredItemRef, MonitoredItemUpdateRef, ParsedReadValueId, ParsedWriteValue,
+    RequestContext, ServerContext, WriteNode,
 };
 use opcua_server::{CreateMonitoredItem, MonitoredItemHandle, Subscription};
 use tokio::sync::oneshot;
@@ -96,6 +96,8 @@ pub(super) struct Signals {
     /// The URIs of the namespaces from number 2 on.
     uris: Vec<String>,
     by_node: HashMap<NodeId, Variable>,
+    /// The signals that are pulses of methods.
+    by_method: HashMap<NodeId, usize>,
     own: Own,
     /// The results of checking sessions' applications, the latest last.
     judged: Mutex<VecDeque<(u32, bool)>>,
@@ -124,12 +126,16 @@ impl fmt::Debug for Signals {
 impl Signals {
     /// The signals of `table`.
     pub(super) fn new(table: Arc<SignalTable>, places: &Places, own: Own) -> Self {
-        let mut by_node = HashMap::new();
+        let (mut by_node, mut by_method) = (HashMap::new(), HashMap::new());
         for index in 0..table.signals.len() {
             let variable = |is_scaled| Variable {
                 signal: index,
                 is_scaled,
             };
+            if places.is_method(index) {
+                by_method.insert(places.node(index).clone(), index);
+                continue;
+            }
             if let Some((scaled, _)) = places.scaled(&table, index) {
                 by_node.insert(scaled, variable(true));
             }
@@ -139,6 +145,7 @@ impl Signals {
             table,
             uris: places.uris.clone(),
             by_node,
+            by_method,
             own,
             judged: Mutex::default(),
         }
@@ -413,6 +420,27 @@ impl InMemoryNodeManagerImpl for Signals {
                 self.own.watched.remove(variable, item.handle());
             }
         }
+    }
+
+    async fn call(
+        &self,
+        context: &RequestContext,
+        _: &RwLock<AddressSpace>,
+        calls: &mut [&mut &mut MethodCall],
+    ) -> Result<(), StatusCode> {
+        self.admits(context)?;
+        for call in calls {
+            let Some(&signal) = self.by_method.get(call.method_id()) else {
+                call.set_status(StatusCode::BadNotImplemented);
+                continue;
+            };
+            // Two commits: the pulse is there and is over.
+            let pulse = vec![vec![(signal, 1)], vec![(signal, 0)]];
+            let visit = Visit::Written(Visitor::of(context), pulse);
+            self.own.inbox.push(visit);
+            call.set_status(StatusCode::Good);
+        }
+        Ok(())
     }
 
     async fn write(

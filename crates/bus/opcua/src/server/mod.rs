@@ -2,6 +2,7 @@
 
 mod image;
 mod manager;
+mod nodeset;
 mod peers;
 mod setup;
 mod space;
@@ -12,6 +13,7 @@ mod watched;
 mod writers;
 
 use std::net::TcpListener;
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -20,6 +22,7 @@ use opcua_server::ServerHandle;
 use socket2::SockRef;
 use tokio::sync::Notify;
 
+use tickbus_base::Mistake;
 use tickbus_base::time::{Nanos, Pace, Stop};
 use tickbus_fieldbus::{BusError, BusSetup, CYCLE, Events, Free, Port, Rarely, Role, tcp};
 use tickbus_image::signal::SignalTable;
@@ -69,7 +72,11 @@ pub struct Server {
 
 impl Server {
     /// The bus that `options` describe, for `line`.
-    pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Self {
+    ///
+    /// # Errors
+    ///
+    /// A mistake in a `NodeSet2` file.
+    pub fn new(options: &ServerOptions, setup: &BusSetup<'_>) -> Result<Self, Mistake> {
         let mut pki = Pki::new(&options.credentials, setup);
         pki.host.clone_from(&options.host);
         let identity = &options.identity;
@@ -79,16 +86,21 @@ impl Server {
         if let Some(uri) = &identity.uri {
             pki.uri.clone_from(uri);
         }
-        Self {
+        let places = Places::new(options, setup.table, setup.folder);
+        let places = places.map_err(|mistakes| {
+            let mut mistakes = mistakes.into_iter();
+            mistakes.next().expect("at least one").1
+        })?;
+        Ok(Self {
             options: options.clone(),
             pki,
             name: setup.name.to_owned(),
-            places: Arc::new(Places::new(options, setup.table)),
+            places: Arc::new(places),
             table: Arc::new(setup.table.clone()),
             role: setup.role,
             cycle: setup.cycle.unwrap_or(CYCLE),
             events: setup.events,
-        }
+        })
     }
 
     fn is_secure(&self) -> bool {
@@ -164,6 +176,17 @@ impl Server {
             tasks_alone,
         })
     }
+}
+
+/// The mistakes in `NodeSet2` files and in the lines that name nodes in them, with their offsets in the driver.cfg.
+pub(crate) fn check_nodesets(
+    options: &ServerOptions,
+    folder: &Path,
+    table: &SignalTable,
+) -> Vec<(usize, Mistake)> {
+    Places::new(options, table, folder)
+        .err()
+        .unwrap_or_default()
 }
 
 /// Checks the folder of rejected certificates outside the bus thread, because file operations may be slow.

@@ -1,15 +1,20 @@
 //! The nodes of a driver: a folder, containing a folder per station, which contain the signals.
 
+use std::path::Path;
+
 use opcua::types::{
-    DataTypeId, ExtensionObject, LocalizedText, NodeId, ObjectId, QualifiedName, Range,
+    DataTypeId, DataValue, ExtensionObject, LocalizedText, NodeId, ObjectId, QualifiedName, Range,
     VariableTypeId, Variant,
 };
 use opcua_server::address_space::AddressSpace;
-use opcua_server::address_space::{ObjectBuilder, VariableBuilder};
+use opcua_server::address_space::{AccessLevel, NodeType, ObjectBuilder, VariableBuilder};
 
 use crate::values::{data_type_id, variant};
-use tickbus_image::signal::{Area, Scale, Signal, SignalTable};
+use tickbus_base::Mistake;
+use tickbus_base::toml_text::shown;
+use tickbus_image::signal::{Area, DataType, Scale, Signal, SignalTable};
 
+use super::nodeset::{NodeSets, Target};
 use super::units::unit;
 use crate::namespaces::FIRST;
 use crate::{Identifier, ServerOptions};
@@ -30,24 +35,75 @@ pub(super) struct Places {
     own: u16,
     /// By signal.
     nodes: Vec<NodeId>,
+    /// The maker's address space.
+    nodesets: NodeSets,
+    /// By signal, its node in the maker's address space; `None` for one that is added.
+    targets: Vec<Option<Target>>,
 }
 
 impl Places {
-    /// The node ids of the signals in `table`.
-    pub(super) fn new(options: &ServerOptions, table: &SignalTable) -> Self {
-        let device = options.device_nodes();
+    /// The node ids of the signals in `table`, and their nodes in the maker's address space.
+    ///
+    /// # Errors
+    ///
+    /// A mistake in that address space, with the offset in the driver.cfg of what is not in it.
+    pub(super) fn new(
+        options: &ServerOptions,
+        table: &SignalTable,
+        folder: &Path,
+    ) -> Result<Self, Vec<(usize, Mistake)>> {
+        let at = options.nodeset_at.unwrap_or(options.at);
+        let whole = |mistake| vec![(at, mistake)];
+        let nodesets = NodeSets::load(folder, &options.nodesets).map_err(whole)?;
+        let device = options.device_nodes(&nodesets.uris());
         let own = usize::from(FIRST) + device.uris.len() - 1;
-        let own = u16::try_from(own).expect("a device has fewer namespaces");
+        let own = u16::try_from(own).unwrap_or(u16::MAX);
         let node = |signal: &Signal| match device.nodes.get(&signal.name) {
             Some((index, Identifier::Number(number))) => NodeId::new(*index, *number),
             Some((index, Identifier::Text(text))) => NodeId::new(*index, text.as_str()),
             None => NodeId::new(own, signal.name.as_str()),
         };
-        Self {
+        let mut places = Self {
             own,
             nodes: table.signals.iter().map(node).collect(),
             uris: device.uris,
+            nodesets,
+            targets: vec![None; table.signals.len()],
+        };
+        if options.nodesets.is_empty() {
+            return Ok(places);
         }
+        let mut found = places
+            .nodesets
+            .check(|uri| places.index(uri))
+            .map_err(whole)?;
+        let mut mistakes = Vec::new();
+        for (index, signal) in table.signals.iter().enumerate() {
+            let Some(line) = options.nodes.get(&signal.name) else {
+                continue;
+            };
+            let target = found.remove(&places.nodes[index]);
+            match bind(signal, target.as_ref(), options.role.areas().1) {
+                Ok(target) => places.targets[index] = Some(target),
+                Err(mistake) => mistakes.push((line.at, mistake)),
+            }
+        }
+        if mistakes.is_empty() {
+            Ok(places)
+        } else {
+            Err(mistakes)
+        }
+    }
+
+    /// The number of a namespace.
+    fn index(&self, uri: &str) -> Option<u16> {
+        let at = self.uris.iter().position(|known| known == uri)?;
+        u16::try_from(at).ok()?.checked_add(FIRST)
+    }
+
+    /// Returns true if a signal is a method of the maker's address space.
+    pub(super) fn is_method(&self, signal: usize) -> bool {
+        self.targets[signal] == Some(Target::Method)
     }
 
     /// The node of a signal.
@@ -57,10 +113,14 @@ impl Places {
 
     /// The node with a signal's value in engineering units, if it has one.
     pub(super) fn scaled(&self, table: &SignalTable, signal: usize) -> Option<(NodeId, Scale)> {
+        let is_bound = self.targets[signal].is_some();
         let signal = &table.signals[signal];
         let name = format!("{}{SCALED}", signal.name);
-        // A signal of that name takes precedence.
-        let scale = signal.scale.filter(|_| table.position(&name).is_none())?;
+        // A signal of that name takes precedence. The maker's variables have what the maker gave them.
+        let scale = signal
+            .scale
+            .filter(|_| !is_bound)
+            .filter(|_| table.position(&name).is_none())?;
         Some((NodeId::new(self.own, name), scale))
     }
 
@@ -78,6 +138,26 @@ pub(super) fn build(
     table: &SignalTable,
     reads: Area,
 ) {
+    if let Err(mistake) = places.nodesets.build(space, |uri| places.index(uri)) {
+        // It was checked when the bus was made.
+        log::warn!("the address space is not complete: {mistake}");
+    }
+    let (bound, others): (Vec<usize>, Vec<usize>) =
+        (0..table.signals.len()).partition(|index| places.targets[*index].is_some());
+    for index in bound {
+        let signal = &table.signals[index];
+        if let Some(NodeType::Variable(variable)) = space.find_mut(places.node(index)) {
+            let mut access = AccessLevel::CURRENT_READ;
+            access.set(AccessLevel::CURRENT_WRITE, signal.area == reads);
+            variable.set_access_level(access);
+            variable.set_user_access_level(access);
+            variable.set_minimum_sampling_interval(0.0);
+            variable.set_data_value(DataValue::new_now(variant(signal.data_type, 0)));
+        }
+    }
+    if others.is_empty() {
+        return;
+    }
     let top = places.number(FOLDERS);
     folder(space, &top, driver, ObjectId::ObjectsFolder.into());
     for (index, station) in table.stations.iter().enumerate() {
@@ -90,13 +170,62 @@ pub(super) fn build(
             );
         }
     }
-    for (index, signal) in table.signals.iter().enumerate() {
+    for index in others {
+        let signal = &table.signals[index];
         let parent = if table.stations[signal.station].name.is_empty() {
             top.clone()
         } else {
             places.number(FOLDERS + 1 + signal.station)
         };
         variable(space, places, table, index, parent, reads);
+    }
+}
+
+/// The node of the maker's address space for a signal; `reads` is the area that clients write.
+fn bind(signal: &Signal, target: Option<&Target>, reads: Area) -> Result<Target, Mistake> {
+    let name = shown(&signal.name);
+    match target {
+        Some(Target::Variable(of_type)) => {
+            // Of other types the standard's tree would have to be known: numbers, times and enumerations.
+            let is_plain = of_type.namespace == 0;
+            let number = of_type.as_data_type_id().ok().filter(|_| is_plain);
+            let fits = match number.map(|id| id as u32) {
+                Some(known @ 1..=11) => known == data_type_id(signal.data_type) as u32,
+                Some(12..=22) => false,
+                _ => true,
+            };
+            if fits {
+                return Ok(Target::Variable(of_type.clone()));
+            }
+            let words = number.map_or_else(|| of_type.to_string(), |id| format!("{id:?}"));
+            Err(Mistake::new(
+                format!(
+                    "the variable is of type {words}, and the signal \"{name}\" of type {}",
+                    signal.data_type
+                ),
+                "correct \"type\" of the signal, or name another node",
+            ))
+        }
+        Some(Target::Method) => {
+            let is_pulse = signal.data_type == DataType::Bool && signal.latch.is_some();
+            if is_pulse && signal.area == reads {
+                return Ok(Target::Method);
+            }
+            Err(Mistake::new(
+                format!(
+                    "the node is a method, whose call is a pulse, and the signal \"{name}\" could miss it"
+                ),
+                "name it for a BOOL that clients write, with latch = \"rising\"",
+            ))
+        }
+        Some(Target::Other) => Err(Mistake::new(
+            "the node is neither a variable nor a method",
+            "name the variable below it that has the value",
+        )),
+        None => Err(Mistake::new(
+            "no file of \"nodeset\" has that node, or another signal is it",
+            "name a variable of the file; \"nsu=…\" spells its namespace as the file does",
+        )),
     }
 }
 

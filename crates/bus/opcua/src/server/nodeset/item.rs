@@ -1,0 +1,223 @@
+//! One element of a `NodeSet2` file as a node of an address space.
+
+use std::collections::HashMap;
+use std::str::FromStr;
+
+use opcua::types::{DataValue, LocalizedText, NodeClass, NodeId, QualifiedName, ReferenceTypeId};
+use opcua_server::address_space::{
+    Base, DataType, EventNotifier, ImportedItem, ImportedReference, Method, NodeType, Object,
+    ObjectType, ReferenceType, Variable, VariableType, View,
+};
+use roxmltree::Node;
+use tickbus_base::toml_text::shown;
+
+use super::{TagName, child, value};
+use crate::namespaces::UA;
+
+/// The names of reference types that files use without an alias.
+const REFERENCES: [(&str, ReferenceTypeId); 6] = [
+    ("HasComponent", ReferenceTypeId::HasComponent),
+    ("HasProperty", ReferenceTypeId::HasProperty),
+    ("HasSubtype", ReferenceTypeId::HasSubtype),
+    ("HasTypeDefinition", ReferenceTypeId::HasTypeDefinition),
+    ("HasModellingRule", ReferenceTypeId::HasModellingRule),
+    ("Organizes", ReferenceTypeId::Organizes),
+];
+
+/// The names of a file.
+pub(super) struct Reader<'t> {
+    aliases: HashMap<&'t str, &'t str>,
+    /// The numbers of its namespaces in the server; `None` for one that the server has not.
+    indices: Vec<Option<u16>>,
+}
+
+impl<'t> Reader<'t> {
+    pub(super) fn new(
+        root: Node<'t, '_>,
+        uris: &[String],
+        index: impl Fn(&str) -> Option<u16>,
+    ) -> Self {
+        let aliases = child(root, "Aliases").into_iter();
+        let aliases = aliases.flat_map(|aliases| aliases.children());
+        let aliases =
+            aliases.filter_map(|alias| Some((alias.attribute("Alias")?, alias.text()?.trim())));
+        let own = uris
+            .iter()
+            .map(|uri| if uri == UA { Some(0) } else { index(uri) });
+        Self {
+            aliases: aliases.collect(),
+            indices: [Some(0)].into_iter().chain(own).collect(),
+        }
+    }
+
+    /// The node of an element; `None` for an element that is none.
+    pub(super) fn item(&self, element: Node<'_, '_>) -> Result<Option<ImportedItem>, String> {
+        let class = match element.tag_name().name() {
+            "UAObject" => NodeClass::Object,
+            "UAVariable" => NodeClass::Variable,
+            "UAMethod" => NodeClass::Method,
+            "UAView" => NodeClass::View,
+            "UAObjectType" => NodeClass::ObjectType,
+            "UAVariableType" => NodeClass::VariableType,
+            "UADataType" => NodeClass::DataType,
+            "UAReferenceType" => NodeClass::ReferenceType,
+            _ => return Ok(None),
+        };
+        Ok(Some(ImportedItem {
+            node: self.node(class, element)?,
+            references: self.references(element)?,
+        }))
+    }
+
+    fn node(&self, class: NodeClass, element: Node<'_, '_>) -> Result<NodeType, String> {
+        let base = self.base(class, element)?;
+        let is_abstract = flag(element, "IsAbstract", false);
+        let rank = number(element, "ValueRank", -1)?;
+        let dimensions = dimensions(element)?;
+        let notifier = || {
+            Ok::<_, String>(EventNotifier::from_bits_truncate(number(
+                element,
+                "EventNotifier",
+                0,
+            )?))
+        };
+        let data_type = || match element.attribute("DataType") {
+            None => Ok(NodeId::new(0, 24_u32)),
+            Some(text) => self.id(text),
+        };
+        let value = child(element, "Value").and_then(|value| value.first_element_child());
+        let value = value.map(|value| value::variant(value, &|text| self.id(text)));
+        let value = value.map(DataValue::new_now);
+        Ok(match class {
+            NodeClass::Object => Object::new_full(base, notifier()?).into(),
+            NodeClass::View => {
+                View::new_full(base, notifier()?, flag(element, "ContainsNoLoops", false)).into()
+            }
+            NodeClass::ObjectType => ObjectType::new_full(base, is_abstract).into(),
+            NodeClass::DataType => DataType::new_full(base, is_abstract, None).into(),
+            NodeClass::Method => Method::new_full(
+                base,
+                flag(element, "Executable", true),
+                flag(element, "UserExecutable", true),
+            )
+            .into(),
+            NodeClass::ReferenceType => ReferenceType::new_full(
+                base,
+                flag(element, "Symmetric", false),
+                is_abstract,
+                localized(element, "InverseName"),
+            )
+            .into(),
+            NodeClass::VariableType => {
+                VariableType::new_full(base, data_type()?, is_abstract, rank, value, dimensions)
+                    .into()
+            }
+            // What no signal is can be read alone.
+            _ => {
+                let readable = number::<u8>(element, "AccessLevel", 1)? & 1;
+                Variable::new_full(
+                    base,
+                    data_type()?,
+                    false,
+                    rank,
+                    value.unwrap_or_else(DataValue::null),
+                    readable,
+                    readable,
+                    dimensions,
+                    None,
+                )
+                .into()
+            }
+        })
+    }
+
+    fn base(&self, class: NodeClass, element: Node<'_, '_>) -> Result<Base, String> {
+        let id = element.attribute("NodeId").ok_or("a node has no NodeId")?;
+        let name = element.attribute("BrowseName").unwrap_or_default();
+        let name = self.qualified(name)?;
+        let shown = localized(element, "DisplayName");
+        let shown = shown.unwrap_or_else(|| LocalizedText::from(name.name.as_ref()));
+        let description = localized(element, "Description");
+        Ok(Base::new_full(
+            self.id(id)?,
+            class,
+            name,
+            shown,
+            description,
+            Some(0),
+            Some(0),
+        ))
+    }
+
+    fn references(&self, element: Node<'_, '_>) -> Result<Vec<ImportedReference>, String> {
+        let list = child(element, "References").into_iter();
+        let list = list.flat_map(|list| list.children());
+        let list = list.filter(|reference| reference.has_tag_name_of("Reference"));
+        let reference = |reference: Node<'_, '_>| {
+            let of_type = reference.attribute("ReferenceType").unwrap_or_default();
+            let known = REFERENCES.iter().find(|(name, _)| *name == of_type);
+            Ok(ImportedReference {
+                target_id: self.id(reference.text().unwrap_or_default())?,
+                type_id: match known {
+                    Some((_, id)) => (*id).into(),
+                    None => self.id(of_type)?,
+                },
+                is_forward: flag(reference, "IsForward", true),
+            })
+        };
+        list.map(reference).collect()
+    }
+
+    /// A node id or its alias, with the namespace's number in the server.
+    fn id(&self, text: &str) -> Result<NodeId, String> {
+        let text = text.trim();
+        let text = self.aliases.get(text).copied().unwrap_or(text);
+        let wrong = || format!("\"{}\" is no node id, and no alias of one", shown(text));
+        let mut id = NodeId::from_str(text).map_err(|_| wrong())?;
+        id.namespace = self.index(id.namespace)?;
+        Ok(id)
+    }
+
+    fn qualified(&self, text: &str) -> Result<QualifiedName, String> {
+        let parts = text.split_once(':');
+        let parts = parts.and_then(|(index, name)| Some((index.parse::<u16>().ok()?, name)));
+        let (index, name) = parts.unwrap_or((0, text));
+        Ok(QualifiedName::new(self.index(index)?, name))
+    }
+
+    fn index(&self, index: u16) -> Result<u16, String> {
+        let found = self.indices.get(usize::from(index)).copied().flatten();
+        found.ok_or_else(|| format!("the file has no namespace {index}"))
+    }
+}
+
+fn flag(element: Node<'_, '_>, name: &str, usual: bool) -> bool {
+    let text = element.attribute(name);
+    text.map_or(usual, |text| matches!(text.trim(), "true" | "1"))
+}
+
+fn number<T: FromStr>(element: Node<'_, '_>, name: &str, usual: T) -> Result<T, String> {
+    let Some(text) = element.attribute(name) else {
+        return Ok(usual);
+    };
+    let wrong = |_| format!("{name} \"{}\" is no number that fits", shown(text));
+    text.trim().parse().map_err(wrong)
+}
+
+fn dimensions(element: Node<'_, '_>) -> Result<Option<Vec<u32>>, String> {
+    let text = element.attribute("ArrayDimensions").unwrap_or_default();
+    if text.trim().is_empty() {
+        return Ok(None);
+    }
+    let sizes = text.split(',').map(|size| size.trim().parse::<u32>());
+    let sizes = sizes.collect::<Result<_, _>>();
+    let wrong = |_| format!("ArrayDimensions \"{}\" is no list of numbers", shown(text));
+    sizes.map(Some).map_err(wrong)
+}
+
+/// The first text of that name: files have the one without a locale, or in English, first.
+fn localized(element: Node<'_, '_>, name: &str) -> Option<LocalizedText> {
+    let text = child(element, name)?;
+    let locale = text.attribute("Locale").unwrap_or_default();
+    Some(LocalizedText::new(locale, text.text().unwrap_or_default()))
+}

@@ -13,6 +13,7 @@ use super::host::{PageAddress, page_address, recording, show_run};
 use tickbus_base::time::{Monotonic, Stop};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_driver_cfg::Kinds;
+use tickbus_net::LocalAddress;
 use tickbus_virtual_time as virtual_time;
 use virtual_time::server::Control;
 #[cfg(unix)]
@@ -183,7 +184,13 @@ fn serve(
         Meeting::Tcp(address) => {
             let listener = tcp::Listener::bind(&address)
                 .map_err(|error| failed(format!("cannot listen on {address}: {error}")))?;
-            say(&format!("listening on {}", listener.address()));
+            say(&format!("listening on {}", listener.place()));
+            listener.run(file.settings, logic, hosting)
+        }
+        Meeting::Unix(address) => {
+            let listener = tcp::Listener::bind_local(&address)
+                .map_err(|error| failed(no_socket(&address, &error)))?;
+            say(&format!("listening on {}", listener.place()));
             listener.run(file.settings, logic, hosting)
         }
         #[cfg(unix)]
@@ -199,6 +206,18 @@ fn serve(
             Err(failed(reason.to_owned()))
         }
     }
+}
+
+/// Says why the server cannot listen at a Unix socket, and what to do.
+fn no_socket(address: &LocalAddress, error: &io::Error) -> String {
+    let right = match error.kind() {
+        io::ErrorKind::AddrInUse => "stop that server, or write another address",
+        io::ErrorKind::AlreadyExists => "write a path that is free",
+        io::ErrorKind::NotFound => "make its folder first, or write another path",
+        io::ErrorKind::Unsupported => "write HOST:PORT",
+        _ => "write a path where you may make files",
+    };
+    format!("cannot listen on {address}: {error}; {right}")
 }
 
 /// Prints the last line: the result of the run. Its texts come from clients, so a quote or a line break in them is

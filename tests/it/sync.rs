@@ -139,6 +139,41 @@ fn two_transports_give_the_same_last_line() {
 }
 
 #[test]
+fn a_unix_socket_has_one_server_and_is_removed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let place = format!("unix:{}", folder.path().join("run").display());
+    let address: tickbus::net::LocalAddress = place.parse().expect("a path");
+    let text =
+        format!("[sync]\nlisten = \"{place}\"\nstep = \"1ms\"\nclients = 1\nuntil = \"5ms\"\n");
+    let run = |sync: &mut Sync| {
+        assert_eq!(sync.line(), format!("sync: listening on {place}"));
+        tcp::join_local(&address, &mut Counter("a", "a")).expect("it runs")
+    };
+    let mut killed = Sync::start(&text, &[]);
+    assert_eq!(killed.line(), format!("sync: listening on {place}"));
+    let (last, code) = Sync::start(&text, &[]).end();
+    assert_eq!(code, Some(3));
+    let reason =
+        format!("cannot listen on {place}: another server listens there; stop that server");
+    assert!(last.contains(&reason), "{last}");
+    killed.child.kill().expect("it runs");
+    killed.child.wait().expect("it was started");
+    assert!(address.path().exists(), "a killed server leaves its file");
+    let mut sync = Sync::start(&text, &[]);
+    let outcome = run(&mut sync);
+    let expected = format!("sync: ok steps=5 time=4ms hash={}", outcome.hash);
+    assert_eq!(sync.end(), (expected, Some(0)));
+    assert!(!address.path().exists());
+    std::fs::write(address.path(), "precious").expect("a file");
+    let (last, code) = Sync::start(&text, &[]).end();
+    assert_eq!(code, Some(3));
+    assert!(
+        last.contains("a file that is no socket is there; write a path that is free"),
+        "{last}"
+    );
+}
+
+#[test]
 fn a_paused_run_is_stepped_and_stopped_by_commands() {
     let text = "[sync]\nlisten = \"127.0.0.1:0\"\nstep = \"1ms\"\nclients = 1\n";
     let mut sync = Sync::start(text, &["--paused"]);

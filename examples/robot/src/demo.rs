@@ -168,7 +168,9 @@ fn in_processes(at: Meeting, plc_first: bool) -> Result<(Run, Outcome), String> 
     let start = |name: &str, server: &Meeting| {
         let mut command = Command::new(std::env::current_exe()?);
         match server {
-            Meeting::Tcp(address) => command.args([name, "--server", &address.to_string()]),
+            Meeting::Tcp(_) | Meeting::Unix(_) => {
+                command.args([name, "--server", &server.to_string()])
+            }
             Meeting::SharedMemory(memory) => command.args([name, "--shared-memory", memory]),
         };
         if name == "plant" {

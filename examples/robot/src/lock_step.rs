@@ -48,6 +48,7 @@ pub fn in_process(plc_first: bool) -> Result<(Run, Outcome), Ended> {
 pub fn join(server: &Meeting, participant: &mut dyn Participant) -> Result<Outcome, Ended> {
     match server {
         Meeting::Tcp(address) => tcp::join(address, participant),
+        Meeting::Unix(address) => tcp::join_local(address, participant),
         #[cfg(unix)]
         Meeting::SharedMemory(name) => shared_memory::join(name, participant),
         #[cfg(not(unix))]
@@ -70,6 +71,11 @@ pub fn served<T>(at: Meeting, clients: impl FnOnce(&Meeting) -> T) -> Result<(T,
             let port = listener.address().port();
             let serve = |hosting: Hosting<'_>| listener.run(settings(), Logic::new(), hosting);
             (Meeting::Tcp(Address { port, ..address }), Box::new(serve))
+        }
+        Meeting::Unix(address) => {
+            let listener = tcp::Listener::bind_local(&address).map_err(cannot)?;
+            let serve = |hosting: Hosting<'_>| listener.run(settings(), Logic::new(), hosting);
+            (Meeting::Unix(address), Box::new(serve))
         }
         #[cfg(unix)]
         Meeting::SharedMemory(name) => {

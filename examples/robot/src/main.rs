@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, Parser, Subcommand};
-use tickbus_net::Address;
 use tickbus_robot::lock_step;
 use tickbus_robot::participants::{Machine, Program};
 use tickbus_virtual_time::{Meeting, Participant};
@@ -52,8 +51,8 @@ enum Command {
 #[group(required = true, multiple = false)]
 struct Server {
     /// The server's address
-    #[arg(long, value_name = "HOST:PORT")]
-    server: Option<Address>,
+    #[arg(long, value_name = "HOST:PORT|unix:PATH")]
+    server: Option<Meeting>,
     /// The name of the shared memory in which the server is
     #[arg(long, value_name = "NAME")]
     shared_memory: Option<String>,
@@ -64,7 +63,6 @@ fn join(server: Server, participant: &mut dyn Participant) -> Result<String, Str
     let name = || server.shared_memory.map(Meeting::SharedMemory);
     let server = server
         .server
-        .map(Meeting::Tcp)
         .or_else(name)
         .expect("clap demands one of them");
     let outcome = lock_step::join(&server, participant).map_err(|ended| ended.to_string())?;

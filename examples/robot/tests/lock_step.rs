@@ -82,6 +82,16 @@ fn over_tcp_all_runs_are_the_same_as_in_one_process() {
 
 #[cfg(unix)]
 #[test]
+fn over_a_unix_socket_a_run_is_the_same_as_in_one_process() {
+    let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
+    let place = format!("unix:robot-test-{}", std::process::id());
+    assert_all_equal(3, |plc_first| {
+        with_threads(place.parse().expect("a place"), plc_first)
+    });
+}
+
+#[cfg(unix)]
+#[test]
 fn through_shared_memory_a_run_is_the_same_as_in_one_process() {
     let _turn = ONE_AT_A_TIME.lock().unwrap_or_else(PoisonError::into_inner);
     let name = format!("robot-test-{}", std::process::id());

@@ -11,7 +11,6 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_driver_cfg::{CommandLineEnd, Config, Kinds};
 use tickbus_fieldbus::{LinkState, Role};
 use tickbus_gateway::{Gateway, GatewayOptions};
-use tickbus_net::Address;
 use tickbus_virtual_time::Meeting;
 
 /// The interval at which the state of the PLC's line is checked until there is one.
@@ -27,7 +26,7 @@ pub(in crate::cli) struct Arguments {
     file: PathBuf,
 
     /// Where the server of the run listens.
-    #[arg(long, value_name = "HOST:PORT", value_parser = address)]
+    #[arg(long, value_name = "HOST:PORT|unix:PATH", value_parser = address)]
     server: Meeting,
 
     /// The PLC's name in the run [default: the driver's, with " PLC" behind it].
@@ -49,9 +48,9 @@ pub(in crate::cli) struct Arguments {
 }
 
 fn address(text: &str) -> Result<Meeting, String> {
-    let address: Address = text.parse().map_err(|wrong| format!("{wrong}"))?;
-    address.check_dialled().map_err(|wrong| wrong.to_string())?;
-    Ok(Meeting::Tcp(address))
+    let meeting: Meeting = text.parse().map_err(|wrong| format!("{wrong}"))?;
+    meeting.check_dialled().map_err(|wrong| wrong.to_string())?;
+    Ok(meeting)
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {

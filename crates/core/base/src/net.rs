@@ -1,21 +1,31 @@
 //! Sockets of the operating system, or of a [simulation](crate::time::Simulation).
 
 use std::io::{self, Read, Write};
-use std::net::{self, Shutdown, SocketAddr};
+use std::net::{self, Ipv4Addr, Shutdown, SocketAddr};
+#[cfg(unix)]
+use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::time::{Interest, Nanos, SimulatedListener, SimulatedStream, Simulation};
+#[cfg(unix)]
+mod local;
 
-/// A TCP connection.
+use crate::time::{Interest, Nanos, SimulatedListener, SimulatedStream, Simulation};
+#[cfg(unix)]
+pub use local::LocalListener;
+
+/// A TCP connection, or one that works like it.
 #[derive(Debug)]
 pub enum TcpStream {
     /// Of the operating system.
     Os(net::TcpStream),
+    /// Over a Unix socket, within this computer.
+    #[cfg(unix)]
+    Local(UnixStream),
     /// Of a simulation.
     Simulated(Box<dyn SimulatedStream>),
 }
 
-/// A TCP connection whose calls block, for some time at most.
+/// A connection whose calls block, for some time at most.
 #[derive(Debug)]
 pub struct BlockingStream {
     stream: TcpStream,
@@ -24,11 +34,14 @@ pub struct BlockingStream {
     blocks: AtomicBool,
 }
 
-/// A listening TCP socket.
+/// A listening TCP socket, or one that works like it.
 #[derive(Debug)]
 pub enum TcpListener {
     /// Of the operating system.
     Os(net::TcpListener),
+    /// A Unix socket, for programs of this computer.
+    #[cfg(unix)]
+    Local(LocalListener),
     /// Of a simulation.
     Simulated(Box<dyn SimulatedListener>),
 }
@@ -37,6 +50,9 @@ pub enum TcpListener {
 /// as after a power cut, try again a second later.
 #[cfg(unix)]
 const BACKLOG: i32 = 4096;
+
+/// The address of both ends of a connection over a Unix socket, which have none.
+const NO_ADDRESS: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::UNSPECIFIED), 0);
 
 /// Two ends of a connection within this computer, as a system without pairs of local sockets has them.
 ///
@@ -65,27 +81,41 @@ impl From<net::TcpStream> for TcpStream {
 }
 
 impl TcpStream {
-    /// The operating system's socket; `None` in a simulation.
+    /// The operating system's TCP socket; `None` in a simulation and for a Unix socket.
     pub fn os(&self) -> Option<&net::TcpStream> {
         match self {
             Self::Os(stream) => Some(stream),
+            #[cfg(unix)]
+            Self::Local(_) => None,
             Self::Simulated(_) => None,
         }
+    }
+
+    /// Connects with the Unix socket at `path`.
+    ///
+    /// # Errors
+    ///
+    /// Nobody listens there, or the system refuses the path.
+    #[cfg(unix)]
+    pub fn connect_local(path: &std::path::Path) -> io::Result<Self> {
+        UnixStream::connect(path).map(Self::Local)
     }
 
     /// The operating system's socket, for code that supports no simulation.
     ///
     /// # Errors
     ///
-    /// The socket is simulated.
+    /// The socket is simulated, or a Unix socket.
     pub fn into_os(self) -> io::Result<net::TcpStream> {
         match self {
             Self::Os(stream) => Ok(stream),
+            #[cfg(unix)]
+            Self::Local(_) => Err(io::ErrorKind::Unsupported.into()),
             Self::Simulated(_) => Err(io::ErrorKind::Unsupported.into()),
         }
     }
 
-    /// As [`std::net::TcpStream::local_addr`].
+    /// As [`std::net::TcpStream::local_addr`]; 0.0.0.0:0 for a Unix socket.
     ///
     /// # Errors
     ///
@@ -93,11 +123,13 @@ impl TcpStream {
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         match self {
             Self::Os(stream) => stream.local_addr(),
+            #[cfg(unix)]
+            Self::Local(_) => Ok(NO_ADDRESS),
             Self::Simulated(stream) => stream.local_addr(),
         }
     }
 
-    /// As [`std::net::TcpStream::peer_addr`].
+    /// As [`std::net::TcpStream::peer_addr`]; 0.0.0.0:0 for a Unix socket.
     ///
     /// # Errors
     ///
@@ -105,6 +137,8 @@ impl TcpStream {
     pub fn peer_addr(&self) -> io::Result<SocketAddr> {
         match self {
             Self::Os(stream) => stream.peer_addr(),
+            #[cfg(unix)]
+            Self::Local(_) => Ok(NO_ADDRESS),
             Self::Simulated(stream) => stream.peer_addr(),
         }
     }
@@ -117,6 +151,8 @@ impl TcpStream {
     pub fn take_error(&self) -> io::Result<Option<io::Error>> {
         match self {
             Self::Os(stream) => stream.take_error(),
+            #[cfg(unix)]
+            Self::Local(stream) => stream.take_error(),
             Self::Simulated(stream) => stream.take_error(),
         }
     }
@@ -127,10 +163,20 @@ impl TcpStream {
     ///
     /// As of [`std::net::TcpStream::set_read_timeout`].
     pub fn block(self, read: Nanos, write: Option<Nanos>) -> io::Result<BlockingStream> {
-        if let Some(stream) = self.os() {
-            stream.set_nonblocking(false)?;
-            stream.set_read_timeout(Some(read.to_duration()))?;
-            stream.set_write_timeout(write.map(Nanos::to_duration))?;
+        let limits = (Some(read.to_duration()), write.map(Nanos::to_duration));
+        match &self {
+            Self::Os(stream) => {
+                stream.set_nonblocking(false)?;
+                stream.set_read_timeout(limits.0)?;
+                stream.set_write_timeout(limits.1)?;
+            }
+            #[cfg(unix)]
+            Self::Local(stream) => {
+                stream.set_nonblocking(false)?;
+                stream.set_read_timeout(limits.0)?;
+                stream.set_write_timeout(limits.1)?;
+            }
+            Self::Simulated(_) => {}
         }
         Ok(BlockingStream {
             stream: self,
@@ -145,8 +191,12 @@ impl TcpStream {
     ///
     /// As of [`std::net::TcpStream::set_nonblocking`].
     pub fn set_nonblocking(&self) -> io::Result<()> {
-        self.os()
-            .map_or(Ok(()), |stream| stream.set_nonblocking(true))
+        match self {
+            Self::Os(stream) => stream.set_nonblocking(true),
+            #[cfg(unix)]
+            Self::Local(stream) => stream.set_nonblocking(true),
+            Self::Simulated(_) => Ok(()),
+        }
     }
 }
 
@@ -170,6 +220,8 @@ impl HalfClose for TcpStream {
     fn shutdown_write(&self) -> io::Result<()> {
         match self {
             Self::Os(stream) => HalfClose::shutdown_write(stream),
+            #[cfg(unix)]
+            Self::Local(stream) => stream.shutdown(Shutdown::Write),
             Self::Simulated(stream) => stream.shutdown_write(),
         }
     }
@@ -179,6 +231,8 @@ impl Read for &TcpStream {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self {
             TcpStream::Os(stream) => (&*stream).read(buffer),
+            #[cfg(unix)]
+            TcpStream::Local(stream) => (&*stream).read(buffer),
             TcpStream::Simulated(stream) => stream.read(buffer),
         }
     }
@@ -188,6 +242,8 @@ impl Write for &TcpStream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         match self {
             TcpStream::Os(stream) => (&*stream).write(bytes),
+            #[cfg(unix)]
+            TcpStream::Local(stream) => (&*stream).write(bytes),
             TcpStream::Simulated(stream) => stream.write(bytes),
         }
     }
@@ -288,15 +344,17 @@ impl TcpListener {
     ///
     /// # Errors
     ///
-    /// The socket is simulated.
+    /// The socket is simulated, or a Unix socket.
     pub fn into_os(self) -> io::Result<net::TcpListener> {
         match self {
             Self::Os(listener) => Ok(listener),
+            #[cfg(unix)]
+            Self::Local(_) => Err(io::ErrorKind::Unsupported.into()),
             Self::Simulated(_) => Err(io::ErrorKind::Unsupported.into()),
         }
     }
 
-    /// As [`std::net::TcpListener::local_addr`].
+    /// As [`std::net::TcpListener::local_addr`]; 0.0.0.0:0 for a Unix socket.
     ///
     /// # Errors
     ///
@@ -304,11 +362,13 @@ impl TcpListener {
     pub fn local_addr(&self) -> io::Result<SocketAddr> {
         match self {
             Self::Os(listener) => listener.local_addr(),
+            #[cfg(unix)]
+            Self::Local(_) => Ok(NO_ADDRESS),
             Self::Simulated(listener) => listener.local_addr(),
         }
     }
 
-    /// As [`std::net::TcpListener::accept`].
+    /// As [`std::net::TcpListener::accept`]; the address of a client over a Unix socket is 0.0.0.0:0.
     ///
     /// # Errors
     ///
@@ -319,6 +379,8 @@ impl TcpListener {
                 let (stream, peer) = listener.accept()?;
                 (TcpStream::Os(stream), peer)
             }
+            #[cfg(unix)]
+            Self::Local(listener) => (TcpStream::Local(listener.accept()?), NO_ADDRESS),
             Self::Simulated(listener) => {
                 let (stream, peer) = listener.accept()?;
                 (TcpStream::Simulated(stream), peer)

@@ -3,6 +3,7 @@
 //! | part | contents |
 //! |---|---|
 //! | [`Address`] | hosts and ports, as a driver.cfg and a command line have them |
+//! | [`LocalAddress`] | Unix sockets, written there as `unix:PATH` |
 //! | [`connect()`], [`reach`], [`Dialler`] | connecting: with a stop, blocking, again and again |
 //! | [`listen()`], [`bind`] | listening: with a stop, at once |
 //! | [`Acceptor`] | accepting clients in a poll set |
@@ -20,6 +21,7 @@ mod connect;
 mod dialler;
 mod error;
 mod listen;
+mod local_address;
 mod message;
 mod resolve;
 pub mod serial;
@@ -32,5 +34,6 @@ pub use connect::{connect, reach, reach_in};
 pub use dialler::Dialler;
 pub use error::Error;
 pub use listen::{bind, listen};
+pub use local_address::LocalAddress;
 pub use message::{Inbox, Message, WireError};
 pub use stream::{Stream, close_by_reset, close_gracefully, is_for_later, prepare, watch_peer};

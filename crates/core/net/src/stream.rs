@@ -87,6 +87,9 @@ pub fn close_by_reset(stream: &TcpStream) {
             // If this fails, the connection has failed already.
             let _ = SockRef::from(stream).set_linger(Some(Duration::ZERO));
         }
+        // Within one computer nothing is on its way once the program has ended.
+        #[cfg(unix)]
+        TcpStream::Local(_) => {}
         TcpStream::Simulated(stream) => stream.close_by_reset(),
     }
 }
@@ -97,7 +100,7 @@ pub fn is_for_later(error: &io::Error) -> bool {
 }
 
 /// Makes the system send at once, never block, and give up after `patience` on a peer with a pulled cable. `None` means
-/// a simulated connection, which behaves like this anyway.
+/// a simulated connection or a Unix socket, which have no cable and send at once anyway.
 ///
 /// # Errors
 ///

@@ -24,7 +24,11 @@ const TICK: &str = "tick";
 
 /// The keys of the bus, for the schema of a driver.cfg.
 pub(crate) const KEYS: &[Key] = &[
-    Key::new("address", Shape::ADDRESS, "Where the server listens"),
+    Key::new(
+        "address",
+        Shape::Any(&[Shape::ADDRESS, Shape::Pattern("unix:[^\\s].*")]),
+        "Where the server listens: a host and a port, or a Unix socket",
+    ),
     Key::new(
         "shared_memory",
         Shape::Pattern("[A-Za-z0-9_-]{1,40}"),
@@ -104,7 +108,7 @@ impl Options {
                 );
                 None
             }
-            (Some(address), None) => read_address(&address, moved).map(Meeting::Tcp),
+            (Some(address), None) => read_address(&address, moved),
             (None, Some(name)) => Meeting::read_name(&name).map(Meeting::SharedMemory),
             // A dummy, replaced later.
             (None, None) => moved.then(|| Meeting::Tcp(Address::local(0))),
@@ -142,9 +146,9 @@ impl Options {
 
     /// Replaces the address.
     pub(super) fn set_address(&mut self, address: &str) -> Result<(), Mistake> {
-        let address: Address = address.parse()?;
-        address.check_dialled()?;
-        self.meeting = Meeting::Tcp(address);
+        let meeting: Meeting = address.parse()?;
+        meeting.check_dialled()?;
+        self.meeting = meeting;
         Ok(())
     }
 
@@ -227,10 +231,10 @@ impl Options {
     }
 }
 
-fn read_address(value: &Value<'_>, moved: bool) -> Option<Address> {
-    let address = Address::read(value)?;
-    if !moved && let Err(mistake) = address.check_dialled() {
+fn read_address(value: &Value<'_>, moved: bool) -> Option<Meeting> {
+    let meeting = Meeting::read(value)?;
+    if !moved && let Err(mistake) = meeting.check_dialled() {
         value.refuse(mistake);
     }
-    Some(address)
+    Some(meeting)
 }

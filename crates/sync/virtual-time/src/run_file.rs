@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use tickbus_base::time::Nanos;
 use tickbus_base::toml_text::{Collector, Mistakes, Table, Value, load_text, read_text};
-use tickbus_net::Address;
 
 use crate::declaration::{LONGEST_NAME, check_name};
 use crate::server::MOST_CLIENTS;
@@ -79,7 +78,7 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
     table.finish();
 
     let meeting = match (listen, shared_memory) {
-        (Some(listen), _) => Address::read(&listen).map(Meeting::Tcp),
+        (Some(listen), _) => Meeting::read(&listen),
         (None, name) => {
             name.and_then(|value| Meeting::read_name(&value).map(Meeting::SharedMemory))
         }
@@ -181,6 +180,8 @@ fn pacing(value: &Value<'_>) -> Option<Pacing> {
 
 #[cfg(test)]
 mod tests {
+    use tickbus_net::Address;
+
     use super::*;
 
     fn parse(text: &str) -> Result<RunFile, Mistakes> {
@@ -205,6 +206,11 @@ mod tests {
         assert_eq!(file.settings, expected);
         assert_eq!(file.meeting, Meeting::Tcp(Address::local(0)));
         assert_eq!(file.logic.as_deref(), Some(Path::new("folder/cell.rhai")));
+        let local = parse("sync = { listen = \"unix:/run/cell\", step = \"1ms\", clients = 2 }\n");
+        assert_eq!(
+            local.expect("it is right").meeting.to_string(),
+            "unix:/run/cell"
+        );
         let file = parse("sync = { shared_memory = \"cell\", step = \"1ms\", clients = 2 }\n");
         let file = file.expect("it is right");
         let expected = Settings::new(Nanos::from_millis(1), StartCondition::Count(2));

@@ -23,6 +23,8 @@ impl Pollable for TcpStream {
     fn source(&self) -> Source<'_> {
         match self {
             Self::Os(stream) => Source::Os(stream.as_fd()),
+            #[cfg(unix)]
+            Self::Local(stream) => Source::Os(stream.as_fd()),
             Self::Simulated(stream) => Source::Simulated(stream.identity()),
         }
     }
@@ -32,6 +34,8 @@ impl Pollable for TcpListener {
     fn source(&self) -> Source<'_> {
         match self {
             Self::Os(listener) => Source::Os(listener.as_fd()),
+            #[cfg(unix)]
+            Self::Local(listener) => Source::Os(listener.socket().as_fd()),
             Self::Simulated(listener) => Source::Simulated(listener.identity()),
         }
     }

@@ -1,11 +1,13 @@
 //! The client, which blocks while it waits for the server.
 
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::sync::Arc;
 
 use tickbus_base::net::BlockingStream;
+#[cfg(unix)]
+use tickbus_base::net::TcpStream;
 use tickbus_base::time::{Clock, Monotonic, Nanos, Stop};
-use tickbus_net::{Address, prepare, reach_in};
+use tickbus_net::{Address, LocalAddress, prepare, reach_in};
 
 use super::is_later;
 use crate::client::{Client, Connection, Line, client_of, closed, silent};
@@ -40,22 +42,57 @@ pub fn connect(
     clock: &Arc<dyn Clock>,
     stop: &Stop,
 ) -> Result<Connection, Ended> {
-    let stream = open(address, &**clock).map_err(|error| {
-        let reason = format!(
-            "no server can be reached at {address} ({error}); start it first, or correct the address"
-        );
-        Ended::before(Cause::Lost, reason)
-    })?;
-    let line = TcpLine {
-        stream,
-        clock: Arc::clone(clock),
-        stop: stop.clone(),
-        leaves: None,
-        buffer: vec![0; 4096],
-        start: 0,
-        end: 0,
+    let stream = open(address, &**clock).map_err(|error| unreachable(address, &error))?;
+    Ok(Connection::join(client, TcpLine::new(stream, clock, stop)))
+}
+
+/// Like [`join`], at a Unix socket.
+///
+/// # Errors
+///
+/// The same as for `join`.
+pub fn join_local(
+    address: &LocalAddress,
+    participant: &mut dyn Participant,
+) -> Result<Outcome, Ended> {
+    let client = client_of(participant)?;
+    let clock = Monotonic::shared() as _;
+    connect_local(address, client, &clock, &Stop::new())?.run(participant)
+}
+
+/// Like [`connect`], at a Unix socket.
+///
+/// # Errors
+///
+/// There is no server, or this system has no Unix sockets.
+pub fn connect_local(
+    address: &LocalAddress,
+    client: Client,
+    clock: &Arc<dyn Clock>,
+    stop: &Stop,
+) -> Result<Connection, Ended> {
+    let stream = open_local(address).map_err(|error| unreachable(address, &error))?;
+    Ok(Connection::join(client, TcpLine::new(stream, clock, stop)))
+}
+
+fn unreachable(address: &dyn std::fmt::Display, error: &io::Error) -> Ended {
+    let right = match error.kind() {
+        ErrorKind::Unsupported => "use HOST:PORT",
+        ErrorKind::PermissionDenied => "the server has to run as the same user",
+        _ => "start it first, or correct the address",
     };
-    Ok(Connection::join(client, line))
+    let reason = format!("no server can be reached at {address} ({error}); {right}");
+    Ended::before(Cause::Lost, reason)
+}
+
+#[cfg(unix)]
+fn open_local(address: &LocalAddress) -> io::Result<BlockingStream> {
+    TcpStream::connect_local(address.path())?.block(LOOK, None)
+}
+
+#[cfg(not(unix))]
+fn open_local(_: &LocalAddress) -> io::Result<BlockingStream> {
+    Err(super::no_unix_sockets())
 }
 
 fn open(address: &Address, clock: &dyn Clock) -> io::Result<BlockingStream> {
@@ -74,6 +111,20 @@ struct TcpLine {
     buffer: Vec<u8>,
     start: usize,
     end: usize,
+}
+
+impl TcpLine {
+    fn new(stream: BlockingStream, clock: &Arc<dyn Clock>, stop: &Stop) -> Self {
+        Self {
+            stream,
+            clock: Arc::clone(clock),
+            stop: stop.clone(),
+            leaves: None,
+            buffer: vec![0; 4096],
+            start: 0,
+            end: 0,
+        }
+    }
 }
 
 fn lost(what: impl std::fmt::Display) -> Ended {

@@ -3,10 +3,12 @@
 use std::io;
 use std::net::SocketAddr;
 
+#[cfg(unix)]
+use tickbus_base::net::LocalListener;
 use tickbus_base::net::TcpListener;
 use tickbus_base::os::{Interest, PollSet};
 use tickbus_base::time::{Nanos, Simulation};
-use tickbus_net::{Acceptor, Address, bind};
+use tickbus_net::{Acceptor, Address, LocalAddress, bind};
 
 use super::connection::{Arrived, BLOCKED, Connection};
 use crate::hosting::{Hosting, hear};
@@ -31,6 +33,7 @@ const FAREWELL: Nanos = Nanos::from_secs(1);
 pub struct Listener {
     listener: TcpListener,
     address: SocketAddr,
+    place: String,
 }
 
 impl Listener {
@@ -50,12 +53,48 @@ impl Listener {
     /// The same as for `bind`.
     pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
         let (listener, address) = bind(address, simulation)?;
-        Ok(Self { listener, address })
+        Ok(Self {
+            listener,
+            address,
+            place: address.to_string(),
+        })
     }
 
-    /// The address on which it listens.
+    /// Like [`bind`](Self::bind), at a Unix socket. The file is removed when the run ends; that of a server that was
+    /// killed is replaced.
+    ///
+    /// # Errors
+    ///
+    /// Another server listens there, a file that is no socket is there, or the system refuses the path or has no Unix
+    /// sockets.
+    #[cfg(unix)]
+    pub fn bind_local(address: &LocalAddress) -> io::Result<Self> {
+        let listener = TcpListener::Local(LocalListener::bind(address.path())?);
+        Ok(Self {
+            address: listener.local_addr()?,
+            listener,
+            place: address.to_string(),
+        })
+    }
+
+    /// As on other systems.
+    ///
+    /// # Errors
+    ///
+    /// Always: this system has no Unix sockets.
+    #[cfg(not(unix))]
+    pub fn bind_local(_: &LocalAddress) -> io::Result<Self> {
+        Err(super::no_unix_sockets())
+    }
+
+    /// The TCP address on which it listens; 0.0.0.0:0 at a Unix socket.
     pub const fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// The address on which it listens, as clients write it: `HOST:PORT` or `unix:PATH`.
+    pub fn place(&self) -> &str {
+        &self.place
     }
 
     /// Waits for the clients and runs until the end.

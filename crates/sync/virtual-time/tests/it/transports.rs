@@ -73,6 +73,63 @@ fn a_browser_is_refused_in_words() {
     );
 }
 
+/// A Unix socket in a folder of its own.
+#[cfg(unix)]
+fn socket(folder: &tempfile::TempDir) -> tickbus_net::LocalAddress {
+    let path = format!("unix:{}", folder.path().join("run").display());
+    path.parse().expect("a path")
+}
+
+#[cfg(unix)]
+#[test]
+fn a_run_over_unix_sockets_is_the_one_in_this_process_and_leaves_no_file() {
+    let expected = in_this_process(500, 4);
+    let folder = tempfile::tempdir().expect("a folder");
+    let address = socket(&folder);
+    for turn in 0..4 {
+        let mut clients = mixers(4);
+        clients.rotate_left(turn);
+        let listener = tcp::Listener::bind_local(&address).expect("a free path");
+        assert_eq!(listener.place(), address.to_string());
+        let (outcome, ends) = thread::scope(|scope| {
+            let join = |mut mixer| {
+                let address = &address;
+                scope.spawn(move || tcp::join_local(address, &mut mixer))
+            };
+            let joined: Vec<_> = clients.into_iter().map(join).collect();
+            let outcome = serve(listener, mixer_settings(500, 4), &Controls::default());
+            let ends = joined.into_iter().map(|end| end.join().expect("no panic"));
+            (outcome, ends.collect::<Vec<_>>())
+        });
+        assert_eq!(outcome, Ok(expected));
+        assert!(ends.iter().all(|end| *end == outcome), "{ends:?}");
+        assert!(!address.path().exists(), "the socket is removed");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn a_client_at_a_unix_socket_without_a_server_is_told_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let address = socket(&folder);
+    let mut one = client("one", 1, &[], &[], |_, _, _| Ok(()));
+    // No file, and the file of a server that was killed.
+    for leftover in [false, true] {
+        if leftover {
+            drop(std::os::unix::net::UnixListener::bind(address.path()).expect("a free path"));
+        }
+        let ended = tcp::join_local(&address, &mut one).expect_err("nobody is there");
+        let begin = format!("no server can be reached at {address} (");
+        assert!(ended.reason.starts_with(&begin), "{ended}");
+        assert!(
+            ended
+                .reason
+                .ends_with("start it first, or correct the address"),
+            "{ended}"
+        );
+    }
+}
+
 fn serve(
     listener: tcp::Listener,
     settings: Settings,

@@ -7,7 +7,7 @@ import java.nio.channels.ClosedByInterruptException;
 import java.nio.charset.StandardCharsets;
 import tickbus.sdsp.EndedException.Cause;
 
-/** Lets a {@link Participant} take part in a run over TCP. */
+/** Lets a {@link Participant} take part in a run over TCP or a Unix socket. */
 public final class Client {
     private static final byte[] MAGIC = {'S', 'D', 'S', 'P'};
     private static final short VERSION = 2;
@@ -48,7 +48,8 @@ public final class Client {
      * Takes part in the run of the server at an address, until its end. Blocks the thread; interrupting the thread leaves
      * the run.
      *
-     * @param address the server's address
+     * @param address the server's address: an {@link java.net.InetSocketAddress}, or a
+     * {@link java.net.UnixDomainSocketAddress} with the path that the server prints behind {@code unix:}
      * @param participant runs in each step
      * @return how the run ended
      * @throws EndedException if no server answers, it refuses this client, or the run was broken off

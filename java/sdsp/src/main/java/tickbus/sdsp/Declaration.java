@@ -65,9 +65,12 @@ public record Declaration(String name, int multiple, long intervalNanos, List<Va
      * @param writes the variables that the client writes
      * @param reads the names of the variables that the client reads
      * @return the declaration
-     * @throws IllegalArgumentException if the step is below 0, or there are too many variables
+     * @throws IllegalArgumentException if the step is not above 0, or there are too many variables
      */
     public static Declaration every(String name, Duration step, List<Variable> writes, List<String> reads) {
+        if (step.isZero()) {
+            throw new IllegalArgumentException("client \"" + name + "\" runs every 0 ns; expected 1 or more");
+        }
         return new Declaration(name, 1, step.toNanos(), writes, reads);
     }
 }

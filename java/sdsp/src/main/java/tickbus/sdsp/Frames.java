@@ -6,6 +6,7 @@ import java.io.IOException;
 import java.net.SocketAddress;
 import java.net.SocketOption;
 import java.net.StandardSocketOptions;
+import java.net.UnixDomainSocketAddress;
 import java.net.UnknownHostException;
 import java.nio.ByteBuffer;
 import java.nio.ByteOrder;
@@ -33,12 +34,15 @@ final class Frames implements Closeable {
             throw new UnknownHostException("unknown host");
         }
         try {
-            channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
-            channel.setOption(StandardSocketOptions.SO_KEEPALIVE, true);
-            // A server whose cable is pulled is detected after some 40 seconds, not after the system's two hours.
-            keepAlive(ExtendedSocketOptions.TCP_KEEPIDLE, 10);
-            keepAlive(ExtendedSocketOptions.TCP_KEEPINTERVAL, 10);
-            keepAlive(ExtendedSocketOptions.TCP_KEEPCOUNT, 3);
+            // A Unix socket has no cable, and sends at once.
+            if (!(address instanceof UnixDomainSocketAddress)) {
+                channel.setOption(StandardSocketOptions.TCP_NODELAY, true);
+                channel.setOption(StandardSocketOptions.SO_KEEPALIVE, true);
+                // A server whose cable is pulled is detected after some 40 seconds, not after the system's two hours.
+                keepAlive(ExtendedSocketOptions.TCP_KEEPIDLE, 10);
+                keepAlive(ExtendedSocketOptions.TCP_KEEPINTERVAL, 10);
+                keepAlive(ExtendedSocketOptions.TCP_KEEPCOUNT, 3);
+            }
         } catch (IOException e) {
             channel.close();
             throw e;

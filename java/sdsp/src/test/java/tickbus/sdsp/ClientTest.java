@@ -127,6 +127,7 @@ class ClientTest {
         assertEquals(List.of("\"plc\" to join", "", "", "", "", ""), events.waits);
         assertThrows(IllegalArgumentException.class,
             () -> Declaration.every("a", Duration.ofNanos(-1), List.of(), List.of()));
+        assertThrows(IllegalArgumentException.class, () -> Declaration.every("a", Duration.ZERO, List.of(), List.of()));
     }
 
     @Test

@@ -5,6 +5,7 @@ import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
 import java.io.IOException;
+import java.net.UnixDomainSocketAddress;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.List;
@@ -13,6 +14,8 @@ import java.util.concurrent.CompletionException;
 import org.junit.jupiter.api.Tag;
 import org.junit.jupiter.api.Test;
 import org.junit.jupiter.api.Timeout;
+import org.junit.jupiter.api.condition.DisabledOnOs;
+import org.junit.jupiter.api.condition.OS;
 import org.junit.jupiter.api.io.TempDir;
 import tickbus.sdsp.EndedException.Cause;
 
@@ -44,6 +47,25 @@ class LockStepTest {
                 String last = sync.await("sync: ok ");
                 assertTrue(last.contains("steps=4702 ") && last.endsWith("hash=" + HASH), last);
             }
+        }
+    }
+
+    @Test
+    @DisabledOnOs(OS.WINDOWS)
+    void overAUnixSocketTheRunIsTheSame() throws IOException {
+        Path socket = folder.resolve("socket");
+        String run = Files.readString(Path.of(System.getProperty("tickbus.root"), "examples", "robot", "robot.toml"))
+            .replace("127.0.0.1:20060", "unix:" + socket);
+        UnixDomainSocketAddress address = UnixDomainSocketAddress.of(socket);
+        EndedException early = assertThrows(EndedException.class, () -> Client.join(address, new RobotPlant()));
+        assertEquals(Cause.LOST, early.cause());
+        assertTrue(early.getMessage().contains("start it first"), early.getMessage());
+        try (Sync sync = new Sync(folder, run)) {
+            assertEquals(address, sync.address());
+            CompletableFuture<Outcome> plant = sync.join(new RobotPlant());
+            assertEquals(HASH, sync.join(new RobotProgram()).join().hashText());
+            assertEquals(HASH, plant.join().hashText());
+            assertTrue(sync.await("sync: ok ").endsWith("hash=" + HASH));
         }
     }
 

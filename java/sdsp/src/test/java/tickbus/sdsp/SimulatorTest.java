@@ -78,7 +78,7 @@ class SimulatorTest {
             name = "height"
             address = "%%IW2"
             type = "%s"
-            """.formatted(sync.address().getPort(), type)));
+            """.formatted(sync.port(), type)));
     }
 
     /** One run; returns its trace hash. */

@@ -4,6 +4,8 @@ import java.io.BufferedReader;
 import java.io.File;
 import java.io.IOException;
 import java.net.InetSocketAddress;
+import java.net.SocketAddress;
+import java.net.UnixDomainSocketAddress;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.concurrent.CompletableFuture;
@@ -13,9 +15,9 @@ import java.util.concurrent.CompletionException;
 final class Sync implements AutoCloseable {
     private final Process process;
     private final BufferedReader out;
-    private final InetSocketAddress address;
+    private final SocketAddress address;
 
-    /** Starts the command in a folder, with the text of its file; there it listens on port 20060. */
+    /** Starts the command in a folder, with the text of its file; there it listens on port 20060, or at a Unix socket. */
     Sync(Path folder, String run) throws IOException {
         Path file = Files.writeString(folder.resolve("run.toml"), run.replace(":20060", ":0"));
         String command = File.separatorChar == '\\' ? "tickbus.exe" : "tickbus";
@@ -23,12 +25,19 @@ final class Sync implements AutoCloseable {
             file.toString()).redirectError(ProcessBuilder.Redirect.INHERIT).start();
         out = process.inputReader();
         String line = await("sync: listening on ");
-        address = new InetSocketAddress("127.0.0.1", Integer.parseInt(line.substring(line.lastIndexOf(':') + 1)));
+        int unix = line.indexOf("unix:");
+        address = unix >= 0 ? UnixDomainSocketAddress.of(line.substring(unix + "unix:".length()))
+            : new InetSocketAddress("127.0.0.1", Integer.parseInt(line.substring(line.lastIndexOf(':') + 1)));
     }
 
     /** The address on which it listens. */
-    InetSocketAddress address() {
+    SocketAddress address() {
         return address;
+    }
+
+    /** The TCP port on which it listens. */
+    int port() {
+        return ((InetSocketAddress) address).getPort();
     }
 
     /** Waits for an output line with this beginning. */

@@ -14,14 +14,15 @@ use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use tickbus_base::time::{Monotonic, Nanos};
+use tickbus_base::time::{Monotonic, Nanos, Stop};
 use tickbus_image::signal::DataType;
 use tickbus_net::Address;
+use tickbus_virtual_time::client::Client;
 #[cfg(unix)]
 use tickbus_virtual_time::shared_memory;
 use tickbus_virtual_time::{
-    Controls, Declaration, Hosting, Logic, Participant, Settings, StartCondition, Step, Variable,
-    in_process, tcp,
+    Controls, Declaration, Hosting, Logic, Meeting, Participant, Settings, StartCondition, Step,
+    Variable, in_process, tcp,
 };
 
 /// The bytes of a step and of its answer without any variable, in our format.
@@ -52,9 +53,21 @@ fn main() {
         }
         let (mut bares, mut ours, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
         let (mut others, mut others_ratios) = (Vec::new(), Vec::new());
+        let local = format!("unix:bench-{}", std::process::id());
+        // The kinds that are compared with the bare coordinator, each in every round.
+        let mut kinds = vec![("direct", "127.0.0.1:0", true)];
+        if cfg!(unix) {
+            kinds.extend([("unix", &*local, false), ("direct_unix", &*local, true)]);
+        }
+        let mut found = vec![(Vec::new(), Vec::new()); kinds.len()];
         for _ in 0..rounds {
             let bare = bare(count, span);
             let tcp = over_tcp(count, 0, span);
+            for ((_, place, direct), (rates, ratios)) in kinds.iter().zip(&mut found) {
+                let rate = over(place, *direct, count, 0, span);
+                rates.push(rate);
+                ratios.push(rate / bare);
+            }
             bares.push(bare);
             ours.push(tcp);
             ratios.push(tcp / bare);
@@ -67,6 +80,10 @@ fn main() {
         println!("rust sdsp.bare.{count} {:.0}", median(&mut bares));
         println!("rust sdsp.tcp.{count} {:.0}", median(&mut ours));
         println!("rust sdsp.tcp.{count}.ratio {:.3}", median(&mut ratios));
+        for ((name, ..), (rates, ratios)) in kinds.iter().zip(&mut found) {
+            println!("rust sdsp.{name}.{count} {:.0}", median(rates));
+            println!("rust sdsp.{name}.{count}.ratio {:.3}", median(ratios));
+        }
         if !others.is_empty() {
             println!("rust sdsp.helics.{count} {:.0}", median(&mut others));
             let ratio = median(&mut others_ratios);
@@ -150,10 +167,15 @@ fn client(arguments: &[String]) {
                 stream.write_all(&[0; ANSWERED]).expect("it reads");
             }
         }
-        "tcp" => {
+        "socket" => {
             let mut idle = Idle(name.clone(), variables.parse().expect("a number"));
-            let address: Address = address.parse().expect("an address");
-            tcp::join(&address, &mut idle).expect("it runs");
+            let clock = Monotonic::shared() as _;
+            let client = Client::new(idle.declare()).expect("it is right");
+            let meeting: Meeting = address.parse().expect("an address");
+            let connection = meeting.connect(client, &clock, &Stop::new());
+            connection
+                .and_then(|connection| connection.run(&mut idle))
+                .expect("it runs");
         }
         #[cfg(unix)]
         "shared_memory" => {
@@ -250,25 +272,40 @@ impl Meter {
 }
 
 fn over_tcp(count: usize, variables: usize, span: Duration) -> f64 {
-    let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
-    let children = clients("tcp", &listener.address().to_string(), count, variables);
+    over("127.0.0.1:0", false, count, variables, span)
+}
+
+/// Steps per second of a server at `place`; if `direct`, the clients exchange their values without it.
+fn over(place: &str, direct: bool, count: usize, variables: usize, span: Duration) -> f64 {
+    let listener = match place.parse().expect("a place") {
+        Meeting::Unix(address) => tcp::Listener::bind_local(&address).expect("a free path"),
+        _ => tcp::Listener::bind(&Address::local(0)).expect("a free port"),
+    };
+    let children = clients("socket", listener.place(), count, variables);
     let controls = Controls::default();
     let mut meter = Meter::default();
-    let logic = Logic::new().on_time(|access| {
-        if meter.step(access.step().sequence, span) {
+    let logic = Logic::new().on_commit(|commit| {
+        if meter.step(commit.step().sequence, span) {
             controls.send(tickbus_virtual_time::server::Control::Stop);
         }
         Ok(())
     });
+    let settings = Settings {
+        direct,
+        ..settings(count)
+    };
+    let mut is_direct = false;
     let hosting = Hosting {
         clock: &*Monotonic::shared(),
         controls: &controls,
-        news: &mut |_| {},
+        news: &mut |line| is_direct |= line.ends_with("directly"),
     };
-    listener
-        .run(settings(count), logic, hosting)
-        .expect("it runs");
+    listener.run(settings, logic, hosting).expect("it runs");
     wait(children);
+    assert_eq!(
+        is_direct, direct,
+        "the clients exchange their values as asked"
+    );
     meter.rate
 }
 

@@ -221,6 +221,11 @@ impl<'l> Barrier<'l> {
         members.filter_map(|(at, member)| member.owes.then_some(at))
     }
 
+    /// True if a client has not answered yet.
+    pub(crate) fn is_owing(&self, client: usize) -> bool {
+        self.members[client].owes
+    }
+
     /// The clients that are due in this step.
     pub(crate) fn due(&self) -> impl Iterator<Item = usize> {
         let members = self.members.iter().enumerate();

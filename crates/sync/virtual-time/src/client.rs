@@ -118,6 +118,10 @@ impl Client {
             self.waits_for.push_str(whom);
             return Ok(None);
         }
+        if let FromServer::Meet(_) | FromServer::Members(_) | FromServer::Until(_) = message {
+            // The line of the client deals with these, if it can.
+            return Err(violated("lets clients meet that cannot".to_owned()));
+        }
         if let Some(owed) = self.owes {
             return Err(violated(format!("went on before step {owed} was answered")));
         }
@@ -154,7 +158,7 @@ impl Client {
                 self.owes = Some(step.sequence);
                 Ok(Some(Asked::Step(step)))
             }
-            FromServer::End(_) | FromServer::Waiting(_) => unreachable!("dealt with above"),
+            _ => unreachable!("dealt with above"),
         }
     }
 

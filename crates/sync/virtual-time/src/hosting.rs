@@ -114,9 +114,14 @@ pub fn hear(server: &mut Server<'_>, now: Nanos, seat: usize, frame: &[u8]) {
             if version >= 2 {
                 server.keep_informed(seat);
             }
+            if version >= wire::DIRECT {
+                server.can_meet(seat);
+            }
             server.join(now, seat, declaration);
         }
         Ok(FromClient::GiveUp(reason)) => server.gave_up(seat, reason),
+        Ok(FromClient::At { token, address }) => server.is_at(now, seat, token, address),
+        Ok(FromClient::Met { token, reason }) => server.has_met(now, seat, token, reason),
         Err(why) => server.violated(seat, &why),
     }
 }

@@ -5,7 +5,7 @@
 //! written. So the result depends neither on the order of answers nor on the speed of the computer, and two runs are
 //! equal to the last bit: [`TraceHash`] shows it.
 //!
-//! A client implements [`Participant`]; it then takes part in this process, over TCP or through shared memory.
+//! A client implements [`Participant`]; it then takes part in this process, over TCP, a Unix socket or shared memory.
 
 mod barrier;
 mod declaration;
@@ -13,6 +13,7 @@ mod hosting;
 mod local;
 mod meeting;
 mod members;
+mod mesh;
 mod outcome;
 mod participant;
 mod parting;
@@ -43,6 +44,7 @@ pub use hosting::{Controls, Hosting, hear};
 pub use logic::{Commit, Logic};
 pub use meeting::Meeting;
 pub use members::{Client, Members};
+pub use mesh::{Mesh, Next};
 pub use outcome::{Cause, Ended, Outcome};
 pub use participant::{Participant, Step};
 pub use parting::{Compared, Difference, Parting, compare};

@@ -69,7 +69,11 @@ impl<'p> Locals<'p> {
                 local.reads.copy_from_slice(reads);
                 local.asked = Some(Asked::Step(*step));
             }
-            ToClient::Waiting(_) => {}
+            // Participants on the server's thread cannot meet others.
+            ToClient::Waiting(_)
+            | ToClient::Meet(_)
+            | ToClient::Members(..)
+            | ToClient::Until(_) => {}
             ToClient::End(end) => {
                 local.asked = None;
                 local.end = Some((*end).clone());

@@ -99,6 +99,15 @@ impl<'l> Logic<'l> {
         self
     }
 
+    /// True if nothing but commits is read, and nothing is written.
+    pub(crate) fn is_passive(&self) -> bool {
+        self.variables.is_empty()
+            && self.start.is_empty()
+            && self.time.is_empty()
+            && self.change.is_empty()
+            && self.read.is_empty()
+    }
+
     /// Adds a reader of every commit, the initial values included.
     #[must_use]
     pub fn on_commit(

@@ -65,6 +65,7 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
     let hang = table.take("hang");
     let join = table.take("join");
     let logic = table.take("logic");
+    let direct = table.take("direct");
     table.require_one_of(
         &["listen", "shared_memory"],
         "add listen = \"127.0.0.1:20060\", or shared_memory = \"cell\" for processes of this computer",
@@ -73,6 +74,12 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
         both.wrong(
             "\"shared_memory\" stands beside \"listen\"",
             "remove one of them: all clients of a run meet the server in the same way",
+        );
+    }
+    if let (Some(direct), Some(_)) = (&direct, &shared_memory) {
+        direct.wrong(
+            "\"direct\" stands beside \"shared_memory\"",
+            "remove it: through shared memory the server is no detour",
         );
     }
     table.finish();
@@ -93,12 +100,14 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
         let path = value.text("write the path of the script, as seen from this file")?;
         Some(Some(folder.join(path)))
     });
+    let direct = direct.map_or(Some(false), |value| value.boolean());
     let standard = Settings::new(step?, start?);
     let settings = Settings {
         steps: steps?,
         pacing: pacing?,
         hang: hang?.unwrap_or(standard.hang),
         join: join?.unwrap_or(standard.join),
+        direct: direct?,
         ..standard
     };
     Some(RunFile {

@@ -1,5 +1,6 @@
 //! The server, without I/O: state, time and messages in; messages and the next deadline out.
 
+mod direct;
 mod joining;
 mod message;
 mod patience;
@@ -14,6 +15,7 @@ use tickbus_base::toml_text::{printable, shown};
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
 use crate::{Cause, Declaration, Ended, Outcome, Settings, Step};
+use direct::{Allowed, Meeting};
 use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
@@ -54,6 +56,12 @@ pub struct Server<'l> {
     /// The deadline for the end of a stopped run.
     stop_by: Option<Nanos>,
     pace: Option<Pace>,
+    /// The seats whose clients can meet.
+    able: BTreeSet<usize>,
+    /// The clients that meet before the start.
+    meeting: Option<Meeting>,
+    /// The steps of clients that exchange their values without the server; `None` if the server passes them on.
+    allowed: Option<Allowed>,
 }
 
 #[derive(Debug)]
@@ -82,6 +90,9 @@ enum Out {
     Start(usize),
     Step(usize),
     Waiting(usize),
+    Meet(usize),
+    Members(usize, usize),
+    Until(usize),
     End(usize),
     Refused(usize, Box<Ended>),
 }
@@ -110,6 +121,9 @@ impl<'l> Server<'l> {
             singles: 0,
             stop_by: None,
             pace: None,
+            able: BTreeSet::new(),
+            meeting: None,
+            allowed: None,
         })
     }
 
@@ -191,6 +205,7 @@ impl<'l> Server<'l> {
         });
         self.seats[seat] = Seat::Silent(now);
         self.informed.remove(&seat);
+        self.able.remove(&seat);
         if self.outcome().is_some() {
             self.seats[seat] = Seat::Leaving;
             self.outbox.push_back(Out::End(seat));
@@ -212,6 +227,9 @@ impl<'l> Server<'l> {
         }
         let name = declaration.name.clone();
         let refused = match &mut self.phase {
+            Phase::Joining(..) if self.meeting.is_some() => {
+                Err("the run is about to start without this client".to_owned())
+            }
             Phase::Joining(joining, _) => declaration
                 .fit(self.settings.step)
                 .and_then(|()| joining.join(seat, declaration)),
@@ -229,7 +247,7 @@ impl<'l> Server<'l> {
         if let Phase::Joining(joining, _) = &self.phase
             && joining.is_complete()
         {
-            self.start(now);
+            self.meet_or_start(now);
         }
     }
 
@@ -258,8 +276,11 @@ impl<'l> Server<'l> {
         else {
             return self.violated(seat, "answered before it was asked");
         };
-        if self.outbox.iter().any(|out| out.seat() == seat) {
+        if self.allowed.is_none() && self.outbox.iter().any(|out| out.seat() == seat) {
             return self.violated(seat, "answered before it was asked");
+        }
+        if let Some(allowed) = &mut self.allowed {
+            allowed.has_reported(sequence);
         }
         if let Err(reason) = barrier.done(client, (sequence, next), values) {
             return self.violated(seat, &reason);
@@ -296,6 +317,7 @@ impl<'l> Server<'l> {
                     self.news
                         .push_back(format!("client \"{name}\" is gone again: {reason}"));
                     joining.remove(seat);
+                    self.meeting = None;
                 }
             }
             Seat::Free | Seat::Silent(_) | Seat::Leaving => {}
@@ -361,6 +383,13 @@ impl<'l> Server<'l> {
                 reads: barrier.read_types(client),
             },
             (Out::Waiting(_), ..) => ToClient::Waiting(&self.waits_for),
+            (Out::Meet(_), ..) => ToClient::Meet(self.token()),
+            (Out::Members(_, own), ..) => match &self.meeting {
+                Some(meeting) => ToClient::Members(own, &meeting.list),
+                // The client of another seat has left in the meantime; a new token makes this one forget the meeting.
+                None => ToClient::Meet(0),
+            },
+            (Out::Until(_), ..) => ToClient::Until(self.allowed.as_ref().map_or(0, Allowed::until)),
             (Out::Refused(_, ended), ..) => {
                 self.seats[seat] = Seat::Free;
                 self.refused = Err(*ended);
@@ -393,6 +422,9 @@ impl<'l> Server<'l> {
         let started = barrier.start();
         for (client, seat) in seats.iter().enumerate() {
             self.seats[*seat] = Seat::Client(client);
+            if self.allowed.is_some() {
+                self.outbox.push_back(Out::Until(*seat));
+            }
             self.outbox.push_back(Out::Start(*seat));
         }
         self.asked = now;
@@ -421,13 +453,27 @@ impl<'l> Server<'l> {
                 continue;
             }
             let Step { sequence, time } = barrier.step();
-            if self.stop_by.is_some() || self.settings.steps == Some(sequence) {
+            let has_run_ahead =
+                (self.allowed.as_ref()).is_some_and(|allowed| allowed.until() > sequence);
+            let is_last = self.stop_by.is_some() || self.settings.steps == Some(sequence);
+            if is_last && !has_run_ahead {
                 let outcome = barrier.outcome();
                 return self.end(Ok(outcome));
             }
             if time.0.checked_add(self.settings.step.0).is_none() {
                 let reason = "virtual time has no room for a further step".to_owned();
                 return self.end_for(Cause::Configuration, None, reason);
+            }
+            if self.allowed.is_some() {
+                if !self.allow_steps(now) {
+                    return;
+                }
+                let Phase::Running(barrier, _) = &mut self.phase else {
+                    return;
+                };
+                self.asked = now;
+                barrier.begin_step().expect("there is no logic");
+                continue;
             }
             if self.is_paused && self.singles == 0 {
                 return;
@@ -481,8 +527,11 @@ impl<'l> Server<'l> {
 
     /// Refuses a client before the start.
     fn refuse(&mut self, seat: usize, client: Option<String>, reason: &str) {
-        if let Phase::Joining(joining, _) = &mut self.phase {
+        if let Phase::Joining(joining, _) = &mut self.phase
+            && self.seats[seat] == Seat::Joined
+        {
             joining.remove(seat);
+            self.meeting = None;
         }
         self.seats[seat] = Seat::Leaving;
         let who = match &client {
@@ -506,6 +555,9 @@ impl Out {
             Self::Start(seat)
             | Self::Step(seat)
             | Self::Waiting(seat)
+            | Self::Meet(seat)
+            | Self::Members(seat, _)
+            | Self::Until(seat)
             | Self::End(seat)
             | Self::Refused(seat, _) => *seat,
         }

@@ -20,6 +20,9 @@ pub struct Settings {
     pub hang: Nanos,
     /// The time limit for all clients to join.
     pub join: Nanos,
+    /// True if the clients exchange their values without the server, if they can: see
+    /// [`ToClient::Meet`](crate::server::ToClient::Meet). The result is the same.
+    pub direct: bool,
 }
 
 /// When a run begins.
@@ -52,6 +55,7 @@ impl Settings {
             paused: false,
             hang: Nanos::from_secs(10),
             join: Nanos::MAX,
+            direct: false,
         }
     }
 }

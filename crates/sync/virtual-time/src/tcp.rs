@@ -2,6 +2,9 @@
 
 mod client;
 mod connection;
+mod direct;
+mod line;
+mod peers;
 mod server;
 
 use std::io::{self, ErrorKind};

@@ -3,6 +3,7 @@
 //! A frame is a length of four bytes, a kind of one byte, and the content; the length includes the kind. Numbers are
 //! little-endian.
 
+mod between;
 mod reader;
 #[cfg(test)]
 mod tests;
@@ -12,11 +13,16 @@ use tickbus_image::signal::DataType;
 
 use crate::server::ToClient;
 use crate::{Cause, Declaration, Ended, Outcome, Step, TraceHash, Variable};
+pub use between::{MemberList, at, hello, is_done, met, read_hello};
+pub(crate) use between::{done_step, is_end};
 use reader::Reader;
 
 /// The version of this format. Joins of version 1 have no interval, and their clients get no [`ToClient::Waiting`] and
-/// ask for no step.
-pub const VERSION: u16 = 2;
+/// ask for no step. Clients of version 2 exchange nothing with each other.
+pub const VERSION: u16 = 3;
+
+/// The first version whose clients can exchange their values without the server.
+pub(crate) const DIRECT: u16 = 3;
 
 /// The oldest version that a server accepts.
 const OLDEST: u16 = 1;
@@ -37,11 +43,17 @@ const JOIN: u8 = 0x01;
 const DONE: u8 = 0x02;
 const GIVE_UP: u8 = 0x03;
 const DONE_UNTIL: u8 = 0x04;
+const AT: u8 = 0x05;
+const MET: u8 = 0x06;
+const HELLO: u8 = 0x07;
 const START: u8 = 0x81;
 const STEP: u8 = 0x82;
 const FINISHED: u8 = 0x83;
 const ENDED: u8 = 0x84;
 const WAITING: u8 = 0x85;
+const MEET: u8 = 0x86;
+const MEMBERS: u8 = 0x87;
+const UNTIL: u8 = 0x88;
 
 /// Slots as they are on the wire.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +87,20 @@ pub enum FromClient<'a> {
     },
     /// The client cannot or will not continue.
     GiveUp(&'a str),
+    /// The answer to [`ToClient::Meet`].
+    At {
+        /// The token of the request.
+        token: u64,
+        /// The address where the other clients can connect; empty if they cannot.
+        address: &'a str,
+    },
+    /// The answer to [`ToClient::Members`].
+    Met {
+        /// The token of the request.
+        token: u64,
+        /// Why not all clients could be reached; empty if all were.
+        reason: &'a str,
+    },
 }
 
 /// A message of the server, as a client reads it.
@@ -98,6 +124,12 @@ pub enum FromServer<'a> {
     End(Result<Outcome, Ended>),
     /// See [`ToClient::Waiting`].
     Waiting(&'a str),
+    /// See [`ToClient::Meet`].
+    Meet(u64),
+    /// See [`ToClient::Members`].
+    Members(MemberList),
+    /// See [`ToClient::Until`].
+    Until(u64),
 }
 
 /// The length of the frame at the beginning of `bytes`, with its header, if already known.
@@ -147,19 +179,26 @@ fn append(out: &mut Vec<u8>, kind: u8, content: impl FnOnce(&mut Vec<u8>)) {
 /// The names are too long to be sent.
 pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> {
     let start = out.len();
-    let name = |out: &mut Vec<u8>, name: &str| {
-        out.push(u8::try_from(name.len()).expect("a name has its limit"));
-        out.extend_from_slice(name.as_bytes());
-    };
-    let count = |out: &mut Vec<u8>, count: usize| {
-        let count = u16::try_from(count).expect("their number has its limit");
-        out.extend_from_slice(&count.to_le_bytes());
-    };
     // Not by `append`: a frame that is too long is an error here, not a bug.
     out.extend_from_slice(&[0; HEADER]);
     out.push(JOIN);
     out.extend_from_slice(&MAGIC);
     out.extend_from_slice(&VERSION.to_le_bytes());
+    declared(out, declaration);
+    let length = out.len() - start - HEADER;
+    if length > LONGEST_FRAME {
+        out.truncate(start);
+        return Err(format!(
+            "the names of its variables take {length} bytes, of {LONGEST_FRAME} at most; shorten them"
+        ));
+    }
+    let length = u32::try_from(length).expect("a frame has its limit");
+    out[start..start + HEADER].copy_from_slice(&length.to_le_bytes());
+    Ok(())
+}
+
+/// Appends a declaration.
+fn declared(out: &mut Vec<u8>, declaration: &Declaration) {
     out.extend_from_slice(&declaration.multiple.get().to_le_bytes());
     let interval = declaration.interval.unwrap_or(Nanos::ZERO);
     out.extend_from_slice(&interval.0.to_le_bytes());
@@ -173,16 +212,16 @@ pub fn join(out: &mut Vec<u8>, declaration: &Declaration) -> Result<(), String> 
     for read in &declaration.reads {
         name(out, read);
     }
-    let length = out.len() - start - HEADER;
-    if length > LONGEST_FRAME {
-        out.truncate(start);
-        return Err(format!(
-            "the names of its variables take {length} bytes, of {LONGEST_FRAME} at most; shorten them"
-        ));
-    }
-    let length = u32::try_from(length).expect("a frame has its limit");
-    out[start..start + HEADER].copy_from_slice(&length.to_le_bytes());
-    Ok(())
+}
+
+fn name(out: &mut Vec<u8>, name: &str) {
+    out.push(u8::try_from(name.len()).expect("a name has its limit"));
+    out.extend_from_slice(name.as_bytes());
+}
+
+fn count(out: &mut Vec<u8>, count: usize) {
+    let count = u16::try_from(count).expect("their number has its limit");
+    out.extend_from_slice(&count.to_le_bytes());
 }
 
 /// Appends the values that a client writes after its run of the step `sequence`. It runs next in the step `next`; 0: as
@@ -219,6 +258,13 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
         }),
         ToClient::Waiting(what) => append(out, WAITING, |out| {
             out.extend_from_slice(cut(what).as_bytes());
+        }),
+        ToClient::Meet(token) => append(out, MEET, |out| {
+            out.extend_from_slice(&token.to_le_bytes());
+        }),
+        ToClient::Members(own, list) => append(out, MEMBERS, |out| list.write(out, *own)),
+        ToClient::Until(step) => append(out, UNTIL, |out| {
+            out.extend_from_slice(&step.to_le_bytes());
         }),
         ToClient::End(Ok(outcome)) => append(out, FINISHED, |out| {
             out.extend_from_slice(&outcome.steps.to_le_bytes());
@@ -262,6 +308,19 @@ pub fn from_client(frame: &[u8]) -> Result<FromClient<'_>, String> {
             writes: reader.slots()?,
         },
         GIVE_UP => FromClient::GiveUp(reader.rest_as_text()?),
+        AT => FromClient::At {
+            token: reader.word()?,
+            address: match reader.rest_as_text()? {
+                long if long.len() > between::LONGEST_ADDRESS => {
+                    return Err(format!("sent an address of {} bytes", long.len()));
+                }
+                address => address,
+            },
+        },
+        MET => FromClient::Met {
+            token: reader.word()?,
+            reason: reader.rest_as_text()?,
+        },
         kind => return Err(format!("sent a message of the unknown kind 0x{kind:02X}")),
     };
     reader.finish()?;
@@ -278,11 +337,20 @@ fn read_join<'a>(reader: &mut Reader<'_>) -> Result<FromClient<'a>, String> {
             "speaks version {version} of the format, and this server versions {OLDEST} to {VERSION}"
         ));
     }
+    let declaration = read_declared(reader, version != OLDEST)?;
+    Ok(FromClient::Join {
+        declaration,
+        version,
+    })
+}
+
+fn read_declared(reader: &mut Reader<'_>, has_interval: bool) -> Result<Declaration, String> {
     let multiple = u32::from_le_bytes(reader.take()?).try_into();
     let multiple = multiple.map_err(|_| "runs every 0 steps; expected 1 or more".to_owned())?;
-    let interval = match version {
-        OLDEST => 0,
-        _ => i64::from_le_bytes(reader.take()?),
+    let interval = if has_interval {
+        i64::from_le_bytes(reader.take()?)
+    } else {
+        0
     };
     if interval < 0 {
         return Err(format!("runs every {interval} ns; expected 0 or more"));
@@ -297,16 +365,12 @@ fn read_join<'a>(reader: &mut Reader<'_>) -> Result<FromClient<'a>, String> {
     for _ in 0..u16::from_le_bytes(reader.take()?) {
         reads.push(reader.name()?.to_owned());
     }
-    let declaration = Declaration {
+    Ok(Declaration {
         name,
         multiple,
         interval: (interval > 0).then_some(Nanos(interval)),
         writes,
         reads,
-    };
-    Ok(FromClient::Join {
-        declaration,
-        version,
     })
 }
 
@@ -335,6 +399,9 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
             reads: reader.slots()?,
         },
         WAITING => FromServer::Waiting(reader.rest_as_text()?),
+        MEET => FromServer::Meet(reader.word()?),
+        MEMBERS => FromServer::Members(MemberList::read(&mut reader)?),
+        UNTIL => FromServer::Until(reader.word()?),
         FINISHED => FromServer::End(Ok(Outcome {
             steps: reader.word()?,
             time: nanos(reader.word()?),

@@ -117,6 +117,11 @@ impl Joining {
         }
     }
 
+    /// The clients with their seats, in the order in which they came.
+    pub(super) fn joined(&self) -> impl ExactSizeIterator<Item = &(usize, Declaration)> {
+        self.joined.iter()
+    }
+
     /// The clients with their seats, in the order of their names.
     pub(super) fn into_clients(mut self) -> (Vec<usize>, Vec<Declaration>) {
         self.joined.sort_by(|a, b| a.1.name.cmp(&b.1.name));

@@ -3,6 +3,7 @@
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
+use crate::wire::MemberList;
 use crate::{Ended, Outcome, Step};
 
 /// A request to a running server.
@@ -39,6 +40,15 @@ pub enum ToClient<'a> {
     /// `"plc" to finish step 42`. Idle clients get this once a second, so that they can tell a waiting server from one
     /// that hangs.
     Waiting(&'a str),
+    /// The clients are to exchange their values without the server: the client answers with the address where the others
+    /// can connect, and with this token.
+    Meet(u64),
+    /// All clients, and the place of this one in their order: the client connects with the others, and answers if it
+    /// could.
+    Members(usize, &'a MemberList),
+    /// The clients exchange their values without the server up to this step, inclusive. Sent before the start for the
+    /// first time, with step 0. Without it, the server passes the values on.
+    Until(u64),
     /// The run has ended, or the client does not take part in it. No message follows.
     End(&'a Result<Outcome, Ended>),
 }

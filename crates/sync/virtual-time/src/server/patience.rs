@@ -24,8 +24,9 @@ impl Server<'_> {
         let inform = informs.then(|| self.informed_at + INFORM);
         let inform = inform.unwrap_or(Nanos::MAX);
         silent.min(inform).min(match &self.phase {
-            Phase::Joining(..) => self.asked + self.settings.join,
+            Phase::Joining(..) => (self.asked + self.settings.join).min(self.meeting_until()),
             Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
+                // Clients that exchange their values directly have no pace.
                 match (self.is_paused(), &self.pace) {
                     (true, _) => Nanos::MAX,
                     (false, Some(pace)) => pace.due(),
@@ -53,7 +54,9 @@ impl Server<'_> {
             }
         }
         match &self.phase {
-            Phase::Joining(joining, _) if now >= self.asked + self.settings.join => {
+            Phase::Joining(joining, _)
+                if self.meeting.is_none() && now >= self.asked + self.settings.join =>
+            {
                 let (limit, missing) = (self.settings.join, joining.missing());
                 let reason = format!("still waiting for {missing}, after {limit}");
                 self.end_for(Cause::Hung, None, reason);
@@ -66,7 +69,7 @@ impl Server<'_> {
                     self.end_of_patience(Cause::Stopped, &limit);
                 }
             }
-            _ => {}
+            _ => self.end_of_meeting(now),
         }
         self.advance(now);
     }
@@ -115,7 +118,7 @@ impl Server<'_> {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        match barrier.step().sequence {
+        match self.owed_step(barrier.step().sequence) {
             _ if named.is_empty() && self.is_paused() => {
                 "a command, since the run is paused".to_owned()
             }
@@ -139,7 +142,7 @@ impl Server<'_> {
             [] => String::new(),
             _ => format!("; nor has {}", others.join(", nor ")),
         };
-        let reason = match barrier.step().sequence {
+        let reason = match self.owed_step(barrier.step().sequence) {
             0 => format!("has not sent its initial values {limit}{others}"),
             sequence => format!("has not finished step {sequence} {limit}{others}"),
         };

@@ -96,6 +96,28 @@ impl Connection {
         Ok(frame)
     }
 
+    /// True if the next complete frame holds the values of a step.
+    pub(super) fn has_values(&self) -> bool {
+        let next = wire::frame(&self.buffer[self.start..self.end]);
+        matches!(next, Ok(Some(frame)) if wire::is_done(frame))
+    }
+
+    /// The step of the last complete frame, if that holds values.
+    pub(super) fn last_step(&self) -> Option<u64> {
+        let mut left = &self.buffer[self.start..self.end];
+        let mut last = None;
+        while let Ok(Some(frame)) = wire::frame(left) {
+            last = wire::done_step(frame);
+            left = &left[wire::HEADER + frame.len()..];
+        }
+        last
+    }
+
+    /// The number of bytes that were received and not taken.
+    pub(super) const fn waiting(&self) -> usize {
+        self.end - self.start
+    }
+
     /// Sends a message, or as much of it as the system accepts.
     pub(super) fn send(&mut self, message: &ToClient<'_>) -> io::Result<()> {
         wire::to_client(&mut self.out, message);

@@ -25,6 +25,9 @@ const ROUND: Nanos = Nanos::from_millis(10);
 /// The least time for a client's machine to acknowledge data: the system repeats lost packets.
 const ACKNOWLEDGED: Nanos = Nanos::from_secs(10);
 
+/// The most bytes of values that the server keeps of a client that is ahead, well above a window.
+const MOST_AHEAD: usize = 1 << 21;
+
 /// The time for a client to read the end of the run.
 const FAREWELL: Nanos = Nanos::from_secs(1);
 
@@ -183,7 +186,8 @@ impl Host<'_, '_, '_> {
             {
                 return outcome.clone();
             }
-            let awaited = self.server.awaited();
+            // Clients that exchange their values are not waited for one by one.
+            let awaited = (self.server.awaited()).filter(|_| !self.server.is_direct());
             if self.leaving.is_empty() && now - self.looked < ROUND {
                 if self.locals.run(&mut self.server, now) {
                     self.server.sent(self.hosting.clock.now());
@@ -250,14 +254,43 @@ impl Host<'_, '_, '_> {
             }
             Arrived::Gone(reason) => return self.lose(seat, &reason),
         }
-        let now = self.hosting.clock.now();
-        loop {
-            match connection.frame() {
-                Ok(None) => return,
-                Ok(Some(frame)) => hear(&mut self.server, now, seat, frame),
-                Err(why) => return self.server.violated(seat, &why),
-            }
+        self.take(seat);
+        self.follow();
+    }
+
+    /// Passes on the values of clients that are ahead of the server, as far as it can follow.
+    fn follow(&mut self) {
+        if !self.server.is_direct() {
+            return;
         }
+        while let Some(seat) = self.server.awaited()
+            && self.take(seat)
+        {}
+    }
+
+    /// Passes on the complete frames of a client, except for values that are ahead of the server; false if there are
+    /// none.
+    fn take(&mut self, seat: usize) -> bool {
+        let now = self.hosting.clock.now();
+        let mut has_taken = false;
+        while let Some(connection) = self.connections.get_mut(seat).and_then(Option::as_mut) {
+            if self.server.is_direct() && connection.has_values() && !self.server.takes(seat) {
+                if connection.waiting() > MOST_AHEAD {
+                    self.server.violated(seat, "ran ahead of the other clients");
+                }
+                return has_taken;
+            }
+            match connection.frame() {
+                Ok(None) => return has_taken,
+                Ok(Some(frame)) => hear(&mut self.server, now, seat, frame),
+                Err(why) => {
+                    self.server.violated(seat, &why);
+                    return has_taken;
+                }
+            }
+            has_taken = true;
+        }
+        has_taken
     }
 
     /// Checks everything: all sockets, controls, time. If `is_busy`, does not wait for long.
@@ -301,7 +334,16 @@ impl Host<'_, '_, '_> {
             connection.write().is_ok() && connection.is_blocked() && now < *until
         });
         self.hosting.controls.apply(now, &mut self.server);
+        if self.server.is_direct() && now >= self.server.deadline() {
+            // Who is waited for depends on how far the others have come.
+            for connection in self.connections.iter().flatten() {
+                if let Some(step) = connection.last_step() {
+                    self.server.is_ahead(step);
+                }
+            }
+        }
         self.server.tick(now);
+        self.follow();
         Ok(())
     }
 

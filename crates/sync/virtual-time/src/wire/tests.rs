@@ -76,6 +76,44 @@ proptest! {
         out.clear();
         give_up(&mut out, &reason);
         prop_assert_eq!(from_client(content(&out)), Ok(FromClient::GiveUp(&reason)));
+        let (token, address) = (sequence, &*format!("unix:/tmp/{next}"));
+        out.clear();
+        at(&mut out, token, address);
+        prop_assert_eq!(from_client(content(&out)), Ok(FromClient::At { token, address }));
+        out.clear();
+        met(&mut out, token, &reason);
+        let met = FromClient::Met { token, reason: &reason };
+        prop_assert_eq!(from_client(content(&out)), Ok(met));
+        out.clear();
+        hello(&mut out, token, 7);
+        prop_assert_eq!(read_hello(content(&out)), Ok((token, 7)));
+    }
+
+    #[test]
+    fn the_list_of_members_is_read_as_it_was_written(
+        token: u64,
+        declarations in proptest::collection::vec(declaration(), 0..5),
+    ) {
+        let member = |declaration: Declaration| (format!("127.0.0.1:{token}"), declaration);
+        let list = MemberList {
+            token,
+            step: Nanos(token.cast_signed()),
+            own: 3,
+            members: declarations.into_iter().map(member).collect(),
+        };
+        let mut out = Vec::new();
+        to_client(&mut out, &ToClient::Members(3, &list));
+        for length in 0..content(&out).len() {
+            prop_assert!(from_server(&content(&out)[..length]).is_err());
+        }
+        prop_assert_eq!(from_server(content(&out)), Ok(FromServer::Members(list)));
+        for message in [ToClient::Meet(token), ToClient::Until(token)] {
+            out.clear();
+            to_client(&mut out, &message);
+            let read = from_server(content(&out));
+            let is_meet = read == Ok(FromServer::Meet(token));
+            prop_assert!(is_meet || read == Ok(FromServer::Until(token)));
+        }
     }
 
     #[test]
@@ -122,6 +160,8 @@ proptest! {
                 done(&mut out, sequence, next, &writes.iter().collect::<Vec<_>>());
             }
             Ok(FromClient::GiveUp(reason)) => give_up(&mut out, reason),
+            Ok(FromClient::At { token, address }) => at(&mut out, token, address),
+            Ok(FromClient::Met { token, reason }) => met(&mut out, token, reason),
             // Joins of version 1 can be read, but not written.
             Ok(FromClient::Join { .. }) | Err(_) => return Ok(()),
         }
@@ -192,7 +232,7 @@ fn another_version_is_refused_by_its_number() {
     let told = from_client(&out[HEADER..]).expect_err("another version");
     assert_eq!(
         told,
-        "speaks version 7 of the format, and this server versions 1 to 2"
+        "speaks version 7 of the format, and this server versions 1 to 3"
     );
 }
 

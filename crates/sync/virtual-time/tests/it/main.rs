@@ -1,6 +1,7 @@
 //! The tests of this crate, in one program.
 
 mod common;
+mod direct;
 mod example;
 mod model_check;
 mod next_update;

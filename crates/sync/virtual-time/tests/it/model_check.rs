@@ -256,8 +256,9 @@ impl World {
                     assert_eq!(step.time.0, (step.sequence.cast_signed() - 1) * 1_000_000);
                     (seat, step.sequence, Some(reads.to_vec()), None)
                 }
-                Some((_, ToClient::Waiting(_))) => continue,
                 Some((seat, ToClient::End(end))) => (seat, 0, None, Some(end.clone())),
+                Some((_, ToClient::Waiting(_))) => continue,
+                Some((_, other)) => panic!("{other:?} without being asked for"),
             };
             if self.stranger == Some(seat) {
                 let refused = end.expect("nothing else").expect_err("it is refused");

@@ -126,6 +126,7 @@ fn play(events: &[Event], pacing: Pacing, steps: Option<u64>) {
                     seats.remove(&at);
                     continue;
                 }
+                other => panic!("{other:?} without being asked for"),
             };
             assert!(!was_over, "no step after the end");
             assert!(seat.last < Some(asked), "steps come in order");

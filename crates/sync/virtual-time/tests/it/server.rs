@@ -52,7 +52,7 @@ impl Bench {
                 ToClient::Start { .. } => 0,
                 ToClient::Step { step, .. } => step.sequence,
                 ToClient::Waiting(_) => continue,
-                ToClient::End(end) => panic!("{end:?}"),
+                other => panic!("{other:?}"),
             });
         }
         asked

@@ -35,6 +35,7 @@
 //! | [`import`] | lists of PLC tags, converted to a driver.cfg |
 //! | [`testing`] | tests of PLC programs from files, on simulation time |
 //! | [`virtual_time`] | lock-step by virtual time (SDSP): server, clients, trace hash |
+//! | [`federation`] | a federation of another engine as a client of a run |
 //! | [`gateway`] | a real PLC, on its own bus, as a client of a run |
 //! | `jni` | the native methods of the Java classes `tickbus.Tickbus`, `DriverVector` and `SweepSession` |
 //! | `c_api` | the functions of `include/tickbus.h` |
@@ -59,6 +60,7 @@ pub use tickbus_dispatcher as dispatcher;
 pub use tickbus_driver as driver;
 pub use tickbus_driver_cfg as driver_cfg;
 pub use tickbus_export as export;
+pub use tickbus_federation as federation;
 pub use tickbus_fieldbus::faults;
 pub use tickbus_fmi as fmi;
 pub use tickbus_function_blocks as function_blocks;

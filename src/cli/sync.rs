@@ -2,6 +2,7 @@
 
 mod diff;
 mod gateway;
+mod join;
 mod prepare;
 
 use std::io::{self, BufRead as _, Write as _};
@@ -52,12 +53,14 @@ pub(super) struct Arguments {
 enum Other {
     Diff(diff::Arguments),
     Gateway(gateway::Arguments),
+    Join(join::Arguments),
     Prepare(prepare::Arguments),
 }
 
 pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
     let path = match (&arguments.other, &arguments.file) {
         (Some(Other::Gateway(arguments)), _) => return gateway::run(arguments, kinds),
+        (Some(Other::Join(arguments)), _) => return join::run(arguments),
         (Some(Other::Diff(arguments)), _) => return diff::run(arguments),
         (Some(Other::Prepare(arguments)), _) => return prepare::run(arguments),
         (None, file) => file.as_ref().expect("it is required"),

@@ -18,6 +18,7 @@ const UNSAFE_HOMES: &[&str] = &[
     "crates/bus/interbus/src/library.rs",
     "crates/bus/plugin/src/library.rs",
     "crates/core/conformance/src/resources.rs",
+    "crates/sync/federation/src/helics/library.rs",
     "crates/tools/fmi/src/foreign/library",
     "crates/core/image/src/triple.rs",
     "crates/tools/launcher/src/main.rs",

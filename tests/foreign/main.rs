@@ -14,6 +14,7 @@ mod fixture;
 mod fmi;
 mod gateway;
 mod harness;
+mod helics;
 mod iec2c;
 #[cfg(feature = "opcua")]
 mod java;
@@ -63,6 +64,7 @@ fn main() -> ExitCode {
         #[cfg(feature = "page")]
         ("page", page::TESTS),
         ("gateway", gateway::TESTS),
+        ("helics", helics::TESTS),
         ("st", st::TESTS),
         ("vcd", vcd::TESTS),
         ("plc", plc::TESTS),

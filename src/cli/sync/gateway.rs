@@ -47,7 +47,8 @@ pub(in crate::cli) struct Arguments {
     timeout: Nanos,
 }
 
-fn address(text: &str) -> Result<Meeting, String> {
+/// Reads the address of a run's server.
+pub(super) fn address(text: &str) -> Result<Meeting, String> {
     let meeting: Meeting = text.parse().map_err(|wrong| format!("{wrong}"))?;
     meeting.check_dialled().map_err(|wrong| wrong.to_string())?;
     Ok(meeting)

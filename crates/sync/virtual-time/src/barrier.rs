@@ -200,6 +200,16 @@ impl<'l> Barrier<'l> {
         &self.members[client].snapshot
     }
 
+    /// The places of the variables that a client writes.
+    pub(crate) fn writes(&self, client: usize) -> Range<usize> {
+        self.members[client].writes.clone()
+    }
+
+    /// The places of the variables that a client reads.
+    pub(crate) fn reads(&self, client: usize) -> &[u32] {
+        &self.members[client].reads
+    }
+
     /// The participants of the run.
     pub(crate) const fn members(&self) -> &Arc<Members> {
         &self.shown

@@ -77,6 +77,37 @@ impl Declaration {
         Ok(())
     }
 
+    /// The first difference to another declaration of the same client, as text for people.
+    pub(crate) fn difference(&self, other: &Self) -> Option<String> {
+        if self.multiple != other.multiple {
+            let (own, other) = (self.multiple, other.multiple);
+            return Some(format!("its multiple was {own}, and is {other}"));
+        }
+        let writes = |one: &Self| -> Vec<String> {
+            let writes = one.writes.iter();
+            writes
+                .map(|variable| format!("\"{}\" ({})", variable.name, variable.data_type))
+                .collect()
+        };
+        let reads = |one: &Self| -> Vec<String> {
+            one.reads.iter().map(|name| format!("\"{name}\"")).collect()
+        };
+        let lists = [
+            ("writes", writes(self), writes(other)),
+            ("reads", reads(self), reads(other)),
+        ];
+        lists.into_iter().find_map(|(what, own, other)| {
+            let at = (0..own.len().max(other.len())).find(|at| own.get(*at) != other.get(*at))?;
+            let shown = |of: &[String]| of.get(at).cloned().unwrap_or_else(|| "nothing".to_owned());
+            let number = at + 1;
+            Some(format!(
+                "number {number} of what it {what} was {}, and is {}",
+                shown(&own),
+                shown(&other)
+            ))
+        })
+    }
+
     /// Checks everything that does not depend on other clients.
     ///
     /// # Errors

@@ -64,6 +64,7 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
     let pace = table.take("pace");
     let hang = table.take("hang");
     let join = table.take("join");
+    let rejoin = table.take("rejoin");
     let logic = table.take("logic");
     let direct = table.take("direct");
     table.require_one_of(
@@ -82,6 +83,18 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
             "remove it: through shared memory the server is no detour",
         );
     }
+    if let (Some(_), Some(rejoin)) = (&shared_memory, &rejoin) {
+        rejoin.wrong(
+            "\"rejoin\" stands beside \"shared_memory\"",
+            "write listen in place of shared_memory: only over TCP a member can come back",
+        );
+    }
+    if let (Some(_), Some(rejoin)) = (&direct, &rejoin) {
+        rejoin.wrong(
+            "\"rejoin\" stands beside \"direct\"",
+            "remove one of them: the server keeps for a member that comes back what it passes on itself",
+        );
+    }
     table.finish();
 
     let meeting = match (listen, shared_memory) {
@@ -96,6 +109,7 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
     let pacing = pace.map_or(Some(Pacing::Fast), |value| pacing(&value));
     let hang = hang.map_or(Some(None), |value| value.duration().map(Some));
     let join = join.map_or(Some(None), |value| value.duration().map(Some));
+    let rejoin = rejoin.map_or(Some(None), |value| value.duration().map(Some));
     let logic = logic.map_or(Some(None), |value| {
         let path = value.text("write the path of the script, as seen from this file")?;
         Some(Some(folder.join(path)))
@@ -108,6 +122,7 @@ fn read(mut table: Table<'_>, folder: &Path) -> Option<RunFile> {
         hang: hang?.unwrap_or(standard.hang),
         join: join?.unwrap_or(standard.join),
         direct: direct?,
+        rejoin: rejoin?,
         ..standard
     };
     Some(RunFile {
@@ -201,7 +216,7 @@ mod tests {
     fn a_file_says_how_the_server_runs() {
         let file = parse(
             "[sync]\nlisten = \"127.0.0.1:0\"\nstep = \"2ms\"\nclients = [\"plc\", \"robot\"]\nuntil = \"1s\"\n\
-             pace = 2.5\nhang = \"3s\"\njoin = \"1min\"\nlogic = \"cell.rhai\"\n",
+             pace = 2.5\nhang = \"3s\"\njoin = \"1min\"\nrejoin = \"30s\"\nlogic = \"cell.rhai\"\n",
         )
         .expect("it is right");
         let names = ["plc", "robot"].map(str::to_owned).to_vec();
@@ -210,6 +225,7 @@ mod tests {
             pacing: Pacing::Times(2.5),
             hang: Nanos::from_secs(3),
             join: Nanos::from_secs(60),
+            rejoin: Some(Nanos::from_secs(30)),
             ..Settings::new(Nanos::from_millis(2), StartCondition::Names(names))
         };
         assert_eq!(file.settings, expected);

@@ -2,8 +2,10 @@
 
 mod direct;
 mod joining;
+mod memory;
 mod message;
 mod patience;
+mod rejoining;
 mod showing;
 
 use std::collections::{BTreeSet, VecDeque};
@@ -19,6 +21,7 @@ use direct::{Allowed, Meeting};
 use joining::Joining;
 pub(crate) use joining::MOST_CLIENTS;
 pub use message::{Control, ToClient};
+use rejoining::Rejoining;
 
 /// The most states without a due client to pass in a row before anything else is done.
 const EMPTY_STATES: usize = 1000;
@@ -62,6 +65,7 @@ pub struct Server<'l> {
     meeting: Option<Meeting>,
     /// The steps of clients that exchange their values without the server; `None` if the server passes them on.
     allowed: Option<Allowed>,
+    rejoining: Option<Rejoining>,
 }
 
 #[derive(Debug)]
@@ -81,6 +85,8 @@ enum Seat {
     Joined,
     /// The client of this number.
     Client(usize),
+    /// The client of this number has come back, and runs its steps again.
+    Back(usize),
     /// The next message is the end.
     Leaving,
 }
@@ -109,6 +115,7 @@ impl<'l> Server<'l> {
         Ok(Self {
             is_paused: settings.paused,
             phase: Phase::Joining(joining, logic),
+            rejoining: settings.rejoin.map(Rejoining::new),
             settings,
             seats: Vec::new(),
             informed: BTreeSet::new(),
@@ -161,7 +168,7 @@ impl<'l> Server<'l> {
     pub fn name(&self, seat: usize) -> Option<&str> {
         match (&self.phase, self.seats[seat]) {
             (Phase::Joining(joining, _), Seat::Joined) => joining.name(seat),
-            (Phase::Running(barrier, _), Seat::Client(client)) => {
+            (Phase::Running(barrier, _), Seat::Client(client) | Seat::Back(client)) => {
                 Some(&barrier.declaration(client).name)
             }
             _ => None,
@@ -179,7 +186,10 @@ impl<'l> Server<'l> {
     /// The seat of the first client, in the order of names, that owes an answer.
     pub fn awaited(&self) -> Option<usize> {
         match &self.phase {
-            Phase::Running(barrier, seats) => barrier.owing().next().map(|client| seats[client]),
+            Phase::Running(barrier, seats) => {
+                let mut owing = barrier.owing().filter(|client| !self.is_away(*client));
+                owing.next().map(|client| seats[client])
+            }
             _ => None,
         }
     }
@@ -222,7 +232,9 @@ impl<'l> Server<'l> {
     pub fn join(&mut self, now: Nanos, seat: usize, mut declaration: Declaration) {
         match self.seats[seat] {
             Seat::Silent(_) => {}
-            Seat::Joined | Seat::Client(_) => return self.violated(seat, "joined twice"),
+            Seat::Joined | Seat::Client(_) | Seat::Back(_) => {
+                return self.violated(seat, "joined twice");
+            }
             Seat::Free | Seat::Leaving => return,
         }
         let name = declaration.name.clone();
@@ -233,10 +245,13 @@ impl<'l> Server<'l> {
             Phase::Joining(joining, _) => declaration
                 .fit(self.settings.step)
                 .and_then(|()| joining.join(seat, declaration)),
-            Phase::Running(barrier, _) => Err(format!(
-                "the run has started, and is at step {}; start it again with this client",
-                barrier.step().sequence
-            )),
+            Phase::Running(..) => {
+                let fit = declaration.fit(self.settings.step);
+                match fit.and_then(|()| self.come_back(now, seat, &declaration)) {
+                    Ok(()) => return,
+                    refused => refused,
+                }
+            }
             Phase::Ended(_) => Err("the run has ended".to_owned()),
         };
         if let Err(reason) = refused {
@@ -271,6 +286,11 @@ impl<'l> Server<'l> {
         (sequence, next): (u64, u64),
         values: impl ExactSizeIterator<Item = u64>,
     ) {
+        if matches!(self.seats[seat], Seat::Back(_))
+            && self.outbox.iter().all(|out| out.seat() != seat)
+        {
+            return self.done_again(now, seat, sequence, values);
+        }
         let (Seat::Client(client), Phase::Running(barrier, _)) =
             (self.seats[seat], &mut self.phase)
         else {
@@ -293,7 +313,9 @@ impl<'l> Server<'l> {
     /// The client at `seat` reports that it cannot, or need not, continue.
     pub fn gave_up(&mut self, seat: usize, reason: &str) {
         match self.seats[seat] {
-            Seat::Client(_) => self.blame(seat, Cause::Failed, &format!("gave up: {reason}")),
+            Seat::Client(_) | Seat::Back(_) => {
+                self.blame(seat, Cause::Failed, &format!("gave up: {reason}"))
+            }
             Seat::Free | Seat::Leaving => {}
             Seat::Silent(_) | Seat::Joined => {
                 let name = self.name(seat).map(str::to_owned);
@@ -305,10 +327,13 @@ impl<'l> Server<'l> {
     /// The connection of the client at `seat` is gone; frees the seat.
     pub fn lost(&mut self, seat: usize, reason: &str) {
         match std::mem::replace(&mut self.seats[seat], Seat::Free) {
-            Seat::Client(client) => {
-                if let Phase::Running(barrier, _) = &self.phase {
+            Seat::Client(client) | Seat::Back(client) => {
+                if let Err(more) = self.wait_for(client, reason)
+                    && let Phase::Running(barrier, _) = &self.phase
+                {
                     let client = barrier.declaration(client).name.clone();
-                    self.end_for(Cause::Lost, Some(client), format!("was lost: {reason}"));
+                    let reason = format!("was lost: {reason}{more}");
+                    self.end_for(Cause::Lost, Some(client), reason);
                 }
             }
             Seat::Joined => {
@@ -328,7 +353,7 @@ impl<'l> Server<'l> {
     /// The client at `seat` violates the protocol: it is excluded, or, once the run has started, ends it.
     pub fn violated(&mut self, seat: usize, reason: &str) {
         match self.seats[seat] {
-            Seat::Client(_) => self.blame(seat, Cause::Protocol, reason),
+            Seat::Client(_) | Seat::Back(_) => self.blame(seat, Cause::Protocol, reason),
             Seat::Silent(_) | Seat::Joined => {
                 let name = self.name(seat).map(str::to_owned);
                 self.refuse(seat, name, reason);
@@ -378,7 +403,14 @@ impl<'l> Server<'l> {
                 step: barrier.step(),
                 reads: barrier.snapshot(client),
             },
-            (Out::Start(_), Phase::Running(barrier, _), Seat::Client(client)) => ToClient::Start {
+            (Out::Step(_), Phase::Running(..), Seat::Back(_)) => {
+                self.replayed(seat).expect("it is asked again")
+            }
+            (
+                Out::Start(_),
+                Phase::Running(barrier, _),
+                Seat::Client(client) | Seat::Back(client),
+            ) => ToClient::Start {
                 step: self.settings.step,
                 reads: barrier.read_types(client),
             },
@@ -437,6 +469,7 @@ impl<'l> Server<'l> {
     /// Advances as far as possible.
     fn advance(&mut self, now: Nanos) {
         for _ in 0..EMPTY_STATES {
+            let misses_members = self.misses_members();
             let Phase::Running(barrier, seats) = &mut self.phase else {
                 return;
             };
@@ -444,12 +477,18 @@ impl<'l> Server<'l> {
                 return;
             }
             if barrier.state() != State::PreRead {
+                self.remember_due();
+                let Phase::Running(barrier, _) = &mut self.phase else {
+                    return;
+                };
                 if let Err(reason) = barrier.commit() {
                     return self.end_for(Cause::Logic, None, of_logic(&reason));
                 }
                 if let Err(reason) = barrier.show_commit() {
                     return self.end_for(Cause::System, None, reason);
                 }
+                self.remember_commit();
+                self.ask_again(now);
                 continue;
             }
             let Step { sequence, time } = barrier.step();
@@ -475,7 +514,7 @@ impl<'l> Server<'l> {
                 barrier.begin_step().expect("there is no logic");
                 continue;
             }
-            if self.is_paused && self.singles == 0 {
+            if (self.is_paused && self.singles == 0) || misses_members {
                 return;
             }
             if let Some(interval) = self.settings.pacing.interval(self.settings.step) {

@@ -23,6 +23,8 @@ pub struct Settings {
     /// True if the clients exchange their values without the server, if they can: see
     /// [`ToClient::Meet`](crate::server::ToClient::Meet). The result is the same.
     pub direct: bool,
+    /// How long the run waits for a member that is lost to come back; `None`: the run ends.
+    pub rejoin: Option<Nanos>,
 }
 
 /// When a run begins.
@@ -56,6 +58,7 @@ impl Settings {
             hang: Nanos::from_secs(10),
             join: Nanos::MAX,
             direct: false,
+            rejoin: None,
         }
     }
 }
@@ -67,6 +70,7 @@ impl Settings {
             ("step", self.step),
             ("hang", self.hang),
             ("join", self.join),
+            ("rejoin", self.rejoin.unwrap_or(Nanos::MAX)),
         ] {
             if span <= Nanos::ZERO {
                 let what = format!("the span \"{name}\" is {span}");

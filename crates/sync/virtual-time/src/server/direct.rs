@@ -117,7 +117,7 @@ impl Server<'_> {
 
     /// All have joined: lets them meet, if they shall and can, or starts the run.
     pub(super) fn meet_or_start(&mut self, now: Nanos) {
-        if !self.settings.direct {
+        if !self.settings.direct || self.settings.rejoin.is_some() {
             return self.start(now);
         }
         if let Err(why) = self.begin_meeting(now) {

@@ -23,24 +23,29 @@ impl Server<'_> {
         let informs = !self.informed.is_empty() && !matches!(self.phase, Phase::Ended(_));
         let inform = informs.then(|| self.informed_at + INFORM);
         let inform = inform.unwrap_or(Nanos::MAX);
-        silent.min(inform).min(match &self.phase {
-            Phase::Joining(..) => (self.asked + self.settings.join).min(self.meeting_until()),
-            Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
-                // Clients that exchange their values directly have no pace.
-                match (self.is_paused(), &self.pace) {
-                    (true, _) => Nanos::MAX,
-                    (false, Some(pace)) => pace.due(),
-                    // Too many empty steps came in a row.
-                    (false, None) => Nanos::ZERO,
+        silent
+            .min(inform)
+            .min(self.rejoin_deadline())
+            .min(match &self.phase {
+                Phase::Joining(..) => (self.asked + self.settings.join).min(self.meeting_until()),
+                Phase::Running(..) if self.misses_members() && self.awaited().is_none() => {
+                    self.stop_by.unwrap_or(Nanos::MAX)
                 }
-            }
-            Phase::Running(barrier, _) if barrier.is_synchronised() => Nanos::ZERO,
-            Phase::Running(..) => {
-                let hang = self.asked + self.settings.hang;
-                hang.min(self.stop_by.unwrap_or(Nanos::MAX))
-            }
-            Phase::Ended(_) => Nanos::MAX,
-        })
+                Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
+                    match (self.is_paused(), &self.pace) {
+                        (true, _) => Nanos::MAX,
+                        (false, Some(pace)) => pace.due(),
+                        // Too many empty steps came in a row.
+                        (false, None) => Nanos::ZERO,
+                    }
+                }
+                Phase::Running(barrier, _) if barrier.is_synchronised() => Nanos::ZERO,
+                Phase::Running(..) => {
+                    let hang = self.asked + self.settings.hang;
+                    hang.min(self.stop_by.unwrap_or(Nanos::MAX))
+                }
+                Phase::Ended(_) => Nanos::MAX,
+            })
     }
 
     /// Does the work due at `now`: the next step, or a timeout.
@@ -53,6 +58,7 @@ impl Server<'_> {
                 self.refuse(seat, None, &reason);
             }
         }
+        self.check_rejoin(now);
         match &self.phase {
             Phase::Joining(joining, _)
                 if self.meeting.is_none() && now >= self.asked + self.settings.join =>
@@ -62,7 +68,7 @@ impl Server<'_> {
                 self.end_for(Cause::Hung, None, reason);
             }
             Phase::Running(barrier, _) if !barrier.is_synchronised() => {
-                if now >= self.asked + hang {
+                if now >= self.asked + hang && self.awaited().is_some() {
                     self.end_of_patience(Cause::Hung, &format!("within {hang}"));
                 } else if self.stop_by.is_some_and(|by| now >= by) {
                     let limit = format!("within {STOP_PATIENCE} after the run was stopped");
@@ -95,7 +101,7 @@ impl Server<'_> {
                 Seat::Client(client) => {
                     barrier.is_some_and(|barrier| barrier.owing().all(|owing| owing != client))
                 }
-                Seat::Free | Seat::Silent(_) | Seat::Leaving => false,
+                Seat::Free | Seat::Silent(_) | Seat::Back(_) | Seat::Leaving => false,
             };
             if is_idle && self.outbox.iter().all(|out| out.seat() != *seat) {
                 self.outbox.push_back(Out::Waiting(*seat));
@@ -110,6 +116,13 @@ impl Server<'_> {
             Phase::Running(barrier, _) => barrier,
             Phase::Ended(_) => return String::new(),
         };
+        if let Some(client) = self.missed().next() {
+            let name = shown(&barrier.declaration(client).name);
+            return match self.missed().count() - 1 {
+                0 => format!("\"{name}\" to come back"),
+                more => format!("\"{name}\" and {more} more to come back"),
+            };
+        }
         let mut owing = (barrier.owing()).map(|client| shown(&barrier.declaration(client).name));
         let named: Vec<String> = (owing.by_ref().take(MOST_NAMED))
             .map(|name| format!("\"{name}\""))
@@ -133,8 +146,10 @@ impl Server<'_> {
         let Phase::Running(barrier, _) = &self.phase else {
             return;
         };
-        let mut owing = barrier
-            .owing()
+        let present = barrier.owing().filter(|client| !self.is_away(*client));
+        let away = barrier.owing().filter(|client| self.is_away(*client));
+        let mut owing = present
+            .chain(away)
             .map(|client| &*barrier.declaration(client).name);
         let client = owing.next().map(str::to_owned);
         let others: Vec<String> = owing.map(|name| format!("\"{name}\"")).collect();

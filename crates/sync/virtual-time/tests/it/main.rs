@@ -6,6 +6,7 @@ mod example;
 mod model_check;
 mod next_update;
 mod recording;
+mod rejoin;
 mod rules;
 mod sequences;
 mod server;

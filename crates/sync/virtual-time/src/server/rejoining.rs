@@ -1,0 +1,373 @@
+//! Members that come back: a run with `rejoin` waits for a member that was lost. The member starts again, and is asked
+//! again for all steps that it had run; when it has written the same values, the run continues.
+
+use tickbus_base::time::Nanos;
+use tickbus_base::toml_text::printable;
+
+use super::memory::{Memory, Place};
+use super::{Out, Phase, Seat, Server, ToClient};
+use crate::barrier::State;
+use crate::{Cause, Declaration, Step};
+
+/// The members that are missing, and the memory of the run.
+#[derive(Debug)]
+pub(super) struct Rejoining {
+    /// How long the run waits for each of them.
+    limit: Nanos,
+    /// `None` once the run is longer than the memory.
+    memory: Option<Memory>,
+    away: Vec<Away>,
+}
+
+/// A member that was lost.
+#[derive(Debug)]
+struct Away {
+    client: usize,
+    reason: String,
+    /// When that was noticed.
+    since: Option<Nanos>,
+    replay: Option<Replay>,
+}
+
+/// A member that has come back, and is asked again.
+#[derive(Debug)]
+struct Replay {
+    seat: usize,
+    place: Place,
+    /// The step that it was asked for; `None` if it waits for the end of the current one.
+    asked: Option<u64>,
+    asked_at: Nanos,
+    reads: Vec<u64>,
+}
+
+impl Rejoining {
+    pub(super) fn new(limit: Nanos) -> Self {
+        Self {
+            limit,
+            memory: Some(Memory::default()),
+            away: Vec::new(),
+        }
+    }
+
+    fn replay_at(&self, seat: usize) -> Option<&Replay> {
+        let mut replays = self.away.iter().filter_map(|away| away.replay.as_ref());
+        replays.find(|replay| replay.seat == seat)
+    }
+
+    fn away_of(&self, client: usize) -> Option<usize> {
+        self.away.iter().position(|away| away.client == client)
+    }
+}
+
+impl Server<'_> {
+    /// True if a member is missing, or has not caught up yet: no step begins.
+    pub(super) fn misses_members(&self) -> bool {
+        (self.rejoining.as_ref()).is_some_and(|rejoining| !rejoining.away.is_empty())
+    }
+
+    /// True if this client is missing, or has not caught up yet.
+    pub(super) fn is_away(&self, client: usize) -> bool {
+        let rejoining = self.rejoining.as_ref();
+        rejoining.is_some_and(|rejoining| rejoining.away_of(client).is_some())
+    }
+
+    /// The clients that are missing.
+    pub(super) fn missed(&self) -> impl Iterator<Item = usize> {
+        let away = self.rejoining.iter().flat_map(|rejoining| &rejoining.away);
+        away.map(|away| away.client)
+    }
+
+    /// The step that the memory gets next has these due clients.
+    pub(super) fn remember_due(&mut self) {
+        let Phase::Running(barrier, _) = &self.phase else {
+            return;
+        };
+        if let Some(Rejoining {
+            memory: Some(memory),
+            ..
+        }) = &mut self.rejoining
+        {
+            memory.note_due(barrier);
+        }
+    }
+
+    /// Keeps the commit that was just made.
+    pub(super) fn remember_commit(&mut self) {
+        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
+        else {
+            return;
+        };
+        let Some(memory) = &mut rejoining.memory else {
+            return;
+        };
+        let step = barrier.step().sequence;
+        // Whoever is missing already is still waited for.
+        if !memory.commit(step, barrier.committed()) && rejoining.away.is_empty() {
+            rejoining.memory = None;
+            self.news.push_back(format!(
+                "after step {step} no member can come back any more: the memory of the run is full (64 MiB)"
+            ));
+        }
+    }
+
+    /// The client has been lost: waits for it.
+    ///
+    /// # Errors
+    ///
+    /// The run cannot wait for it; the text says why, if the run has the key `rejoin`.
+    pub(super) fn wait_for(&mut self, client: usize, reason: &str) -> Result<(), String> {
+        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
+        else {
+            return Err(String::new());
+        };
+        if rejoining.memory.is_none() {
+            return Err("; it cannot come back, since the memory of the run is full".to_owned());
+        }
+        if barrier.state() == State::InitialWrite {
+            return Err("; a member can come back from step 1 on".to_owned());
+        }
+        let name = &barrier.declaration(client).name;
+        let limit = rejoining.limit;
+        self.news.push_back(format!(
+            "client \"{name}\" was lost: {}; the run waits {limit} for it to come back",
+            printable(reason)
+        ));
+        match rejoining.away_of(client) {
+            Some(at) => rejoining.away[at].replay = None,
+            None => rejoining.away.push(Away {
+                client,
+                reason: reason.to_owned(),
+                since: None,
+                replay: None,
+            }),
+        }
+        Ok(())
+    }
+
+    /// A client joins a run that has started. If it is one that is missing, it is asked again.
+    pub(super) fn come_back(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        declaration: &Declaration,
+    ) -> Result<(), String> {
+        let Phase::Running(barrier, seats) = &mut self.phase else {
+            return Err("the run has ended".to_owned());
+        };
+        let step = barrier.step().sequence;
+        let started = format!("the run has started, and is at step {step}");
+        let mut away = self
+            .rejoining
+            .iter_mut()
+            .flat_map(|rejoining| &mut rejoining.away);
+        let Some(away) =
+            away.find(|away| barrier.declaration(away.client).name == declaration.name)
+        else {
+            return Err(format!("{started}; start it again with this client"));
+        };
+        if away.replay.is_some() {
+            return Err(format!(
+                "{started}, and \"{}\" has come back already",
+                declaration.name
+            ));
+        }
+        if let Some(difference) = barrier.declaration(away.client).difference(declaration) {
+            return Err(format!(
+                "{started}, and its member \"{}\" is missing, but declared other things: {difference}",
+                declaration.name
+            ));
+        }
+        let memory = self
+            .rejoining
+            .as_ref()
+            .and_then(|rejoining| rejoining.memory.as_ref());
+        let place = memory.expect("kept while members are missing").start();
+        let mut away = self
+            .rejoining
+            .iter_mut()
+            .flat_map(|rejoining| &mut rejoining.away);
+        let away = away.find(|away| barrier.declaration(away.client).name == declaration.name);
+        let away = away.expect("found above");
+        away.replay = Some(Replay {
+            seat,
+            place,
+            asked: Some(0),
+            asked_at: now,
+            reads: Vec::new(),
+        });
+        seats[away.client] = seat;
+        self.seats[seat] = Seat::Back(away.client);
+        self.outbox.push_back(Out::Start(seat));
+        self.news.push_back(format!(
+            "client \"{}\" is back, and runs the steps up to {step} again",
+            declaration.name
+        ));
+        Ok(())
+    }
+
+    /// The message of a step that is asked for again.
+    pub(super) fn replayed(&self, seat: usize) -> Option<ToClient<'_>> {
+        let replay = self.rejoining.as_ref()?.replay_at(seat)?;
+        let sequence = replay.asked?;
+        let before = i64::try_from(sequence).ok()? - 1;
+        Some(ToClient::Step {
+            step: Step {
+                sequence,
+                time: Nanos(before * self.settings.step.0),
+            },
+            reads: &replay.reads,
+        })
+    }
+
+    /// A member that has come back answers: its values must be those that it had written.
+    pub(super) fn done_again(
+        &mut self,
+        now: Nanos,
+        seat: usize,
+        sequence: u64,
+        values: impl ExactSizeIterator<Item = u64>,
+    ) {
+        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
+        else {
+            return;
+        };
+        let memory = rejoining.memory.as_ref();
+        let mut away = rejoining.away.iter_mut();
+        let Some((
+            Away {
+                client,
+                replay: Some(replay),
+                ..
+            },
+            memory,
+        )) = away
+            .find(|away| {
+                away.replay
+                    .as_ref()
+                    .is_some_and(|replay| replay.seat == seat)
+            })
+            .zip(memory)
+        else {
+            return;
+        };
+        if replay.asked != Some(sequence) {
+            let reason = format!("answered step {sequence}, for which it was not asked again");
+            return self.violated(seat, &reason);
+        }
+        let range = barrier.writes(*client);
+        if values.len() != range.len() {
+            let reason = format!(
+                "wrote {} values in step {sequence}, expected {}",
+                values.len(),
+                range.len()
+            );
+            return self.violated(seat, &reason);
+        }
+        memory.pass(&mut replay.place);
+        replay.asked = None;
+        let mut pairs = values.zip(replay.place.of(range.clone())).zip(range);
+        if let Some(((value, before), at)) = pairs.find(|((value, before), _)| value != *before) {
+            let variable = &barrier.members().variables[at].name;
+            let reason = format!(
+                "came back as another one: in step {sequence} it had written 0x{before:x} to \"{variable}\", and now \
+                 writes 0x{value:x}; a member that is to come back must compute the same from the same reads"
+            );
+            return self.blame(seat, Cause::Failed, &reason);
+        }
+        self.ask_again(now);
+        self.advance(now);
+    }
+
+    /// Asks all members that have come back for their next steps. Members that have caught up take part again.
+    pub(super) fn ask_again(&mut self, now: Nanos) {
+        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
+        else {
+            return;
+        };
+        let Some(memory) = &rejoining.memory else {
+            return;
+        };
+        let (seats, outbox, news) = (&mut self.seats, &mut self.outbox, &mut self.news);
+        let asked = &mut self.asked;
+        rejoining.away.retain_mut(|Away { client, replay, .. }| {
+            let Some(replay) = replay.as_mut().filter(|replay| replay.asked.is_none()) else {
+                return true;
+            };
+            replay.asked_at = now;
+            replay.asked = memory.next(&mut replay.place, *client);
+            if replay.asked.is_some() {
+                replay.place.read(barrier.reads(*client), &mut replay.reads);
+                outbox.push_back(Out::Step(replay.seat));
+                return true;
+            }
+            let owes = barrier.owing().any(|owing| owing == *client);
+            let was_due = barrier.due().any(|due| due == *client);
+            if barrier.state() != State::PreRead && was_due && !owes {
+                // It had answered the step that is under way, which others have not finished yet.
+                return true;
+            }
+            seats[replay.seat] = Seat::Client(*client);
+            if owes {
+                outbox.push_back(Out::Step(replay.seat));
+                *asked = now;
+            }
+            let name = &barrier.declaration(*client).name;
+            news.push_back(format!("client \"{name}\" has caught up"));
+            false
+        });
+    }
+
+    /// When the next patience ends.
+    pub(super) fn rejoin_deadline(&self) -> Nanos {
+        let Some(rejoining) = &self.rejoining else {
+            return Nanos::MAX;
+        };
+        let ends = rejoining
+            .away
+            .iter()
+            .map(|away| match (&away.replay, away.since) {
+                (Some(replay), _) if replay.asked.is_some() => replay.asked_at + self.settings.hang,
+                (Some(_), _) => Nanos::MAX,
+                (None, Some(since)) => since + rejoining.limit,
+                (None, None) => Nanos::ZERO,
+            });
+        ends.min().unwrap_or(Nanos::MAX)
+    }
+
+    /// Ends the run for a member that does not come back in time.
+    pub(super) fn check_rejoin(&mut self, now: Nanos) {
+        let (Some(rejoining), Phase::Running(barrier, _)) = (&mut self.rejoining, &self.phase)
+        else {
+            return;
+        };
+        let (limit, hang) = (rejoining.limit, self.settings.hang);
+        let mut end = None;
+        for away in &mut rejoining.away {
+            let since = *away.since.get_or_insert(now);
+            let late =
+                match &away.replay {
+                    Some(replay) => replay.asked.filter(|_| now >= replay.asked_at + hang).map(
+                        |step| {
+                            (
+                                Cause::Hung,
+                                format!(
+                                    "has come back, and has not run step {step} again within {hang}"
+                                ),
+                            )
+                        },
+                    ),
+                    None if now >= since + limit => {
+                        let reason = &away.reason;
+                        let reason =
+                            format!("was lost: {reason}; it did not come back within {limit}");
+                        Some((Cause::Lost, reason))
+                    }
+                    None => None,
+                };
+            end = end.or(late.map(|late| (barrier.declaration(away.client).name.clone(), late)));
+        }
+        if let Some((client, (cause, reason))) = end {
+            self.end_for(cause, Some(client), reason);
+        }
+    }
+}

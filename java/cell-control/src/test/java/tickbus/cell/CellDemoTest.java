@@ -164,12 +164,14 @@ class CellDemoTest {
     }
 
     private static List<ProcessHandle> netsAfterACylinder(Process demo, BufferedReader out) throws IOException {
+        List<String> lines = new ArrayList<>();
         String line = out.readLine();
         while (line != null && !line.contains("cylinder 1,")) {
+            lines.add(line);
             line = out.readLine();
         }
         List<ProcessHandle> nets = demo.children().toList();
-        assertEquals(1, nets.size());
+        assertEquals(1, nets.size(), lines::toString);
         return nets;
     }
 

@@ -195,6 +195,53 @@ class ControllerSafetyTest {
     }
 
     @Test
+    void netsThatMayNotBeginWaitForTheirMarkings() throws IOException {
+        Path file = folder.resolve("markings");
+        in("Piece at stop", true);
+        machine.signal("Weight").set(4);
+        begin(NetController.of(plc, button(toggle())).keepMarkings(file).numberMarkings("Pieces", 7)
+            .beginIf(() -> plc.signal("Weight").get() == 5));
+        machine.signal("Weight").set(5);
+        in("Piece at stop", false);
+        assertEquals(0, scan(), "it is asked once");
+        assertTrue(nets.isWaiting());
+        assertFalse(out("Gripper"));
+        assertFalse(Files.exists(file));
+        nets.begin(List.of(nets.coordinator("toggle").net().marking(0, 1)));
+        scan();
+        assertTrue(out("Gripper"));
+        assertEquals("tickbus markings 1\nnet toggle\n1 on\nnet number of the markings\n8 number\nend\n", Files.readString(file));
+        assertEquals(8, machine.signal("Pieces").get());
+        reopen();
+        begin(NetController.of(plc, button(toggle())).numberMarkings("Pieces", 1).resume(file));
+        assertEquals(8, nets.markingNumber());
+        assertThrows(IllegalArgumentException.class, () -> nets.numberMarkings("Weight", 1));
+        assertThrows(IllegalArgumentException.class, () -> nets.numberMarkings("Pieces", 0));
+    }
+
+    @Test
+    void aStopThatWaitsForRearmIsResumedToo() throws IOException {
+        Path file = folder.resolve("markings");
+        BoundNet net = BoundNet.of(PetriNet.named("n").place("p", 1).build()).during("p").set("Gripper");
+        begin(NetController.of(plc, net).failSafeWhile("Piece at stop", "Gripper closed").keepMarkings(file)
+            .numberMarkings("Pieces", 1));
+        assertTrue(out("Gripper"));
+        in("Piece at stop", true);
+        scan();
+        reopen();
+        BoundNet same = BoundNet.of(PetriNet.named("n").place("p", 1).build()).during("p").set("Gripper");
+        begin(NetController.of(plc, same).failSafeWhile("Piece at stop", "Gripper closed").keepMarkings(file)
+            .numberMarkings("Pieces", 1).resume(file));
+        scan();
+        assertFalse(out("Gripper"), "the stop was released meanwhile");
+        in("Gripper closed", true);
+        scan();
+        scan();
+        assertTrue(out("Gripper"));
+        assertEquals("tickbus markings 1\nnet n\n1 p\nnet number of the markings\n5 number\nend\n", Files.readString(file));
+    }
+
+    @Test
     void aFileOfOtherNetsOrACutOneIsRefused() throws IOException {
         Path file = folder.resolve("markings");
         NetController fresh = NetController.of(plc, button(toggle()));

@@ -28,7 +28,7 @@ class CellRestartTest extends CellLoop {
     /** Longer than every stroke of the cell. */
     private static final int MOST_TICKS_GONE = 60;
 
-    /** What happens between the end of a control and its next start. */
+    /** Happenings between the end of a control and its next start. */
     private enum Gap {
         /** The machine keeps the last outputs: a bus that holds them, and a fast start. */
         HELD,

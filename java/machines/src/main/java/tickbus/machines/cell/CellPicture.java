@@ -76,7 +76,7 @@ public final class CellPicture {
         svg.text(x + 12, TOP, "font-size=\"15\" font-weight=\"600\" " + INK, name);
     }
 
-    /** What moves along x or y between two sensors; the distances are in pixels. */
+    /** A part that moves along x or y between two sensors; distances are in pixels. */
     private void between(String back, String forward, String axis, int way, Runnable inside) {
         svg.group(Svg.bound(axis, "%s: off -> %d, on -> 0", back, way / 2) + SMOOTH,
                 () -> svg.group(Svg.bound(axis, "%s: off -> 0, on -> %d", forward, way - way / 2) + SMOOTH, inside));

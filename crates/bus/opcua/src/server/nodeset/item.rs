@@ -2,8 +2,11 @@
 
 use std::collections::HashMap;
 use std::str::FromStr;
+use std::sync::OnceLock;
 
-use opcua::types::{DataValue, LocalizedText, NodeClass, NodeId, QualifiedName, ReferenceTypeId};
+use opcua::types::{
+    DataTypeId, DataValue, LocalizedText, NodeClass, NodeId, QualifiedName, ReferenceTypeId,
+};
 use opcua_server::address_space::{
     Base, DataType, EventNotifier, ImportedItem, ImportedReference, Method, NodeType, Object,
     ObjectType, ReferenceType, Variable, VariableType, View,
@@ -14,15 +17,23 @@ use tickbus_base::toml_text::shown;
 use super::{TagName, child, value};
 use crate::namespaces::UA;
 
-/// The names of reference types that files use without an alias.
-const REFERENCES: [(&str, ReferenceTypeId); 6] = [
-    ("HasComponent", ReferenceTypeId::HasComponent),
-    ("HasProperty", ReferenceTypeId::HasProperty),
-    ("HasSubtype", ReferenceTypeId::HasSubtype),
-    ("HasTypeDefinition", ReferenceTypeId::HasTypeDefinition),
-    ("HasModellingRule", ReferenceTypeId::HasModellingRule),
-    ("Organizes", ReferenceTypeId::Organizes),
-];
+/// The types of the standard by their names, which some files use without an alias.
+fn standard(name: &str) -> Option<NodeId> {
+    /// Above the numbers of all types of the standard.
+    const NUMBERS: u32 = 40_000;
+    static TYPES: OnceLock<HashMap<String, NodeId>> = OnceLock::new();
+    let types = TYPES.get_or_init(|| {
+        let numbers = 1..NUMBERS;
+        let types = numbers.filter_map(|number| {
+            let data_type = DataTypeId::try_from(number).map(|id| format!("{id:?}"));
+            let reference = || ReferenceTypeId::try_from(number).map(|id| format!("{id:?}"));
+            let name = data_type.or_else(|_| reference()).ok()?;
+            Some((name, NodeId::new(0, number)))
+        });
+        types.collect()
+    });
+    types.get(name).cloned()
+}
 
 /// The names of a file.
 pub(super) struct Reader<'t> {
@@ -155,13 +166,9 @@ impl<'t> Reader<'t> {
         let list = list.filter(|reference| reference.has_tag_name_of("Reference"));
         let reference = |reference: Node<'_, '_>| {
             let of_type = reference.attribute("ReferenceType").unwrap_or_default();
-            let known = REFERENCES.iter().find(|(name, _)| *name == of_type);
             Ok(ImportedReference {
                 target_id: self.id(reference.text().unwrap_or_default())?,
-                type_id: match known {
-                    Some((_, id)) => (*id).into(),
-                    None => self.id(of_type)?,
-                },
+                type_id: self.id(of_type)?,
                 is_forward: flag(reference, "IsForward", true),
             })
         };
@@ -172,8 +179,10 @@ impl<'t> Reader<'t> {
     fn id(&self, text: &str) -> Result<NodeId, String> {
         let text = text.trim();
         let text = self.aliases.get(text).copied().unwrap_or(text);
-        let wrong = || format!("\"{}\" is no node id, and no alias of one", shown(text));
-        let mut id = NodeId::from_str(text).map_err(|_| wrong())?;
+        let Ok(mut id) = NodeId::from_str(text) else {
+            let wrong = || format!("\"{}\" is no node id, and no alias of one", shown(text));
+            return standard(text).ok_or_else(wrong);
+        };
         id.namespace = self.index(id.namespace)?;
         Ok(id)
     }

@@ -282,3 +282,6 @@ fn child<'a, 't>(of: Node<'a, 't>, name: &str) -> Option<Node<'a, 't>> {
 fn text_of<'a>(of: Node<'a, '_>, name: &str) -> Option<&'a str> {
     child(of, name)?.text().map(str::trim)
 }
+
+#[cfg(test)]
+mod tests;

@@ -4,7 +4,7 @@ use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
@@ -27,6 +27,7 @@ use tickbus_image::signal::{Area, SignalTable};
 
 use super::SESSIONS;
 use super::space::Places;
+use super::verdict::Verdict;
 use super::visitor::Visitor;
 use super::watched::{Rhythm, Variable, Watched};
 use super::writers::Writers;
@@ -52,39 +53,6 @@ pub(super) enum Visit {
     Rejected(Vec<String>, usize),
     /// The server has ended.
     Ended(String),
-}
-
-/// By how much a timer of the runtime can be late: it counts whole milliseconds, and so does the wait of the system
-/// below it.
-const TIMER: Duration = Duration::from_millis(4);
-
-/// How faults change the answer to a request.
-#[derive(Debug, Default)]
-pub(super) struct Verdict {
-    /// The stations that refuse the request, with this status.
-    pub(super) refused: Vec<(usize, StatusCode)>,
-    /// How much later the answer goes out.
-    pub(super) late: Duration,
-}
-
-impl Verdict {
-    /// The status with which a signal of `station` is refused.
-    fn status(&self, station: usize) -> Option<StatusCode> {
-        let found = self.refused.iter().find(|(of, _)| *of == station);
-        found.map(|(_, status)| *status)
-    }
-
-    /// Holds the answer to a request that came at `since` back.
-    async fn hold(&self, since: Instant) {
-        if self.late.is_zero() {
-            return;
-        }
-        let due = since + self.late;
-        tokio::time::sleep(self.late.saturating_sub(TIMER)).await;
-        while Instant::now() < due {
-            tokio::task::yield_now().await;
-        }
-    }
 }
 
 /// The nodes and their values.

@@ -1,5 +1,7 @@
 //! The lines of `[fieldbus.at]` at a server: the CPU has its variables where its program put them.
 
+use std::collections::BTreeSet;
+
 use crate::Variable;
 use crate::item::Object;
 use tickbus_base::toml_text::{Collector, shown};
@@ -227,14 +229,12 @@ fn report_unplaced(lines: &[At<'_>], table: &SignalTable) {
         let Some(line) = lines.iter().find(of_station) else {
             continue;
         };
-        let is_lined = |name: &str| {
-            let mut lines = lines.iter();
-            lines.any(|line| table.signals[line.signal].name == name)
-        };
-        let signals = table.signals.iter();
-        let missing = signals.filter(|signal| signal.station == station);
-        let missing = missing.map(|signal| signal.name.as_str());
-        let missing: Vec<&str> = missing.filter(|name| !is_lined(name)).collect();
+        let lined: BTreeSet<usize> = lines.iter().map(|line| line.signal).collect();
+        let signals = table.signals.iter().enumerate();
+        let missing =
+            signals.filter(|(at, signal)| signal.station == station && !lined.contains(at));
+        let missing = missing.map(|(_, signal)| signal.name.as_str());
+        let missing: Vec<&str> = missing.collect();
         if let [first, rest @ ..] = &missing[..] {
             let others = match rest.len() {
                 0 => String::new(),

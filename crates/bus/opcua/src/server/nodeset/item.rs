@@ -27,7 +27,7 @@ fn standard(name: &str) -> Option<NodeId> {
         let types = numbers.filter_map(|number| {
             let data_type = DataTypeId::try_from(number).map(|id| format!("{id:?}"));
             let reference = || ReferenceTypeId::try_from(number).map(|id| format!("{id:?}"));
-            let name = data_type.or_else(|_| reference()).ok()?;
+            let name = data_type.or_else(|()| reference()).ok()?;
             Some((name, NodeId::new(0, number)))
         });
         types.collect()

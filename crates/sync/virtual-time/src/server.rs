@@ -314,7 +314,7 @@ impl<'l> Server<'l> {
     pub fn gave_up(&mut self, seat: usize, reason: &str) {
         match self.seats[seat] {
             Seat::Client(_) | Seat::Back(_) => {
-                self.blame(seat, Cause::Failed, &format!("gave up: {reason}"))
+                self.blame(seat, Cause::Failed, &format!("gave up: {reason}"));
             }
             Seat::Free | Seat::Leaving => {}
             Seat::Silent(_) | Seat::Joined => {

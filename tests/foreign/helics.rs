@@ -154,7 +154,7 @@ fn tank(steps: u64, kind: &str) -> Result<(Child, String), Absent> {
     Ok((tank, port))
 }
 
-/// What the tank printed last.
+/// The text that the tank printed last.
 fn end_of(tank: Child) -> String {
     let output = tank.wait_with_output().expect("it ends");
     String::from_utf8_lossy(&output.stdout).trim().to_owned()

@@ -185,3 +185,32 @@ fn a_file_that_no_bridge_can_use_is_refused_at_once() {
         assert_eq!(output.status.code(), Some(code), "{part}\n{told}");
     }
 }
+
+#[test]
+fn stations_that_would_be_the_same_client_are_refused_with_both_names() {
+    let folder = Folder::new();
+    let signal = |station: &str| {
+        format!(
+            "[[signal]]\nname = \"run {station}\"\nstation = \"{station}\"\naddress = \"%IX0.0\"\n"
+        )
+    };
+    let file = folder.write(
+        "driver.cfg",
+        &format!(
+            "[driver]\nid = 1\nname = \"HALL\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\n\
+             [[station]]\nname = \"Ofen ä\"\n[[station]]\nname = \"Ofen ö\"\n{}{}",
+            signal("Ofen ä"),
+            signal("Ofen ö")
+        ),
+    );
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_tickbus"));
+    let output = command.args(["bridge", "bus", &file]).output();
+    let output = output.expect("it runs");
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        told.contains("\"Ofen ä\" and \"Ofen ö\" would both be the client HALL.Ofen__"),
+        "{told}"
+    );
+    assert!(told.contains("rename one of the stations"), "{told}");
+    assert_eq!(output.status.code(), Some(1), "{told}");
+}

@@ -11,7 +11,7 @@ use crate::cli::host::{is_news, never_ran, span};
 use crate::cli::lab::{dialled, key};
 use seat::{Seat, Seating};
 use tickbus_base::time::{Clock, Monotonic, Nanos, Pace, Stop};
-use tickbus_dispatcher::PORT;
+use tickbus_dispatcher::{Key, PORT};
 use tickbus_driver::{Code, Driver, Watch};
 use tickbus_driver_cfg::{Config, Kinds};
 use tickbus_fieldbus::{Link, LinkState};
@@ -39,8 +39,8 @@ pub(super) struct Arguments {
     name: Option<String>,
 
     /// The file with the key of the laboratory, if it has one.
-    #[arg(long, value_name = "FILE", value_parser = key_path)]
-    key_file: Option<PathBuf>,
+    #[arg(long, value_name = "FILE", value_parser = key)]
+    key_file: Option<Key>,
 
     /// Use this address of the device instead of the one in FILE.
     #[arg(long, value_name = "HOST:PORT")]
@@ -53,12 +53,6 @@ pub(super) struct Arguments {
     /// Stop after this time [default: at Ctrl-C].
     #[arg(long, value_name = "TIME", value_parser = span)]
     duration: Option<Nanos>,
-}
-
-/// Checks the key, and returns the whole path of its file.
-fn key_path(text: &str) -> Result<PathBuf, String> {
-    key(text)?;
-    std::path::absolute(text).map_err(|error| error.to_string())
 }
 
 /// Why the command ends early.
@@ -114,12 +108,9 @@ fn carry(arguments: &Arguments, kinds: &'static Kinds, stop: &Stop) -> Result<Pa
     let seating = Seating {
         name: arguments.name.as_ref().unwrap_or(&config.name),
         dispatcher: &arguments.dispatcher,
-        key_file: arguments.key_file.as_deref(),
+        key: arguments.key_file.as_ref(),
     };
-    let seats: Result<Vec<_>, String> = (0..config.table.stations.len())
-        .filter_map(|station| Seat::new(&config, station, &seating).transpose())
-        .collect();
-    let seats = seats.map_err(Failed::Input)?;
+    let seats = seat::all(&config, &seating).map_err(Failed::Input)?;
     let clock: Arc<dyn Clock> = Monotonic::shared();
     let kind = config.bus.kind();
     let failed = |error: tickbus_driver::DriverError| {

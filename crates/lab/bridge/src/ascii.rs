@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::grammar::{Identification, LONGEST_LINE, Line, Values, parse};
+use tickbus_dispatcher::grammar::{Identification, LONGEST_LINE, Line, Values, parse, printable};
 use tickbus_dispatcher::{Channel, Counts, Key, Number};
 
 use crate::lines::{Cut, Lines};
@@ -418,6 +418,14 @@ impl AsciiBridge {
         }
         match self.state {
             State::Away | State::Refused | State::Leaving { by_client: false } => {}
+            State::Stranger if self.key.is_none() && line.starts_with(b"ERR 401") => {
+                self.pass(line);
+                return self.wants_key(line);
+            }
+            // A dispatcher with a key closes a connection that states none.
+            State::Stranger if self.key.is_none() && line.starts_with(b"ERR 408") => {
+                return self.wants_key(line);
+            }
             State::Introduced => self.introduced(now, line)?,
             State::Leaving { by_client: true } | State::Stranger | State::Here => self.pass(line),
         }
@@ -426,16 +434,27 @@ impl AsciiBridge {
 
     /// The dispatcher has answered the key.
     fn key_answered(&mut self, line: &[u8]) -> Result<(), String> {
-        if line == b"OK KEY" {
+        let Err(refused) = Key::answered(line) else {
             return Ok(());
-        }
+        };
+        // What listens there may have returned the key, so the line is not repeated.
+        let refused = refused.to_string();
         if let Some(client) = &mut self.client
             && std::mem::take(&mut client.is_waiting)
         {
-            self.pass(line);
+            self.say(refused.as_bytes());
         }
         self.state = State::Refused;
-        Err(format!("it answers {}", String::from_utf8_lossy(line)))
+        Err(format!("it answers {refused}"))
+    }
+
+    /// The dispatcher refuses a client without a key.
+    fn wants_key(&mut self, line: &[u8]) -> Result<(), String> {
+        self.state = State::Refused;
+        Err(format!(
+            "it answers {}; if the laboratory has a key, start the bridge with --key-file",
+            shown(line)
+        ))
     }
 
     /// The dispatcher has answered the identification.
@@ -454,9 +473,11 @@ impl AsciiBridge {
                 .iter()
                 .any(|code| line.starts_with(*code))
             {
+                if line.starts_with(b"ERR 401") {
+                    return self.wants_key(line);
+                }
                 self.state = State::Refused;
-                let text = String::from_utf8_lossy(line);
-                return Err(format!("it answers {text}"));
+                return Err(format!("it answers {}", shown(line)));
             }
             self.client = None;
             self.requests.clear();
@@ -518,6 +539,13 @@ impl AsciiBridge {
             self.to_serial.line(line);
         }
     }
+}
+
+/// The beginning of a line of the dispatcher, for a message: what listens there may be anything.
+fn shown(line: &[u8]) -> String {
+    const LONGEST: usize = 200;
+
+    printable(&line[..line.len().min(LONGEST)])
 }
 
 impl Speaker for AsciiBridge {

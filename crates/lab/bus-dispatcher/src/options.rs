@@ -50,6 +50,8 @@ pub struct Options {
     pub cables: Vec<(usize, Cable)>,
     /// The file with the key of the laboratory, if it has one; relative to the folder of the driver.cfg.
     pub key_file: Option<PathBuf>,
+    /// The key, if it is known without a file.
+    pub key: Option<LabKey>,
     /// Signals with their own channel, by name: `[fieldbus.at]`.
     pub at: BTreeMap<String, Channel>,
     pub(super) role: Role,
@@ -82,6 +84,7 @@ impl Options {
             name: name?,
             cables: cables?,
             key_file: key_file?,
+            key: None,
             at: BTreeMap::new(),
             role,
             offset: table.at(),
@@ -98,8 +101,12 @@ impl Options {
 
     /// The key of the laboratory; `folder` is that of the driver.cfg.
     fn key(&self, folder: &Path) -> Result<Option<LabKey>, Mistake> {
-        let key = self.key_file.as_ref();
-        key.map(|file| LabKey::load(&folder.join(file))).transpose()
+        if self.key.is_some() {
+            return Ok(self.key.clone());
+        }
+        let file = self.key_file.as_ref();
+        file.map(|file| LabKey::load(&folder.join(file)))
+            .transpose()
     }
 
     /// Reports a key that cannot be read.

@@ -88,7 +88,7 @@ pub struct Dispatcher {
 )]
 struct Session {
     peer: SocketAddr,
-    /// When the client's last complete line came, or the connection was made.
+    /// When the client's last complete line came, or the connection was made. Lines before the key do not count.
     heard: Nanos,
     /// Bytes that have arrived but were not processed yet.
     begun: Vec<u8>,
@@ -187,10 +187,11 @@ impl Dispatcher {
     ///
     /// # Errors
     ///
-    /// The number of clients has reached the settings' maximum. Send the client this refusal, and close.
+    /// The number of clients has reached the settings' maximum, and all of them have stated the key, if there is one. Send
+    /// the client this refusal, and close.
     pub fn connected(&mut self, now: Nanos, peer: SocketAddr) -> Result<usize, Refusal> {
         let most = self.settings.clients;
-        if self.count >= most {
+        if self.count >= most && !self.make_room() {
             return Err(Code::Limit.because(format_args!(
                 "{most} clients are here, and no more are served"
             )));
@@ -208,6 +209,9 @@ impl Dispatcher {
             is_silent: false,
             progress: Progress::Going,
         });
+        if self.guard.is_closed() {
+            self.guard.strangers.insert((now, seat));
+        }
         let patience = self.patience(seat);
         self.next_look = self.next_look.min(now + patience);
         Ok(seat)
@@ -225,8 +229,9 @@ impl Dispatcher {
 
     /// The connection of a seat was lost or closed.
     pub fn gone(&mut self, seat: usize) {
-        if self.sessions[seat].take().is_some() {
+        if let Some(session) = self.sessions[seat].take() {
             self.count -= 1;
+            self.guard.strangers.remove(&(session.heard, seat));
             let promised = self.promised.iter_mut().map(|it| &mut it.author);
             let waiting = self.waiting.iter_mut().map(|it| &mut it.author);
             for author in promised.chain(waiting).filter(|author| author.is(seat)) {
@@ -396,10 +401,10 @@ impl Dispatcher {
         at
     }
 
-    /// A line of a client has come.
+    /// A line of a client has come. A stranger gets no more time by it.
     #[inline]
     fn heard(&mut self, now: Nanos, seat: usize) {
-        if let Some(session) = &mut self.sessions[seat] {
+        if let Some(session) = self.sessions[seat].as_mut().filter(|it| it.is_admitted) {
             session.heard = now;
         }
     }
@@ -655,7 +660,11 @@ impl Dispatcher {
         self.refuse(seat, &Code::Syntax.because(IS_BROWSER));
     }
 
+    /// Refuses a line that is too long. A stranger has no reason to send one, and is closed.
     fn refuse_length(&mut self, seat: usize) {
+        if let Some(session) = self.sessions[seat].as_mut().filter(|it| !it.is_admitted) {
+            session.progress = Progress::Closing;
+        }
         let text = format!("the line has more than {LONGEST_LINE} bytes and was ignored");
         self.refuse(seat, &Code::TooLong.because(text));
     }

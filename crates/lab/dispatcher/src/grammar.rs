@@ -406,7 +406,7 @@ fn shown(bytes: &[u8]) -> String {
 }
 
 /// A text with ? in place of all characters that cannot be printed.
-pub(crate) fn printable(bytes: &[u8]) -> String {
+pub fn printable(bytes: &[u8]) -> String {
     let character = |byte: &u8| match byte {
         b' '..=b'~' => char::from(*byte),
         _ => '?',

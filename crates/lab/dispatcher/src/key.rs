@@ -57,6 +57,8 @@ impl Key {
             let right = first.map_or("check the path", |first| &*first.mistake.right);
             of_file(Mistake::new(what, right))
         })?;
+        // Some editors begin a file with a byte-order mark.
+        let text = text.strip_prefix('\u{feff}').unwrap_or(&text);
         Self::parse(text.trim()).map_err(of_file)
     }
 
@@ -65,10 +67,49 @@ impl Key {
         format!("KEY {}", self.0)
     }
 
+    /// Reads the line that answers a key, without its end.
+    ///
+    /// # Errors
+    ///
+    /// The key was not accepted, or the line is not from a dispatcher.
+    pub fn answered(line: &[u8]) -> Result<(), KeyRefused> {
+        if line == b"OK KEY" {
+            return Ok(());
+        }
+        let code = line.strip_prefix(b"ERR ").and_then(|rest| rest.get(..3));
+        let code = code.and_then(|code| std::str::from_utf8(code).ok());
+        Err(match code.and_then(|code| code.parse().ok()) {
+            Some(403) => KeyRefused::Wrong,
+            Some(429) => KeyRefused::Later,
+            Some(code) => KeyRefused::Otherwise(code),
+            None => KeyRefused::NoDispatcher,
+        })
+    }
+
     /// True if a client that has stated `said` knows the key.
     pub(crate) fn is(&self, said: &[u8]) -> bool {
         is_same_secret(said, self.0.as_bytes())
     }
+}
+
+/// Why a key was not accepted. The texts repeat nothing of the answer: a service that returns what it gets, or complains
+/// about it, would put the key into logs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum KeyRefused {
+    /// The key is wrong.
+    #[error("ERR 403 the key is wrong; ask the operator of the laboratory for it")]
+    Wrong,
+    /// Keys of this address are not looked at for a moment, or the dispatcher is full.
+    #[error("ERR 429 a wrong key came from this address just now, or the dispatcher is full")]
+    Later,
+    /// The dispatcher refused the line with this code.
+    #[error("ERR {0} the key was not accepted")]
+    Otherwise(u16),
+    /// The answer is not that of a dispatcher.
+    #[error(
+        "ERR 503 what listens there does not answer the key as a dispatcher does; check the address of the dispatcher"
+    )]
+    NoDispatcher,
 }
 
 impl PartialEq for Key {
@@ -119,6 +160,8 @@ mod tests {
             "{missing}"
         );
         std::fs::write(&file, "0123456789abcdef\r\n").expect("a file");
+        assert!(Key::load(&file).expect("a key").is(b"0123456789abcdef"));
+        std::fs::write(&file, "\u{feff}0123456789abcdef\n").expect("a file");
         assert!(Key::load(&file).expect("a key").is(b"0123456789abcdef"));
         std::fs::write(&file, "0123456789abcdef\n0123456789abcdef\n").expect("a file");
         assert!(Key::load(&file).is_err());

@@ -41,7 +41,7 @@ pub use door::Door;
 pub use federation::Identity;
 pub use grammar::{LEAST_PROMISE, LONGEST_PROMISE};
 pub use host::HostId;
-pub use key::Key;
+pub use key::{Key, KeyRefused};
 pub use name::{LONGEST_NAME, is_name};
 pub use number::{LONGEST_NUMBER, Number};
 pub use patch::{Patch, Pin};

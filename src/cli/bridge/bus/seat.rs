@@ -1,12 +1,11 @@
 //! One station of the bus as a client of the dispatcher.
 
-use std::path::Path;
 use std::sync::Arc;
 
 use super::{Told, say};
 use tickbus_base::time::{Clock, Nanos};
 use tickbus_bus_dispatcher::Options;
-use tickbus_dispatcher::{Kind, LONGEST_NAME, is_name};
+use tickbus_dispatcher::{Key, Kind, LONGEST_NAME, is_name};
 use tickbus_driver::Driver;
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::{Events, LifeSigns, Outputs, Role};
@@ -27,7 +26,28 @@ pub(super) struct Seating<'a> {
     /// The name; stations, if there are several, have theirs behind it.
     pub(super) name: &'a str,
     pub(super) dispatcher: &'a Address,
-    pub(super) key_file: Option<&'a Path>,
+    pub(super) key: Option<&'a Key>,
+}
+
+/// The clients of all stations of `bus` that have signals to share. Fails with whole lines of text.
+pub(super) fn all(bus: &Config, seating: &Seating<'_>) -> Result<Vec<Seat>, String> {
+    let mut seats: Vec<Seat> = Vec::new();
+    for station in 0..bus.table.stations.len() {
+        let Some(seat) = Seat::new(bus, station, seating)? else {
+            continue;
+        };
+        let name = &seat.config.name;
+        if let Some(other) = seats.iter().find(|other| other.config.name == *name) {
+            let [one, two] = [other.station, station].map(|at| &*bus.table.stations[at].name);
+            return Err(format!(
+                "{}: the stations \"{one}\" and \"{two}\" would both be the client {name}, because a client has letters, \
+                 digits, _, - and . in its name; rename one of the stations",
+                bus.path.display()
+            ));
+        }
+        seats.push(seat);
+    }
+    Ok(seats)
 }
 
 /// A station of the bus as a client.
@@ -45,11 +65,7 @@ pub(super) struct Seat {
 
 impl Seat {
     /// The client for a station of `bus`; `None` if the station has no signals to share. Fails with whole lines of text.
-    pub(super) fn new(
-        bus: &Config,
-        station: usize,
-        seating: &Seating<'_>,
-    ) -> Result<Option<Self>, String> {
+    fn new(bus: &Config, station: usize, seating: &Seating<'_>) -> Result<Option<Self>, String> {
         let name = name_of(bus, station, seating.name)?;
         let signals = shared(bus, station);
         if signals.is_empty() {
@@ -89,7 +105,10 @@ impl Seat {
         if let Some(options) = config.bus.downcast_mut::<Options>() {
             options.address = seating.dispatcher.clone();
             options.name = Some(config.name.clone());
-            options.key_file = seating.key_file.map(Path::to_owned);
+            // Read once: a station that comes back does not wait for a disk, and a file that is replaced meanwhile does not
+            // lock it out.
+            options.key_file = None;
+            options.key = seating.key.cloned();
         }
         Ok(Some(Self {
             station,

@@ -124,7 +124,11 @@ impl Access {
 fn text_of(value: &Value<'_>, folder: &Path) -> Option<String> {
     let file = folder.join(value.label(LONGEST, "write the name of a file")?);
     match load_text(&file) {
-        Ok(text) => Some(text),
+        // Some editors begin a file with a byte-order mark.
+        Ok(text) => Some(match text.strip_prefix('\u{feff}') {
+            Some(rest) => rest.to_owned(),
+            None => text,
+        }),
         Err(mistakes) => {
             for one in &mistakes {
                 let what = format!("{}: {}", file.display(), one.mistake.what);

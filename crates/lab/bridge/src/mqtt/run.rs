@@ -61,7 +61,12 @@ enum Heard {
 /// The system cannot wait for sockets, or has no more threads. [`io::ErrorKind::InvalidInput`]: a certificate cannot be used.
 pub fn run(mapping: &mut Mapping, hosting: Hosting<'_>) -> io::Result<()> {
     let set = PollSet::new(hosting.stop);
-    let broker = Broker::call(mapping, &hosting)?;
+    let (broker, left_out) = Broker::call(mapping, &hosting)?;
+    if left_out > 0 {
+        (hosting.news)(&format!(
+            "certificates in ca_file that cannot be read, and do not count: {left_out}"
+        ));
+    }
     let mut host = Between {
         link: Link::new(&mapping.map().dispatcher, hosting.stop),
         mapping,
@@ -207,7 +212,9 @@ struct Broker {
 }
 
 impl Broker {
-    fn call(mapping: &Mapping, hosting: &Hosting<'_>) -> io::Result<Self> {
+    /// Calls the broker; returns also how many certificates of `ca_file` were left out.
+    fn call(mapping: &Mapping, hosting: &Hosting<'_>) -> io::Result<(Self, usize)> {
+        let mut left_out = 0;
         let map = mapping.map();
         // Without the brackets of an IPv6 address.
         let host = match &map.broker.host {
@@ -221,11 +228,11 @@ impl Broker {
             options.set_credentials(&*login.user, &*login.password);
         }
         if let Some(tls) = &map.access.tls {
-            let transport = tls::transport(tls);
-            options.set_transport(
-                transport
-                    .map_err(|mistake| io::Error::new(io::ErrorKind::InvalidInput, mistake))?,
-            );
+            let made = tls::transport(tls);
+            let (transport, broken) =
+                made.map_err(|mistake| io::Error::new(io::ErrorKind::InvalidInput, mistake))?;
+            options.set_transport(transport);
+            left_out = broken;
         }
         if let Some(status) = &map.status {
             options.set_last_will(LastWill::new(status, OFFLINE, QoS::AtLeastOnce, true));
@@ -241,12 +248,13 @@ impl Broker {
         };
         let thread = std::thread::Builder::new().name("tickbus-mqtt".to_owned());
         let thread = thread.spawn(move || driver.run(connection))?;
-        Ok(Self {
+        let broker = Self {
             client,
             receiver,
             thread,
             stop,
-        })
+        };
+        Ok((broker, left_out))
     }
 
     fn heard(&self) -> Option<Heard> {

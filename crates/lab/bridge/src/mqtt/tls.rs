@@ -12,12 +12,13 @@ use tickbus_base::Mistake;
 
 use super::access::Tls;
 
-/// The transport with these certificates.
+/// The transport with these certificates, and the number of authorities that were left out because they cannot be read:
+/// a system's list can contain such.
 ///
 /// # Errors
 ///
-/// A text is no certificate or no key.
-pub(super) fn transport(tls: &Tls) -> Result<Transport, Mistake> {
+/// No authority can be read, or another text is no certificate or no key.
+pub(super) fn transport(tls: &Tls) -> Result<(Transport, usize), Mistake> {
     const RIGHT: &str = "name a file in PEM, which begins with -----BEGIN";
 
     let wrong = |what: &str, error: &dyn std::fmt::Display| {
@@ -32,9 +33,19 @@ pub(super) fn transport(tls: &Tls) -> Result<Transport, Mistake> {
         }
     };
     let mut roots = RootCertStore::empty();
-    for one in certificates(&tls.authorities, "ca_file")? {
-        let added = roots.add(one);
-        added.map_err(|error| wrong("ca_file", &error))?;
+    let (readable, broken): (Vec<_>, Vec<_>) =
+        CertificateDer::pem_slice_iter(tls.authorities.as_bytes()).partition(Result::is_ok);
+    let (added, ignored) = roots.add_parsable_certificates(readable.into_iter().flatten());
+    let left_out = ignored + broken.len();
+    match (added, left_out) {
+        (0, 0) => return Err(wrong("ca_file", &"it has no certificate")),
+        (0, _) => {
+            return Err(wrong(
+                "ca_file",
+                &format_args!("it has no certificate that can be read, and {left_out} that cannot"),
+            ));
+        }
+        _ => {}
     }
     let provider = Arc::new(rustls::crypto::ring::default_provider());
     let config = ClientConfig::builder_with_provider(provider)
@@ -51,7 +62,7 @@ pub(super) fn transport(tls: &Tls) -> Result<Transport, Mistake> {
             config.map_err(|error| wrong("certificate_file with private_key_file", &error))?
         }
     };
-    Ok(Transport::tls_with_config(config.into()))
+    Ok((Transport::tls_with_config(config.into()), left_out))
 }
 
 /// Why a connection failed, and what to do.

@@ -582,4 +582,47 @@ fn the_bridge_states_the_key_in_its_clients_place() {
         why.starts_with("it answers ERR 401 this laboratory has a key"),
         "{why}"
     );
+    assert!(why.contains("start the bridge with --key-file"), "{why}");
+    assert!(lab.told()[0].starts_with("ERR 401"));
+
+    // So does a bridge whose driver is silent.
+    let mut lab = Lab::new();
+    lab.cut();
+    lab.dispatcher.require(key("0123456789abcdef"));
+    lab.connect();
+    lab.now += Nanos::from_secs(10);
+    let why = lab.settle().expect("it is refused");
+    assert!(
+        why.contains("no key came within 10s") && why.contains("with --key-file"),
+        "{why}"
+    );
+    assert!(!lab.bridge.is_here() && lab.told().is_empty());
+}
+
+#[test]
+fn what_is_no_dispatcher_gets_no_key_into_a_log_and_no_sequence_to_a_terminal() {
+    const KEY: &str = "0123456789abcdef";
+
+    let key = Key::parse(KEY).expect("a key");
+    for line in [format!("KEY {KEY}\r\n"), format!("-ERR `{KEY}`\r\n")] {
+        let mut bridge = AsciiBridge::new(LineEnd::Cr).with_key(Some(key.clone()));
+        bridge.from_serial(Nanos::ZERO, b"VR SCADA Q1 I1\r");
+        let length = bridge.to_serial().len();
+        bridge.wrote_to_serial(length);
+        bridge.connected(Nanos::ZERO);
+        let why = bridge.hear(Nanos::ZERO, line.as_bytes());
+        let why = why.expect_err("it is no dispatcher");
+        let told = String::from_utf8_lossy(bridge.to_serial()).into_owned();
+        for text in [&why, &told] {
+            assert!(
+                text.contains("check the address") && !text.contains(KEY),
+                "{text}"
+            );
+        }
+    }
+    let mut bridge = AsciiBridge::new(LineEnd::Cr);
+    bridge.from_serial(Nanos::ZERO, b"VR SCADA Q1 I1\r");
+    bridge.connected(Nanos::ZERO);
+    let why = bridge.hear(Nanos::ZERO, b"ERR 409 \x1b]0;owned\x07\xff\r\n");
+    assert_eq!(why, Err("it answers ERR 409 ?]0;owned??".to_owned()));
 }

@@ -9,7 +9,7 @@ use tickbus_base::time::Nanos;
 use crate::cable::Cable;
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::{Device, Role};
-use crate::key::Key;
+use crate::key::{Key, KeyRefused};
 use crate::name::{LONGEST_NAME, is_name};
 use crate::number::Number;
 use crate::refusal::Code;
@@ -273,7 +273,22 @@ impl Client {
             self.obey(now, line, events)
         });
         self.lines = lines;
-        result
+        // What arrives instead of an answer may repeat the key.
+        result.map_err(|error| match error {
+            ClientError::Protocol(_) if self.awaits_key() => {
+                ClientError::Protocol(KeyRefused::NoDispatcher.to_string())
+            }
+            other => other,
+        })
+    }
+
+    /// True if the dispatcher has not answered the key yet.
+    fn awaits_key(&self) -> bool {
+        let is_before = matches!(
+            self.progress,
+            Progress::Connected | Progress::Asking(Request::Key)
+        );
+        is_before && self.profile.key.is_some()
     }
 
     fn obey(
@@ -282,6 +297,9 @@ impl Client {
         line: &[u8],
         events: &mut dyn FnMut(Event<'_>),
     ) -> Result<(), ClientError> {
+        if self.awaits_key() && !line.is_empty() {
+            return self.key_answered(line);
+        }
         match lines::read(line)? {
             Heard::Nothing => {}
             Heard::Values(values) => {
@@ -312,6 +330,22 @@ impl Client {
         Ok(())
     }
 
+    fn key_answered(&mut self, line: &[u8]) -> Result<(), ClientError> {
+        let name = &self.profile.name;
+        match Key::answered(line) {
+            Ok(()) if self.progress == Progress::Asking(Request::Key) => {
+                self.progress = Progress::Admitted;
+                Ok(())
+            }
+            Ok(()) | Err(KeyRefused::NoDispatcher) => {
+                Err(ClientError::Protocol(KeyRefused::NoDispatcher.to_string()))
+            }
+            Err(refused) => Err(ClientError::Refused(format!(
+                "the dispatcher does not take \"{name}\": {refused}"
+            ))),
+        }
+    }
+
     fn done(
         &mut self,
         line: &[u8],
@@ -322,6 +356,7 @@ impl Client {
             return Err(lines::nonsense(line, "nothing was asked"));
         };
         let expected = match request {
+            // Answers to a key are read elsewhere.
             Request::Key => "KEY",
             Request::Identify => self.profile.role.keyword(),
             Request::Connect(_) => "CONNECT",
@@ -336,7 +371,7 @@ impl Client {
         }
         self.progress = Progress::Idle;
         match request {
-            Request::Key => self.progress = Progress::Admitted,
+            Request::Key => {}
             Request::Identify => events(Event::Identified),
             Request::Connect(at) => {
                 self.wishes[at] = Wish::Granted;

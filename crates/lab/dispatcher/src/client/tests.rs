@@ -437,3 +437,40 @@ proptest::proptest! {
         proptest::prop_assert_eq!(run(&mut cuts.into_iter()), whole);
     }
 }
+
+#[test]
+fn until_the_key_is_answered_nothing_that_came_is_repeated() {
+    const KEY: &str = "0123456789abcdef";
+
+    let bench = || {
+        let mut bench = Bench::new(&[]);
+        let mut profile = bench.client.profile.clone();
+        profile.key = Some(Key::parse(KEY).expect("a key"));
+        bench.client = Client::new(profile, KEEP_ALIVE).expect("a right profile");
+        bench.client.connected(Nanos::ZERO);
+        assert_eq!(bench.says(), format!("KEY {KEY}\r\n"));
+        bench
+    };
+    let mut right = bench();
+    assert!(right.hears("\r\nOK KEY\r\n").expect("right").is_empty());
+    assert!(right.says().starts_with("VP PUMP"));
+    // An echo, Redis, a web server, and a line without an end.
+    for (line, expected) in [
+        (format!("KEY {KEY}\r\n"), "check the address"),
+        (
+            format!("-ERR unknown command `KEY`, with args beginning with: `{KEY}`\r\n"),
+            "check the address",
+        ),
+        (format!("OK KEY {KEY}\r\n"), "check the address"),
+        (format!("P Q1={KEY}\r\n"), "check the address"),
+        (KEY.repeat(300), "check the address"),
+        (format!("ERR 403 {KEY}\r\n"), "the key is wrong"),
+        (format!("ERR 429 {KEY}\r\n"), "or the dispatcher is full"),
+        (format!("ERR 400 {KEY}\r\n"), "ERR 400"),
+        (format!("ERR 012{KEY}\r\n"), "ERR 12"),
+    ] {
+        let told = bench().hears(&line).expect_err("no key is accepted");
+        assert!(told.contains(expected), "{line}: {told}");
+        assert!(!told.contains("456789ab"), "{told}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Admits clients that know the key of the laboratory.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::net::{IpAddr, SocketAddr};
 
 use tickbus_base::os::is_told;
@@ -27,6 +27,8 @@ pub(super) struct Guard {
     wrong: u64,
     /// Addresses that have stated a wrong key, and when the next one of each is looked at; the soonest first.
     pauses: VecDeque<(IpAddr, Nanos)>,
+    /// The seats whose clients have not stated the key, and since when they are connected.
+    pub(super) strangers: BTreeSet<(Nanos, usize)>,
     news: VecDeque<String>,
 }
 
@@ -90,12 +92,32 @@ impl Dispatcher {
         };
         let admitted = self.guard.admit(now, session.peer, said);
         if admitted.is_ok() {
+            self.guard.strangers.remove(&(session.heard, seat));
             session.is_admitted = true;
+            session.heard = now;
             self.board.say(seat, "OK KEY");
         } else {
             session.progress = Progress::Closing;
         }
         admitted
+    }
+
+    /// Closes the connection of the stranger that has waited longest, so that a newcomer has its place. Returns false if there
+    /// is no stranger.
+    pub(super) fn make_room(&mut self) -> bool {
+        let Some((_, seat)) = self.guard.strangers.pop_first() else {
+            return false;
+        };
+        if let Some(session) = &mut self.sessions[seat] {
+            session.progress = Progress::Closing;
+        }
+        self.refuse(
+            seat,
+            &Code::Limit.because(
+                "the dispatcher is full, and this client has not stated the key; connect again",
+            ),
+        );
+        true
     }
 
     /// A client begins without the key: closes the connection.

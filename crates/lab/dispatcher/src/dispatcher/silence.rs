@@ -60,9 +60,15 @@ impl Dispatcher {
             };
             if now - session.heard >= idle {
                 session.progress = Progress::Closing;
-                let refusal = Code::TimeOut.because(format_args!(
-                    "nothing was heard for {idle}; send PING when there is nothing else to send"
-                ));
+                let refusal = if session.is_admitted {
+                    Code::TimeOut.because(format_args!(
+                        "nothing was heard for {idle}; send PING when there is nothing else to send"
+                    ))
+                } else {
+                    Code::TimeOut.because(format_args!(
+                        "no key came within {idle}; the first line is KEY and the key"
+                    ))
+                };
                 self.refuse(seat, &refusal);
                 continue;
             }

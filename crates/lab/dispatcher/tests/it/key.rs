@@ -4,7 +4,7 @@ use std::net::SocketAddr;
 
 use crate::common::Lab;
 use tickbus_base::time::Nanos;
-use tickbus_dispatcher::Key;
+use tickbus_dispatcher::{Key, Patch, Settings};
 
 const KEY: &str = "sesame+open/you=0";
 
@@ -124,6 +124,64 @@ fn a_connection_without_the_key_lasts_ten_seconds() {
     lab.wait(Nanos::from_secs(1));
     assert!(lab.hear(stranger)[0].starts_with("ERR 408"));
     assert!(lab.dispatcher.is_closing(stranger));
+}
+
+#[test]
+fn lines_of_a_stranger_give_it_no_more_time_and_a_long_one_closes_it() {
+    let mut lab = closed();
+    let stranger = lab.connect();
+    lab.wait(Nanos::from_secs(9));
+    assert!(lab.ask(stranger, "").is_empty());
+    lab.wait(Nanos::from_secs(1));
+    assert_eq!(
+        lab.hear(stranger),
+        ["ERR 408 no key came within 10s; the first line is KEY and the key"]
+    );
+    assert!(lab.dispatcher.is_closing(stranger));
+
+    // The key begins the client's own time.
+    let pump = lab.connect();
+    lab.wait(Nanos::from_secs(9));
+    assert_eq!(lab.ask(pump, &format!("KEY {KEY}")), ["OK KEY"]);
+    lab.wait(Nanos::from_secs(59));
+    assert!(!lab.dispatcher.is_closing(pump));
+
+    for end in ["", "\n"] {
+        let stranger = lab.connect();
+        lab.send(stranger, format!("{}{end}", " ".repeat(4096)).as_bytes());
+        assert!(lab.hear(stranger)[0].starts_with("ERR 413"));
+        assert!(lab.dispatcher.is_closing(stranger));
+    }
+}
+
+#[test]
+fn in_a_full_laboratory_the_stranger_that_waits_longest_makes_room() {
+    let settings = Settings {
+        clients: 3,
+        ..Settings::default()
+    };
+    let mut lab = Lab::with(settings, Patch::new());
+    lab.dispatcher.require(Key::parse(KEY).expect("a key"));
+    let pump = lab.connect();
+    lab.ask(pump, &format!("KEY {KEY}"));
+    let first = lab.connect();
+    lab.wait(Nanos::from_secs(1));
+    let second = lab.connect();
+    let logo = lab.connect();
+    assert!(lab.dispatcher.is_closing(first) && !lab.dispatcher.is_closing(second));
+    assert!(lab.hear(first)[0].starts_with("ERR 429 the dispatcher is full"));
+    lab.dispatcher.gone(first);
+    assert_eq!(lab.ask(logo, &format!("KEY {KEY}")), ["OK KEY"]);
+    assert_eq!(lab.ask(second, &format!("KEY {KEY}")), ["OK KEY"]);
+    // Clients that have stated the key keep their places.
+    let peer = SocketAddr::from(([192, 168, 0, 20], 4000));
+    let refused = lab.dispatcher.connected(lab.now, peer);
+    assert!(
+        refused
+            .expect_err("it is full")
+            .text
+            .contains("3 clients are here")
+    );
 }
 
 #[test]

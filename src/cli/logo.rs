@@ -11,7 +11,7 @@ use super::lab::{self, dialled, key};
 use tickbus_base::time::{Clock as _, Monotonic, Nanos};
 use tickbus_base::toml_text::Mistakes;
 use tickbus_dispatcher::client::{Client, Profile};
-use tickbus_dispatcher::{Counts, Key, PORT, Role};
+use tickbus_dispatcher::{Channel, Counts, Key, PORT, Role};
 use tickbus_function_blocks::{Controller, Program, Terminals};
 use tickbus_net::Address;
 
@@ -100,6 +100,10 @@ fn read(arguments: &Arguments) -> Result<(Program, Client), Mistakes> {
     };
     let client = Client::new(profile, KEEP_ALIVE);
     let client = client.map_err(|mistake| Mistakes::of("--name", mistake))?;
+    let names = program.names.iter();
+    let names =
+        names.filter_map(|(output, name)| Some((Channel::parse(output.as_bytes())?, &**name)));
+    let client = client.with_labels(names);
     Ok((program, client))
 }
 

@@ -282,9 +282,10 @@ impl AsciiBridge {
                     self.to_dispatcher.values(&line, &items);
                 }
             }
-            (Ok(Line::Connect(_) | Line::Disconnect(_) | Line::List), _)
-                if self.client.is_some() =>
-            {
+            (
+                Ok(Line::Connect(_) | Line::Disconnect(_) | Line::Name(..) | Line::List { .. }),
+                _,
+            ) if self.client.is_some() => {
                 self.request(now, line);
             }
             // The dispatcher knows best what is wrong.

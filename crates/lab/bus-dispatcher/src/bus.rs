@@ -36,10 +36,14 @@ impl DispatcherBus {
     pub fn new(options: &Options, setup: &BusSetup<'_>) -> Result<Self, Mistake> {
         let channels = options.channels(setup.table);
         let sign = Nanos((setup.max_age.0 / SIGNS_OF_LIFE).max(1));
+        let client = Client::new(options.profile(setup)?, sign.min(KEEP_ALIVE))?;
+        let signals = setup.table.signals.iter();
+        let names = channels.list.iter().zip(signals);
+        let names = names.map(|(channel, signal)| (*channel, &*signal.name));
         Ok(Self {
             address: options.address.clone(),
             cycle: setup.cycle.unwrap_or(CYCLE),
-            client: Client::new(options.profile(setup)?, sign.min(KEEP_ALIVE))?,
+            client: client.with_labels(names),
             outputs: Outputs::new(setup.table, setup.role, &channels),
             inputs: Inputs::new(setup.table, setup.role, &channels),
         })

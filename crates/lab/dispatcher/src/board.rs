@@ -11,6 +11,7 @@ use std::ops::Bound;
 use crate::channel::Channel;
 use crate::device::{Device, Role};
 use crate::host::{HostId, Rank};
+use crate::label::Label as Name;
 use crate::number::Number;
 use crate::outbox::{Label, Listing, Outbox};
 use crate::patch::{Patch, Pin};
@@ -72,6 +73,8 @@ struct Plugged {
     /// routed on the host.
     host: Option<Box<str>>,
     outputs: Box<[Output]>,
+    /// What the client calls its channels.
+    labels: BTreeMap<Channel, Name>,
     /// True if an input that loses its source gets `?` and not 0.
     hears_losses: bool,
     /// True if the client has been silent for longer than its `ALIVE` time; the patch then ignores its outputs.
@@ -278,6 +281,7 @@ impl Board {
             order,
             host,
             outputs,
+            labels: BTreeMap::new(),
             hears_losses: false,
             is_silent: false,
         }));
@@ -487,8 +491,15 @@ impl Board {
         touch(&mut self.touched, outbox, to.seat);
     }
 
-    /// Requests the current device list.
-    pub(crate) fn list(&mut self, seat: usize) {
+    /// The client on a seat calls one of its channels so.
+    pub(crate) fn name_channel(&mut self, seat: usize, channel: Channel, label: Name) {
+        if let Some(plugged) = &mut self.seats[seat].plugged {
+            plugged.labels.insert(channel, label);
+        }
+    }
+
+    /// Requests the current device list, with the labels of channels if wanted.
+    pub(crate) fn list(&mut self, seat: usize, with_names: bool) {
         self.seats[seat].outbox.listing = Some(Listing {
             after: None,
             end: Rank {
@@ -496,6 +507,7 @@ impl Board {
                 host: HostId::default(),
             },
             count: 0,
+            with_names,
         });
         self.touch(seat);
     }
@@ -520,6 +532,13 @@ impl Board {
                     _ => &*plugged.line,
                 };
                 self.seats[seat].outbox.line(line);
+                if listing.with_names {
+                    let name = &plugged.device.name;
+                    for (channel, label) in &plugged.labels {
+                        let line = format!("NAME {name}:{channel} {label}");
+                        self.seats[seat].outbox.line(&line);
+                    }
+                }
                 self.seats[*other].plugged = Some(plugged);
                 listing.after = Some(*order);
                 listing.count += 1;

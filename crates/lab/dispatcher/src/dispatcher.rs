@@ -464,9 +464,16 @@ impl Dispatcher {
             Line::Values(values) => self.values(seat, values)?,
             Line::Connect(joints) => self.connect(seat, joints)?,
             Line::Disconnect(channels) => self.disconnect(seat, channels)?,
-            Line::List => {
+            Line::Name(channel, label) => {
+                if !self.board.has(seat, channel) {
+                    return Err(no_channel("you have", channel));
+                }
+                self.board.name_channel(seat, channel, label);
+                self.confirm(seat, "NAME");
+            }
+            Line::List { with_names } => {
                 self.confirm(seat, "LIST");
-                self.board.list(seat);
+                self.board.list(seat, with_names);
             }
             // A client that sends PING wants the answer, in version 1 too.
             Line::Ping => self.board.say(seat, "OK PING"),
@@ -529,7 +536,7 @@ impl Dispatcher {
             self.board.hear_losses(seat);
         }
         self.confirm(seat, Role::keyword(role));
-        self.board.list(seat);
+        self.board.list(seat, false);
         self.board.refresh_all(seat);
         // As far as there is room: values of this turn have not waited for a client that does not read.
         self.board.refill(seat, is_version_2);

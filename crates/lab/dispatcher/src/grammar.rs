@@ -1,12 +1,14 @@
 //! The lines that a client may send.
 //!
 //! ```text
-//! line       = [key | ident | values | connect | disconnect | "LIST" | "PING" | "BYE"] (CRLF | LF)
+//! line       = [key | ident | values | connect | disconnect | name-of | list | "PING" | "BYE"] (CRLF | LF)
 //! key        = "KEY" 16*128(visible character)
 //! ident      = ("VR" | "VP") name 1*(("Q" | "I" | "AQ" | "AI") 1*DIGIT) *("V=2" | "V=3" | "ALIVE=" time)
 //! values     = "P" *(channel "=" number)
 //! connect    = "CONNECT" 1*(channel ":" name ":" channel)
 //! disconnect = "DISCONNECT" 1*channel
+//! name-of    = "NAME" channel 1*120(character without controls)
+//! list       = "LIST" ["NAMES"]
 //! channel    = ("Q" | "I" | "AQ" | "AI") 1*DIGIT
 //! number     = ["-" | "+"] (1*DIGIT ["." *DIGIT] | "." 1*DIGIT) ["E" ["-" | "+"] 1*DIGIT]
 //! time       = 1*DIGIT ["." 1*DIGIT] ("ms" | "s")
@@ -18,6 +20,7 @@
 
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::Role;
+use crate::label::{LONGEST_LABEL, Label};
 use crate::name::{LONGEST_NAME, is_name, is_shown_name};
 use crate::number::Number;
 use crate::refusal::{Code, Refusal};
@@ -47,8 +50,13 @@ pub enum Line<'a> {
     Connect(Joints<'a>),
     /// Channels whose connections are to be cut.
     Disconnect(Channels<'a>),
+    /// The label of a channel.
+    Name(Channel, Label),
     /// A request for the list of devices.
-    List,
+    List {
+        /// With the labels of their channels.
+        with_names: bool,
+    },
     /// A sign of life.
     Ping,
     /// Good-bye.
@@ -78,7 +86,7 @@ pub struct Identification<'a> {
 ///
 /// The line is not in the grammar. The items that the iterators of [`Line`] yield can be invalid as well.
 pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
-    const VERBS: [&str; 6] = ["P", "CONNECT", "DISCONNECT", "LIST", "PING", "BYE"];
+    const VERBS: [&str; 7] = ["P", "CONNECT", "DISCONNECT", "LIST", "PING", "BYE", "NAME"];
 
     let mut words = Words(line);
     let Some(keyword) = words.word() else {
@@ -109,12 +117,31 @@ pub fn parse(line: &[u8]) -> Result<Line<'_>, Refusal> {
                 .not_empty("I1")
                 .map(|()| Line::Disconnect(Channels(words)));
         }
-        Some(3) => Line::List,
+        Some(3) => {
+            let word = words.word();
+            let with_names = word.is_some_and(|word| word.eq_ignore_ascii_case(b"NAMES"));
+            if let Some(word) = word.filter(|_| !with_names) {
+                return Err(Code::Syntax.because(format_args!(
+                    "\"{}\" stands behind LIST; write LIST or LIST NAMES",
+                    shown(word)
+                )));
+            }
+            Line::List { with_names }
+        }
         Some(4) => Line::Ping,
         Some(5) => Line::Bye,
+        Some(6) => {
+            let channel = words.channel()?;
+            let label = Label::read(words.0).ok_or_else(|| {
+                Code::Syntax.because(format_args!(
+                    "{channel} needs a name of 1 to {LONGEST_LABEL} printable characters of UTF-8, such as NAME {channel} Level"
+                ))
+            })?;
+            return Ok(Line::Name(channel, label));
+        }
         _ => {
             return Err(Code::Syntax.because(format_args!(
-                "\"{}\" is no keyword; write VR, VP, P, CONNECT, DISCONNECT, LIST, PING or BYE",
+                "\"{}\" is no keyword; write VR, VP, P, CONNECT, DISCONNECT, NAME, LIST, PING or BYE",
                 shown(keyword)
             )));
         }

@@ -46,6 +46,8 @@ pub(crate) struct Listing {
     pub(crate) end: Rank,
     /// Devices written.
     pub(crate) count: usize,
+    /// The labels of the channels are part of the list.
+    pub(crate) with_names: bool,
 }
 
 /// The bytes that the system has not accepted for a client yet, and the data waiting after them: at most the newest

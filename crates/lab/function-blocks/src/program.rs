@@ -21,6 +21,8 @@ pub struct Program {
     pub(crate) blocks: Vec<Block>,
     pub(crate) outputs: Vec<Option<Wire>>,
     pub(crate) analog_outputs: Vec<Option<Quantity>>,
+    /// The outputs that a block drives, each with the name of that block: `Q1`, `pump`.
+    pub names: Vec<(String, String)>,
 }
 
 impl Program {
@@ -109,6 +111,7 @@ fn read<'a>(
         blocks: Vec::new(),
         outputs: vec![None; terminals.outputs],
         analog_outputs: vec![None; terminals.analog_outputs],
+        names: Vec::new(),
     };
     for (mut table, kind) in tables {
         if let Some(kind) = kind {
@@ -123,6 +126,12 @@ fn read<'a>(
     for (key, value) in &reader.outputs {
         match Terminal::split(key).filter(|(kind, _)| kind.is_output()) {
             Some((kind, number)) if (1..=terminals.of(kind)).contains(&number) => {
+                let blocks = || reader.blocks.iter();
+                if let Some(text) = value.as_text()
+                    && let Some((name, _)) = blocks().find(|(name, _)| *name == text)
+                {
+                    program.names.push(((*key).to_owned(), (*name).to_owned()));
+                }
                 if kind.is_analog() {
                     program.analog_outputs[number - 1] = reader.quantity(value);
                 } else {

@@ -19,7 +19,7 @@ const board = (() => {
     return made;
   }
 
-  function makePin(name, isHere) {
+  function makePin(name, isHere, label) {
     const channel = name.slice(name.indexOf(':') + 1);
     const isInput = /^A?I/.test(channel);
     const isAnalog = channel.startsWith('A');
@@ -28,8 +28,14 @@ const board = (() => {
     button.dataset.pin = name;
     button.setAttribute('aria-pressed', 'false');
     const value = element('span', 'value');
-    button.append(element('span', 'jack'), element('span', 'label', channel), value);
-    const pin = { element: button, text: value, name, channel, isInput, isAnalog, isHere, isOn: false, isForced: false };
+    button.append(element('span', 'jack'), element('span', 'label', channel));
+    if (label) {
+      const called = element('span', 'called', label);
+      called.title = label;
+      button.append(called);
+    }
+    button.append(value);
+    const pin = { element: button, text: value, name, label, channel, isInput, isAnalog, isHere, isOn: false, isForced: false };
     pins.set(name, pin);
     return button;
   }
@@ -45,10 +51,10 @@ const board = (() => {
     const sides = element('div', 'sides');
     for (const isInput of [true, false]) {
       const list = element('ul', '');
-      for (const { channel } of client.channels) {
+      for (const { channel, label } of client.channels) {
         if (/^A?I/.test(channel) !== isInput) continue;
         const item = element('li', '');
-        item.append(makePin(`${client.name}:${channel}`, client.isHere));
+        item.append(makePin(`${client.name}:${channel}`, client.isHere, label));
         list.append(item);
       }
       sides.append(list);
@@ -92,7 +98,8 @@ const board = (() => {
   }
 
   function describe(pin, value, own, sources) {
-    const parts = [`${pin.name} ${pin.isAnalog ? 'analog' : 'digital'} ${pin.isInput ? 'input' : 'output'}`];
+    const called = pin.label ? `${pin.label}, ` : '';
+    const parts = [`${called}${pin.name} ${pin.isAnalog ? 'analog' : 'digital'} ${pin.isInput ? 'input' : 'output'}`];
     parts.push(!pin.isHere ? 'not here' : value === null ? 'no value yet' : value);
     if (pin.isForced) parts.push(own === null ? 'forced' : `forced, its client says ${own}`);
     if (sources) parts.push(`connected with ${sources.join(' and ')}`);
@@ -112,7 +119,7 @@ const board = (() => {
       isMoved = true;
     }
     all.forEach((client, place) => {
-      const shape = JSON.stringify([client.isHere, client.role, client.address, client.channels.map((it) => it.channel)]);
+      const shape = JSON.stringify([client.isHere, client.role, client.address, client.channels.map((it) => [it.channel, it.label])]);
       let box = boxes.get(client.name);
       if (!box || box.shape !== shape) {
         if (box) forget(client.name, box);
@@ -256,7 +263,21 @@ const board = (() => {
     cables.append(loose);
   }
 
+  /** Marks the channels whose client, channel or label has all words of `text`; returns them in the order of the page. */
+  function search(text) {
+    const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+    const found = [];
+    for (const pin of pins.values()) {
+      const names = `${pin.name} ${pin.label ?? ''}`.toLowerCase();
+      const isFound = words.every((word) => names.includes(word));
+      pin.element.classList.toggle('beside', !isFound);
+      if (isFound && words.length) found.push(pin);
+    }
+    const isBefore = (one, other) => one.element.compareDocumentPosition(other.element) & Node.DOCUMENT_POSITION_FOLLOWING;
+    return found.sort((one, other) => (isBefore(one, other) ? -1 : 1));
+  }
+
   new ResizeObserver(draw).observe(clients);
 
-  return { show, setAttribute, drag, drop: () => loose.remove(), pins, wires, clients, cables };
+  return { show, search, setAttribute, drag, drop: () => loose.remove(), pins, wires, clients, cables };
 })();

@@ -2,9 +2,9 @@
 
 use std::fmt::{self, Display, Write as _};
 
-use tickbus_dispatcher::{ClientState, Number, Snapshot};
+use tickbus_dispatcher::{ClientState, Label, Number, Snapshot};
 
-/// The state of the page, in one line. Names, channels and numbers contain no characters to escape.
+/// The state of the page, in one line. Of its texts, only labels can contain characters to escape.
 pub(crate) fn state(snapshot: &Snapshot) -> String {
     let mut json = String::new();
     // Writing to a String cannot fail.
@@ -44,8 +44,9 @@ fn write_client(client: &ClientState, json: &mut String) -> fmt::Result {
         comma(at, json);
         write!(
             json,
-            "{{\"channel\":\"{}\",\"value\":{},\"forced\":{}}}",
+            "{{\"channel\":\"{}\",\"label\":{},\"value\":{},\"forced\":{}}}",
             channel.channel,
+            Labelled(channel.label.as_ref()),
             Quoted(channel.value),
             Quoted(channel.forced)
         )?;
@@ -69,5 +70,25 @@ impl Display for Quoted {
             Some(number) => write!(f, "\"{number}\""),
             None => f.write_str("null"),
         }
+    }
+}
+
+/// A label as text, or `null`.
+struct Labelled<'a>(Option<&'a Label>);
+
+impl Display for Labelled<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(label) = self.0 else {
+            return f.write_str("null");
+        };
+        f.write_char('"')?;
+        // A label has no control characters.
+        for sign in label.as_str().chars() {
+            if matches!(sign, '"' | '\\') {
+                f.write_char('\\')?;
+            }
+            f.write_char(sign)?;
+        }
+        f.write_char('"')
     }
 }

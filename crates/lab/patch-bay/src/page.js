@@ -193,7 +193,7 @@
   });
 
   window.addEventListener('keydown', (event) => {
-    const isTyping = event.target === value;
+    const isTyping = event.target === value || event.target === get('search');
     if (event.key === 'Escape' && held) {
       endDrag();
       return;
@@ -229,6 +229,22 @@
     }
   });
 
+  // Searching: other channels fade, and Enter goes to the first that fits.
+
+  function search() {
+    const text = get('search').value;
+    const found = board.search(text);
+    const told = text.trim() ? count(found.length, 'channel', 'channels') : '';
+    if (get('found').textContent !== told) get('found').textContent = told;
+    return found;
+  }
+  get('search').addEventListener('input', search);
+  get('search').addEventListener('keydown', (event) => {
+    if (event.key !== 'Enter') return;
+    event.preventDefault();
+    search()[0]?.element.focus();
+  });
+
   // Incoming states.
 
   function count(number, one, many) {
@@ -238,6 +254,7 @@
   function show(text) {
     state = JSON.parse(text);
     board.show(state);
+    search();
     if (held && !board.pins.has(held.name)) endDrag();
     const asleep = state.connections.filter(({ awake }) => !awake).length;
     const waiting = asleep ? `, ${asleep} of them waiting` : '';

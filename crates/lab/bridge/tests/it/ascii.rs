@@ -591,6 +591,7 @@ fn the_bridge_states_the_key_in_its_clients_place() {
     lab.dispatcher.require(key("0123456789abcdef"));
     lab.connect();
     lab.now += Nanos::from_secs(10);
+    lab.dispatcher.tick(lab.now);
     let why = lab.settle().expect("it is refused");
     assert!(
         why.contains("no key came within 10s") && why.contains("with --key-file"),

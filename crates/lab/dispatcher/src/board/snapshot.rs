@@ -3,6 +3,7 @@
 use super::{Board, Traffic};
 use crate::channel::Channel;
 use crate::device::Device;
+use crate::label::Label;
 use crate::number::Number;
 use crate::patch::{Patch, Pin};
 
@@ -30,10 +31,12 @@ pub struct ClientState {
 }
 
 /// A channel and its value.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChannelState {
     /// The channel.
     pub channel: Channel,
+    /// What the client calls the channel, if it has said so.
+    pub label: Option<Label>,
     /// The last value that the client sent for its output, or was sent for its input. `None` if there was no value yet, if the
     /// client has exceeded its `ALIVE` time, or if the input has lost its source.
     pub value: Option<Number>,
@@ -75,6 +78,7 @@ impl Board {
             let has_forces = self.has_forces();
             let channels = outputs.chain(inputs).map(|(channel, value)| ChannelState {
                 channel,
+                label: plugged.labels.get(&channel).cloned(),
                 value: (value.is_known() && value != Number::LOST).then_some(value),
                 // A name is copied for each channel only while something is forced.
                 forced: has_forces

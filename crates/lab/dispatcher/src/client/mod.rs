@@ -10,6 +10,7 @@ use crate::cable::Cable;
 use crate::channel::{Channel, Counts, Kind, MOST_CHANNELS};
 use crate::device::{Device, Role};
 use crate::key::{Key, KeyRefused};
+use crate::label::Label;
 use crate::name::{LONGEST_NAME, is_name};
 use crate::number::Number;
 use crate::refusal::Code;
@@ -131,6 +132,9 @@ pub struct Client {
     progress: Progress,
     /// The state of each cable's request.
     wishes: Box<[Wish]>,
+    /// The labels of channels, and how many of them the dispatcher has answered.
+    labels: Box<[(Channel, Label)]>,
+    labelled: usize,
     outputs: Outputs,
     lines: Lines,
     out: Vec<u8>,
@@ -163,6 +167,7 @@ enum Request {
     Key,
     Identify,
     Connect(usize),
+    Label,
     List,
     Ping,
 }
@@ -188,6 +193,8 @@ impl Client {
             keep_alive,
             progress: Progress::Apart,
             wishes: vec![Wish::At(Nanos::ZERO); profile.cables.len()].into(),
+            labels: Box::default(),
+            labelled: 0,
             out: Vec::with_capacity(outputs.longest() + 256),
             outputs,
             lines: Lines::new(),
@@ -199,6 +206,15 @@ impl Client {
             heard: Nanos::ZERO,
             profile,
         })
+    }
+
+    /// Announces what these channels are called, once the dispatcher has accepted the client. A dispatcher that does not know
+    /// labels does without.
+    #[must_use]
+    pub fn with_labels<'n>(mut self, names: impl Iterator<Item = (Channel, &'n str)>) -> Self {
+        let named = names.filter_map(|(channel, name)| Some((channel, Label::of(name)?)));
+        self.labels = named.collect();
+        self
     }
 
     /// The client's description of itself.
@@ -216,6 +232,7 @@ impl Client {
         self.written = 0;
         self.wants_list = false;
         self.is_settled = false;
+        self.labelled = 0;
         self.said = now;
         self.heard = now;
     }
@@ -360,6 +377,7 @@ impl Client {
             Request::Key => "KEY",
             Request::Identify => self.profile.role.keyword(),
             Request::Connect(_) => "CONNECT",
+            Request::Label => "NAME",
             Request::List => "LIST",
             Request::Ping => "PING",
         };
@@ -377,6 +395,7 @@ impl Client {
                 self.wishes[at] = Wish::Granted;
                 events(Event::Connected(&self.profile.cables[at]));
             }
+            Request::Label => self.labelled += 1,
             Request::List => {}
             Request::Ping => {
                 if !std::mem::replace(&mut self.is_settled, true) {
@@ -415,6 +434,14 @@ impl Client {
                 } else {
                     format!("the dispatcher does not take \"{name}\": {text} (ERR {code})")
                 }));
+            }
+            Progress::Asking(Request::Label) => {
+                self.progress = Progress::Idle;
+                // An older dispatcher has no names for channels. Nothing else depends on them.
+                self.labelled = self.labels.len();
+                if code == Code::Syntax.number() {
+                    return Ok(());
+                }
             }
             Progress::Asking(request) => {
                 self.progress = Progress::Idle;
@@ -476,6 +503,11 @@ impl Client {
             self.ask(now, Request::Connect(at), &line);
         } else if std::mem::take(&mut self.wants_list) {
             self.ask(now, Request::List, "LIST");
+        } else if self.is_settled
+            && let Some((channel, label)) = self.labels.get(self.labelled)
+        {
+            let line = format!("NAME {channel} {label}");
+            self.ask(now, Request::Label, &line);
         } else if now >= self.next_ping() {
             self.ask(now, Request::Ping, "PING");
         }
@@ -556,6 +588,9 @@ impl Client {
             Progress::Connected | Progress::Admitted => deadline = self.said,
             Progress::Idle => {
                 deadline = deadline.min(self.next_ping());
+                if self.is_settled && self.labelled < self.labels.len() {
+                    deadline = self.said;
+                }
                 for wish in &self.wishes {
                     if let Wish::At(at) = wish {
                         deadline = deadline.min(*at);

@@ -474,3 +474,31 @@ fn until_the_key_is_answered_nothing_that_came_is_repeated() {
         assert!(!told.contains("456789ab"), "{told}");
     }
 }
+
+#[test]
+fn labels_are_announced_once_it_is_settled_and_an_older_dispatcher_does_without() {
+    for answer in ["OK NAME\r\n", "ERR 400 \"NAME\" is no keyword\r\n"] {
+        let mut bench = Bench::taken(&["I1:LOGO:Q1"]);
+        let channel = |text: &str| Channel::parse(text.as_bytes()).expect(text);
+        let names = [("Q1", "Pump\nruns"), ("Q2", " "), ("AQ1", "Level")];
+        let names = names.map(|(text, name)| (channel(text), name));
+        let other = Bench::new(&[]).client;
+        let client = std::mem::replace(&mut bench.client, other);
+        bench.client = client.with_labels(names.into_iter());
+        assert_eq!(bench.says(), "CONNECT I1:LOGO:Q1\r\n");
+        bench.hears("OK CONNECT\r\n").expect("right");
+        bench.settles();
+        assert_eq!(bench.says(), "NAME Q1 Pump runs\r\n");
+        assert!(bench.hears(answer).expect("right").is_empty());
+        bench.set("Q1", "24");
+        let then = if answer.starts_with("OK") {
+            "NAME AQ1 Level\r\nP Q1=24\r\n"
+        } else {
+            "P Q1=24\r\n"
+        };
+        assert_eq!(bench.says(), then);
+        // A new connection announces them again.
+        bench.client.connected(bench.now);
+        assert!(bench.says().starts_with("VP PUMP"));
+    }
+}

@@ -139,7 +139,7 @@ fn a_forced_output_gives_its_value_to_its_inputs_until_it_is_released() {
     assert_eq!(order(&mut lab, Order::Disconnect(pin("LOGO:I2"))), Ok(()));
     assert_eq!(lab.hear(logo), ["P I2=0"]);
     let client = &lab.dispatcher.snapshot().clients[0];
-    let shown = client.channels[0];
+    let shown = &client.channels[0];
     let texts = (shown.value, shown.forced);
     assert_eq!(format!("{texts:?}"), "(Some(24), Some(5))");
     assert_eq!(order(&mut lab, release("PUMP:Q1")), Ok(()));

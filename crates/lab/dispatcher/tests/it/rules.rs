@@ -627,3 +627,63 @@ fn values_and_further_changes_do_not_wait_for_the_disk() {
     assert!(lab.dispatcher.wants_bytes(pump));
     assert!(lab.dispatcher.unsaved().is_none());
 }
+
+#[test]
+fn channels_have_names_for_those_who_ask() {
+    let mut lab = Lab::new();
+    let adam = lab.join("VP ADAM Q1 AQ2 V=2");
+    let old = lab.join("VR LOGO I1");
+    assert_eq!(lab.ask(adam, "NAME AQ1 Level of \"B\" "), ["OK NAME"]);
+    assert_eq!(lab.ask(adam, "name q1 Pumpe läuft"), ["OK NAME"]);
+    // The last name counts.
+    assert_eq!(lab.ask(adam, "NAME AQ1 Level"), ["OK NAME"]);
+    let listed = lab.ask(adam, "list names");
+    assert_eq!(
+        listed,
+        [
+            "OK LIST",
+            "VP:ADAM:Q01:I00:AQ02:AI00:192.168.0.20:3330",
+            "NAME ADAM:Q1 Pumpe läuft",
+            "NAME ADAM:AQ1 Level",
+            "VR:LOGO:Q00:I01:AQ00:AI00:192.168.0.20:3331",
+            "END 2"
+        ]
+    );
+    assert_eq!(lab.ask(adam, "LIST").len(), 4);
+    assert_eq!(lab.ask(old, "LIST").len(), 2, "as in the paper");
+    assert!(lab.ask(old, "NAME I1 start").is_empty());
+    for (line, code) in [
+        ("NAME", 400),
+        ("NAME AQ1", 400),
+        ("NAME AQ1 \t ", 400),
+        ("NAME AQ1 a\u{1b}[2J", 400),
+        ("NAME X1 a", 400),
+        ("NAME AQ3 a", 404),
+        ("NAME I1 a", 404),
+        ("LIST NAME", 400),
+        ("LIST NAMES NAMES", 400),
+        (&format!("NAME AQ1 {}", "x".repeat(121)), 400),
+    ] {
+        let heard = lab.ask(adam, line);
+        assert!(
+            heard[0].starts_with(&format!("ERR {code} ")),
+            "{line}: {heard:?}"
+        );
+    }
+    let state = lab.dispatcher.snapshot();
+    let labels = state.clients.iter().flat_map(|client| &client.channels);
+    let labels = labels.filter_map(|channel| {
+        Some((
+            channel.channel.to_string(),
+            channel.label.as_ref()?.to_string(),
+        ))
+    });
+    let labels: Vec<_> = labels
+        .map(|(channel, label)| format!("{channel} {label}"))
+        .collect();
+    assert_eq!(labels, ["Q1 Pumpe läuft", "AQ1 Level", "I1 start"]);
+    // They leave with their client.
+    lab.dispatcher.gone(adam);
+    lab.join("VP ADAM Q1 AQ2 V=2");
+    assert_eq!(lab.ask(old, "LIST NAMES").len(), 3);
+}

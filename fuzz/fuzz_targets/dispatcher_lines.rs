@@ -64,7 +64,7 @@ fn check(heard: &[u8]) {
     assert!(text.is_empty() || text.ends_with("\r\n"));
     for line in text.split_terminator("\r\n") {
         assert!(line.len() <= 4094, "{line}");
-        let is_known = ["P ", "OK ", "ERR ", "END "].iter().any(|word| line.starts_with(word));
+        let is_known = ["P ", "OK ", "ERR ", "END ", "NAME "].iter().any(|word| line.starts_with(word));
         assert!(is_known || Device::parse(line.as_bytes()).is_some(), "{line}");
     }
 }

@@ -67,6 +67,22 @@ fn values_of_a_bus_move_both_ways_in_engineering_units_and_a_second_bridge_of_th
     tank.say("P Q1=24 AQ1=3.21");
     // Two signals of one line may arrive with two ticks.
     tank.until_values("AI1=3.21");
+    // Its channels are called what the driver.cfg calls them.
+    let begun = std::time::Instant::now();
+    let mut names = Vec::new();
+    while names.len() < 8 {
+        assert!(begun.elapsed().as_secs() < 60, "{names:?}");
+        tank.say("LIST NAMES");
+        names = std::iter::from_fn(|| Some(tank.until("")).filter(|line| !line.starts_with("END")))
+            .collect();
+        names.retain(|line| line.starts_with("NAME "));
+    }
+    for name in ["Q1 running", "I1 run", "AQ1 is", "AI1 set"] {
+        assert!(
+            names.contains(&format!("NAME Real_PLC:{name}")),
+            "{names:?}"
+        );
+    }
     tank.say("P Q1=0 AQ1=-1");
     tank.until_values("AI1=-1");
     // The first bridge ends, and the second one gets the name.

@@ -138,7 +138,7 @@ fn a_program_patches_forces_and_sees_the_board() {
         page.done("PUT /force/LOGO:I1", "7.50");
         assert_eq!(logo.hear(), "P I1=7.5");
         let (_, state) = page.ask("GET /state", "");
-        let channel = |channel: &str, value: Value, forced: Value| json!({"channel": channel, "value": value, "forced": forced});
+        let channel = |channel: &str, value: Value, forced: Value| json!({"channel": channel, "label": null, "value": value, "forced": forced});
         let client = |name: &str, role: &str, stream: &TcpStream, channels: Value| {
             let address = stream.local_addr().expect("it is connected").to_string();
             json!({"name": name, "role": role, "address": address, "channels": channels})
@@ -156,6 +156,13 @@ fn a_program_patches_forces_and_sees_the_board() {
             "connections": [{"input": "LOGO:I1", "output": "PUMP:Q1", "awake": true}],
         });
         assert_eq!(state, expected);
+        logo.say("NAME AI1 Level \"A\\B\" </script> ä");
+        assert_eq!(logo.hear(), "OK NAME");
+        let (_, state) = page.ask("GET /state", "");
+        assert_eq!(
+            state["clients"][1]["channels"][2]["label"],
+            "Level \"A\\B\" </script> ä"
+        );
         page.done("DELETE /force/LOGO:I1", "");
         assert_eq!(logo.hear(), "P I1=24");
         drop(pump);

@@ -133,3 +133,49 @@ fn of_tls(error: &rustls::Error) -> String {
         other => other.to_string(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An authority, made by `openssl req -x509`.
+    const AUTHORITY: &str = "-----BEGIN CERTIFICATE-----\n\
+        MIIBdTCCARugAwIBAgIUZlQ5SaU69stclsslLKRCqEagp4YwCgYIKoZIzj0EAwIw\n\
+        DzENMAsGA1UEAwwEdGVzdDAgFw0yNjExMjgxMTEyNDBaGA8yMTI2MTEwNDExMTI0\n\
+        MFowDzENMAsGA1UEAwwEdGVzdDBZMBMGByqGSM49AgEGCCqGSM49AwEHA0IABPfs\n\
+        mQ/ZovRI49AMNg9kY/FztJ3KNlQ6ZNAkJ05MdX586+NJVNbt1h80Rn9HrXnIw7LG\n\
+        sPJuwrJwjAa12e6O1FujUzBRMB0GA1UdDgQWBBRw/9Ven+ihfUDef0g5tM92IoBe\n\
+        QjAfBgNVHSMEGDAWgBRw/9Ven+ihfUDef0g5tM92IoBeQjAPBgNVHRMBAf8EBTAD\n\
+        AQH/MAoGCCqGSM49BAMCA0gAMEUCIENwGfCSVqp3HH/lZV1FyGaNQFzIgRSy/Mk9\n\
+        KQ9ESPr0AiEAw+FmgH+5BdDZIE6bq2OrkCSjzd2jhPCS8mQPqlzlxPQ=\n\
+        -----END CERTIFICATE-----\n";
+
+    fn left_out(authorities: &str) -> Result<usize, String> {
+        let tls = Tls {
+            authorities: authorities.to_owned(),
+            own: None,
+        };
+        let made = transport(&tls).map(|(_, left_out)| left_out);
+        made.map_err(|mistake| mistake.to_string())
+    }
+
+    #[test]
+    fn authorities_that_cannot_be_read_are_left_out_unless_none_is_left() {
+        // A certificate of a single byte, and one whose text is broken.
+        let short = "-----BEGIN CERTIFICATE-----\nMAA=\n-----END CERTIFICATE-----\n";
+        let broken = "-----BEGIN CERTIFICATE-----\n!!!!\n-----END CERTIFICATE-----\n";
+        assert_eq!(left_out(AUTHORITY), Ok(0));
+        assert_eq!(left_out(&[short, AUTHORITY].concat()), Ok(1));
+        assert_eq!(left_out(&[broken, short, AUTHORITY].concat()), Ok(2));
+        let told = left_out(&[short, broken].concat()).expect_err("no authority is left");
+        assert!(
+            told.contains("no certificate that can be read, and 2 that cannot"),
+            "{told}"
+        );
+        let told = left_out("notes\n").expect_err("it has none");
+        assert!(
+            told.contains("ca_file cannot be used (it has no certificate)"),
+            "{told}"
+        );
+    }
+}

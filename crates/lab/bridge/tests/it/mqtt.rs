@@ -417,7 +417,8 @@ fn map_with(mqtt: &str, dispatcher: &str) -> Result<Map, String> {
     let write = |name: &str, text: &str| {
         std::fs::write(folder.path().join(name), text).expect("a file");
     };
-    write("password", "geheim\r\nnotes\n");
+    // Some editors begin a file with a byte-order mark.
+    write("password", "\u{feff}geheim\r\nnotes\n");
     write("ca.pem", "-----BEGIN CERTIFICATE-----\n");
     write("lab.key", "0123456789abcdef\n");
     write("short.key", "short\n");

@@ -502,3 +502,42 @@ fn names_are_shown_and_a_board_with_many_fits_every_screen() {
         assert_quiet(&browser);
     }
 }
+
+#[test]
+fn channels_are_found_by_what_their_client_calls_them() {
+    let lab = Lab::new();
+    let mut adam = lab.join("VP ADAM Q02 AQ01");
+    let _logo = lab.join("VR LOGO I02");
+    adam.say("NAME AQ1 Level <b>\"A\"</b>");
+    adam.say(&format!("NAME Q1 {}", "Druck im Kessel ".repeat(7)));
+    let browser = open(&lab, 390, 844);
+    let shown = "document.querySelector('[data-pin=\"ADAM:AQ1\"] .called')?.textContent === 'Level <b>\"A\"</b>'";
+    browser.wait(shown);
+    browser.wait("document.querySelector('[data-pin=\"ADAM:Q1\"] .called')");
+    assert_fits(&browser);
+    let find = |text: &str| {
+        browser.run(&format!(
+            "const field = document.getElementById('search'); field.value = '{text}'; \
+             field.dispatchEvent(new Event('input')); return null"
+        ));
+    };
+    let seen = |said: &str, pins: usize| {
+        browser.wait(&format!(
+            "document.getElementById('found').textContent === '{said}' && \
+             document.querySelectorAll('.pin:not(.beside)').length === {pins}"
+        ));
+    };
+    seen("", 6);
+    find("LEVEL adam");
+    seen("1 channel", 1);
+    browser.run(
+        "document.getElementById('search').dispatchEvent(new KeyboardEvent('keydown', { key: 'Enter' })); return null",
+    );
+    browser.wait("document.activeElement.dataset.pin === 'ADAM:AQ1'");
+    find("i1");
+    seen("1 channel", 1);
+    find("no such");
+    seen("0 channels", 0);
+    find(" ");
+    seen("", 6);
+}

@@ -73,7 +73,7 @@ struct Plugged {
     /// routed on the host.
     host: Option<Box<str>>,
     outputs: Box<[Output]>,
-    /// What the client calls its channels.
+    /// The names that the client has given its channels.
     labels: BTreeMap<Channel, Name>,
     /// True if an input that loses its source gets `?` and not 0.
     hears_losses: bool,

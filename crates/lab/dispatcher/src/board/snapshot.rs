@@ -35,7 +35,7 @@ pub struct ClientState {
 pub struct ChannelState {
     /// The channel.
     pub channel: Channel,
-    /// What the client calls the channel, if it has said so.
+    /// The name that the client has given the channel, if any.
     pub label: Option<Label>,
     /// The last value that the client sent for its output, or was sent for its input. `None` if there was no value yet, if the
     /// client has exceeded its `ALIVE` time, or if the input has lost its source.

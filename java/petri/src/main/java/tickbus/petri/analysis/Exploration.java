@@ -10,7 +10,7 @@ import tickbus.petri.net.PetriNet;
  * with what it has found until then: {@link Reachability#gaveUpBecause}.
  */
 public final class Exploration {
-    /** The clock is read once for so many markings. */
+    /** The clock is read once for so many markings, and once for so many firings. */
     private static final int CLOCK = 256;
 
     private final PetriNet net;
@@ -111,6 +111,14 @@ public final class Exploration {
         return bytes <= memory && Memory.has(bytes);
     }
 
+    private boolean isLate() {
+        return nanos != Long.MAX_VALUE && System.nanoTime() - start >= nanos;
+    }
+
+    private String late() {
+        return "the limit of " + Duration.ofNanos(nanos);
+    }
+
     private String full() {
         return Memory.has(memory) ? "the limit of " + memory + " bytes" : "three quarters of the heap are used";
     }
@@ -123,16 +131,20 @@ public final class Exploration {
         long hash = store.hash(packed);
         store.find(packed, hash);
         store.append(packed, hash);
-        Stubborn stubborn = reduced ? new Stubborn(net, walk) : null;
+        Stubborn stubborn = reduced ? new Stubborn(net, walk, this::isLate) : null;
         for (int number = 0; number < store.size(); number++) {
-            if (number % CLOCK == 0 && System.nanoTime() - start >= nanos) {
-                return "the limit of " + Duration.ofNanos(nanos);
+            if (number % CLOCK == 0 && isLate()) {
+                return late();
             }
             walk.moveTo(number);
+            long[] choice = reduced ? stubborn.set() : walk.enabled;
+            // A search for a stubborn set that ran out of time has no set.
+            if (reduced && isLate()) {
+                return late();
+            }
             if (firings) {
                 firstEdge.add(targets.size());
             }
-            long[] choice = reduced ? stubborn.set() : walk.enabled;
             boolean dead = true;
             for (int w = 0; w < choice.length; w++) {
                 for (long bits = choice[w]; bits != 0; bits &= bits - 1) {
@@ -154,6 +166,9 @@ public final class Exploration {
     }
 
     private String fire(int t) {
+        if (edges % CLOCK == CLOCK - 1 && isLate()) {
+            return late();
+        }
         for (int p = walk.fire(t); p >= 0; p = walk.fire(t)) {
             long count = walk.after(t, p);
             if (count > Integer.MAX_VALUE) {

@@ -1,6 +1,7 @@
 package tickbus.petri.analysis;
 
 import java.util.Arrays;
+import java.util.function.BooleanSupplier;
 import tickbus.petri.net.Effects;
 import tickbus.petri.net.PetriNet;
 
@@ -17,6 +18,10 @@ final class Stubborn {
     private final int[][] raisers;
     private final int[][] lowerers;
     private final int[] stamps;
+    /** The set whose members have all that depends on a fall, or on a rise, of the place. */
+    private final int[] fallStamps;
+    private final int[] riseStamps;
+    private final BooleanSupplier isLate;
     private int stamp;
     private final int[] open;
     private int opened;
@@ -24,13 +29,17 @@ final class Stubborn {
     private int[] best;
     private final long[] result;
 
-    Stubborn(PetriNet net, Walk walk) {
+    /** Stops looking for a smaller set when {@code isLate}, which it asks before each key. */
+    Stubborn(PetriNet net, Walk walk, BooleanSupplier isLate) {
+        this.isLate = isLate;
         this.walk = walk;
         effects = net.effects();
         int transitions = net.transitions().size();
         raisers = changers(net, 1);
         lowerers = changers(net, -1);
         stamps = new int[transitions];
+        fallStamps = new int[net.places().size()];
+        riseStamps = new int[net.places().size()];
         open = new int[transitions];
         members = new int[transitions];
         best = new int[transitions];
@@ -55,7 +64,7 @@ final class Stubborn {
     long[] set() {
         int least = Integer.MAX_VALUE;
         for (int w = 0; w < walk.enabled.length && least > 1; w++) {
-            for (long bits = walk.enabled[w]; bits != 0 && least > 1; bits &= bits - 1) {
+            for (long bits = walk.enabled[w]; bits != 0 && least > 1 && !isLate.getAsBoolean(); bits &= bits - 1) {
                 int size = close(64 * w + Long.numberOfTrailingZeros(bits), least);
                 if (size < least) {
                     least = size;
@@ -74,6 +83,8 @@ final class Stubborn {
     private int close(int key, int least) {
         if (++stamp == 0) {
             Arrays.fill(stamps, 0);
+            Arrays.fill(fallStamps, 0);
+            Arrays.fill(riseStamps, 0);
             stamp = 1;
         }
         int size = 0;
@@ -118,10 +129,14 @@ final class Stubborn {
         for (int i = effects.firstChange(t); i < effects.firstChange(t + 1); i++) {
             int gain = effects.puts(i) - effects.takes(i);
             int p = effects.changePlace(i);
-            for (int d = effects.firstDependent(p); gain != 0 && d < effects.firstDependent(p + 1); d++) {
-                int need = effects.dependent(d);
-                if (effects.isAtLeast(need) == gain < 0) {
-                    open(effects.needTransition(need));
+            int[] done = gain < 0 ? fallStamps : riseStamps;
+            if (gain != 0 && done[p] != stamp) {
+                done[p] = stamp;
+                for (int d = effects.firstDependent(p); d < effects.firstDependent(p + 1); d++) {
+                    int need = effects.dependent(d);
+                    if (effects.isAtLeast(need) == gain < 0) {
+                        open(effects.needTransition(need));
+                    }
                 }
             }
         }

@@ -165,14 +165,16 @@ final class Walk {
         if (count > bounds[p]) {
             bounds[p] = count;
         }
-        for (int d = effects.firstDependent(p); d < effects.firstDependent(p + 1); d++) {
-            int need = effects.dependent(d);
-            boolean met = isMet(need, before);
-            if (met != isMet(need, count)) {
-                int t = effects.needTransition(need);
-                if (met ? unmet[t]++ == 0 : --unmet[t] == 0) {
-                    enabled[t / 64] ^= 1L << t;
-                }
+        count(effects.dependentAbove(p, true, before), effects.dependentAbove(p, true, count));
+        count(effects.dependentAbove(p, false, count - 1), effects.dependentAbove(p, false, before - 1));
+    }
+
+    /** Counts the needs of these dependents as met now, or as unmet if the two are the other way round. */
+    private void count(int from, int to) {
+        for (int d = Math.min(from, to); d < Math.max(from, to); d++) {
+            int t = effects.needTransition(effects.dependent(d));
+            if (from > to ? unmet[t]++ == 0 : --unmet[t] == 0) {
+                enabled[t / 64] ^= 1L << t;
             }
         }
     }

@@ -1,14 +1,17 @@
 package tickbus.petri.net;
 
 import java.util.Arrays;
+import java.util.Comparator;
 import java.util.List;
+import java.util.stream.IntStream;
 
 /**
  * The arcs of a net by number, for programs that go through them often: analyses, and interpreters of nets. Immutable.
  *
  * <p>A transition has needs, which must hold before it fires, and changes, one for each place that it takes from or puts
  * into. The needs of transition t are {@code firstNeed(t)} to {@code firstNeed(t + 1) - 1}, and likewise its changes; the
- * dependents of a place lead to the needs that compare with its tokens. Numbers out of range throw an
+ * dependents of a place lead to the needs that compare with its tokens: those at least a level, then those at most one, by
+ * level. Numbers out of range throw an
  * {@link IndexOutOfBoundsException}.
  */
 public final class Effects {
@@ -24,6 +27,8 @@ public final class Effects {
     private final int[] changeTakes;
     private final int[] changePuts;
     private final int[] dependentFirst;
+    /** The end of a place's dependents that are at least a level; behind it are those that are at most one. */
+    private final int[] limitFirst;
     /** The number of a need. */
     private final int[] dependentNeed;
     /** The transition of each need. */
@@ -88,10 +93,12 @@ public final class Effects {
         for (int p = 0; p < places.size(); p++) {
             dependentFirst[p + 1] += dependentFirst[p];
         }
-        dependentNeed = new int[needPlace.length];
-        int[] filled = dependentFirst.clone();
+        dependentNeed = IntStream.range(0, needPlace.length).boxed()
+            .sorted(Comparator.<Integer>comparingInt(i -> needPlace[i]).thenComparing(i -> !atLeast[i]).thenComparingInt(i -> needLevel[i]))
+            .mapToInt(Integer::intValue).toArray();
+        limitFirst = Arrays.copyOf(dependentFirst, places.size());
         for (int i = 0; i < needPlace.length; i++) {
-            dependentNeed[filled[needPlace[i]]++] = i;
+            limitFirst[needPlace[i]] += atLeast[i] ? 1 : 0;
         }
     }
 
@@ -151,6 +158,24 @@ public final class Effects {
     /** The first dependent of a place. The number of places is a valid place here, for the end of the last one. */
     public int firstDependent(int place) {
         return dependentFirst[place];
+    }
+
+    /**
+     * The first dependent of a place, of those that are at least a level or of those that are at most one, whose level is above
+     * this number of tokens. A change of tokens meets or breaks only the needs between two such dependents.
+     */
+    public int dependentAbove(int place, boolean isAtLeast, int tokens) {
+        int low = isAtLeast ? dependentFirst[place] : limitFirst[place];
+        int high = isAtLeast ? limitFirst[place] : dependentFirst[place + 1];
+        while (low < high) {
+            int middle = (low + high) >>> 1;
+            if (needLevel[dependentNeed[middle]] > tokens) {
+                high = middle;
+            } else {
+                low = middle + 1;
+            }
+        }
+        return low;
     }
 
     /** The need to which a dependent leads. */

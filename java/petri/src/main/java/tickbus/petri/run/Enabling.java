@@ -21,7 +21,7 @@ final class Enabling {
     private final Watcher watcher;
     /** Timed transitions by index, then timed places. */
     final DueHeap due;
-    /** The number of needs evaluated so far. */
+    /** The number of needs that have changed so far. */
     long visits;
 
     /** Called for the transitions that a change as a whole enables or disables. */
@@ -139,15 +139,17 @@ final class Enabling {
         int allBefore = tokens[p];
         available[p] = usable;
         tokens[p] = all;
-        for (int d = effects.firstDependent(p); d < effects.firstDependent(p + 1); d++) {
-            int need = effects.dependent(d);
+        count(effects.dependentAbove(p, true, usableBefore), effects.dependentAbove(p, true, usable));
+        count(effects.dependentAbove(p, false, all - 1), effects.dependentAbove(p, false, allBefore - 1));
+    }
+
+    /** Counts the needs of these dependents as met now, or as unmet if the two are the other way round. */
+    private void count(int from, int to) {
+        for (int d = Math.min(from, to); d < Math.max(from, to); d++) {
+            int t = effects.needTransition(effects.dependent(d));
             visits++;
-            boolean before = isMet(need, usableBefore, allBefore);
-            if (before != isMet(need, usable, all)) {
-                int t = effects.needTransition(need);
-                unmet[t] += before ? 1 : -1;
-                touched.add(t);
-            }
+            unmet[t] += from < to ? -1 : 1;
+            touched.add(t);
         }
     }
 

@@ -20,14 +20,17 @@ final class Ready {
     /** Transitions of one cluster and one priority share a bucket; -1 for a transition without conflicts. */
     private final int[] bucket;
     private final int[] bucketFirst;
-    private final int[] bucketSize;
-    /** The number of transitions in the bucket with a due time. */
-    private final int[] bucketTimed;
-    private final int[] members;
+    /** The front of a bucket: those of its members that are due first, once {@link #choices} has asked for them. */
+    private final int[] front;
+    private final int[] frontSize;
+    private final long[] frontSince;
+    /** The other members of a bucket, a heap by due time. */
+    private final int[] behind;
+    private final int[] behindSize;
+    private final boolean[] isFront;
+    /** The position of a member in the front, or among the others. */
     private final int[] memberAt;
-    private final int[] candidates;
-    private int base;
-    private int[] from;
+    private int chosen;
 
     Ready(int[] priority, int[] cluster) {
         this.priority = priority;
@@ -36,9 +39,10 @@ final class Ready {
         heap = new int[all];
         position = new int[all];
         bucket = new int[all];
-        members = new int[all];
+        front = new int[all];
+        behind = new int[all];
+        isFront = new boolean[all];
         memberAt = new int[all];
-        candidates = new int[all];
         Map<Long, Integer> numbers = new HashMap<>();
         for (int t = 0; t < all; t++) {
             long key = (long) cluster[t] << 32 | priority[t] & 0xFFFFFFFFL;
@@ -46,14 +50,15 @@ final class Ready {
             bucket[t] = known == null ? numbers.size() - 1 : known;
         }
         bucketFirst = new int[numbers.size() + 1];
-        bucketSize = new int[numbers.size()];
-        bucketTimed = new int[numbers.size()];
+        frontSize = new int[numbers.size()];
+        frontSince = new long[numbers.size()];
+        behindSize = new int[numbers.size()];
         for (int t = 0; t < all; t++) {
             if (bucket[t] >= 0) {
                 bucketFirst[bucket[t] + 1]++;
             }
         }
-        for (int b = 0; b < bucketSize.length; b++) {
+        for (int b = 0; b < frontSize.length; b++) {
             bucketFirst[b + 1] += bucketFirst[b];
         }
     }
@@ -79,11 +84,22 @@ final class Ready {
         since[t] = at;
         up(size++, t);
         int b = bucket[t];
-        if (b >= 0) {
-            memberAt[t] = bucketFirst[b] + bucketSize[b]++;
-            members[memberAt[t]] = t;
-            bucketTimed[b] += at == UNTIMED ? 0 : 1;
+        if (b < 0) {
+            return;
         }
+        if (frontSize[b] == 0 && behindSize[b] == 0) {
+            frontSince[b] = at;
+        }
+        if (at == frontSince[b] && (frontSize[b] > 0 || behindSize[b] == 0)) {
+            addToFront(b, t);
+            return;
+        }
+        // An earlier one is rare: it ends the front.
+        while (frontSize[b] > 0 && at < frontSince[b]) {
+            int back = front[bucketFirst[b] + --frontSize[b]];
+            addBehind(b, back);
+        }
+        addBehind(b, t);
     }
 
     void remove(int t) {
@@ -98,11 +114,32 @@ final class Ready {
             down(position[last] - 1);
         }
         int b = bucket[t];
-        if (b >= 0) {
-            int moved = members[bucketFirst[b] + --bucketSize[b]];
-            members[memberAt[t]] = moved;
+        if (b >= 0 && isFront[t]) {
+            int moved = front[bucketFirst[b] + --frontSize[b]];
+            front[memberAt[t]] = moved;
             memberAt[moved] = memberAt[t];
-            bucketTimed[b] -= since[t] == UNTIMED ? 0 : 1;
+        } else if (b >= 0) {
+            removeBehind(b, t);
+        }
+    }
+
+    private void addToFront(int b, int t) {
+        isFront[t] = true;
+        memberAt[t] = bucketFirst[b] + frontSize[b]++;
+        front[memberAt[t]] = t;
+    }
+
+    private void addBehind(int b, int t) {
+        isFront[t] = false;
+        raise(b, bucketFirst[b] + behindSize[b]++, t);
+    }
+
+    private void removeBehind(int b, int t) {
+        int hole = memberAt[t];
+        int last = behind[bucketFirst[b] + --behindSize[b]];
+        if (last != t) {
+            raise(b, hole, last);
+            sink(b, memberAt[last]);
         }
     }
 
@@ -111,31 +148,57 @@ final class Ready {
      * rank.
      */
     int choices() {
-        int first = heap[0];
-        int b = bucket[first];
-        from = candidates;
-        base = 0;
-        candidates[0] = first;
+        chosen = heap[0];
+        int b = bucket[chosen];
         if (b < 0) {
             return 1;
         }
-        if (bucketTimed[b] == 0) {
-            from = members;
-            base = bucketFirst[b];
-            return bucketSize[b];
-        }
-        int count = 0;
-        for (int i = bucketFirst[b]; i < bucketFirst[b] + bucketSize[b]; i++) {
-            if (since[members[i]] == since[first]) {
-                candidates[count++] = members[i];
+        if (frontSize[b] == 0) {
+            frontSince[b] = since[chosen];
+            while (behindSize[b] > 0 && since[behind[bucketFirst[b]]] == frontSince[b]) {
+                int t = behind[bucketFirst[b]];
+                removeBehind(b, t);
+                addToFront(b, t);
             }
         }
-        return count;
+        return frontSize[b];
     }
 
     /** One of the last {@link #choices}. */
     int choice(int number) {
-        return from[base + number];
+        return bucket[chosen] < 0 ? chosen : front[bucketFirst[bucket[chosen]] + number];
+    }
+
+    private void putBehind(int t, int at) {
+        behind[at] = t;
+        memberAt[t] = at;
+    }
+
+    private void raise(int b, int start, int t) {
+        int root = bucketFirst[b];
+        int at = start;
+        while (at > root && since[t] < since[behind[root + (at - root - 1) / 2]]) {
+            int parent = root + (at - root - 1) / 2;
+            putBehind(behind[parent], at);
+            at = parent;
+        }
+        putBehind(t, at);
+    }
+
+    private void sink(int b, int start) {
+        int root = bucketFirst[b];
+        int end = root + behindSize[b];
+        int at = start;
+        int t = behind[at];
+        for (int child = 2 * at - root + 1; child < end; child = 2 * at - root + 1) {
+            child += child + 1 < end && since[behind[child + 1]] < since[behind[child]] ? 1 : 0;
+            if (since[behind[child]] >= since[t]) {
+                break;
+            }
+            putBehind(behind[child], at);
+            at = child;
+        }
+        putBehind(t, at);
     }
 
     private boolean before(int a, int b) {

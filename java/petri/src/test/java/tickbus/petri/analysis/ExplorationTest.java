@@ -221,4 +221,21 @@ class ExplorationTest {
         int last = graph.find(net.marking(0, 20_000, 1));
         assertArrayEquals(new int[] {0, 20_000, 1}, graph.marking(last).toArray());
     }
+
+    /** Every transition depends on every other one, so the search for stubborn sets itself takes longer than the limit. */
+    @Test
+    void theLimitOfTimeHoldsWithinOneMarking() {
+        NetBuilder builder = PetriNet.named("shared").place("shared", 2);
+        for (int t = 0; t < 6000; t++) {
+            builder.place("own " + t, 1).transition("t" + t).input("shared", "own " + t);
+        }
+        PetriNet net = builder.build();
+        for (Exploration exploration : List.of(Exploration.of(net).onlyForDeadlocks(), Exploration.of(net).withoutFirings())) {
+            long start = System.nanoTime();
+            Reachability graph = exploration.time(Duration.ofMillis(100)).run();
+            assertTrue(graph.gaveUpBecause().isPresent() || graph.isComplete());
+            assertTrue(System.nanoTime() - start < 5_000_000_000L, "took " + (System.nanoTime() - start) + " ns");
+            assertEquals(0, graph.deadlocks().size(), "a search that was cut off takes no marking for dead");
+        }
+    }
 }

@@ -11,6 +11,7 @@ import java.util.Set;
 import java.util.TreeMap;
 import java.util.TreeSet;
 import org.junit.jupiter.api.Test;
+import tickbus.petri.net.NetBuilder;
 import tickbus.petri.net.PetriNet;
 
 /** The order in which ready transitions fire. */
@@ -47,6 +48,35 @@ class ReadyTest {
                 }
             }
         }
+    }
+
+    /** All transitions contend for one place, half of them by a delay of their own: what a firing costs does not depend on them. */
+    @Test
+    void aClusterOfManyTransitionsCostsALogarithmForEachFiring() {
+        assertEquals(10_000, fireCluster(10_000, 0));
+        long small = timeOfCluster(5_000);
+        long large = timeOfCluster(40_000);
+        assertTrue(large < 30 * small, large + " ns for 40,000 transitions, " + small + " ns for 5,000");
+    }
+
+    private static long timeOfCluster(int size) {
+        long best = Long.MAX_VALUE;
+        for (int round = 0; round < 5; round++) {
+            long start = System.nanoTime();
+            fireCluster(size, round);
+            best = Math.min(best, System.nanoTime() - start);
+        }
+        return best;
+    }
+
+    private static int fireCluster(int size, long seed) {
+        NetBuilder builder = PetriNet.named("cluster").place("shared", size);
+        for (int t = 0; t < size; t++) {
+            builder.place("own " + t, 1);
+            builder.transition("t" + t).delay(t % 2 == 0 ? 0 : t).input("shared", "own " + t);
+        }
+        Coordinator cluster = Coordinator.of(builder.build()).seed(seed).limit(size).build();
+        return cluster.scan(0) + cluster.scan(size);
     }
 
     private static Set<Integer> choices(Ready ready) {

@@ -9,4 +9,5 @@ module org.tickbus.petri {
     exports tickbus.petri.net;
     exports tickbus.petri.page;
     exports tickbus.petri.run;
+    exports tickbus.petri.sfc;
 }

@@ -32,7 +32,8 @@ public final class Main {
                java -jar tickbus-petri.jar draw NET [options]      as a drawing, or in another format
 
         NET is a file in PNML (also that of TAPAAL, ProM, pm4py, WoPeD and PIPE), a .lola file of LoLA, a .net file
-        of TINA, a .hpx file of HPSim, or the text that HPSim exports.
+        of TINA, a .hpx file of HPSim, the text that HPSim exports, or a sequential function chart in the text of
+        IEC 61131-3 (.st, .sfc), of which these commands see steps and transitions alone.
 
         step:
           --seed N           of chance and of random delays (default 0)

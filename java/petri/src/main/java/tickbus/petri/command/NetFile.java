@@ -20,6 +20,7 @@ import tickbus.petri.format.Pnml;
 import tickbus.petri.format.Tina;
 import tickbus.petri.net.Delay;
 import tickbus.petri.net.PetriNet;
+import tickbus.petri.sfc.Sfc;
 
 /** Reads a net from a file of any supported format. */
 final class NetFile {
@@ -62,6 +63,7 @@ final class NetFile {
             case "hpx" -> Hpx.read(file, nanos);
             case "tina" -> Tina.read(file, nanos);
             case "lola" -> Lola.read(file);
+            case "sfc" -> new Imported(Sfc.read(file).net(), List.of("conditions and actions of the chart are left out"));
             default -> HpsimText.read(file, delays);
         };
         imported.warnings().forEach(warning -> err.println("warning: " + warning));
@@ -108,6 +110,9 @@ final class NetFile {
         }
         if (name.endsWith(".pnml") || name.endsWith(".xml")) {
             return "pnml";
+        }
+        if (name.endsWith(".st") || name.endsWith(".sfc")) {
+            return "sfc";
         }
         if (name.endsWith(".hpx")) {
             return "hpx";

@@ -1,0 +1,73 @@
+package tickbus.petri.sfc;
+
+import java.io.IOException;
+import java.nio.charset.StandardCharsets;
+import java.nio.file.Files;
+import java.nio.file.Path;
+import java.util.List;
+import tickbus.petri.net.NetException;
+import tickbus.petri.net.PetriNet;
+
+/**
+ * A sequential function chart as a Petri net: a step is a place, a transition a transition. The conditions and actions are
+ * those of the program; {@link #start} runs them as a PLC does.
+ */
+public final class Sfc {
+    private static final long MOST_BYTES = 16L << 20;
+
+    private final PetriNet net;
+    final List<Variable> variables;
+    final List<Value> conditions;
+    final List<Association> associations;
+    final List<Action> actions;
+
+    /**
+     * An action.
+     *
+     * @param variable the index of the variable that it sets; -1 for an action with statements
+     * @param body the statements; null for a variable
+     */
+    record Action(int variable, Statement body) {
+    }
+
+    Sfc(PetriNet net, List<Variable> variables, List<Value> conditions, List<Association> associations, List<Action> actions) {
+        this.net = net;
+        this.variables = List.copyOf(variables);
+        this.conditions = List.copyOf(conditions);
+        this.associations = List.copyOf(associations);
+        this.actions = List.copyOf(actions);
+    }
+
+    /**
+     * Reads the first program or function block of a file in IEC 61131-3 text, which must be a chart.
+     *
+     * @throws NetException with file, line and column for what cannot be read
+     */
+    public static Sfc read(Path file) throws IOException {
+        long size = Files.size(file);
+        if (size > MOST_BYTES) {
+            throw new NetException(file.toString(), 0, "", size + " bytes; expected at most " + MOST_BYTES);
+        }
+        return parse(file.toString(), new String(Files.readAllBytes(file), StandardCharsets.UTF_8));
+    }
+
+    /** Reads a text, as {@link #read}; {@code name} is for messages. */
+    public static Sfc parse(String name, String text) {
+        return new SfcReader(name, text).read();
+    }
+
+    /** The net. Of two transitions that can fire, the one with the smaller {@code PRIORITY}, or else the first one, has the greater priority. */
+    public PetriNet net() {
+        return net;
+    }
+
+    /** The variables, in the order of the program. */
+    public List<Variable> variables() {
+        return variables;
+    }
+
+    /** A run from the initial steps and values. */
+    public SfcController start() {
+        return new SfcController(this);
+    }
+}

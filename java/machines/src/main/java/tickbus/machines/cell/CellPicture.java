@@ -150,7 +150,7 @@ public final class CellPicture {
     }
 
     private void stationThree(int x) {
-        station(x, "Station 3: piston, spring and head");
+        station(x, "Station 3: parts and head");
         double middle = x + 150;
         pallet(middle, 3);
         shown("S3 piston in", () -> {

@@ -3,6 +3,7 @@
 #![allow(missing_docs, unreachable_pub, reason = "a test")]
 
 mod actions;
+mod diagrams;
 mod project;
 mod stepped;
 
@@ -49,6 +50,14 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     (
         "a_prepared_project_in_xml_does_what_the_original_does",
         a_prepared_project_in_xml_does_what_the_original_does,
+    ),
+    (
+        "diagrams_do_what_they_show",
+        diagrams::diagrams_do_what_they_show,
+    ),
+    (
+        "prepared_diagrams_do_what_the_originals_do",
+        diagrams::prepared_diagrams_do_what_the_originals_do,
     ),
     ("the_blocks_in_xml_compile", the_blocks_in_xml_compile),
     (

@@ -41,15 +41,24 @@ pub(crate) fn is_cycled(code: &Code<'_>, body: &Range<usize>, instance: &str) ->
     let calls = body.clone().filter(|at| {
         code.is(*at, instance) && code.word(at + 1) == "(" && code.word(at.wrapping_sub(1)) != "."
     });
-    let mut calls = calls.map(|at| at + 1..code.closing(at + 1, body.end)).peekable();
-    let sets = |mut inner: Range<usize>| inner.any(|at| code.is(at, "CYCLE") && code.word(at + 1) == ":=");
+    let mut calls = calls
+        .map(|at| at + 1..code.closing(at + 1, body.end))
+        .peekable();
+    let sets =
+        |mut inner: Range<usize>| inner.any(|at| code.is(at, "CYCLE") && code.word(at + 1) == ":=");
     calls.peek().is_some() && calls.all(sets)
 }
 
 /// A literal for `CYCLE` that differs from the interval, in milliseconds, at which these statements run: its position and
 /// a remark.
-pub(crate) fn differing(code: &Code<'_>, body: &Range<usize>, interval: u32) -> Vec<(usize, String)> {
-    let set = body.clone().filter(|at| code.is(*at, "CYCLE") && code.word(at + 1) == ":=");
+pub(crate) fn differing(
+    code: &Code<'_>,
+    body: &Range<usize>,
+    interval: u32,
+) -> Vec<(usize, String)> {
+    let set = body
+        .clone()
+        .filter(|at| code.is(*at, "CYCLE") && code.word(at + 1) == ":=");
     set.filter_map(|at| {
         let literal = code.word(at + 2);
         let is_alone = matches!(code.word(at + 3), "," | ")");

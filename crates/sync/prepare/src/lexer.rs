@@ -277,7 +277,11 @@ mod tests {
     #[test]
     fn what_has_no_end_is_seen() {
         for source in ["(* ", "'a\n'", "\"", "{", "/* *", "(*)", "'$"] {
-            assert_eq!(tokens(source, Comments::Flat)[0].kind, Kind::Endless, "{source}");
+            assert_eq!(
+                tokens(source, Comments::Flat)[0].kind,
+                Kind::Endless,
+                "{source}"
+            );
         }
     }
 

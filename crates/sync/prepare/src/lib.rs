@@ -211,7 +211,8 @@ fn prepared(
                 token.kind == Kind::Comment && text.get(2..).is_some_and(|text| text.contains("(*"))
             });
             let at = first.map_or(0, |token| token.start);
-            let remark = "a comment is within a comment: compile with the option for that (-n of iec2c)";
+            let remark =
+                "a comment is within a comment: compile with the option for that (-n of iec2c)";
             remarks.push(placed_remark(wrong, at, remark));
         }
         for unit in &outline.units {

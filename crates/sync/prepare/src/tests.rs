@@ -123,12 +123,20 @@ fn comments_within_comments_are_read_as_the_compiler_does() {
     // In a text and behind // nothing begins.
     with("// (* a", None).expect("prepared");
     let told = with("(* a", None).expect_err("no end")[0].to_string();
-    assert!(told.contains("line.st:3:6: what begins here has no end"), "{told}");
+    assert!(
+        told.contains("line.st:3:6: what begins here has no end"),
+        "{told}"
+    );
 }
 
 #[test]
 fn a_pid_that_is_told_its_cycle_needs_no_clock() {
-    let with = |call: &str| prepare(&[source(&line("VAR p : PID; q : RAMP; END_VAR", call))], &Settings::default());
+    let with = |call: &str| {
+        prepare(
+            &[source(&line("VAR p : PID; q : RAMP; END_VAR", call))],
+            &Settings::default(),
+        )
+    };
     let made = with("p(AUTO := TRUE, CYCLE := T#20ms); q(CYCLE := T#10ms);").expect("prepared");
     let told = "line.st:3:17: CYCLE is T#20ms, and the task of this program runs it every 10 ms: the block counts another \
                 time, with the original too";
@@ -137,7 +145,10 @@ fn a_pid_that_is_told_its_cycle_needs_no_clock() {
     assert_eq!(made.notes, Vec::<String>::new());
     for call in ["p(CYCLE := T#10ms); p();", "q();"] {
         let told = with(call).expect_err("a clock")[0].to_string();
-        assert!(told.contains("line.st:2:9: PID runs on a clock of its own"), "{told}");
+        assert!(
+            told.contains("line.st:2:9: PID runs on a clock of its own"),
+            "{told}"
+        );
     }
 }
 

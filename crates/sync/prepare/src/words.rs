@@ -13,9 +13,17 @@ pub(crate) fn is_put_in(name: &str) -> bool {
         return false;
     };
     let own = "ACTION_CONTROL SCHEDULER SCHEDULE CYCLE FIRST NOW SIMULATED EXECUTE";
-    let begins = |start| rest.strip_prefix(start).is_some_and(|rest: &str| rest.starts_with(|c: char| c.is_ascii_digit()));
+    let begins = |start| {
+        rest.strip_prefix(start)
+            .is_some_and(|rest: &str| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
     // Those of diagrams as text have the numbers of their elements.
-    is_in(own, rest) || rest.starts_with("EXECUTE_") || begins("WIRE_") || begins("EDGE_") || begins("JUMP_") || TIMERS.contains(&rest)
+    is_in(own, rest)
+        || rest.starts_with("EXECUTE_")
+        || begins("WIRE_")
+        || begins("EDGE_")
+        || begins("JUMP_")
+        || TIMERS.contains(&rest)
 }
 
 /// True if a name is one of the inserted variables: no type or program can have that name, too.

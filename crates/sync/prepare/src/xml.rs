@@ -5,9 +5,9 @@ mod declared;
 mod drawn;
 mod mask;
 mod nodes;
-mod text;
 #[cfg(test)]
 mod tests;
+mod text;
 
 use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
@@ -28,8 +28,8 @@ use super::edit::{Edits, Marks};
 use super::lexer::{Comments, Kind};
 use super::library::{self, SCHEDULE, TASK};
 use super::outline;
-use super::pragma;
 use super::plan::{self, Named, Plan};
+use super::pragma;
 use super::structured_text::header_and_footer;
 use super::words;
 use super::{Settings, plcopen};
@@ -258,7 +258,9 @@ impl<'a, 'i> Project<'a, 'i> {
                 check_words(&code, self.wrong);
                 let name = unit.attribute("name").unwrap_or_default();
                 if code.comments == Comments::Nested && settings.comments.is_none() {
-                    let remark = format!("{name} has a comment within a comment: compile with the option for that (-n of iec2c)");
+                    let remark = format!(
+                        "{name} has a comment within a comment: compile with the option for that (-n of iec2c)"
+                    );
                     shared.insert(super::placed_remark(self.wrong, start, &remark));
                 }
                 for pragma in code.all.iter().filter(|token| token.kind == Kind::Pragma) {
@@ -422,7 +424,11 @@ impl<'a, 'i> Project<'a, 'i> {
                 Form::Text(_) | Form::Clock(..) => false,
             });
             if world.is_timer(name) && !is_replaced {
-                edits.replace(first_tag(self.text, block), self.timer(block, "typeName")?, Marks::Xml);
+                edits.replace(
+                    first_tag(self.text, block),
+                    self.timer(block, "typeName")?,
+                    Marks::Xml,
+                );
             }
         }
         let timers: Vec<&str> = timers.iter().map(String::as_str).collect();

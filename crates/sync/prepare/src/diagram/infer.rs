@@ -35,8 +35,7 @@ pub(crate) fn origin(block: &Element, wire: &Wire) -> Option<usize> {
     let Kind::Block { outputs, .. } = &block.kind else {
         return Some(0);
     };
-    let named = (outputs.iter())
-        .position(|pin| pin.name.eq_ignore_ascii_case(&wire.parameter));
+    let named = (outputs.iter()).position(|pin| pin.name.eq_ignore_ascii_case(&wire.parameter));
     if let (Some(named), false) = (named, wire.parameter.is_empty()) {
         return Some(named);
     }
@@ -55,8 +54,8 @@ pub(crate) fn origin(block: &Element, wire: &Wire) -> Option<usize> {
 
 /// True if this pin is the result of a function, and not one of its other outputs.
 pub(crate) fn is_result(pin: &Pin, name: &str, library: &Library) -> bool {
-    let is_parameter = (library.signature(name))
-        .is_some_and(|one| one.parameter(&pin.name).is_some());
+    let is_parameter =
+        (library.signature(name)).is_some_and(|one| one.parameter(&pin.name).is_some());
     !is_parameter && !pin.name.eq_ignore_ascii_case("ENO")
 }
 
@@ -89,7 +88,10 @@ pub(crate) fn infer(
             for wire in &pin.wires {
                 let from = diagram.by_id[&wire.id];
                 if let Some(output) = origin(&diagram.elements[from], wire) {
-                    let (one, other) = (types.outputs[&(from, output)], types.inputs[&(index, number)]);
+                    let (one, other) = (
+                        types.outputs[&(from, output)],
+                        types.inputs[&(index, number)],
+                    );
                     types.classes.join(one, other);
                 }
             }
@@ -182,11 +184,14 @@ impl Types {
             else {
                 continue;
             };
-            let (false, Some(rule)) = (library.units.contains_key(&name.to_uppercase()), rule(name))
+            let (false, Some(rule)) =
+                (library.units.contains_key(&name.to_uppercase()), rule(name))
             else {
                 continue;
             };
-            let result = outputs.iter().position(|pin| !pin.name.eq_ignore_ascii_case("ENO"));
+            let result = outputs
+                .iter()
+                .position(|pin| !pin.name.eq_ignore_ascii_case("ENO"));
             let result = result.map(|number| self.outputs[&(index, number)]);
             let values: Vec<usize> = (inputs.iter().enumerate())
                 .filter(|(_, pin)| !pin.name.eq_ignore_ascii_case("EN"))
@@ -233,7 +238,10 @@ impl Types {
 
     /// True if the types of an arithmetic function are known now.
     fn join_arithmetic(&mut self, name: &str, values: &[usize], result: Option<usize>) -> bool {
-        let kinds: Vec<Option<Type>> = values.iter().map(|class| self.classes.kind(*class).cloned()).collect();
+        let kinds: Vec<Option<Type>> = values
+            .iter()
+            .map(|class| self.classes.kind(*class).cloned())
+            .collect();
         let is_time = |kind: &Option<Type>, name| kind.as_ref().is_some_and(|kind| kind.is(name));
         let times = kinds.iter().any(|kind| is_time(kind, "TIME"));
         let date = ["TIME_OF_DAY", "DATE_AND_TIME", "DATE"].into_iter();

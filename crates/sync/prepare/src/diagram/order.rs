@@ -20,7 +20,10 @@ pub(crate) struct Network {
 pub(crate) fn networks(diagram: &Diagram) -> Vec<Network> {
     let all: Vec<usize> = (0..diagram.elements.len()).collect();
     let has_jumps = (diagram.elements.iter()).any(|element| {
-        matches!(element.kind, Kind::Jump { .. } | Kind::Label { .. } | Kind::Return { .. })
+        matches!(
+            element.kind,
+            Kind::Jump { .. } | Kind::Label { .. } | Kind::Return { .. }
+        )
     });
     if !has_jumps {
         let roots = roots(diagram, &all);
@@ -104,7 +107,10 @@ fn roots(diagram: &Diagram, part: &[usize]) -> Vec<usize> {
         )
     };
     let outputs = in_rows(diagram, of(is_output, false));
-    let blocks = in_rows(diagram, of(|kind| matches!(kind, Kind::Block { .. }), false));
+    let blocks = in_rows(
+        diagram,
+        of(|kind| matches!(kind, Kind::Block { .. }), false),
+    );
     let jumps = in_rows(diagram, of(|kind| matches!(kind, Kind::Jump { .. }), false));
     [ordered, outputs, blocks, jumps].concat()
 }
@@ -124,7 +130,9 @@ fn in_rows(diagram: &Diagram, mut list: Vec<usize>) -> Vec<usize> {
     let mut start = 0;
     while start < list.len() {
         let first = position(list[start]).1;
-        let length = list[start..].iter().take_while(|at| position(**at).1 - first < ROW);
+        let length = list[start..]
+            .iter()
+            .take_while(|at| position(**at).1 - first < ROW);
         let end = start + length.count();
         list[start..end].sort_by_key(|at| position(*at).0);
         start = end;

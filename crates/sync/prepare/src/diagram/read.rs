@@ -224,9 +224,9 @@ impl Reader<'_> {
             output.wires.clear();
             outputs.push(output);
         }
-        let outgoing = outputs.iter().any(|pin| {
-            matches!(pin.modifier, Modifier::Rising | Modifier::Falling)
-        });
+        let outgoing = outputs
+            .iter()
+            .any(|pin| matches!(pin.modifier, Modifier::Rising | Modifier::Falling));
         if outgoing {
             let what = "an output has an edge";
             let right = "draw an R_TRIG or F_TRIG behind it";
@@ -281,7 +281,10 @@ impl Reader<'_> {
                 .last();
             pin.wires.push(Wire {
                 id,
-                parameter: wire.attribute("formalParameter").unwrap_or_default().to_owned(),
+                parameter: wire
+                    .attribute("formalParameter")
+                    .unwrap_or_default()
+                    .to_owned(),
                 from: last.map(position),
                 at,
             });

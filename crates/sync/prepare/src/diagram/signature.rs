@@ -178,7 +178,9 @@ pub(crate) fn rule(name: &str) -> Option<Rule> {
     let name = name.to_uppercase();
     let is_in = |list| words::is_in(list, &name);
     let gives = |kind| Some(Rule::Gives(Type::named(kind)));
-    if is_in("ABS SQRT LN LOG EXP SIN COS TAN ASIN ACOS ATAN ATAN2 AND OR XOR NOT MAX MIN LIMIT MOVE MOD CEIL FLOOR ROUND") {
+    if is_in(
+        "ABS SQRT LN LOG EXP SIN COS TAN ASIN ACOS ATAN ATAN2 AND OR XOR NOT MAX MIN LIMIT MOVE MOD CEIL FLOOR ROUND",
+    ) {
         return Some(Rule::Same);
     }
     if is_in("ADD SUB MUL DIV") {
@@ -199,7 +201,9 @@ pub(crate) fn rule(name: &str) -> Option<Rule> {
     if is_in("LEFT RIGHT MID CONCAT INSERT DELETE REPLACE") {
         return gives("STRING");
     }
-    if is_in("ADD_TIME SUB_TIME MULTIME MUL_TIME DIVTIME DIV_TIME SUB_DATE_DATE SUB_TOD_TOD SUB_DT_DT") {
+    if is_in(
+        "ADD_TIME SUB_TIME MULTIME MUL_TIME DIVTIME DIV_TIME SUB_DATE_DATE SUB_TOD_TOD SUB_DT_DT",
+    ) {
         return gives("TIME");
     }
     if is_in("ADD_TOD_TIME SUB_TOD_TIME DATE_AND_TIME_TO_TIME_OF_DAY") {

@@ -11,7 +11,10 @@ fn project(body: &str) -> String {
         ("t", "<derived name=\"TON\"/>"),
         ("s", "<derived name=\"SR\"/>"),
         ("own", "<derived name=\"Own\"/>"),
-        ("list", "<array><dimension lower=\"1\" upper=\"3\"/><baseType><INT/></baseType></array>"),
+        (
+            "list",
+            "<array><dimension lower=\"1\" upper=\"3\"/><baseType><INT/></baseType></array>",
+        ),
     ]
     .iter()
     .flat_map(|(names, kind)| {
@@ -62,17 +65,22 @@ fn refused(body: &str, says: &str) {
     // The same when the program is prepared.
     let mistakes = prepare(&[source(&project(body))], &Settings::default()).expect_err(says);
     let told: Vec<String> = mistakes.iter().map(ToString::to_string).collect();
-    assert!(told.join("\n").contains(says), "expected {says}, found {told:?}");
+    assert!(
+        told.join("\n").contains(says),
+        "expected {says}, found {told:?}"
+    );
 }
 
 /// The wires to a pin: from these elements, and with a dot from their parameter.
 fn pin(from: &str) -> String {
-    let wires = from.split_whitespace().map(|from| match from.split_once('.') {
-        Some((id, parameter)) => {
-            format!("<connection refLocalId=\"{id}\" formalParameter=\"{parameter}\"/>")
-        }
-        None => format!("<connection refLocalId=\"{from}\"/>"),
-    });
+    let wires = from
+        .split_whitespace()
+        .map(|from| match from.split_once('.') {
+            Some((id, parameter)) => {
+                format!("<connection refLocalId=\"{id}\" formalParameter=\"{parameter}\"/>")
+            }
+            None => format!("<connection refLocalId=\"{from}\"/>"),
+        });
     let wires: String = wires.collect();
     format!("<connectionPointIn>{wires}</connectionPointIn>")
 }
@@ -116,7 +124,10 @@ fn block(id: u32, more: &str, inputs: &str, outputs: &str) -> String {
             None => (name, ""),
         };
         let from = from.replace(',', " ");
-        format!("<variable formalParameter=\"{name}\" {negated}>{}</variable>", pin(&from))
+        format!(
+            "<variable formalParameter=\"{name}\" {negated}>{}</variable>",
+            pin(&from)
+        )
     });
     let outputs = outputs.split_whitespace().map(|name| {
         format!("<variable formalParameter=\"{name}\"><connectionPointOut/></variable>")
@@ -183,7 +194,12 @@ fn blocks_run_once_before_their_readers() {
     let made = statements(&fbd(&[
         input(1, "a"),
         input(2, "T#1s"),
-        block(3, "typeName=\"TON\" instanceName=\"t\"", "!IN=1 PT=2", "Q ET"),
+        block(
+            3,
+            "typeName=\"TON\" instanceName=\"t\"",
+            "!IN=1 PT=2",
+            "Q ET",
+        ),
         output(4, 50, "x", "", "3.Q"),
         output(5, 10, "total", "", "3.ET"),
         block(6, "typeName=\"SR\" instanceName=\"s\"", "S1=3.Q R=1", "Q1"),
@@ -203,8 +219,18 @@ fn blocks_run_once_before_their_readers() {
 fn an_order_comes_before_positions_and_is_not_broken_by_readers() {
     let made = statements(&fbd(&[
         input(1, "a"),
-        block(3, "typeName=\"TON\" instanceName=\"t\" executionOrderId=\"2\"", "IN=6.Q1", "Q"),
-        block(6, "typeName=\"SR\" instanceName=\"s\" executionOrderId=\"3\"", "S1=1", "Q1"),
+        block(
+            3,
+            "typeName=\"TON\" instanceName=\"t\" executionOrderId=\"2\"",
+            "IN=6.Q1",
+            "Q",
+        ),
+        block(
+            6,
+            "typeName=\"SR\" instanceName=\"s\" executionOrderId=\"3\"",
+            "S1=1",
+            "Q1",
+        ),
         output(4, 5, "x", "executionOrderId=\"1\"", "1"),
     ]));
     assert_eq!(made, ["x := a;", "t(IN := s.Q1);", "s(S1 := a);"]);
@@ -296,7 +322,12 @@ fn a_loop_through_a_block_reads_the_last_scan() {
 fn what_a_block_changes_is_a_variable() {
     let made = statements(&fbd(&[
         input(1, "n"),
-        block(2, "typeName=\"Own\" instanceName=\"own\"", "go=3 both=1", "count both"),
+        block(
+            2,
+            "typeName=\"Own\" instanceName=\"own\"",
+            "go=3 both=1",
+            "count both",
+        ),
         input(3, "a"),
         output(4, 10, "m", "", "2.both"),
     ]));
@@ -306,7 +337,10 @@ fn what_a_block_changes_is_a_variable() {
 #[test]
 fn connectors_are_wires() {
     let connector = |id, name: &str, from| {
-        format!("<connector localId=\"{id}\" name=\"{name}\">{}</connector>", pin(from))
+        format!(
+            "<connector localId=\"{id}\" name=\"{name}\">{}</connector>",
+            pin(from)
+        )
     };
     let made = statements(&fbd(&[
         input(1, "a"),
@@ -322,12 +356,24 @@ fn a_jump_skips_networks_and_a_return_the_rest() {
     let made = statements(&ld(&[
         rail(1),
         contact(2, "a", "", "1"),
-        format!("<jump localId=\"3\" label=\"end\"><position x=\"5\" y=\"10\"/>{}</jump>", pin("2")),
+        format!(
+            "<jump localId=\"3\" label=\"end\"><position x=\"5\" y=\"10\"/>{}</jump>",
+            pin("2")
+        ),
         coil(4, 40, "x", "", "5"),
-        contact(5, "b", "", "1").replace("<connectionPointIn>", "<position x=\"1\" y=\"40\"/><connectionPointIn>"),
+        contact(5, "b", "", "1").replace(
+            "<connectionPointIn>",
+            "<position x=\"1\" y=\"40\"/><connectionPointIn>",
+        ),
         "<label localId=\"6\" label=\"END\"><position x=\"1\" y=\"60\"/></label>".to_owned(),
-        format!("<return localId=\"7\"><position x=\"5\" y=\"80\"/>{}</return>", pin("8")),
-        contact(8, "c", "negated=\"true\"", "1").replace("<connectionPointIn>", "<position x=\"1\" y=\"80\"/><connectionPointIn>"),
+        format!(
+            "<return localId=\"7\"><position x=\"5\" y=\"80\"/>{}</return>",
+            pin("8")
+        ),
+        contact(8, "c", "negated=\"true\"", "1").replace(
+            "<connectionPointIn>",
+            "<position x=\"1\" y=\"80\"/><connectionPointIn>",
+        ),
         coil(9, 100, "y", "", "1"),
     ]));
     assert_eq!(
@@ -346,7 +392,10 @@ fn a_jump_skips_networks_and_a_return_the_rest() {
 
 #[test]
 fn comparisons_survive_the_references_of_xml() {
-    let made = statements(&fbd(&[input(1, "n &lt;&gt; m"), output(2, 10, "x", "", "1")]));
+    let made = statements(&fbd(&[
+        input(1, "n &lt;&gt; m"),
+        output(2, 10, "x", "", "1"),
+    ]));
     assert_eq!(made, ["x := n <> m;"]);
 }
 
@@ -362,7 +411,11 @@ fn what_a_diagram_gets_wrong_is_told_with_its_element() {
             "is in a loop without a function block or a variable",
         ),
         (
-            vec![contact(1, "a", "", "2"), contact(2, "b", "", "1"), coil(3, 1, "x", "", "1")],
+            vec![
+                contact(1, "a", "", "2"),
+                contact(2, "b", "", "1"),
+                coil(3, 1, "x", "", "1"),
+            ],
             "main, element 1: this element is in a loop",
         ),
         (
@@ -378,7 +431,10 @@ fn what_a_diagram_gets_wrong_is_told_with_its_element() {
             "main, element 3: negated is maybe; write true or false",
         ),
         (
-            vec![rail(1), coil(3, 1, "x", "negated=\"true\" storage=\"set\"", "1")],
+            vec![
+                rail(1),
+                coil(3, 1, "x", "negated=\"true\" storage=\"set\"", "1"),
+            ],
             "two of negated, storage and edge are given",
         ),
         (
@@ -386,30 +442,63 @@ fn what_a_diagram_gets_wrong_is_told_with_its_element() {
             "the edge up is unknown",
         ),
         (vec![rail(1), rail(1)], "another element has this localId"),
-        (vec![rail(1), coil(3, 1, "x; y := 1", "", "1")], "is no variable and no value"),
         (
-            vec![input(1, "a"), block(2, "typeName=\"Own\" instanceName=\"own\"", "stop=1", "count")],
+            vec![rail(1), coil(3, 1, "x; y := 1", "", "1")],
+            "is no variable and no value",
+        ),
+        (
+            vec![
+                input(1, "a"),
+                block(
+                    2,
+                    "typeName=\"Own\" instanceName=\"own\"",
+                    "stop=1",
+                    "count",
+                ),
+            ],
             "main, element 2: Own has no parameter stop",
         ),
         (
-            vec![input(1, "a"), block(2, "typeName=\"Own\"", "go=1", "count"), output(3, 1, "n", "", "2")],
+            vec![
+                input(1, "a"),
+                block(2, "typeName=\"Own\"", "go=1", "count"),
+                output(3, 1, "n", "", "2"),
+            ],
             "Own is a function block, and has no instance here",
         ),
         (
-            vec![block(2, "typeName=\"Own\" instanceName=\"own\"", "both", "both")],
+            vec![block(
+                2,
+                "typeName=\"Own\" instanceName=\"own\"",
+                "both",
+                "both",
+            )],
             "nothing leads to both, which the block changes",
         ),
         (
-            vec![input(1, "5"), block(2, "typeName=\"ADD\"", "IN1=1 IN2=1", "OUT"), coil(3, 1, "x", "", "4"),
-                block(4, "typeName=\"GT\"", "IN1=2 IN2=1", "OUT")],
+            vec![
+                input(1, "5"),
+                block(2, "typeName=\"ADD\"", "IN1=1 IN2=1", "OUT"),
+                coil(3, 1, "x", "", "4"),
+                block(4, "typeName=\"GT\"", "IN1=2 IN2=1", "OUT"),
+            ],
             "the type of the result of ADD is unknown",
         ),
         (
-            vec![rail(1), "<jump localId=\"3\" label=\"L\"><connectionPointIn/></jump>".to_owned()],
+            vec![
+                rail(1),
+                "<jump localId=\"3\" label=\"L\"><connectionPointIn/></jump>".to_owned(),
+            ],
             "there is no label L",
         ),
-        (vec!["<step localId=\"1\"/>".to_owned()], "step is no element of LD or FBD"),
-        (vec!["<block localId=\"x\"/>".to_owned()], "there is no number localId"),
+        (
+            vec!["<step localId=\"1\"/>".to_owned()],
+            "step is no element of LD or FBD",
+        ),
+        (
+            vec!["<block localId=\"x\"/>".to_owned()],
+            "there is no number localId",
+        ),
     ] {
         refused(&fbd(&parts), says);
     }
@@ -422,9 +511,16 @@ fn what_a_diagram_gets_wrong_is_told_with_its_element() {
     let wide: Vec<String> = (1..40)
         .flat_map(|stage| {
             let id = stage * 10;
-            let before = if stage == 1 { "1".to_owned() } else { format!("{} {}", id - 10, id - 9) };
+            let before = if stage == 1 {
+                "1".to_owned()
+            } else {
+                format!("{} {}", id - 10, id - 9)
+            };
             let other = format!("{before} 1");
-            [contact(id, "a", "", &before), contact(id + 1, "b", "", &other)]
+            [
+                contact(id, "a", "", &before),
+                contact(id + 1, "b", "", &other),
+            ]
         })
         .chain([rail(1), coil(1000, 1, "x", "", "390 391")])
         .collect();
@@ -443,10 +539,17 @@ fn a_prepared_diagram_waits_for_its_step_and_comes_back() {
     ]);
     // A block of the project keeps its diagram.
     let inner = "<localVars><variable name=\"late\"><type><derived name=\"TOF\"/></type></variable></localVars></interface>";
-    let own = fbd(&[block(1, "typeName=\"TOF\" instanceName=\"late\"", "IN PT", "Q")]);
-    let text = project(&body)
-        .replacen("</interface>", inner, 1)
-        .replacen("<ST><p>count := both;</p></ST>", &own, 1);
+    let own = fbd(&[block(
+        1,
+        "typeName=\"TOF\" instanceName=\"late\"",
+        "IN PT",
+        "Q",
+    )]);
+    let text = project(&body).replacen("</interface>", inner, 1).replacen(
+        "<ST><p>count := both;</p></ST>",
+        &own,
+        1,
+    );
     let made = prepare(&[source(&text)], &Settings::default());
     let made = made.unwrap_or_else(|mistakes| panic!("{}", mistakes[0]));
     let bytes = made.files[0].clone();
@@ -472,14 +575,23 @@ fn a_pid_with_its_cycle_is_accepted_and_compared_with_the_task() {
             input(1, cycle),
             block(2, "typeName=\"PID\" instanceName=\"p\"", "CYCLE=1", "XOUT"),
         ]);
-        let declared = "<localVars><variable name=\"p\"><type><derived name=\"PID\"/></type></variable>";
+        let declared =
+            "<localVars><variable name=\"p\"><type><derived name=\"PID\"/></type></variable>";
         project(&body).replacen("<localVars>", declared, 1)
     };
     let made = prepare(&[source(&with("T#20ms"))], &Settings::default()).expect("prepared");
-    assert!(made.notes[0].contains("main: CYCLE is T#20ms, and the task"), "{:?}", made.notes);
+    assert!(
+        made.notes[0].contains("main: CYCLE is T#20ms, and the task"),
+        "{:?}",
+        made.notes
+    );
     let made = prepare(&[source(&with("T#10ms"))], &Settings::default()).expect("prepared");
     assert_eq!(made.notes, Vec::<String>::new());
     let without = with("T#10ms").replace("\"CYCLE\"", "\"AUTO\"");
     let told = prepare(&[source(&without)], &Settings::default()).expect_err("a clock");
-    assert!(told[0].to_string().contains("PID runs on a clock of its own"));
+    assert!(
+        told[0]
+            .to_string()
+            .contains("PID runs on a clock of its own")
+    );
 }

@@ -49,7 +49,9 @@ impl Project<'_, '_> {
             };
             let code = Code::part(&text, start);
             let all = 0..code.tokens.len();
-            let is_named = all.clone().any(|at| code.is(at, name) && code.word(at + 1) == "(");
+            let is_named = all
+                .clone()
+                .any(|at| code.is(at, name) && code.word(at + 1) == "(");
             if is_named && !cycle::is_cycled(&code, &all, name) {
                 return false;
             }
@@ -76,7 +78,11 @@ impl Project<'_, '_> {
             let all = 0..code.tokens.len();
             for (place, remark) in cycle::differing(&code, &all, interval) {
                 let place = at.unwrap_or(place);
-                found.push(crate::placed_remark(self.wrong, place, &format!("{name}: {remark}")));
+                found.push(crate::placed_remark(
+                    self.wrong,
+                    place,
+                    &format!("{name}: {remark}"),
+                ));
             }
         }
         found

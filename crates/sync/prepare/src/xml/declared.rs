@@ -36,7 +36,10 @@ pub(super) fn library(root: Node<'_, '_>) -> Library {
         library.units.insert(name, signature);
     }
     for declared in named(root, "dataType") {
-        let name = declared.attribute("name").unwrap_or_default().to_uppercase();
+        let name = declared
+            .attribute("name")
+            .unwrap_or_default()
+            .to_uppercase();
         let Some(base) = child(declared, "baseType") else {
             continue;
         };
@@ -68,16 +71,16 @@ pub(super) fn variables(unit: Node<'_, '_>) -> HashMap<String, Type> {
 }
 
 fn list(interface: Node<'_, '_>, name: &str) -> Vec<(String, Option<Type>)> {
-    let lists = interface.children().filter(|node| {
-        node.is_element() && node.tag_name().name() == name
-    });
+    let lists = interface
+        .children()
+        .filter(|node| node.is_element() && node.tag_name().name() == name);
     lists.flat_map(of_variables).collect()
 }
 
 fn of_variables(holder: Node<'_, '_>) -> Vec<(String, Option<Type>)> {
-    let variables = holder.children().filter(|node| {
-        node.is_element() && node.tag_name().name() == "variable"
-    });
+    let variables = holder
+        .children()
+        .filter(|node| node.is_element() && node.tag_name().name() == "variable");
     let found = variables.map(|variable| {
         let name = variable.attribute("name").unwrap_or_default();
         (name.to_uppercase(), child(variable, "type").and_then(kind))

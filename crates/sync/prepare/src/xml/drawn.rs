@@ -7,7 +7,7 @@ use tickbus_base::toml_text::shown;
 
 use super::nodes::{child, named};
 use super::{Project, declared};
-use crate::check::{World, check_callers, check_statements, check_words, reads_clock, MEASURE};
+use crate::check::{MEASURE, World, check_callers, check_statements, check_words, reads_clock};
 use crate::code::Code;
 use crate::diagram::{self, Written};
 use crate::outline;
@@ -44,7 +44,10 @@ impl Project<'_, '_> {
         for block in named(body, "block") {
             let name = block.attribute("typeName").unwrap_or_default();
             let at = block.range().start;
-            if block.attribute("instanceName").is_some_and(|name| !name.is_empty()) {
+            if block
+                .attribute("instanceName")
+                .is_some_and(|name| !name.is_empty())
+            {
                 // The type of the variable decides, and was checked.
                 self.check_instance(block);
                 continue;
@@ -57,7 +60,11 @@ impl Project<'_, '_> {
             if words::is_clock(name) {
                 self.wrong.report(at, reads_clock(name), MEASURE);
             } else {
-                let what = format!("{}, block {}, is in none of these sources", shown(name), shown(id));
+                let what = format!(
+                    "{}, block {}, is in none of these sources",
+                    shown(name),
+                    shown(id)
+                );
                 let right = "add it to the project; if it comes from a library and reads no clock, name it with --no-clock";
                 self.wrong.report(at, what, right);
             }
@@ -85,16 +92,29 @@ impl Project<'_, '_> {
 
     /// Reports a block that is drawn as another type than its variable has.
     fn check_instance(&self, block: Node<'_, '_>) {
-        let Some(unit) = block.ancestors().find(|node| node.has_tag_name("pou") || node.tag_name().name() == "pou") else {
+        let Some(unit) = block
+            .ancestors()
+            .find(|node| node.has_tag_name("pou") || node.tag_name().name() == "pou")
+        else {
             return;
         };
         let name = block.attribute("instanceName").unwrap_or_default();
         let drawn = block.attribute("typeName").unwrap_or_default();
         let variables = declared::variables(unit);
-        let declared = variables.get(&name.to_uppercase()).and_then(diagram::Type::name);
+        let declared = variables
+            .get(&name.to_uppercase())
+            .and_then(diagram::Type::name);
         if let Some(declared) = declared.filter(|one| !one.eq_ignore_ascii_case(drawn)) {
-            let what = format!("{} is drawn as {}, and declared as {declared}", shown(name), shown(drawn));
-            self.wrong.report(block.range().start, what, "draw it again, or declare it as it is drawn");
+            let what = format!(
+                "{} is drawn as {}, and declared as {declared}",
+                shown(name),
+                shown(drawn)
+            );
+            self.wrong.report(
+                block.range().start,
+                what,
+                "draw it again, or declare it as it is drawn",
+            );
         }
     }
 }

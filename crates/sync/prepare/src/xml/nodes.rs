@@ -20,7 +20,9 @@ pub(super) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, '
     children.find(|child| child.tag_name().name() == name)
 }
 
-pub(super) fn variable_names<'a, 'i>(list: Node<'a, 'i>) -> impl Iterator<Item = String> + use<'a, 'i> {
+pub(super) fn variable_names<'a, 'i>(
+    list: Node<'a, 'i>,
+) -> impl Iterator<Item = String> + use<'a, 'i> {
     let names = named(list, "variable").filter_map(|node| node.attribute("name"));
     names.map(str::to_uppercase)
 }

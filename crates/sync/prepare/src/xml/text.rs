@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use roxmltree::Node;
 use tickbus_base::toml_text::shown;
 
+use super::Project;
 use super::drawn::drawn;
 use super::nodes::{child, named};
-use super::Project;
 use crate::duration;
 
 /// The lists of variables, and their keywords.
@@ -64,9 +64,8 @@ impl Project<'_, '_> {
         let name = unit.attribute("name").unwrap_or_default();
         let interface = child(unit, "interface");
         let result = interface.and_then(|interface| child(interface, "returnType"));
-        let result = result.map_or_else(String::new, |result| {
-            format!(" : {}", self.kind(result, 0))
-        });
+        let result =
+            result.map_or_else(String::new, |result| format!(" : {}", self.kind(result, 0)));
         let _ = writeln!(text, "{keyword} {name}{result}");
         for list in interface.iter().flat_map(|interface| interface.children()) {
             self.section(list, text);
@@ -161,7 +160,8 @@ impl Project<'_, '_> {
             base.map_or_else(String::new, |base| self.kind(base, depth + 1))
         };
         let range = |node: Node<'_, '_>| {
-            let [lower, upper] = ["lower", "upper"].map(|key| node.attribute(key).unwrap_or_default());
+            let [lower, upper] =
+                ["lower", "upper"].map(|key| node.attribute(key).unwrap_or_default());
             format!("{lower}..{upper}")
         };
         match node.tag_name().name() {
@@ -172,7 +172,9 @@ impl Project<'_, '_> {
                 node.tag_name().name().to_uppercase() + &length
             }
             "array" => {
-                let dimensions = node.children().filter(|node| node.tag_name().name() == "dimension");
+                let dimensions = node
+                    .children()
+                    .filter(|node| node.tag_name().name() == "dimension");
                 let dimensions: Vec<String> = dimensions.map(range).collect();
                 format!("ARRAY [{}] OF {}", dimensions.join(", "), base())
             }
@@ -186,7 +188,10 @@ impl Project<'_, '_> {
             }
             "struct" => {
                 let mut text = "STRUCT\n".to_owned();
-                for member in node.children().filter(|node| node.tag_name().name() == "variable") {
+                for member in node
+                    .children()
+                    .filter(|node| node.tag_name().name() == "variable")
+                {
                     let name = member.attribute("name").unwrap_or_default();
                     let kind = child(member, "type");
                     let kind = kind.map_or_else(String::new, |kind| self.kind(kind, depth + 1));
@@ -206,19 +211,27 @@ impl Project<'_, '_> {
             return String::new();
         };
         let value = self.value(initial, kind, 0);
-        if value.is_empty() { value } else { format!(" := {value}") }
+        if value.is_empty() {
+            value
+        } else {
+            format!(" := {value}")
+        }
     }
 
     fn value(&self, holder: Node<'_, '_>, kind: &str, depth: usize) -> String {
         if depth > DEPTH {
             let what = "this value is too deep";
-            self.wrong.report(holder.range().start, what, "assign it in the program");
+            self.wrong
+                .report(holder.range().start, what, "assign it in the program");
             return String::new();
         }
         let Some(node) = holder.children().find(Node::is_element) else {
             return String::new();
         };
-        let values = || node.children().filter(|node| node.tag_name().name() == "value");
+        let values = || {
+            node.children()
+                .filter(|node| node.tag_name().name() == "value")
+        };
         match node.tag_name().name() {
             "arrayValue" => {
                 let items = values().map(|item| {
@@ -263,20 +276,27 @@ impl Project<'_, '_> {
         lists.for_each(|list| self.section(list, text));
         for resource in named(configuration, "resource") {
             let _ = writeln!(text, "  RESOURCE {} ON PLC", name(resource));
-            resource.children().for_each(|list| self.section(list, text));
+            resource
+                .children()
+                .for_each(|list| self.section(list, text));
             let children = |wanted: &'static str| {
                 let all = resource.children().filter(Node::is_element);
                 all.filter(move |node| node.tag_name().name() == wanted)
             };
             for task in children("task") {
                 let single = task.attribute("single").filter(|single| !single.is_empty());
-                let single = single.map_or_else(String::new, |single| format!("SINGLE := {single}, "));
+                let single =
+                    single.map_or_else(String::new, |single| format!("SINGLE := {single}, "));
                 let interval = task.attribute("interval").filter(|text| !text.is_empty());
                 let interval = interval.map_or_else(String::new, |interval| {
                     format!("INTERVAL := {}, ", duration_text(interval))
                 });
                 let priority = task.attribute("priority").unwrap_or("0");
-                let _ = writeln!(text, "    TASK {}({single}{interval}PRIORITY := {priority});", name(task));
+                let _ = writeln!(
+                    text,
+                    "    TASK {}({single}{interval}PRIORITY := {priority});",
+                    name(task)
+                );
             }
             let mut instance = |node: Node<'_, '_>, task: &str| {
                 let program = super::program(node).text;

@@ -97,7 +97,11 @@ impl Expression {
             (Level::On, _) => other,
             (_, Level::On) => self,
             _ => {
-                let text = format!("{} AND {}", self.within(Level::And), other.within(Level::And));
+                let text = format!(
+                    "{} AND {}",
+                    self.within(Level::And),
+                    other.within(Level::And)
+                );
                 let level = Level::And;
                 Self { text, level }
             }

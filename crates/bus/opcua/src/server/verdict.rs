@@ -1,4 +1,4 @@
-//! What faults make of the answer to a request.
+//! The changes that faults make to the answer to a request.
 
 use std::time::{Duration, Instant};
 

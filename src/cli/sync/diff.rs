@@ -11,7 +11,8 @@ const MOST_LISTED: usize = 20;
 
 /// Find the first step, variable and client at which two recorded runs part.
 ///
-/// The recordings are made by tickbus sync --record. Exit code 1 if the runs differ.
+/// The recordings are made by tickbus sync --record. Exit code 1 if the runs differ, or if
+/// both recordings are cut.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct Arguments {
     /// The recording of a run, a VCD file.
@@ -71,6 +72,12 @@ fn text(compared: &Compared, names: &[String; 2]) -> String {
                 names[1 - shorter]
             ));
             format!("parted step={} reason=\"one ends\"", steps + 1)
+        }
+        Some(Parting::Cut { steps }) => {
+            lines.push(format!(
+                "both recordings are cut after step {steps}; up to there they are equal, and what followed is unknown"
+            ));
+            format!("unknown steps={steps} reason=\"both are cut\"")
         }
         Some(Parting::Hash { step }) => {
             lines.push(

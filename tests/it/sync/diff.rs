@@ -55,6 +55,17 @@ fn two_recorded_runs_are_equal_or_part_at_a_step_a_variable_and_a_client() {
         (told, code),
         (format!("diff: equal steps=40 hash={hash}\n"), Some(0))
     );
+    // Both cut at the same row, as by a power failure.
+    let text = std::fs::read_to_string(&a).expect("text");
+    let at = text.find("#30000000").expect("the row of step 31");
+    let cut = folder.path().join("cut.vcd");
+    std::fs::write(&cut, &text[..at + 12]).expect("written");
+    let (told, code) = diff([&cut, &cut]);
+    assert_eq!(code, Some(1), "{told}");
+    assert!(
+        told.ends_with("diff: unknown steps=29 reason=\"both are cut\"\n"),
+        "{told}"
+    );
     let (told, code) = diff([&a, &c]);
     let [shown_a, shown_c] = [a.display(), c.display()];
     let expected = format!(

@@ -49,6 +49,8 @@ pub(crate) struct Barrier<'l> {
     read_calls: Vec<(usize, usize)>,
     trace: Trace,
     owing: usize,
+    /// The first step in which a client wants to run, after a commit.
+    next_due: u64,
 }
 
 #[derive(Debug)]
@@ -143,6 +145,7 @@ impl<'l> Barrier<'l> {
                 time: Nanos::ZERO - length,
             },
             owing: members.len(),
+            next_due: 0,
             members,
             data,
             logic,
@@ -183,6 +186,16 @@ impl<'l> Barrier<'l> {
             time: self.step.time,
             hash: self.trace.hash(),
         }
+    }
+
+    /// The number of the last step for which virtual time has room.
+    pub(crate) const fn last_step(&self) -> u64 {
+        (i64::MAX / self.length.0).unsigned_abs() + 1
+    }
+
+    /// True if no client wants to run again, between two steps.
+    pub(crate) const fn is_idle_for_ever(&self) -> bool {
+        self.step.sequence < self.last_step() && self.next_due > self.last_step()
     }
 
     /// The declaration of a client.
@@ -302,8 +315,10 @@ impl<'l> Barrier<'l> {
         self.trace.commit(self.step, self.data.committed());
         self.state = State::PreRead;
         let next = self.step.sequence + 1;
+        self.next_due = u64::MAX;
         for member in &mut self.members {
             member.is_due = member.next_update <= next;
+            self.next_due = self.next_due.min(member.next_update);
         }
         Ok(())
     }

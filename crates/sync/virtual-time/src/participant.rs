@@ -13,7 +13,7 @@ pub struct Step {
     pub time: Nanos,
 }
 
-/// A client, which runs in this process, over TCP or through shared memory without knowing which.
+/// A client, which runs in this process, over TCP, a Unix socket or through shared memory without knowing which.
 pub trait Participant {
     /// The variables that the client writes and reads. Called once, before the run.
     fn declare(&self) -> Declaration;
@@ -35,13 +35,16 @@ pub trait Participant {
     /// The virtual time at which the client wants to run next, asked after [`initial`](Self::initial) and after each
     /// [`run`](Self::run), for simulations that know the time of their next event. The client runs in the first step at
     /// or after this time, in the following step at the earliest; the values that it has written stay until then.
-    /// `None`: as declared, by its multiple or interval.
+    /// `None`: as declared, by its multiple or interval. [`Nanos::MAX`]: never again, unless it asks otherwise; a run
+    /// without a number of steps ends when no client wants to run again.
     fn next_update(&self) -> Option<Nanos> {
         None
     }
 
-    /// The server has been waiting for others for a second or more, while this client has nothing to do: `for_whom` is
-    /// a text for people, such as `"plc" to finish step 42`. Called once a second over TCP, and never elsewhere.
+    /// The server waits, and this client has nothing to do: other clients have to join or to finish a step, or the run is
+    /// paused. `for_whom` is a text for people, such as `"plc" to finish step 42`. Over TCP and Unix sockets this is
+    /// called about once a second while the wait lasts; a shorter wait has no call. It is never called through shared
+    /// memory or in one process.
     fn waiting(&mut self, for_whom: &str) {
         let _ = for_whom;
     }

@@ -45,6 +45,12 @@ pub enum Parting {
         /// The number of its steps.
         steps: u64,
     },
+    /// Neither recording was closed, and both end after this number of steps, equal so far: whether the runs part later is
+    /// unknown.
+    Cut {
+        /// The number of steps.
+        steps: u64,
+    },
     /// All values that both have are equal, and the trace hashes are not: there are other clients, or they have other
     /// multiples or another order, or values are NaN with other bits, which a recording does not keep.
     Hash {
@@ -162,10 +168,15 @@ pub fn compare(paths: [&Path; 2]) -> Result<Compared, RecordingError> {
         }
         time = Some(a.tick.time);
     }
+    // A recording that was closed has its counts; one whose disk was full says so.
+    let is_closed = |side: &Side| side.recording.ending().starts_with("ticks=");
+    if compared.parting.is_none() && !is_closed(&a) && !is_closed(&b) {
+        let steps = compared.steps;
+        compared.parting = Some(Parting::Cut { steps });
+    }
     for ((side, path), is_over) in [&a, &b].into_iter().zip(paths).zip(are_over) {
         let ending = side.recording.ending();
-        // A recording that was closed has its counts; one whose disk was full says so.
-        if is_over && !ending.starts_with("ticks=") {
+        if is_over && !is_closed(side) {
             compared.notes.push(format!("{}: {ending}", path.display()));
         }
     }

@@ -157,9 +157,7 @@ impl Server<'_> {
             allowed.window = (allowed.window / 2).max(1);
         }
         allowed.at = now;
-        let room = (i64::MAX - step.time.0.max(0)) / self.settings.step.0;
-        let room = step.sequence.saturating_add(room.unsigned_abs());
-        let mut until = (step.sequence + allowed.window).min(room);
+        let mut until = (step.sequence + allowed.window).min(barrier.last_step());
         until = until.min(self.settings.steps.unwrap_or(u64::MAX));
         if self.is_paused {
             until = until.min(allowed.until.saturating_add(self.singles));

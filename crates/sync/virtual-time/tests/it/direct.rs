@@ -1,6 +1,7 @@
 //! Clients that exchange their values without the server: the run is the same, the server follows, and whoever breaks it
 //! off is named.
 
+use std::collections::VecDeque;
 use std::sync::Mutex;
 use std::thread;
 
@@ -8,9 +9,10 @@ use crate::common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_net::Address;
 use tickbus_virtual_time::server::Control;
+use tickbus_virtual_time::wire::{self, MemberList};
 use tickbus_virtual_time::{
-    Cause, Controls, Declaration, Ended, Hosting, Logic, Outcome, Participant, Settings, Step,
-    in_process, tcp,
+    Cause, Controls, Declaration, Ended, Hosting, Logic, Mesh, Next, Outcome, Participant,
+    Settings, Step, in_process, tcp,
 };
 
 type Ends = Vec<Result<Outcome, Ended>>;
@@ -334,4 +336,125 @@ fn a_client_that_gives_up_or_writes_a_wrong_value_is_named() {
             "{ends:?}"
         );
     }
+}
+
+/// Any order in which frames arrive at the clients gives the run of one process.
+#[test]
+fn no_order_of_frames_between_clients_changes_a_run() {
+    const STEPS: u64 = 12;
+    let expected = in_this_process(STEPS, 3);
+    for seed in 0..2000_u64 {
+        let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut choose = |count: usize| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            usize::try_from(random % count as u64).expect("below a length")
+        };
+        let mut participants = mixers(3);
+        let declared = participants
+            .iter()
+            .map(|mixer| (String::new(), mixer.declare()));
+        let members: Vec<_> = declared.collect();
+        let mut meshes: Vec<Mesh> = (0..3)
+            .map(|own| {
+                let list = MemberList {
+                    token: 1,
+                    step: Nanos::from_millis(1),
+                    own,
+                    members: members.clone(),
+                };
+                Mesh::new(&list).expect("it is right")
+            })
+            .collect();
+        let mut writes = vec![vec![0; 2]; 3];
+        // The frames on their way, by sender and receiver.
+        let mut ways = vec![VecDeque::<Vec<u8>>::new(); 9];
+        let mut allowed = 0;
+        loop {
+            let mut can = Vec::new();
+            for (at, mesh) in meshes.iter_mut().enumerate() {
+                match mesh.next() {
+                    Next::Run(_) => can.push((at, at)),
+                    Next::Wait(_) | Next::Server => {}
+                }
+                can.extend((0..3).map(|from| (from, at)).filter(|(from, to)| {
+                    from != to && !ways[3 * from + to].is_empty() && mesh.takes(*from)
+                }));
+            }
+            if allowed < STEPS {
+                can.push((3, choose(3)));
+            }
+            if can.is_empty() {
+                break;
+            }
+            let (from, to) = can[choose(can.len())];
+            if from == 3 {
+                // The server's message reaches one client before another.
+                allowed += 1;
+                (0..3).for_each(|at| meshes[(to + at) % 3].allow(allowed));
+            } else if from != to {
+                let frame = ways[3 * from + to].pop_front().expect("on its way");
+                meshes[to].hear(from, &frame).expect("it is right");
+            } else if let Next::Run(step) = meshes[to].next() {
+                match step.sequence {
+                    0 => participants[to].initial(&mut writes[to]),
+                    sequence => {
+                        assert!(sequence <= allowed);
+                        let reads = meshes[to].reads();
+                        let ran = participants[to].run(step, reads, &mut writes[to]);
+                        ran.expect("it runs");
+                    }
+                }
+                let mut frame = Vec::new();
+                wire::done(&mut frame, step.sequence, 0, &writes[to]);
+                frame.drain(..wire::HEADER);
+                meshes[to].hear(to, &frame).expect("it is right");
+                for other in (0..3).filter(|other| *other != to) {
+                    ways[3 * to + other].push_back(frame.clone());
+                }
+            }
+        }
+        for mesh in &mut meshes {
+            assert_eq!(mesh.next(), Next::Server, "seed {seed}");
+            assert_eq!(mesh.outcome(), Some(expected), "seed {seed}");
+        }
+    }
+}
+
+#[test]
+fn what_a_client_sends_another_is_checked() {
+    let declared = mixers(2)
+        .into_iter()
+        .map(|mixer| (String::new(), mixer.declare()));
+    let list = MemberList {
+        token: 1,
+        step: Nanos::from_millis(1),
+        own: 0,
+        members: declared.collect(),
+    };
+    let frame = |sequence, writes: &[u64]| {
+        let mut frame = Vec::new();
+        wire::done(&mut frame, sequence, 0, writes);
+        frame.split_off(wire::HEADER)
+    };
+    let mut join = Vec::new();
+    wire::join(&mut join, &list.members[1].1).expect("short names");
+    for (bytes, part) in [
+        (frame(1, &[0, 0]), "answered step 1 in step 0"),
+        (frame(0, &[0]), "wrote 1 values in step 0, expected 2"),
+        (frame(0, &[0, 70_000]), "wrote a wrong value in step 0"),
+        (join.split_off(wire::HEADER), "something else than values"),
+        (vec![2, 0], "too short"),
+    ] {
+        let mut mesh = Mesh::new(&list).expect("it is right");
+        let told = mesh.hear(1, &bytes).expect_err("it is wrong");
+        assert!(told.contains(part), "{told}");
+    }
+    let twice = MemberList {
+        members: vec![list.members[0].clone(), list.members[0].clone()],
+        ..list.clone()
+    };
+    Mesh::new(&twice).expect_err("two of one name");
+    Mesh::new(&MemberList { own: 2, ..list }).expect_err("not in the list");
 }

@@ -19,12 +19,19 @@ struct Events {
     ran: Vec<u64>,
     /// False: it runs in each step, and does nothing in those without an event.
     asks: bool,
+    /// True beside the counter.
+    checks: bool,
 }
 
 impl Events {
     fn new(times: &[i64], asks: bool) -> Self {
         let (times, ran) = (times.to_vec(), Vec::new());
-        Self { times, ran, asks }
+        Self {
+            times,
+            ran,
+            asks,
+            checks: true,
+        }
     }
 }
 
@@ -40,7 +47,9 @@ impl Participant for Events {
 
     fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
         self.ran.push(step.sequence);
-        assert_eq!(reads[0], step.sequence - 1, "the newest value is read");
+        if self.checks {
+            assert_eq!(reads[0], step.sequence - 1, "the newest value is read");
+        }
         let passed = self.times.iter().filter(|time| **time <= step.time.0);
         writes[0] = passed.count() as u64;
         Ok(())
@@ -174,4 +183,65 @@ fn a_step_that_has_passed_is_the_following_one_and_none_is_that_of_the_multiple(
         [0_u64; 0],
         "after the end"
     );
+}
+
+#[test]
+fn a_run_without_an_end_is_over_when_no_client_wants_to_run_again() {
+    let mut endless = twelve();
+    endless.steps = None;
+    let unchecked = |times: &[i64]| Events {
+        checks: false,
+        ..Events::new(times, true)
+    };
+    let mut events = unchecked(&TIMES);
+    let mut other = unchecked(&[4_000_000]);
+    let expected = {
+        let mut declared = Renamed(&mut other);
+        let clients: Vec<&mut dyn Participant> = vec![&mut events, &mut declared];
+        in_process::run(endless.clone(), clients, Logic::new()).expect("it ends")
+    };
+    assert_eq!((expected.steps, &*events.ran), (9, &[1, 4, 8, 9][..]));
+    for direct in [false, true] {
+        let settings = Settings {
+            direct,
+            ..endless.clone()
+        };
+        let listener = tcp::Listener::bind(&Address::local(0)).expect("a free port");
+        let address = Address::local(listener.address().port());
+        let outcome = thread::scope(|scope| {
+            scope.spawn(|| tcp::join(&address, &mut unchecked(&TIMES)).expect("it ends"));
+            scope.spawn(|| {
+                let mut other = unchecked(&[4_000_000]);
+                tcp::join(&address, &mut Renamed(&mut other)).expect("it ends")
+            });
+            let hosting = Hosting {
+                clock: &*Monotonic::shared(),
+                controls: &Controls::default(),
+                news: &mut |_| {},
+            };
+            listener.run(settings, Logic::new(), hosting)
+        });
+        assert_eq!(outcome, Ok(expected), "direct: {direct}");
+    }
+}
+
+/// Events of another client, the one that counts in the tests above.
+struct Renamed<'e>(&'e mut Events);
+
+impl Participant for Renamed<'_> {
+    fn declare(&self) -> Declaration {
+        let mut declaration = Declaration::new("counter");
+        declaration.writes = vec![Variable::new("x", DataType::Udint)];
+        declaration
+    }
+
+    fn initial(&mut self, _: &mut [u64]) {}
+
+    fn run(&mut self, step: Step, reads: &[u64], writes: &mut [u64]) -> Result<(), String> {
+        self.0.run(step, reads, writes)
+    }
+
+    fn next_update(&self) -> Option<Nanos> {
+        self.0.next_update()
+    }
 }

@@ -181,6 +181,10 @@ fn a_run_that_ends_earlier_is_told_with_its_number_of_steps() {
     };
     assert_eq!(compared.parting, Some(parting));
     assert!(compared.notes[0].ends_with("never ended"), "{compared:?}");
+    // Two that are cut at the same row.
+    let compared = self::compared(&cut, &cut);
+    assert_eq!(compared.parting, Some(Parting::Cut { steps: 39 }));
+    assert_eq!(compared.notes.len(), 2, "{compared:?}");
 }
 
 #[test]

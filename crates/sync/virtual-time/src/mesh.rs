@@ -91,7 +91,7 @@ impl Mesh {
     }
 
     /// Advances as far as possible.
-    pub fn next(&mut self) -> Next {
+    pub fn advance(&mut self) -> Next {
         loop {
             if self.barrier.is_owing(self.own) {
                 return Next::Run(self.barrier.step());

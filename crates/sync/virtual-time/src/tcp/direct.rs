@@ -189,7 +189,7 @@ impl DirectLine {
             if direct.broken.is_some() {
                 return self.await_end();
             }
-            match direct.mesh.next() {
+            match direct.mesh.advance() {
                 Next::Run(step) => {
                     self.frame.clear();
                     let reads = direct.mesh.reads();
@@ -237,9 +237,8 @@ impl DirectLine {
         loop {
             match self.hear_server(GRACE) {
                 Ok(Heard::Frame) if wire::is_end(&self.frame) => return Ok(()),
-                Ok(_) => {}
                 Err(ended) if ended.cause != Cause::Hung || has_told => return Err(ended),
-                Err(_) => {}
+                Ok(_) | Err(_) => {}
             }
             // Otherwise the reason of the server is the better one: it knows who has gone.
             if !has_told && self.server.clock().now() >= begun + GRACE - LOOK {

@@ -34,7 +34,7 @@ const FAREWELL: Nanos = Nanos::from_secs(1);
 /// A server that listens for its clients.
 #[derive(Debug)]
 pub struct Listener {
-    listener: TcpListener,
+    socket: TcpListener,
     address: SocketAddr,
     place: String,
 }
@@ -55,9 +55,9 @@ impl Listener {
     ///
     /// The same as for `bind`.
     pub fn bind_in(address: &Address, simulation: Option<&dyn Simulation>) -> io::Result<Self> {
-        let (listener, address) = bind(address, simulation)?;
+        let (socket, address) = bind(address, simulation)?;
         Ok(Self {
-            listener,
+            socket,
             address,
             place: address.to_string(),
         })
@@ -72,10 +72,10 @@ impl Listener {
     /// sockets.
     #[cfg(unix)]
     pub fn bind_local(address: &LocalAddress) -> io::Result<Self> {
-        let listener = TcpListener::Local(LocalListener::bind(address.path())?);
+        let socket = TcpListener::Local(LocalListener::bind(address.path())?);
         Ok(Self {
-            address: listener.local_addr()?,
-            listener,
+            address: socket.local_addr()?,
+            socket,
             place: address.to_string(),
         })
     }
@@ -137,7 +137,7 @@ impl Listener {
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
         let locals = Locals::join(&mut server, now, locals);
         let mut set = PollSet::new(hosting.controls.stop());
-        let mut acceptor = Acceptor::new(self.listener, Acceptor::KEY);
+        let mut acceptor = Acceptor::new(self.socket, Acceptor::KEY);
         acceptor.watch(now, &mut set).map_err(cannot)?;
         let mut host = Host {
             server,

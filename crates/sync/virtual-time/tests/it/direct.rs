@@ -374,7 +374,7 @@ fn no_order_of_frames_between_clients_changes_a_run() {
         loop {
             let mut can = Vec::new();
             for (at, mesh) in meshes.iter_mut().enumerate() {
-                match mesh.next() {
+                match mesh.advance() {
                     Next::Run(_) => can.push((at, at)),
                     Next::Wait(_) | Next::Server => {}
                 }
@@ -396,7 +396,7 @@ fn no_order_of_frames_between_clients_changes_a_run() {
             } else if from != to {
                 let frame = ways[3 * from + to].pop_front().expect("on its way");
                 meshes[to].hear(from, &frame).expect("it is right");
-            } else if let Next::Run(step) = meshes[to].next() {
+            } else if let Next::Run(step) = meshes[to].advance() {
                 match step.sequence {
                     0 => participants[to].initial(&mut writes[to]),
                     sequence => {
@@ -416,7 +416,7 @@ fn no_order_of_frames_between_clients_changes_a_run() {
             }
         }
         for mesh in &mut meshes {
-            assert_eq!(mesh.next(), Next::Server, "seed {seed}");
+            assert_eq!(mesh.advance(), Next::Server, "seed {seed}");
             assert_eq!(mesh.outcome(), Some(expected), "seed {seed}");
         }
     }

@@ -19,7 +19,7 @@ record Word(String text, String written, int line, int column) {
     private static final Pattern ONE = Pattern.compile(
         "(?<skip>\\s+|//[^\\n]*|\\(\\*(?s:.*?)\\*\\)|\\{[^}]*\\})"
             + "|%[A-Za-z]+[0-9.]+|(?:T|t|TIME|time)#[-0-9A-Za-z_.]+|16#[0-9A-Fa-f_]+|2#[01_]+|8#[0-7_]+|[0-9][0-9_]*(?:\\.[0-9]+)?"
-            + "|[A-Za-z_][A-Za-z0-9_]*|:=|<=|>=|<>|[-+*/()=<>;:,.&\\[\\]#]");
+            + "|[A-Za-z_][A-Za-z0-9_]*|:=|<=|>=|<>|\\((?!\\*)|[-+*/)=<>;:,.&\\[\\]#]");
 
     static List<Word> all(String file, String text) {
         List<Word> words = new ArrayList<>();
@@ -29,7 +29,7 @@ record Word(String text, String written, int line, int column) {
         int at = 0;
         while (at < text.length()) {
             if (!matcher.region(at, text.length()).lookingAt()) {
-                throw new NetException(file, line, "", "column " + (at - lineStart + 1) + ": '" + text.charAt(at)
+                throw new NetException(file, line, "", "column " + (at - lineStart + 1) + ": '" + shown(text.charAt(at))
                     + "' begins no word" + (text.startsWith("(*", at) ? "; the comment has no end" : ""));
             }
             if (matcher.group("skip") == null) {
@@ -45,5 +45,10 @@ record Word(String text, String written, int line, int column) {
         }
         words.add(new Word("", "the end of the file", line, text.length() - lineStart + 1));
         return words;
+    }
+
+    /** Without control characters, which a terminal would execute. */
+    private static char shown(char of) {
+        return Character.isISOControl(of) ? '\uFFFD' : of;
     }
 }

@@ -42,7 +42,7 @@ class CompiledByIec2cTest {
     @Test
     void aSequenceWithTimesAndAJumpBack() throws Exception {
         compare("""
-              INITIAL_STEP idle: u(); END_STEP
+              INITIAL_STEP idle: u(N); END_STEP
               STEP fill: v(N); w(D, T#30ms); END_STEP
               STEP stir: x(L, T#25ms); count(N); y(N); END_STEP
               ACTION count: n := n + 1; m := (n * 3 - m) MOD 17; END_ACTION

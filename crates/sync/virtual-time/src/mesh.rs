@@ -9,7 +9,7 @@ use crate::logic::Logic;
 use crate::wire::{self, FromClient, MemberList};
 use crate::{Outcome, Step};
 
-/// What a client has to do next.
+/// The next action of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Next {
     /// Run this step, which reads [`Mesh::reads`], and [hear](Mesh::hear) the own answer. Step 0: the initial values.

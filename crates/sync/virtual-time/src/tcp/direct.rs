@@ -69,7 +69,7 @@ struct Direct {
     has_ended: bool,
 }
 
-/// What a frame of the server changes.
+/// The effect of a frame of the server.
 enum Heard {
     Nothing,
     /// The frame is for the client.

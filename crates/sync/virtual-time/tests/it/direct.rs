@@ -17,7 +17,7 @@ use tickbus_virtual_time::{
 
 type Ends = Vec<Result<Outcome, Ended>>;
 
-/// What a run says at its start, if its clients exchange their values.
+/// The news of a run whose clients exchange their values.
 const DIRECTLY: &str = "the clients exchange their values directly";
 
 /// A run with a thread for each client, at a Unix socket or over TCP: the server's result, those of the clients, and the
@@ -256,7 +256,7 @@ fn a_client_that_hangs_is_named_with_its_step() {
     let good = |name| {
         let sender = &sender;
         Waits(client(name, 1, &[], &["x"], |_, _, _| Ok(())), move || {
-            drop(sender.lock().expect("no panic").take())
+            drop(sender.lock().expect("no panic").take());
         })
     };
     let clients: Vec<Box<dyn Participant + Send>> = vec![

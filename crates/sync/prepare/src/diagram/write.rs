@@ -22,7 +22,7 @@ const WORK: usize = 200_000;
 /// The unit around a diagram.
 pub(crate) struct Unit<'u> {
     pub(crate) name: &'u str,
-    /// Its variables, by their names in capitals.
+    /// The variables of the unit, by their names in capitals.
     pub(crate) variables: &'u HashMap<String, Type>,
     pub(crate) library: &'u Library,
 }

@@ -51,52 +51,62 @@ async def make_certificate(folder, uri):
     )
 
 
-async def compare(client, file, uri):
-    """Reads every node of the file's namespace from the server, and from asyncua's own import of the file."""
-    own = Server()
-    await own.init()
-    await own.import_xml(file)
-    here, there = await own.get_namespace_index(uri), await client.get_namespace_index(uri)
-    attributes = [ua.AttributeIds.NodeClass, ua.AttributeIds.BrowseName, ua.AttributeIds.DisplayName]
-    differ, count = [], 0
-    own_uris, uris = await own.get_namespace_array(), await client.get_namespace_array()
+ATTRIBUTES = [ua.AttributeIds.NodeClass, ua.AttributeIds.BrowseName, ua.AttributeIds.DisplayName]
 
-    def theirs(index):
-        return uris.index(own_uris[index]) if index else 0
 
+async def facts(node):
+    """The attributes of a node, and its references."""
+    values = [(await node.read_attribute(attribute)).Value.Value for attribute in ATTRIBUTES]
+    return values, await node.get_references()
+
+
+async def imported(file, uri):
+    """asyncua's own import of a NodeSet file: its namespaces, and of each node of `uri` its facts."""
+    server = Server()
+    await server.init()
+    await server.import_xml(file)
+    index = await server.get_namespace_index(uri)
     # asyncua adds some nodes of its own.
     listed = {element.get("NodeId") for element in ElementTree.parse(file).getroot()} - {None}
     listed = {ua.NodeId.from_string(id) for id in listed}
     listed = {(id.Identifier, id.NodeIdType) for id in listed if id.NamespaceIndex == 1}
-    for id in list(own.iserver.aspace._nodes):
-        if id.NamespaceIndex != here or (id.Identifier, id.NodeIdType) not in listed:
-            continue
-        count += 1
-        mine = own.get_node(id)
-        other = client.get_node(ua.NodeId(id.Identifier, there, id.NodeIdType))
+    ids = [id for id in list(server.iserver.aspace._nodes) if id.NamespaceIndex == index]
+    ids = [id for id in ids if (id.Identifier, id.NodeIdType) in listed]
+    return await server.get_namespace_array(), {id: await facts(server.get_node(id)) for id in ids}
+
+
+async def compare(client, file, uri):
+    """Reads every node of the file's namespace from the server, and from asyncua's own import of the file."""
+    # In a thread: the import takes seconds, and the client's session must be kept meanwhile.
+    own_uris, own = await asyncio.to_thread(lambda: asyncio.run(imported(file, uri)))
+    uris = await client.get_namespace_array()
+    there, differ = uris.index(uri), []
+
+    def theirs(index):
+        return uris.index(own_uris[index]) if index else 0
+
+    def same(references, change):
+        def one(id):
+            return change(id.NamespaceIndex), str(id.Identifier)
+
+        return {(one(r.ReferenceTypeId), r.IsForward, one(r.NodeId)) for r in references}
+
+    for id, (mine, references) in own.items():
         try:
-            for attribute in attributes:
-                a, b = [(await one.read_attribute(attribute)).Value.Value for one in (mine, other)]
-                if attribute == ua.AttributeIds.BrowseName:
-                    a = ua.QualifiedName(a.Name, theirs(a.NamespaceIndex))
-                if attribute == ua.AttributeIds.DisplayName:
-                    a, b = a.Text, b.Text
-                if a != b:
-                    differ.append(f"{id.to_string()} {attribute.name}: {a} and {b}")
-            found = []
-            for one, change in ((mine, theirs), (other, lambda index: index)):
-                references = await one.get_references()
-                found.append({
-                    (r.ReferenceTypeId.to_string() if r.ReferenceTypeId.NamespaceIndex == 0
-                     else (change(r.ReferenceTypeId.NamespaceIndex), r.ReferenceTypeId.Identifier), r.IsForward,
-                     change(r.NodeId.NamespaceIndex), str(r.NodeId.Identifier))
-                    for r in references
-                })
-            if found[0] != found[1]:
-                differ.append(f"{id.to_string()} references: {sorted(map(str, found[0] ^ found[1]))[:4]}")
+            other = client.get_node(ua.NodeId(id.Identifier, there, id.NodeIdType))
+            found, found_references = await facts(other)
         except Exception as error:
             differ.append(f"{id.to_string()}: {type(error).__name__} {error}")
-    return {"nodes": count, "differ": differ}
+            continue
+        name, text = mine[1], mine[2].Text
+        expected = (mine[0], theirs(name.NamespaceIndex), name.Name, text)
+        got = (found[0], found[1].NamespaceIndex, found[1].Name, found[2].Text)
+        if expected != got:
+            differ.append(f"{id.to_string()}: {expected} and {got}")
+        only = same(references, theirs) ^ same(found_references, lambda index: index)
+        if only:
+            differ.append(f"{id.to_string()} references: {sorted(map(str, only))[:4]}")
+    return {"nodes": len(own), "differ": differ}
 
 
 async def lines():

@@ -4,7 +4,6 @@ use std::collections::{HashMap, VecDeque};
 use std::fmt;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Instant;
 
 use async_trait::async_trait;
 use opcua::core::sync::RwLock;
@@ -173,7 +172,6 @@ impl Signals {
         let signal = |id: &NodeId| self.by_node.get(id).map(|variable| variable.signal);
         let signals = nodes.iter().filter_map(|node| signal(&node.node_id));
         let signals = signals.collect();
-        let since = Instant::now();
         let (done, ready) = oneshot::channel();
         let visit = Visit::Reads(Visitor::of(context), signals, is_read, done);
         self.own.inbox.push(visit);
@@ -188,7 +186,7 @@ impl Signals {
             });
             read.collect()
         };
-        verdict.hold(since).await;
+        verdict.hold().await;
         read
     }
 
@@ -422,13 +420,12 @@ impl InMemoryNodeManagerImpl for Signals {
         let nodes = nodes_to_write.iter();
         let signals = nodes.filter_map(|node| self.by_node.get(&node.value().node_id));
         let signals = signals.map(|variable| variable.signal).collect();
-        let since = Instant::now();
         let (done, ready) = oneshot::channel();
         self.own.inbox.push(Visit::Writes(signals, done));
         // Fails if the bus has stopped.
         let verdict = ready.await.unwrap_or_default();
         self.carry_out(context, address_space, nodes_to_write, &verdict);
-        verdict.hold(since).await;
+        verdict.hold().await;
         Ok(())
     }
 }

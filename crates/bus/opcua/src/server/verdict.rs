@@ -1,12 +1,8 @@
 //! The changes that faults make to the answer to a request.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use opcua::types::StatusCode;
-
-/// By how much a timer of the runtime can be late: it counts whole milliseconds, and so does the wait of the system
-/// below it.
-const TIMER: Duration = Duration::from_millis(4);
 
 /// How faults change the answer to a request.
 #[derive(Debug, Default)]
@@ -24,15 +20,10 @@ impl Verdict {
         found.map(|(_, status)| *status)
     }
 
-    /// Holds the answer to a request that came at `since` back.
-    pub(super) async fn hold(&self, since: Instant) {
-        if self.late.is_zero() {
-            return;
-        }
-        let due = since + self.late;
-        tokio::time::sleep(self.late.saturating_sub(TIMER)).await;
-        while Instant::now() < due {
-            tokio::task::yield_now().await;
+    /// Holds the answer back. The timer counts whole milliseconds, so that the answer goes out up to 2 ms later.
+    pub(super) async fn hold(&self) {
+        if !self.late.is_zero() {
+            tokio::time::sleep(self.late).await;
         }
     }
 }

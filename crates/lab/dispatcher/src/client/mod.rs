@@ -389,14 +389,13 @@ impl Client {
         }
         self.progress = Progress::Idle;
         match request {
-            Request::Key => {}
+            Request::Key | Request::List => {}
             Request::Identify => events(Event::Identified),
             Request::Connect(at) => {
                 self.wishes[at] = Wish::Granted;
                 events(Event::Connected(&self.profile.cables[at]));
             }
             Request::Label => self.labelled += 1,
-            Request::List => {}
             Request::Ping => {
                 if !std::mem::replace(&mut self.is_settled, true) {
                     events(Event::Settled);

@@ -44,6 +44,7 @@ use check::World;
 use code::Code;
 use lexer::Kind;
 use outline::Outline;
+use plan::Plan;
 use structured_text::{Preparation, plan};
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, PlacedMistake, shown};
@@ -203,28 +204,7 @@ fn prepared(
     }
     let (home, configuration) = found?;
     let (plan, note) = plan(&codes[home], configuration, &wrong[home]);
-    let mut remarks = Vec::new();
-    for (code, (outline, wrong)) in codes.iter().zip(outlines.iter().zip(wrong)) {
-        if code.comments == Comments::Nested && settings.comments.is_none() {
-            let first = code.all.iter().find(|token| {
-                let text = &code.text[token.range()];
-                token.kind == Kind::Comment && text.get(2..).is_some_and(|text| text.contains("(*"))
-            });
-            let at = first.map_or(0, |token| token.start);
-            let remark =
-                "a comment is within a comment: compile with the option for that (-n of iec2c)";
-            remarks.push(placed_remark(wrong, at, remark));
-        }
-        for unit in &outline.units {
-            if let Some(interval) = plan.interval(&code.capitals(unit.name)) {
-                let found = cycle::differing(code, &unit.body, interval).into_iter();
-                remarks.extend(found.map(|(at, remark)| placed_remark(wrong, at, &remark)));
-            }
-            let known = check::variables(code, unit);
-            let is_run = |name: &str| plan.programs.contains_key(name);
-            check::check_callers(code, &unit.body, &known, is_run, wrong);
-        }
-    }
+    let remarks = check_runs(&codes, &outlines, &plan, settings, wrong);
     for instance in &configuration.instances {
         let name = codes[home].capitals(instance.program);
         if !world.types.contains(&name) {
@@ -252,6 +232,46 @@ fn prepared(
     let files = files.map(|(index, part)| part.text((index == home).then_some(blocks.as_str())));
     let notes = note.into_iter().chain(shared).chain(remarks);
     Some((files.collect(), notes.collect()))
+}
+
+/// Reports calls of programs that a task runs; returns remarks about comments and cycles.
+fn check_runs(
+    codes: &[Code<'_>],
+    outlines: &[Outline],
+    plan: &Plan,
+    settings: &Settings,
+    wrong: &[Collector<'_>],
+) -> Vec<String> {
+    let mut remarks = Vec::new();
+    for (code, (outline, wrong)) in codes.iter().zip(outlines.iter().zip(wrong)) {
+        if settings.comments.is_none() {
+            remarks.extend(nested_remark(code, wrong));
+        }
+        for unit in &outline.units {
+            if let Some(interval) = plan.interval(&code.capitals(unit.name)) {
+                let found = cycle::differing(code, &unit.body, interval).into_iter();
+                remarks.extend(found.map(|(at, remark)| placed_remark(wrong, at, &remark)));
+            }
+            let known = check::variables(code, unit);
+            let is_run = |name: &str| plan.programs.contains_key(name);
+            check::check_callers(code, &unit.body, &known, is_run, wrong);
+        }
+    }
+    remarks
+}
+
+/// A remark about a comment within a comment, if there is one.
+fn nested_remark(code: &Code<'_>, wrong: &Collector<'_>) -> Option<String> {
+    let mut all = code
+        .all
+        .iter()
+        .filter(|_| code.comments == Comments::Nested);
+    let first = all.find(|token| {
+        let text = &code.text[token.range()];
+        token.kind == Kind::Comment && text.get(2..).is_some_and(|text| text.contains("(*"))
+    })?;
+    let remark = "a comment is within a comment: compile with the option for that (-n of iec2c)";
+    Some(placed_remark(wrong, first.start, remark))
 }
 
 /// A remark with its place.

@@ -236,7 +236,7 @@ impl<'a, 'i> Project<'a, 'i> {
                 }
                 if let Some(diagram) = drawn(body) {
                     self.check_drawn(diagram, &known, world, &|name| run.contains(name));
-                    let is_program = body.parent() == Some(unit) && self.is_run(unit, &run);
+                    let is_program = body.parent() == Some(unit) && is_run(unit, &run);
                     if is_program && let Some(written) = self.written(unit, diagram) {
                         let form = Form::Drawn(diagram, written);
                         found.push(Body { unit, form });
@@ -284,12 +284,6 @@ impl<'a, 'i> Project<'a, 'i> {
             }
         }
         found
-    }
-
-    /// True if a task runs a unit.
-    fn is_run(&self, unit: Node<'_, '_>, run: &HashSet<String>) -> bool {
-        let name = unit.attribute("name").unwrap_or_default();
-        unit.attribute("pouType") == Some("program") && run.contains(&name.to_uppercase())
     }
 
     /// The text of statements with blanks in place of markup, so that each byte keeps its position; and the start of
@@ -582,6 +576,12 @@ impl<'a, 'i> Project<'a, 'i> {
         }
         Some(())
     }
+}
+
+/// True if a task runs a unit.
+fn is_run(unit: Node<'_, '_>, run: &HashSet<String>) -> bool {
+    let name = unit.attribute("name").unwrap_or_default();
+    unit.attribute("pouType") == Some("program") && run.contains(&name.to_uppercase())
 }
 
 /// A file in XML together with other files.

@@ -54,8 +54,7 @@ pub(crate) fn origin(block: &Element, wire: &Wire) -> Option<usize> {
 
 /// True if this pin is the result of a function, and not one of its other outputs.
 pub(crate) fn is_result(pin: &Pin, name: &str, library: &Library) -> bool {
-    let is_parameter =
-        (library.signature(name)).is_some_and(|one| one.parameter(&pin.name).is_some());
+    let is_parameter = (library.signature(name)).is_some_and(|one| one.has(&pin.name));
     !is_parameter && !pin.name.eq_ignore_ascii_case("ENO")
 }
 
@@ -122,8 +121,11 @@ impl Types {
     ) {
         let bool = || Type::named("BOOL");
         let (known, input, output) = match &element.kind {
-            Kind::Rail | Kind::Contact { .. } | Kind::Coil { .. } => (Some(bool()), 0, 0),
-            Kind::Jump { .. } | Kind::Return { .. } => (Some(bool()), 0, 0),
+            Kind::Rail
+            | Kind::Contact { .. }
+            | Kind::Coil { .. }
+            | Kind::Jump { .. }
+            | Kind::Return { .. } => (Some(bool()), 0, 0),
             Kind::Input { expression, .. }
             | Kind::Output { expression, .. }
             | Kind::InOut { expression, .. } => (type_of(expression, variables, library), 0, 0),
@@ -139,10 +141,7 @@ impl Types {
                         return Some(bool());
                     }
                     let signature = signature.as_ref()?;
-                    match signature.parameter(&pin.name) {
-                        Some(kind) => kind.cloned(),
-                        None => None,
-                    }
+                    signature.parameter(&pin.name).cloned()
                 };
                 for (number, pin) in inputs.iter().enumerate() {
                     let written = pin.expression.as_ref();

@@ -100,15 +100,13 @@ impl Reader<'_> {
             let right = "export the project again from its editor";
             return self.refuse(node, at, "there is no number localId", right);
         };
-        let order = match node.attribute("executionOrderId") {
-            None => 0,
-            Some(_) => match number(node, "executionOrderId") {
-                Some(order) => order,
-                None => {
-                    let what = "the executionOrderId is no number";
-                    return self.refuse(node, at, what, "take it out");
-                }
-            },
+        let order = if node.attribute("executionOrderId").is_none() {
+            0
+        } else if let Some(order) = number(node, "executionOrderId") {
+            order
+        } else {
+            let what = "the executionOrderId is no number";
+            return self.refuse(node, at, what, "take it out");
         };
         let kind = self.kind(node)?;
         Some(Element {
@@ -277,8 +275,7 @@ impl Reader<'_> {
             };
             let last = wire
                 .children()
-                .filter(|node| node.tag_name().name() == "position")
-                .last();
+                .rfind(|node| node.tag_name().name() == "position");
             pin.wires.push(Wire {
                 id,
                 parameter: wire

@@ -44,12 +44,22 @@ pub(crate) struct Signature {
 }
 
 impl Signature {
-    /// The type of a parameter: `Some(None)` if it has one that is unknown.
-    pub(crate) fn parameter(&self, name: &str) -> Option<Option<&Type>> {
+    /// The type of a parameter, if it is known.
+    pub(crate) fn parameter(&self, name: &str) -> Option<&Type> {
+        let mut all = self.parameters();
+        let (_, kind) = all.find(|(one, _)| one.eq_ignore_ascii_case(name))?;
+        kind.as_ref()
+    }
+
+    /// True if there is a parameter of this name.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        let mut all = self.parameters();
+        all.any(|(one, _)| one.eq_ignore_ascii_case(name))
+    }
+
+    fn parameters(&self) -> impl Iterator<Item = &(String, Option<Type>)> {
         let lists = [&self.inputs, &self.outputs, &self.in_outs];
-        let mut all = lists.into_iter().flatten();
-        all.find(|(one, _)| one.eq_ignore_ascii_case(name))
-            .map(|(_, kind)| kind.as_ref())
+        lists.into_iter().flatten()
     }
 }
 
@@ -150,7 +160,7 @@ impl Library {
             return members.get(&member.to_uppercase()).cloned();
         }
         let signature = self.signature(name)?;
-        signature.parameter(member)?.cloned()
+        signature.parameter(member).cloned()
     }
 }
 

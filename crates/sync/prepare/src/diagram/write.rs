@@ -19,6 +19,9 @@ const DEPTH: usize = 200;
 /// Evaluated elements of one unit, with repetitions: a ladder with more ways than this is refused.
 const WORK: usize = 200_000;
 
+/// The wires behind a contact, sorted: their elements and parameters.
+type Key<'d> = Vec<(u64, &'d str)>;
+
 /// The unit around a diagram.
 pub(crate) struct Unit<'u> {
     pub(crate) name: &'u str,
@@ -53,6 +56,9 @@ pub(crate) fn write(diagram: &Diagram, unit: &Unit<'_>, wrong: &Collector<'_>) -
     writer.networks(&networks(diagram))?;
     Some(writer.made)
 }
+
+/// The value at a pin; `None` if nothing leads to it.
+struct Value(Option<Expression>);
 
 struct Writer<'w> {
     diagram: &'w Diagram,
@@ -157,7 +163,7 @@ impl<'w> Writer<'w> {
         let element = &self.diagram.elements[at];
         match &element.kind {
             Kind::Coil { variable, input } => {
-                let Some(value) = self.pin(at, input, false)? else {
+                let Some(value) = self.pin(at, input, false)?.0 else {
                     return Some(());
                 };
                 self.assign(element, variable, input.modifier, value, None)
@@ -167,13 +173,13 @@ impl<'w> Writer<'w> {
                 expression, input, ..
             } => {
                 let enable = self.enable_output(input);
-                let Some(value) = self.pin(at, input, false)? else {
+                let Some(value) = self.pin(at, input, false)?.0 else {
                     return Some(());
                 };
                 self.assign(element, expression, input.modifier, value, enable)
             }
             Kind::Return { input } => {
-                let value = self.pin(at, input, false)?;
+                let value = self.pin(at, input, false)?.0;
                 let value = self.modified(
                     element,
                     input.modifier,
@@ -183,7 +189,7 @@ impl<'w> Writer<'w> {
                 Some(())
             }
             Kind::Jump { input, .. } => {
-                let value = self.pin(at, input, false)?;
+                let value = self.pin(at, input, false)?.0;
                 let value = self.modified(
                     element,
                     input.modifier,
@@ -266,14 +272,14 @@ impl<'w> Writer<'w> {
         Some(Expression::primary(format!("{name}.Q")))
     }
 
-    /// The value at a pin of an element: that of its wires, joined by OR; `Some(None)` if it has none.
-    fn pin(&mut self, at: usize, pin: &Pin, ordered: bool) -> Option<Option<Expression>> {
+    /// The value at a pin of an element: that of its wires, joined by OR.
+    fn pin(&mut self, at: usize, pin: &Pin, ordered: bool) -> Option<Value> {
         let element = &self.diagram.elements[at];
         if let Some(text) = &pin.expression {
-            return Some(Some(Expression::of_text(text)));
+            return Some(Value(Some(Expression::of_text(text))));
         }
         if pin.wires.is_empty() {
-            return Some(None);
+            return Some(Value(None));
         }
         if pin.wires.len() > 1 {
             let inputs = element.kind.inputs();
@@ -289,17 +295,17 @@ impl<'w> Writer<'w> {
         self.running.push(at);
         let value = self.any(&pin.wires, ordered);
         self.running.pop();
-        value.map(Some)
+        value.map(|value| Value(Some(value)))
     }
 
     /// The values of these wires, joined by OR. Parallel contacts behind the same wires share them.
     fn any(&mut self, wires: &[Wire], ordered: bool) -> Option<Expression> {
-        let mut groups: Vec<(Option<Vec<(u64, &str)>>, Vec<&Wire>)> = Vec::new();
+        let mut groups: Vec<(Option<Key<'_>>, Vec<&Wire>)> = Vec::new();
         for wire in wires {
             let from = &self.diagram.elements[self.diagram.by_id[&wire.id]];
             let key = match &from.kind {
                 Kind::Contact { input, .. } if input.expression.is_none() => {
-                    let mut key: Vec<(u64, &str)> = (input.wires.iter())
+                    let mut key: Key<'_> = (input.wires.iter())
                         .map(|wire| (wire.id, wire.parameter.as_str()))
                         .collect();
                     key.sort_unstable();
@@ -353,12 +359,11 @@ impl<'w> Writer<'w> {
             return None;
         };
         self.check_loop(at)?;
-        match self.pin(at, input, ordered)? {
-            Some(value) => Some(value),
-            None => {
-                let right = "draw a wire to it, from the power rail for example";
-                self.refuse(element, element.at, "nothing leads to this contact", right)
-            }
+        if let Some(value) = self.pin(at, input, ordered)?.0 {
+            Some(value)
+        } else {
+            let right = "draw a wire to it, from the power rail for example";
+            self.refuse(element, element.at, "nothing leads to this contact", right)
         }
     }
 
@@ -397,12 +402,11 @@ impl<'w> Writer<'w> {
             }
             Kind::Coil { input, .. } => {
                 self.check_loop(at)?;
-                match self.pin(at, input, false)? {
-                    Some(value) => Some(value),
-                    None => {
-                        let right = "draw a wire to it, from the power rail for example";
-                        self.refuse(element, element.at, "nothing leads to this coil", right)
-                    }
+                if let Some(value) = self.pin(at, input, false)?.0 {
+                    Some(value)
+                } else {
+                    let right = "draw a wire to it, from the power rail for example";
+                    self.refuse(element, element.at, "nothing leads to this coil", right)
                 }
             }
             Kind::Continuation { name } => self.continued(element, name, ordered),
@@ -433,7 +437,7 @@ impl<'w> Writer<'w> {
             return self.refuse(second, second.at, &what, "give it another name");
         }
         self.check_loop(at)?;
-        let Some(value) = self.pin(at, &connector.kind.inputs()[0], ordered)? else {
+        let Some(value) = self.pin(at, &connector.kind.inputs()[0], ordered)?.0 else {
             let what = format!("nothing leads to the connector {}", shown(name));
             return self.refuse(connector, connector.at, &what, "draw a wire to it");
         };

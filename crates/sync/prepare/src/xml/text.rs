@@ -67,7 +67,7 @@ impl Project<'_, '_> {
         let result =
             result.map_or_else(String::new, |result| format!(" : {}", self.kind(result, 0)));
         let _ = writeln!(text, "{keyword} {name}{result}");
-        for list in interface.iter().flat_map(|interface| interface.children()) {
+        for list in interface.iter().flat_map(Node::children) {
             self.section(list, text);
         }
         let Some(body) = child(unit, "body") else {
@@ -122,7 +122,7 @@ impl Project<'_, '_> {
         for is_located in [false, true] {
             let is_located_so = |node: &Node<'_, '_>| {
                 let address = node.attribute("address").unwrap_or_default();
-                !address.is_empty() == is_located
+                address.is_empty() != is_located
             };
             let mut variables = variables().filter(is_located_so).peekable();
             if variables.peek().is_none() {

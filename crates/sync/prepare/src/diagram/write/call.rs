@@ -58,7 +58,7 @@ impl Writer<'_> {
                 .iter()
                 .any(|one| !pin.name.is_empty() && one.name == pin.name);
             let value = self.pin(at, pin, element.order > 0)?;
-            let value = match value {
+            let value = match value.0 {
                 None if is_both => {
                     let what = format!("nothing leads to {}, which the block changes", pin.name);
                     return self.refuse(
@@ -120,7 +120,7 @@ impl Writer<'_> {
                 !is_input && !signature.is_block && is_result(pin, name, self.unit.library);
             let is_enable =
                 pin.name.eq_ignore_ascii_case("EN") || pin.name.eq_ignore_ascii_case("ENO");
-            if signature.parameter(&pin.name).is_none() && !is_result && !is_enable {
+            if !signature.has(&pin.name) && !is_result && !is_enable {
                 let what = format!("{} has no parameter {}", shown(name), shown(&pin.name));
                 let right = "draw the block again, as it is declared";
                 return self.refuse(element, pin.at, &what, right);

@@ -55,7 +55,8 @@ impl Shown {
         let (pulse, clear) = (inputs & 4 != 0, inputs & 8 != 0);
         if clear {
             self.count = 0;
-        } else if pulse && !self.pulse_before {
+        } else if pulse && !self.pulse_before && self.count < 3 {
+            // The CTU of iec2c stops at PV.
             self.count += 1;
         }
         self.pulse_before = pulse;

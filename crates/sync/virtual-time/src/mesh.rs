@@ -101,7 +101,8 @@ impl Mesh {
             }
             if self.barrier.state() != State::PreRead {
                 self.barrier.commit().expect("there is no logic");
-            } else if self.barrier.step().sequence >= self.until {
+            } else if self.barrier.step().sequence >= self.until || self.barrier.is_idle_for_ever()
+            {
                 return Next::Server;
             } else {
                 self.barrier.begin_step().expect("there is no logic");

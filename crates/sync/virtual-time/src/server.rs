@@ -495,9 +495,9 @@ impl<'l> Server<'l> {
             let has_run_ahead =
                 (self.allowed.as_ref()).is_some_and(|allowed| allowed.until() > sequence);
             let is_idle = self.settings.steps.is_none() && barrier.is_idle_for_ever();
-            let is_last =
-                self.stop_by.is_some() || is_idle || self.settings.steps == Some(sequence);
-            if is_last && !has_run_ahead {
+            let is_last = self.stop_by.is_some() || self.settings.steps == Some(sequence);
+            // In the steps that idle clients are allowed they do nothing.
+            if is_idle || (is_last && !has_run_ahead) {
                 let outcome = barrier.outcome();
                 return self.end(Ok(outcome));
             }

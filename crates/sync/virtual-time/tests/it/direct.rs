@@ -330,7 +330,8 @@ fn a_client_that_gives_up_or_writes_a_wrong_value_is_named() {
             "{ended}"
         );
         assert!(ended.reason.contains(part) || is_wrong, "{ended}");
-        assert_eq!(ended.steps, 1233);
+        // The values of the other client may still be on their way to the server.
+        assert!(ended.steps <= 1233, "{ended}");
         assert!(
             ends.iter().all(|end| *end == Err(ended.clone())),
             "{ends:?}"

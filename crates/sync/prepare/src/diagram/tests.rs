@@ -400,6 +400,7 @@ fn comparisons_survive_the_references_of_xml() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a list of mistakes")]
 fn what_a_diagram_gets_wrong_is_told_with_its_element() {
     for (parts, says) in [
         (
@@ -502,6 +503,10 @@ fn what_a_diagram_gets_wrong_is_told_with_its_element() {
     ] {
         refused(&fbd(&parts), says);
     }
+}
+
+#[test]
+fn a_diagram_without_a_measure_is_refused() {
     let deep: Vec<String> = (2..300)
         .map(|id| contact(id, "a", "", &(id - 1).to_string()))
         .chain([rail(1), coil(1000, 1, "x", "", "299")])

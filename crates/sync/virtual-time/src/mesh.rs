@@ -6,8 +6,8 @@
 
 use crate::barrier::{Barrier, State};
 use crate::logic::Logic;
-use crate::wire::{self, FromClient, MemberList};
-use crate::{Outcome, Step};
+use crate::wire::{self, FromClient};
+use crate::{MemberList, Outcome, Step};
 
 /// The next action of a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

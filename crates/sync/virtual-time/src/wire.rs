@@ -12,8 +12,8 @@ use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
 use crate::server::ToClient;
-use crate::{Cause, Declaration, Ended, Outcome, Step, TraceHash, Variable};
-pub use between::{MemberList, at, hello, is_done, met, read_hello};
+use crate::{Cause, Declaration, Ended, MemberList, Outcome, Step, TraceHash, Variable};
+pub use between::{at, hello, is_done, met, read_hello};
 pub(crate) use between::{done_step, is_end};
 use reader::Reader;
 
@@ -262,7 +262,9 @@ pub fn to_client(out: &mut Vec<u8>, message: &ToClient<'_>) {
         ToClient::Meet(token) => append(out, MEET, |out| {
             out.extend_from_slice(&token.to_le_bytes());
         }),
-        ToClient::Members(own, list) => append(out, MEMBERS, |out| list.write(out, *own)),
+        ToClient::Members(own, list) => append(out, MEMBERS, |out| {
+            between::write_members(out, list, *own);
+        }),
         ToClient::Until(step) => append(out, UNTIL, |out| {
             out.extend_from_slice(&step.to_le_bytes());
         }),
@@ -400,7 +402,7 @@ pub fn from_server(frame: &[u8]) -> Result<FromServer<'_>, String> {
         },
         WAITING => FromServer::Waiting(reader.rest_as_text()?),
         MEET => FromServer::Meet(reader.word()?),
-        MEMBERS => FromServer::Members(MemberList::read(&mut reader)?),
+        MEMBERS => FromServer::Members(between::read_members(&mut reader)?),
         UNTIL => FromServer::Until(reader.word()?),
         FINISHED => FromServer::End(Ok(Outcome {
             steps: reader.word()?,

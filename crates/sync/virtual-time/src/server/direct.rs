@@ -8,8 +8,7 @@ use std::hash::{BuildHasher as _, Hasher as _, RandomState};
 use tickbus_base::time::Nanos;
 
 use super::{Out, Phase, Seat, Server};
-use crate::wire::MemberList;
-use crate::{Declaration, Pacing, State};
+use crate::{Declaration, MemberList, Pacing, State};
 
 /// How long clients may take to meet.
 const MEETING: Nanos = Nanos::from_secs(10);

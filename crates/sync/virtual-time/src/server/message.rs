@@ -3,8 +3,7 @@
 use tickbus_base::time::Nanos;
 use tickbus_image::signal::DataType;
 
-use crate::wire::MemberList;
-use crate::{Ended, Outcome, Step};
+use crate::{Ended, MemberList, Outcome, Step};
 
 /// A request to a running server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

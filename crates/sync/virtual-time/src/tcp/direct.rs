@@ -13,8 +13,8 @@ use super::peers::{Door, Peers};
 use crate::client::Line;
 use crate::mesh::{Mesh, Next};
 use crate::server::ToClient;
-use crate::wire::{self, FromServer, MemberList};
-use crate::{Cause, Ended};
+use crate::wire::{self, FromServer};
+use crate::{Cause, Ended, MemberList};
 
 /// The longest time that values wait before the server gets them, while steps follow each other.
 const REPORT: Nanos = Nanos::from_millis(2);

@@ -14,7 +14,7 @@ use tickbus_net::{Address, Host, LocalAddress, bind, prepare, reach};
 use super::connection::Arrived;
 use super::is_later;
 use super::line::{LOOK, PATIENCE};
-use crate::wire::{self, MemberList};
+use crate::{MemberList, wire};
 
 /// How long the other clients may take to connect.
 const MEETING: Nanos = Nanos::from_secs(5);

@@ -7,60 +7,42 @@ use super::{
     AT, DIRECT, DONE, DONE_UNTIL, ENDED, FINISHED, HELLO, LONGEST_FRAME, MAGIC, MET, append, count,
     cut, declared, name, read_declared,
 };
-use crate::Declaration;
+use crate::MemberList;
 
 /// The longest address, in bytes.
 pub(super) const LONGEST_ADDRESS: usize = 255;
 
-/// The clients of a run that exchange their values without the server.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MemberList {
-    /// A number that tells this meeting from others.
-    pub token: u64,
-    /// The virtual time of one step of the server.
-    pub step: Nanos,
-    /// The place in the list of the client that reads it.
-    pub own: usize,
-    /// The addresses and the declarations, in the order of the names.
-    pub members: Vec<(String, Declaration)>,
+/// A list is as long as a frame at most.
+const _: () = assert!(MemberList::LONGEST == LONGEST_FRAME);
+
+/// Appends the content of a list, for the client at `own`.
+pub(super) fn write_members(out: &mut Vec<u8>, list: &MemberList, own: usize) {
+    out.extend_from_slice(&list.token.to_le_bytes());
+    out.extend_from_slice(&list.step.0.to_le_bytes());
+    count(out, own);
+    count(out, list.members.len());
+    for (address, declaration) in &list.members {
+        name(out, address);
+        declared(out, declaration);
+    }
 }
 
-impl MemberList {
-    /// True if the list fits into a frame.
-    pub(crate) fn fits(&self) -> bool {
-        let mut out = Vec::new();
-        self.write(&mut out, 0);
-        out.len() < LONGEST_FRAME
+/// Reads the content of a list.
+pub(super) fn read_members(reader: &mut Reader<'_>) -> Result<MemberList, String> {
+    let token = reader.word()?;
+    let step = Nanos(reader.word()?.cast_signed());
+    let own = u16::from_le_bytes(reader.take()?).into();
+    let mut members = Vec::new();
+    for _ in 0..u16::from_le_bytes(reader.take()?) {
+        let address = reader.name()?.to_owned();
+        members.push((address, read_declared(reader, true)?));
     }
-
-    /// Appends the content, for the client at `own`.
-    pub(super) fn write(&self, out: &mut Vec<u8>, own: usize) {
-        out.extend_from_slice(&self.token.to_le_bytes());
-        out.extend_from_slice(&self.step.0.to_le_bytes());
-        count(out, own);
-        count(out, self.members.len());
-        for (address, declaration) in &self.members {
-            name(out, address);
-            declared(out, declaration);
-        }
-    }
-
-    pub(super) fn read(reader: &mut Reader<'_>) -> Result<Self, String> {
-        let token = reader.word()?;
-        let step = Nanos(reader.word()?.cast_signed());
-        let own = u16::from_le_bytes(reader.take()?).into();
-        let mut members = Vec::new();
-        for _ in 0..u16::from_le_bytes(reader.take()?) {
-            let address = reader.name()?.to_owned();
-            members.push((address, read_declared(reader, true)?));
-        }
-        Ok(Self {
-            token,
-            step,
-            own,
-            members,
-        })
-    }
+    Ok(MemberList {
+        token,
+        step,
+        own,
+        members,
+    })
 }
 
 /// Appends the address where other clients can connect, at most 255 bytes; an empty one: they cannot.

@@ -9,10 +9,9 @@ use crate::common::{client, mixer_settings, mixers, settings};
 use tickbus_base::time::{Monotonic, Nanos};
 use tickbus_net::Address;
 use tickbus_virtual_time::server::Control;
-use tickbus_virtual_time::wire::{self, MemberList};
 use tickbus_virtual_time::{
-    Cause, Controls, Declaration, Ended, Hosting, Logic, Mesh, Next, Outcome, Participant,
-    Settings, Step, in_process, tcp,
+    Cause, Controls, Declaration, Ended, Hosting, Logic, MemberList, Mesh, Next, Outcome,
+    Participant, Settings, Step, in_process, tcp, wire,
 };
 
 type Ends = Vec<Result<Outcome, Ended>>;

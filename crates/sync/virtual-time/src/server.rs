@@ -389,7 +389,8 @@ impl<'l> Server<'l> {
     /// All clients that are due were sent their requests by `now`, and those on the server's own thread have run. The
     /// time to answer starts here for the others, so that the server's own time does not count.
     pub fn sent(&mut self, now: Nanos) {
-        if matches!(self.phase, Phase::Running(..)) {
+        // While members are missing no step begins, and only those that have come back are asked.
+        if matches!(self.phase, Phase::Running(..)) && !self.misses_members() {
             self.asked = now;
         }
     }
@@ -513,6 +514,8 @@ impl<'l> Server<'l> {
                     return;
                 };
                 self.asked = now;
+                // The clients finish all steps that they are allowed.
+                self.stop_by = self.stop_by.map(|_| now + STOP_PATIENCE);
                 barrier.begin_step().expect("there is no logic");
                 continue;
             }

@@ -95,6 +95,12 @@ impl Server<'_> {
         }
     }
 
+    /// True if clients have run, or may run, steps that the server has not followed yet.
+    pub(super) fn has_run_ahead(&self) -> bool {
+        let until = self.allowed.as_ref().map_or(0, Allowed::until);
+        self.step().is_some_and(|step| until > step.sequence)
+    }
+
     /// The client at `seat` listens at `address`.
     pub(crate) fn is_at(&mut self, now: Nanos, seat: usize, token: u64, address: &str) {
         self.answered(now, seat, token, (false, address));

@@ -27,12 +27,13 @@ impl Server<'_> {
             .min(inform)
             .min(self.rejoin_deadline())
             .min(match &self.phase {
-                Phase::Joining(..) => (self.asked + self.settings.join).min(self.meeting_until()),
+                Phase::Joining(..) if self.meeting.is_some() => self.meeting_until(),
+                Phase::Joining(..) => self.asked + self.settings.join,
                 Phase::Running(..) if self.misses_members() && self.awaited().is_none() => {
                     self.stop_by.unwrap_or(Nanos::MAX)
                 }
                 Phase::Running(barrier, _) if barrier.state() == State::PreRead => {
-                    match (self.is_paused(), &self.pace) {
+                    match (self.is_paused() && !self.has_run_ahead(), &self.pace) {
                         (true, _) => Nanos::MAX,
                         (false, Some(pace)) => pace.due(),
                         // Too many empty steps came in a row.

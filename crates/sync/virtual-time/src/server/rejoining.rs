@@ -132,15 +132,14 @@ impl Server<'_> {
             "client \"{name}\" was lost: {}; the run waits {limit} for it to come back",
             printable(reason)
         ));
-        match rejoining.away_of(client) {
-            Some(at) => rejoining.away[at].replay = None,
-            None => rejoining.away.push(Away {
-                client,
-                reason: reason.to_owned(),
-                since: None,
-                replay: None,
-            }),
-        }
+        // A member that had come back has its whole time again.
+        rejoining.away.retain(|away| away.client != client);
+        rejoining.away.push(Away {
+            client,
+            reason: reason.to_owned(),
+            since: None,
+            replay: None,
+        });
         Ok(())
     }
 

@@ -87,6 +87,11 @@ impl Listener {
         locals: Vec<&mut dyn Participant>,
     ) -> Result<Outcome, Ended> {
         let now = hosting.clock.now();
+        // Clients through shared memory cannot meet; the server is no detour for them.
+        let settings = Settings {
+            direct: false,
+            ..settings
+        };
         let mut server = server::Server::new(settings, logic, now)
             .map_err(|mistake| Ended::before(Cause::Configuration, mistake.to_string()))?;
         let locals = Locals::join(&mut server, now, locals);

@@ -182,10 +182,10 @@ impl Peer {
                 self.start = wire::HEADER + frame.len();
                 return (token == list.token && at < list.members.len()).then_some(at);
             }
-            match self.read() {
-                Arrived::Gone(_) => return None,
-                Arrived::NothingYet if clock.now() >= until => return None,
-                Arrived::NothingYet | Arrived::Something => {}
+            let read = self.read();
+            // Whoever sends on and on must not keep this client here.
+            if matches!(read, Arrived::Gone(_)) || clock.now() >= until {
+                return None;
             }
         }
     }

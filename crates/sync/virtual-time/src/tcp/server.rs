@@ -335,7 +335,10 @@ impl Host<'_, '_, '_> {
         });
         self.hosting.controls.apply(now, &mut self.server);
         if self.server.is_direct() && now >= self.server.deadline() {
-            // Who is waited for depends on how far the others have come.
+            // Who is waited for depends on what has come from everyone, and on how far the others have come.
+            for seat in 0..self.connections.len() {
+                self.take(seat);
+            }
             for connection in self.connections.iter().flatten() {
                 if let Some(step) = connection.last_step() {
                     self.server.is_ahead(step);

@@ -241,11 +241,12 @@ fn a_stop_ends_the_run_with_a_hash_that_all_have() {
 
 #[test]
 fn a_client_that_hangs_is_named_with_its_step() {
-    let mut settings = direct(settings(5000, &["good", "other", "stuck"]));
+    // The first by name: the server looks for its values first, and those of the others have come.
+    let mut settings = direct(settings(5000, &["first", "good", "other"]));
     settings.hang = Nanos::from_millis(500);
     let (sender, receiver) = std::sync::mpsc::channel::<()>();
     let sender = Mutex::new(Some(sender));
-    let stuck = client("stuck", 1, &["x"], &[], move |step, _, _| {
+    let stuck = client("first", 1, &["x"], &[], move |step, _, _| {
         if step.sequence == 1007 {
             // Until the other end is dropped, when the run has ended.
             let _ = receiver.recv();
@@ -266,7 +267,7 @@ fn a_client_that_hangs_is_named_with_its_step() {
     let (outcome, ends, _) = run(settings, Logic::new(), &Controls::default(), false, clients);
     let ended = outcome.expect_err("it hangs");
     assert_eq!(ended.cause, Cause::Hung);
-    assert_eq!(ended.client.as_deref(), Some("stuck"));
+    assert_eq!(ended.client.as_deref(), Some("first"));
     assert_eq!(ended.reason, "has not finished step 1007 within 500ms");
     assert!(ended.steps <= 1006, "{ended}");
     assert!(

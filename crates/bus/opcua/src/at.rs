@@ -35,7 +35,7 @@ impl ServerOptions {
             };
             let is_reserved = match &node.namespace {
                 Namespace::Index(index) => *index < FIRST,
-                Namespace::Uri(uri) => uri == UA,
+                Namespace::Uri(uri) => self.is_taken(uri),
             };
             match &node.namespace {
                 _ if is_reserved => line.wrong(
@@ -75,6 +75,21 @@ impl ServerOptions {
 
     /// Reports signals without a line beside some that have one, and keys without effect.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
+        if let Some(uri) = self.identity.uri.as_deref().filter(|uri| [UA, OWN].contains(uri)) {
+            collector.report(
+                self.at,
+                format!("the \"uri\" of \"identity\" is \"{uri}\", which is another namespace"),
+                "write the ApplicationUri of the device, such as \"urn:acme:press:1\"",
+            );
+        }
+        let own = self.namespaces.iter().find(|uri| self.is_taken(uri));
+        if let (Some(at), Some(uri)) = (self.namespaces_at, own) {
+            collector.report(
+                at,
+                format!("\"{}\" is namespace 1, by \"identity\"", shown(uri)),
+                "begin with the URI that the device has as number 2",
+            );
+        }
         if self.nodes.is_empty() {
             if let (Some(at), true) = (self.namespaces_at, self.nodesets.is_empty()) {
                 collector.report(
@@ -102,6 +117,12 @@ impl ServerOptions {
                 "write a line for each signal, or none at all",
             );
         }
+    }
+
+    /// Returns true for a URI that the server has in any case: that of OPC UA, its own ones, and that of `identity`.
+    pub(crate) fn is_taken(&self, uri: &str) -> bool {
+        let stated = self.identity.uri.as_deref();
+        uri == UA || uri.starts_with("urn:tickbus:") || stated == Some(uri)
     }
 
     /// The nodes of the server that `[fieldbus.at]` names, and its namespaces: those of the key, of `NodeSet2` files and of

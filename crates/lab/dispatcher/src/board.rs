@@ -508,6 +508,7 @@ impl Board {
             },
             count: 0,
             with_names,
+            begun: None,
         });
         self.touch(seat);
     }
@@ -527,21 +528,33 @@ impl Board {
                 let Some(plugged) = self.seats[*other].plugged.take() else {
                     continue;
                 };
-                let line = match &plugged.host {
-                    Some(host) if has_end => &format!("{}@{host}", plugged.line),
-                    _ => &*plugged.line,
-                };
-                self.seats[seat].outbox.line(line);
+                let begun = listing.begun.take().filter(|(of, _)| of == order);
+                if begun.is_none() {
+                    let line = match &plugged.host {
+                        Some(host) if has_end => &format!("{}@{host}", plugged.line),
+                        _ => &*plugged.line,
+                    };
+                    self.seats[seat].outbox.line(line);
+                    listing.count += 1;
+                }
                 if listing.with_names {
                     let name = &plugged.device.name;
-                    for (channel, label) in &plugged.labels {
-                        let line = format!("NAME {name}:{channel} {label}");
-                        self.seats[seat].outbox.line(&line);
+                    let from = begun.map_or(Bound::Unbounded, |(_, last)| Bound::Excluded(last));
+                    for (channel, label) in plugged.labels.range((from, Bound::Unbounded)) {
+                        let outbox = &mut self.seats[seat].outbox;
+                        outbox.line(&format!("NAME {name}:{channel} {label}"));
+                        if outbox.is_full() {
+                            listing.begun = Some((*order, *channel));
+                            break;
+                        }
                     }
                 }
                 self.seats[*other].plugged = Some(plugged);
+                if listing.begun.is_some() {
+                    self.seats[seat].outbox.listing = Some(listing);
+                    return;
+                }
                 listing.after = Some(*order);
-                listing.count += 1;
             }
             self.seats[seat].outbox.is_swollen = true;
             if has_end {

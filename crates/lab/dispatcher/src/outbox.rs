@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use crate::channel::Channel;
 use crate::host::Rank;
 use crate::number::Number;
 
@@ -48,6 +49,8 @@ pub(crate) struct Listing {
     pub(crate) count: usize,
     /// The labels of the channels are part of the list.
     pub(crate) with_names: bool,
+    /// A device that is written in part, up to the label of this channel.
+    pub(crate) begun: Option<(Rank, Channel)>,
 }
 
 /// The bytes that the system has not accepted for a client yet, and the data waiting after them: at most the newest

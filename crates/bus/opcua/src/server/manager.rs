@@ -400,6 +400,19 @@ impl InMemoryNodeManagerImpl for Signals {
                 call.set_status(StatusCode::BadNotImplemented);
                 continue;
             };
+            let (writers, session) = (&self.own.writers, context.session_id);
+            writers.begin(session, || Visitor::of(context));
+            let refused = writers.refuses(session, [signal]);
+            let is_refused = refused.is_some();
+            let second = refused.or_else(|| writers.write(session, signal));
+            if let Some(other) = second {
+                let name = Visitor::of(context).name;
+                self.own.inbox.push(Visit::SecondWriter(name, other));
+            }
+            if is_refused {
+                call.set_status(StatusCode::BadUserAccessDenied);
+                continue;
+            }
             // Two commits: the pulse is there and is over.
             let pulse = vec![vec![(signal, 1)], vec![(signal, 0)]];
             let visit = Visit::Written(Visitor::of(context), pulse);

@@ -55,7 +55,17 @@ impl Places {
         let at = options.nodeset_at.unwrap_or(options.at);
         let whole = |mistake| vec![(at, mistake)];
         let nodesets = NodeSets::load(folder, &options.nodesets).map_err(whole)?;
-        let device = options.device_nodes(&nodesets.uris());
+        let of_files = nodesets.uris();
+        if let Some(uri) = of_files.iter().find(|uri| options.is_taken(uri)) {
+            return Err(whole(Mistake::new(
+                format!(
+                    "a file of \"nodeset\" has the namespace \"{}\", which is that of the server itself",
+                    shown(uri)
+                ),
+                "write another \"uri\" in \"identity\", or another namespace in the file",
+            )));
+        }
+        let device = options.device_nodes(&of_files);
         let own = usize::from(FIRST) + device.uris.len() - 1;
         let own = u16::try_from(own).unwrap_or(u16::MAX);
         let node = |signal: &Signal| match device.nodes.get(&signal.name) {

@@ -162,9 +162,12 @@ pub(super) fn objects(options: &ServerOptions, table: &SignalTable) -> Vec<Place
         let length = match placed.object {
             Object::Flags => options.flags,
             Object::Block(number) => {
-                let mut lengths = options.lengths_of(table, placed.owner);
-                let stated = lengths.find(|length| length.number == number);
-                stated.map_or(0, |length| length.length)
+                // Several stations can have the block in common, and any of them its length.
+                let stations = 0..table.stations.len();
+                let sharers = stations.filter(|station| options.cpu(table, *station) == placed.cpu);
+                let lengths = sharers.flat_map(|station| options.lengths_of(table, station));
+                let stated = lengths.filter(|length| length.number == number);
+                stated.map(|length| length.length).max().unwrap_or(0)
             }
             Object::Inputs | Object::Outputs => 0,
         };

@@ -140,7 +140,8 @@ impl NodeSets {
         index: impl Fn(&str) -> Option<u16>,
     ) -> Result<HashMap<NodeId, Target>, Mistake> {
         let mut targets = HashMap::new();
-        let mut supertypes: HashMap<NodeId, NodeId> = HashMap::new();
+        // A type can state several, and the crate takes any of them.
+        let mut supertypes: HashMap<NodeId, Vec<NodeId>> = HashMap::new();
         self.each(index, |item| {
             let id = item.node.node_id().clone();
             let is_type = !matches!(
@@ -156,7 +157,7 @@ impl NodeSets {
                 } else {
                     (id.clone(), reference.target_id.clone())
                 };
-                supertypes.insert(sub, of);
+                supertypes.entry(sub).or_default().push(of);
             }
             let target = match &item.node {
                 NodeType::Variable(variable) => Target::Variable(variable.data_type()),
@@ -186,22 +187,30 @@ pub(crate) enum Target {
     Other,
 }
 
-/// A type that is a subtype of itself.
-fn circle(supertypes: &HashMap<NodeId, NodeId>) -> Option<&NodeId> {
+/// A type that is a subtype of itself, over any of its supertypes.
+fn circle(supertypes: &HashMap<NodeId, Vec<NodeId>>) -> Option<&NodeId> {
     let mut sound: HashSet<&NodeId> = HashSet::new();
     for begin in supertypes.keys() {
-        let mut way: HashSet<&NodeId> = HashSet::new();
-        let mut at = begin;
-        while !sound.contains(at) {
-            if !way.insert(at) {
-                return Some(at);
-            }
-            match supertypes.get(at) {
-                Some(next) => at = next,
-                None => break,
+        if sound.contains(begin) {
+            continue;
+        }
+        // The types on the way, and how many supertypes of each were looked at.
+        let mut way = vec![(begin, 0)];
+        let mut passed = HashSet::from([begin]);
+        while let Some((at, looked)) = way.last_mut() {
+            let at = *at;
+            let next = supertypes.get(at).and_then(|all| all.get(*looked));
+            *looked += 1;
+            match next {
+                Some(next) if sound.contains(next) => {}
+                Some(next) if !passed.insert(next) => return Some(next),
+                Some(next) => way.push((next, 0)),
+                None => {
+                    sound.insert(at);
+                    way.pop();
+                }
             }
         }
-        sound.extend(way);
     }
     None
 }

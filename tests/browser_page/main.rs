@@ -276,6 +276,8 @@ fn everything_is_done_from_the_keyboard_and_announced() {
     wait_value(&browser, "PUMP:Q1", "24");
     browser.run("document.activeElement.blur()");
     browser.keys(TAB);
+    assert_eq!(browser.run("return document.activeElement.id"), "search");
+    browser.keys(TAB);
     assert_eq!(
         browser.run("return document.activeElement.getAttribute('aria-label')"),
         "PUMP:Q1 digital output, 24"

@@ -35,7 +35,8 @@ struct HelicsArguments {
     #[arg(long, value_name = "HOST:PORT", value_parser = address)]
     server: Meeting,
 
-    /// The library of HELICS [default: HELICS_LIBRARY, the Python package's, or the system's].
+    /// The library of HELICS [default: $HELICS_LIBRARY, the Python package's, or the system's].
+    #[expect(clippy::doc_markdown, reason = "the help is plain text")]
     #[arg(long, value_name = "PATH")]
     library: Option<PathBuf>,
 

@@ -14,6 +14,10 @@ use tickbus_prepare::{
 /// Put a PLC program on virtual time, so that it runs in lock-step with a simulation; --undo takes it off again, byte for byte.
 ///
 /// Takes the sources in Structured Text of one PLC together, or a project as PLCopen XML in Structured Text, LD and FBD. docs/virtual-time-plc.md has the steps for an engineer.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a flag of the command line"
+)]
 #[derive(Debug, clap::Args)]
 pub(super) struct Arguments {
     /// The sources of the program.

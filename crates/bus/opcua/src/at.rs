@@ -75,7 +75,12 @@ impl ServerOptions {
 
     /// Reports signals without a line beside some that have one, and keys without effect.
     pub fn fit(&self, table: &SignalTable, collector: &Collector<'_>) {
-        if let Some(uri) = self.identity.uri.as_deref().filter(|uri| [UA, OWN].contains(uri)) {
+        if let Some(uri) = self
+            .identity
+            .uri
+            .as_deref()
+            .filter(|uri| [UA, OWN].contains(uri))
+        {
             collector.report(
                 self.at,
                 format!("the \"uri\" of \"identity\" is \"{uri}\", which is another namespace"),

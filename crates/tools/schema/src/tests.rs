@@ -62,10 +62,10 @@ fn is_structural(mistake: &Mistake) -> bool {
         " is a single table",
     ];
     let Mistake { what, right } = mistake;
-    // The type of a signal decides which values it has.
-    if ["\"value\" is ", "\"fail_safe\" is "]
-        .iter()
-        .any(|key| what.starts_with(key))
+    // The type of a signal decides which values it has, and the bus which codes of errors there are.
+    let decided = ["\"value\" is ", "\"fail_safe\" is ", "\"code\" is "];
+    if decided.iter().any(|key| what.starts_with(key))
+        || what.contains(" is not one of the codes of errors")
     {
         return false;
     }

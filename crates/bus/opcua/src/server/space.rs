@@ -228,6 +228,10 @@ fn bind(signal: &Signal, target: Option<&Target>, reads: Area) -> Result<Target,
                 "name it for a BOOL that clients write, with latch = \"rising\"",
             ))
         }
+        Some(Target::List) => Err(Mistake::new(
+            format!("the variable has lists, and the signal \"{name}\" is a single value"),
+            "name a variable with a single value",
+        )),
         Some(Target::Other) => Err(Mistake::new(
             "the node is neither a variable nor a method",
             "name the variable below it that has the value",

@@ -160,6 +160,7 @@ impl NodeSets {
                 supertypes.entry(sub).or_default().push(of);
             }
             let target = match &item.node {
+                NodeType::Variable(variable) if variable.value_rank() >= 0 => Target::List,
                 NodeType::Variable(variable) => Target::Variable(variable.data_type()),
                 NodeType::Method(_) => Target::Method,
                 _ => Target::Other,
@@ -181,6 +182,8 @@ impl NodeSets {
 pub(crate) enum Target {
     /// A variable with values of this type.
     Variable(NodeId),
+    /// A variable with lists of values.
+    List,
     /// A method, whose call is a pulse of a BOOL.
     Method,
     /// A node without a value.

@@ -145,11 +145,9 @@ fn tank(steps: u64, kind: &str) -> Result<(Child, String), Absent> {
     let mut port = String::new();
     let stdout = tank.stdout.as_mut().expect("it is piped");
     // One byte at a time: the rest is for `end_of`.
-    for byte in stdout.bytes() {
-        match byte.expect("a port") {
-            b'\n' => break,
-            digit => port.push(digit.into()),
-        }
+    let mut byte = [0];
+    while stdout.read_exact(&mut byte).is_ok() && byte[0] != b'\n' {
+        port.push(byte[0].into());
     }
     Ok((tank, port))
 }

@@ -25,6 +25,10 @@ fn play(random: &mut Random, plc: &mut Stepped) {
 }
 
 /// The answers of tests/prepare/diagrams.xml, worked out from its drawings.
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is an output of the program"
+)]
 #[derive(Default)]
 struct Shown {
     motor: bool,

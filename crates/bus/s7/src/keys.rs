@@ -34,9 +34,9 @@ pub(crate) const SERVER: &[Key] = &[
     Key::new(
         "m_bytes",
         Shape::Whole(0, AREA_END),
-        "The bytes of M, scratch memory unless [fieldbus.at] places signals there",
-    )
-    .or("256"),
+        "The bytes of M, scratch memory unless [fieldbus.at] places signals there; without this key 256, or as many as the \
+         signals there need",
+    ),
     PDU,
     Key::new(
         "clients",

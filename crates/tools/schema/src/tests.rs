@@ -73,7 +73,9 @@ fn is_structural(mistake: &Mistake) -> bool {
     let is_for_several = ["unit", "head"]
         .iter()
         .any(|key| what.ends_with(&format!(" has no \"{key}\"")));
-    let is_for_several = is_for_several || what.ends_with(", and others have");
+    let is_for_several = is_for_several
+        || what.ends_with(", and others have")
+        || what.ends_with(", and [fieldbus.at] places nothing of its station");
     what.starts_with("unknown key ")
         || (what.contains(" has no \"") && !is_for_several)
         || TYPES.iter().any(|kind| what.ends_with(kind))

@@ -270,7 +270,7 @@ impl Image {
         for station in frames.stations() {
             self.sends.take(station, frames.frame(station));
         }
-        frames.receipt()
+        frames.receipt().of_pulses()
     }
 
     fn show_what_is_sent(&mut self, port: &Port, now: Nanos) {

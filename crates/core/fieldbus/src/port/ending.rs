@@ -267,8 +267,8 @@ impl Port {
         }
     }
 
-    /// The peer of a station has the last values of all signals that it takes. For buses that send each signal
-    /// separately, and thus have no receipt for a whole frame.
+    /// The peer of a station has the last values of all signals that it takes. For buses whose peers confirm nothing, and
+    /// whose receipts are [of pulses](Receipt::of_pulses).
     pub fn has_last(&mut self, station: usize) {
         // Injected faults may have given the bus older values.
         if let Some(ending) = &mut self.image.ending

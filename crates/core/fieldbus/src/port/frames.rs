@@ -80,6 +80,16 @@ impl Receipt {
         }
     }
 
+    /// The receipt of a bus that tells itself when a peer [has the last values](Port::has_last): this one only confirms
+    /// pulses.
+    #[must_use]
+    pub fn of_pulses(self) -> Self {
+        Self {
+            is_last: false,
+            ..self
+        }
+    }
+
     /// The receipt for these bits of a station's frame (bit n of byte k is 8k + n), for a peer that gets no others:
     /// pulses elsewhere do not count as seen.
     ///

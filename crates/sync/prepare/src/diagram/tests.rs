@@ -352,6 +352,35 @@ fn connectors_are_wires() {
 }
 
 #[test]
+fn connectors_that_double_each_other_are_refused_before_memory_ends() {
+    let mut body = vec![input(1, "a")];
+    let mut from = "1".to_owned();
+    for id in (10..800).step_by(10) {
+        body.push(format!(
+            "<connector localId=\"{id}\" name=\"K{id}\">{}</connector>",
+            pin(&from)
+        ));
+        for continued in [id + 1, id + 2] {
+            body.push(format!(
+                "<continuation localId=\"{continued}\" name=\"K{id}\"><connectionPointOut/></continuation>"
+            ));
+        }
+        from = format!("{} {}", id + 1, id + 2);
+    }
+    body.push(output(4, 10, "x", "", &from));
+    refused(&fbd(&body), "the diagram has too many ways");
+}
+
+#[test]
+fn an_input_of_a_block_without_a_name_is_refused() {
+    let made = block(2, "typeName=\"Foreign\" instanceName=\"f\"", "=1", "");
+    refused(
+        &fbd(&[input(1, "a"), made]),
+        "an input of \"Foreign\" has no name",
+    );
+}
+
+#[test]
 fn a_jump_skips_networks_and_a_return_the_rest() {
     let made = statements(&ld(&[
         rail(1),

@@ -421,6 +421,8 @@ impl<'w> Writer<'w> {
     fn continued(&mut self, element: &Element, name: &str, ordered: bool) -> Option<Expression> {
         let key = name.to_uppercase();
         if let Some(known) = self.connectors.get(&key) {
+            // Each connector can double the text of the one before: its length is work, too.
+            self.work += known.text.len() / 16;
             return Some(known.clone());
         }
         let all = self.diagram.elements.iter().enumerate();

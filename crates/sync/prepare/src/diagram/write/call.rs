@@ -69,6 +69,10 @@ impl Writer<'_> {
                     );
                 }
                 None => continue,
+                Some(_) if instance.is_some() && pin.name.is_empty() => {
+                    let what = format!("an input of {} has no name", shown(name));
+                    return self.refuse(element, pin.at, &what, "draw the block again");
+                }
                 Some(value) if is_both => self.changeable(element, pin, value)?,
                 Some(value) => self.modified(element, pin.modifier, value)?,
             };

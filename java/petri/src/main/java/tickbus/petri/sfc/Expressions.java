@@ -7,6 +7,8 @@ import java.util.Map;
 /** Reads expressions and statements in Structured Text. */
 final class Expressions {
     private static final int DEEPEST = 100;
+    /** Each operator is a call within a call when the expression is evaluated. */
+    private static final int MOST_OPERATORS = 2_000;
     private static final List<List<String>> LEVELS = List.of(List.of("OR"), List.of("XOR"), List.of("AND", "&"),
         List.of("=", "<>"), List.of("<", ">", "<=", ">="), List.of("+", "-"), List.of("*", "/", "MOD"));
 
@@ -15,6 +17,7 @@ final class Expressions {
     private final Map<String, Integer> indexes;
     private final Map<String, Integer> steps;
     private int depth;
+    private int operators;
 
     /** The names are in capitals. */
     Expressions(Words words, List<Variable> variables, Map<String, Integer> indexes, Map<String, Integer> steps) {
@@ -27,6 +30,7 @@ final class Expressions {
     /** An expression of this type. */
     Value of(Kind kind) {
         Word first = words.look();
+        operators = 0;
         Value value = level(0);
         if (value.kind() != kind) {
             throw words.mistake(first, "this is " + value.kind() + "; expected " + kind);
@@ -41,6 +45,9 @@ final class Expressions {
         Value left = level(level + 1);
         while (LEVELS.get(level).contains(words.look().text())) {
             Word sign = words.next();
+            if (++operators > MOST_OPERATORS) {
+                throw words.mistake(sign, "more than " + MOST_OPERATORS + " operators in one expression");
+            }
             left = binary(sign, left, level(level + 1));
         }
         return left;

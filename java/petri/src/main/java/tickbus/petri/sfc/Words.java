@@ -8,6 +8,8 @@ import tickbus.petri.net.NetException;
 
 /** Goes through the words of a program. */
 final class Words {
+    /** A longer literal is no time. Its digits would be read in quadratic time. */
+    private static final int LONGEST_TIME = 100;
     private static final Pattern PART = Pattern.compile("([0-9]+(?:\\.[0-9]+)?)(D|H|MS|M|S|US|NS)_?");
 
     private final String file;
@@ -73,6 +75,9 @@ final class Words {
     /** Nanoseconds of a literal such as T#1m30s. */
     long time(Word word) {
         String text = word.text().substring(word.text().indexOf('#') + 1);
+        if (text.length() > LONGEST_TIME) {
+            throw mistake(word, "a time of " + text.length() + " characters; expected one such as T#1m30s");
+        }
         Matcher part = PART.matcher(text);
         BigDecimal sum = BigDecimal.ZERO;
         int end = 0;

@@ -53,6 +53,21 @@ class SfcTest {
     }
 
     @Test
+    void aTimeOfManyDigitsIsRefusedAtOnce() {
+        String text = TANK.replace(":= full", ":= fill.T > T#" + "1".repeat(1_000_000));
+        NetException wrong = assertThrows(NetException.class, () -> Sfc.parse("tank.st", text));
+        assertTrue(wrong.getMessage().contains("a time of 1000000 characters"), wrong.getMessage());
+    }
+
+    @Test
+    void aLongExpressionIsRefusedAndDoesNotEndTheStack() {
+        String text = TANK.replace(":= full", ":= full" + " OR full".repeat(2_001));
+        NetException wrong = assertThrows(NetException.class, () -> Sfc.parse("tank.st", text));
+        assertTrue(wrong.getMessage().contains("more than 2000 operators"), wrong.getMessage());
+        Sfc.parse("tank.st", TANK.replace(":= full", ":= full" + " OR full".repeat(2_000))).start().scan(0);
+    }
+
+    @Test
     void aStepIsAPlace() {
         Sfc chart = Sfc.parse("tank.st", TANK);
         assertEquals("net tank: 2 places, 2 transitions, 4 arcs, [1, 0]", chart.net().toString());

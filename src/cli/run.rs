@@ -129,10 +129,10 @@ pub(super) fn run(arguments: &Arguments, kinds: &'static Kinds) -> Outcome {
 
 fn try_run(arguments: &Arguments, kinds: &'static Kinds) -> Result<Outcome, Refused> {
     let config = configured(arguments, kinds)?;
-    let fmu = Unpacked::open(&arguments.model).map_err(wrong)?;
+    let mut fmu = Unpacked::open(&arguments.model).map_err(wrong)?;
     let map = match &arguments.map {
         None => Map::default(),
-        Some(file) => Map::load(file, &fmu.model, &config).map_err(wrong)?,
+        Some(file) => Map::load(file, &mut fmu.model, &config).map_err(wrong)?,
     };
     let join = Join::of(&config, &fmu.model, &map)
         .map_err(|mistake| wrong(format!("{}: {mistake}", fmu.file)))?;

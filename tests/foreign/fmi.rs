@@ -5,6 +5,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::OnceLock;
 
+use tempfile::TempDir;
+
 use crate::fixture::{library, made, tanks};
 use crate::harness::{self, Absent, Test};
 use tickbus::driver::Driver;
@@ -24,6 +26,7 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ("libcosim_runs_an_fmu_of_2_0", in_libcosim),
     ("the_rig_records_the_same_in_an_fmu_in_c_and_in_rust", rig),
     ("an_fmu_by_pythonfmu_is_the_machine", by_pythonfmu),
+    ("arrays_of_an_fmu_by_pythonfmu3_are_signals", by_pythonfmu3),
 ];
 
 /// A Python with the tools.
@@ -39,6 +42,7 @@ fn python() -> Result<Command, Absent> {
             "fmpy",
             "libcosimpy",
             "pythonfmu",
+            "pythonfmu3",
             "fmu_manipulation_toolbox",
         ],
     )
@@ -281,13 +285,13 @@ class Machine(Fmi2Slave):
         return True
 ";
 
-fn by_pythonfmu() -> Result<(), Absent> {
-    let mut python = python()?;
+/// Makes `Machine.fmu` from a class in Python, with one of the two tools; returns its folder.
+fn built_by(tool: &str, class: &str) -> Result<TempDir, Absent> {
     let folder = tempfile::tempdir().expect("a folder");
     let script = folder.path().join("machine.py");
-    std::fs::write(&script, MACHINE).expect("a file");
-    let built = python
-        .args(["-m", "pythonfmu", "build", "-f"])
+    std::fs::write(&script, class).expect("a file");
+    let built = python()?
+        .args(["-m", tool, "build", "-f"])
         .arg(&script)
         .arg("-d")
         .arg(folder.path())
@@ -299,18 +303,31 @@ fn by_pythonfmu() -> Result<(), Absent> {
         text(&built.stdout),
         text(&built.stderr)
     );
-    // The library is Python's, which the FMU expects to be loaded already.
-    let mut python = self::python()?;
-    let asked = python
-        .args(["-c", "import sysconfig, os; print(os.path.join(sysconfig.get_config_var('LIBDIR'), sysconfig.get_config_var('INSTSONAME')))"])
-        .output()
-        .expect("it starts");
-    let shared = text(&asked.stdout);
+    Ok(folder)
+}
+
+/// Returns what the Python with the tools prints.
+fn printed(code: &str) -> Result<String, Absent> {
+    let asked = python()?.args(["-c", code]).output().expect("it starts");
+    Ok(text(&asked.stdout))
+}
+
+/// The library of Python, which these FMUs expect to be loaded already.
+fn shared_python() -> Result<String, Absent> {
+    let shared = printed(
+        "import sysconfig, os; print(os.path.join(sysconfig.get_config_var('LIBDIR'), sysconfig.get_config_var('INSTSONAME')))",
+    )?;
     if !shared.contains(".so") || !Path::new(&shared).exists() {
         return Err(Absent(format!(
             "this Python has no shared library ({shared}), which FMUs of PythonFMU need"
         )));
     }
+    Ok(shared)
+}
+
+fn by_pythonfmu() -> Result<(), Absent> {
+    let folder = built_by("pythonfmu", MACHINE)?;
+    let shared = shared_python()?;
     for file in ["tank.cfg", "tank.toml"] {
         let from = Path::new(ROOT).join("examples/fmu-tank").join(file);
         let text = std::fs::read_to_string(from).expect("a file");
@@ -380,5 +397,68 @@ fn by_pythonfmu() -> Result<(), Absent> {
     let told = text(&ran.stdout);
     assert!(ran.status.success(), "{told}\n{}", text(&ran.stderr));
     assert!(told.contains("sweep: runs=4 told=4 "), "{told}");
+    Ok(())
+}
+
+/// A machine with arrays, made an FMU 3.0 by `PythonFMU3`.
+const ARRAYS: &str = "\
+import numpy
+from pythonfmu3 import Dimension, Float64, Fmi3Causality, Fmi3Slave, Fmi3Variability
+
+
+class Machine(Fmi3Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.time = 0.0
+        self.gain = numpy.array([1.0, 1.0, 1.0])
+        self.u = numpy.array([1.0, 2.0, 3.0])
+        self.y = numpy.array([0.0, 0.0, 0.0])
+        three = [Dimension(start='3')]
+        self.register_variable(Float64('time', causality=Fmi3Causality.independent, variability=Fmi3Variability.continuous))
+        self.register_variable(Float64('u', causality=Fmi3Causality.input, dimensions=three))
+        self.register_variable(
+            Float64('gain', causality=Fmi3Causality.parameter, variability=Fmi3Variability.tunable, dimensions=three)
+        )
+        self.register_variable(Float64('y', causality=Fmi3Causality.output, dimensions=three))
+
+    def do_step(self, current_time, step_size):
+        self.y = self.gain * self.u
+        return True
+";
+
+fn by_pythonfmu3() -> Result<(), Absent> {
+    let folder = built_by("pythonfmu3", ARRAYS)?;
+    let config = "[driver]\nid = 1\nname = \"It\"\n[fieldbus]\nkind = \"loopback\"\nprogram = \"mirror\"\nmode = \"stepped\"\n\
+                  [[signal]]\nname = \"y[1]\"\naddress = \"%ID0\"\ntype = \"REAL\"\n\
+                  [[signal]]\nname = \"y[3]\"\naddress = \"%ID4\"\ntype = \"REAL\"\n\
+                  [[signal]]\nname = \"u[3]\"\naddress = \"%QD0\"\ntype = \"REAL\"\n";
+    std::fs::write(folder.path().join("it.cfg"), config).expect("a file");
+    let map = "[parameters]\ngain = [2.0, 3.0, 5.0]\n";
+    std::fs::write(folder.path().join("it.toml"), map).expect("a file");
+    let ran = Command::new(env!("CARGO_BIN_EXE_tickbus"))
+        .args([
+            "run",
+            "Machine.fmu",
+            "--config",
+            "it.cfg",
+            "--map",
+            "it.toml",
+        ])
+        .args(["--step", "1s", "--duration", "3s", "--record", "run.csv"])
+        .arg("--isolated")
+        .env("LD_PRELOAD", shared_python()?)
+        .env(
+            "PYTHONPATH",
+            printed("import sysconfig; print(sysconfig.get_path('purelib'))")?,
+        )
+        .current_dir(folder.path())
+        .output()
+        .expect("it runs");
+    let told = text(&ran.stdout);
+    assert!(ran.status.success(), "{told}\n{}", text(&ran.stderr));
+    let record = std::fs::read_to_string(folder.path().join("run.csv")).expect("a recording");
+    // The mirror sends y[1] to u[3]; u[1] keeps its start value 1.
+    let last = record.lines().last().expect("a line");
+    assert!(last.ends_with(",2,10,2"), "{record}");
     Ok(())
 }

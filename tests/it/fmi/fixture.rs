@@ -91,21 +91,31 @@ pub(crate) fn tanks() -> &'static Path {
     })
 }
 
+/// Compiles a C file of tests/fmi, and returns its library.
+fn compiled(name: &str) -> PathBuf {
+    let library = format!("{name}.so");
+    let folder = made(name, |folder| {
+        let compiled = Command::new("cc")
+            .args(["-std=gnu99", "-Wall", "-fPIC", "-shared", "-o"])
+            .arg(folder.join(&library))
+            .arg(repository().join("tests/fmi").join(format!("{name}.c")))
+            .output()
+            .expect("the compiler runs");
+        assert!(compiled.status.success(), "{}", err(&compiled));
+    });
+    folder.join(library)
+}
+
 /// The library of `misbehave.c`, compiled once.
 pub(crate) fn misbehaving() -> &'static Path {
     static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
-    LIBRARY.get_or_init(|| {
-        let folder = made("misbehave", |folder| {
-            let compiled = Command::new("cc")
-                .args(["-std=gnu99", "-Wall", "-fPIC", "-shared", "-o"])
-                .arg(folder.join("misbehave.so"))
-                .arg(repository().join("tests/fmi/misbehave.c"))
-                .output()
-                .expect("the compiler runs");
-            assert!(compiled.status.success(), "{}", err(&compiled));
-        });
-        folder.join("misbehave.so")
-    })
+    LIBRARY.get_or_init(|| compiled("misbehave"))
+}
+
+/// The library of `sampler.c`, compiled once.
+pub(crate) fn sampling() -> &'static Path {
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(|| compiled("sampler"))
 }
 
 /// A model description of FMI 2.0 with an input and an output of type Real.

@@ -7,4 +7,5 @@ mod faults;
 mod fit;
 mod fixture;
 mod run;
+mod three;
 mod wrong;

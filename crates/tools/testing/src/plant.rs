@@ -89,9 +89,16 @@ impl Plant {
                 "only floating point numbers can be fitted",
             ));
         }
-        let set = self.join.parameters.iter().find(|(at, _)| *at == index);
+        if variable.is_element() {
+            return Err(Mistake::new(
+                format!("\"{}\" is an element of an array", shown(name)),
+                "only scalar variables can be fitted",
+            ));
+        }
+        let mut set = self.join.parameters.iter().filter(|(at, _)| *at == index);
+        let set = set.find_map(|(_, values)| values.first());
         let unit = variable.unit.clone().unwrap_or_default();
-        Ok((index, unit, set.map(|(_, value)| value.real())))
+        Ok((index, unit, set.map(|value| value.real())))
     }
 
     /// This FMU with other values of some variables.
@@ -100,7 +107,7 @@ impl Plant {
         let parameters = &mut plant.join.parameters;
         parameters.retain(|(at, _)| values.iter().all(|(other, _)| at != other));
         let values = values.iter();
-        parameters.extend(values.map(|(at, value)| (*at, FmuValue::Real(*value))));
+        parameters.extend(values.map(|(at, value)| (*at, vec![FmuValue::Real(*value)])));
         plant
     }
 
@@ -161,14 +168,14 @@ impl<'a> FmuKeys<'a> {
         };
         let map = self.map.as_ref();
         let map = map.map(|value| path(value, "write the path of a map, as seen from this file"));
-        let fmu = match Unpacked::open(&file) {
+        let mut fmu = match Unpacked::open(&file) {
             Ok(fmu) => fmu,
             Err(mistakes) => return (None, Some(mistakes)),
         };
         let map = match map {
             None => Map::default(),
             Some(None) => return (None, None),
-            Some(Some(file)) => match Map::load(&file, &fmu.model, config) {
+            Some(Some(file)) => match Map::load(&file, &mut fmu.model, config) {
                 Ok(map) => map,
                 Err(mistakes) => return (None, Some(mistakes)),
             },

@@ -223,6 +223,11 @@ impl<'a> Value<'a> {
         matches!(self.node.get_ref(), DeValue::Table(_))
     }
 
+    /// The value is a list.
+    pub fn is_list(&self) -> bool {
+        matches!(self.node.get_ref(), DeValue::Array(_))
+    }
+
     /// The value is an integer.
     pub fn is_integer(&self) -> bool {
         matches!(self.node.get_ref(), DeValue::Integer(_))

@@ -376,7 +376,7 @@ fn an_input_of_a_block_without_a_name_is_refused() {
     let made = block(2, "typeName=\"Foreign\" instanceName=\"f\"", "=1", "");
     refused(
         &fbd(&[input(1, "a"), made]),
-        "an input of \"Foreign\" has no name",
+        "an input of Foreign has no name",
     );
 }
 

@@ -1,10 +1,14 @@
 //! Reads `modelDescription.xml` of a foreign FMU.
 
+use std::collections::HashMap;
+
 use roxmltree::{Document, Node};
 
 use tickbus_base::Mistake;
 use tickbus_base::toml_text::{Collector, Mistakes, shown};
 
+use super::arrays::{Array, Declared, Dimension, Element};
+use super::events::{Clock, Timing};
 use crate::value::{ValueType, Version};
 
 /// The contents of a model description that a run needs.
@@ -26,12 +30,19 @@ pub struct Model {
     pub tolerance: Option<f64>,
     /// True if the FMU needs the tool that generated it.
     pub needs_tool: bool,
-    /// The variables, in the order of the model description.
+    /// The variables, in the order of the model description. The elements of an array are variables of their own.
     pub variables: Vec<ForeignVariable>,
+    /// True if the FMU has an event mode.
+    pub(super) has_event_mode: bool,
+    /// The clocks that the importer lets tick at their times.
+    pub(super) clocks: Vec<Clock>,
+    /// The clocks that the FMU lets tick.
+    pub(super) own_clocks: Vec<u32>,
+    /// The arrays among the variables, by each of their names.
+    pub(super) arrays: Vec<Array>,
+    /// The variables as the model description has them.
+    pub(super) declared: Vec<Declared>,
 }
-
-/// The beginning of an array's type name.
-const ARRAY: &str = "array of ";
 
 /// The role of a variable for the importing tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +66,7 @@ pub struct ForeignVariable {
     pub reference: u32,
     /// The variable's type; `None` if the variable cannot be a signal.
     pub value_type: Option<ValueType>,
-    /// The name of the type, with "array of" for an array; for people.
+    /// The name of the type, with "array of" for an array without elements; for people.
     pub type_name: String,
     /// The variable's role for the importing tool.
     pub causality: Causality,
@@ -65,12 +76,20 @@ pub struct ForeignVariable {
     pub unit: Option<String>,
     /// The variable's other names.
     pub aliases: Vec<String>,
+    /// True for a structural parameter, which the tool sets before all others.
+    pub(super) is_structural: bool,
+    /// The values of an enumeration, by name.
+    pub(super) items: Vec<(String, i64)>,
+    /// The clocks at whose ticks alone the variable has a value.
+    pub(super) clocks: Vec<u32>,
+    /// The place in an array; `None` for a scalar.
+    pub(super) element: Option<Element>,
 }
 
 impl ForeignVariable {
-    /// Returns true if the variable is an array.
-    pub(super) fn is_array(&self) -> bool {
-        self.type_name.starts_with(ARRAY)
+    /// Returns true for an element of an array.
+    pub fn is_element(&self) -> bool {
+        self.element.is_some()
     }
 }
 
@@ -80,13 +99,6 @@ impl Model {
         let is_alias = |one: &ForeignVariable| one.aliases.iter().any(|alias| alias == name);
         let mut variables = self.variables.iter();
         variables.position(|one| one.name == name || is_alias(one))
-    }
-
-    /// Returns the array that this name is an element of: `y` for `y[1]`, if `y` is an array.
-    pub(super) fn array_of(&self, name: &str) -> Option<&ForeignVariable> {
-        let (array, _) = name.split_once('[')?;
-        let found = &self.variables[self.position(array)?];
-        found.is_array().then_some(found)
     }
 
     /// Reads a model description; mistakes call it `file`.
@@ -210,14 +222,18 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
     let number = |name: &str| experiment.and_then(|node| node.attribute(name)?.parse::<f64>().ok());
     let variables = child(root, "ModelVariables");
     let variables = variables.into_iter().flat_map(|node| node.children());
-    let variables: Vec<_> = variables
-        .filter(Node::is_element)
+    let types = child(root, "TypeDefinitions").map_or_else(HashMap::new, enumerations);
+    let variables: Vec<_> = variables.filter(Node::is_element).collect();
+    let clocks = variables.iter().filter(|node| node.has_tag_name("Clock"));
+    let (clocks, own_clocks) = clocks_of(clocks.copied());
+    let declared: Vec<_> = variables
+        .into_iter()
         .filter_map(|node| match version {
-            Version::Two => variable_of_two(node, collector),
-            Version::Three => variable_of_three(node, collector),
+            Version::Two => variable_of_two(node, &types, collector),
+            Version::Three => variable_of_three(node, &types, collector),
         })
         .collect();
-    Some(Model {
+    let mut model = Model {
         version,
         name,
         identifier: identifier?.to_owned(),
@@ -229,8 +245,77 @@ fn read(root: Node<'_, '_>, collector: &Collector<'_>) -> Option<Model> {
         tolerance: number("tolerance")
             .filter(|tolerance| *tolerance > 0.0 && tolerance.is_finite()),
         needs_tool: matches!(kind.attribute("needsExecutionTool"), Some("true" | "1")),
-        variables,
-    })
+        has_event_mode: matches!(kind.attribute("hasEventMode"), Some("true" | "1")),
+        clocks,
+        own_clocks,
+        variables: Vec::new(),
+        arrays: Vec::new(),
+        declared,
+    };
+    model.resize(&[]);
+    Some(model)
+}
+
+/// The clocks that the importer lets tick at times of its own reckoning, and those of the FMU. A triggered input is
+/// neither: nothing triggers it.
+fn clocks_of<'a, 'i: 'a>(nodes: impl Iterator<Item = Node<'a, 'i>>) -> (Vec<Clock>, Vec<u32>) {
+    let (mut clocks, mut own) = (Vec::new(), Vec::new());
+    for node in nodes {
+        let Some(reference) = node
+            .attribute("valueReference")
+            .and_then(|text| text.parse().ok())
+        else {
+            continue;
+        };
+        let number = |name| node.attribute(name)?.parse::<f64>().ok();
+        let resolution = number("resolution").filter(|resolution| *resolution > 0.0);
+        let seconds = |decimal, counter| {
+            let counted = || Some(number(counter)? / resolution?);
+            number(decimal).or_else(counted)
+        };
+        let interval = seconds("intervalDecimal", "intervalCounter");
+        let interval = interval.filter(|interval| interval.is_finite() && *interval > 0.0);
+        let timing = match (node.attribute("intervalVariability"), interval) {
+            (Some("constant" | "fixed"), Some(interval)) => Timing::Periodic {
+                interval,
+                shift: seconds("shiftDecimal", "shiftCounter").unwrap_or(0.0),
+            },
+            (Some("countdown"), _) => Timing::Countdown,
+            (Some("triggered"), _) => {
+                if node.attribute("causality") != Some("input") {
+                    own.push(reference);
+                }
+                continue;
+            }
+            _ => Timing::Asked,
+        };
+        match node.attribute("causality") {
+            Some("input") => clocks.push(Clock { reference, timing }),
+            _ => own.push(reference),
+        }
+    }
+    (clocks, own)
+}
+
+/// The items of an enumeration, by name.
+type Items = Vec<(String, i64)>;
+
+/// The enumerations of a `<TypeDefinitions>` of either version, by the names of their types.
+fn enumerations<'a>(node: Node<'a, '_>) -> HashMap<&'a str, Items> {
+    let types = node.children().filter_map(|one| {
+        let inner = match one.tag_name().name() {
+            "SimpleType" => child(one, "Enumeration")?,
+            "EnumerationType" => one,
+            _ => return None,
+        };
+        let items = inner.children().filter(|item| item.has_tag_name("Item"));
+        let items = items.filter_map(|item| {
+            let value = item.attribute("value")?.parse().ok()?;
+            Some((item.attribute("name")?.to_owned(), value))
+        });
+        Some((one.attribute("name")?, items.collect()))
+    });
+    types.collect()
 }
 
 /// The parts that both versions write in the same way.
@@ -269,6 +354,15 @@ fn common(
             Some("parameter") => node.attribute("variability") == Some("tunable"),
             _ => false,
         },
+        is_structural: node.attribute("causality") == Some("structuralParameter"),
+        items: Vec::new(),
+        clocks: (node
+            .attribute("clocks")
+            .unwrap_or_default()
+            .split_whitespace())
+        .filter_map(|clock| clock.parse().ok())
+        .collect(),
+        element: None,
         unit: unit.map(str::to_owned),
         aliases: node
             .children()
@@ -290,7 +384,11 @@ fn unknown_type(collector: &Collector<'_>, node: Node<'_, '_>, name: &str) {
     );
 }
 
-fn variable_of_two(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<ForeignVariable> {
+fn variable_of_two(
+    node: Node<'_, '_>,
+    enumerations: &HashMap<&str, Items>,
+    collector: &Collector<'_>,
+) -> Option<Declared> {
     if !node.has_tag_name("ScalarVariable") {
         let name = node.tag_name().name();
         wrong(
@@ -324,10 +422,47 @@ fn variable_of_two(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<Fore
             return None;
         }
     };
-    common(node, collector, (value_type, name), inner.attribute("unit"))
+    let mut variable = common(node, collector, (value_type, name), inner.attribute("unit"))?;
+    variable.items = items(inner, enumerations);
+    Some(Declared {
+        variable,
+        dimensions: Vec::new(),
+        size: None,
+    })
 }
 
-fn variable_of_three(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<ForeignVariable> {
+/// The items of the type that an enumeration has declared.
+fn items(node: Node<'_, '_>, types: &HashMap<&str, Items>) -> Items {
+    let declared = node.attribute("declaredType");
+    let found = declared.filter(|_| node.has_tag_name("Enumeration"));
+    let found = found.and_then(|name| types.get(name));
+    found.cloned().unwrap_or_default()
+}
+
+/// One `<Dimension>`.
+fn dimension(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<Dimension> {
+    let number = |name| node.attribute(name)?.parse::<u64>().ok();
+    let found = match (number("start"), number("valueReference")) {
+        (Some(size), None) => Some(Dimension::Fixed(size)),
+        (None, Some(reference)) => u32::try_from(reference).ok().map(Dimension::Structural),
+        _ => None,
+    };
+    if found.is_none() {
+        wrong(
+            collector,
+            node,
+            "a <Dimension> without a size",
+            "expected one of start and valueReference, a whole number",
+        );
+    }
+    found
+}
+
+fn variable_of_three(
+    node: Node<'_, '_>,
+    enumerations: &HashMap<&str, Items>,
+    collector: &Collector<'_>,
+) -> Option<Declared> {
     use ValueType as T;
 
     let name = node.tag_name().name();
@@ -349,11 +484,15 @@ fn variable_of_three(node: Node<'_, '_>, collector: &Collector<'_>) -> Option<Fo
             return None;
         }
     };
-    if child(node, "Dimension").is_some() {
-        let name = format!("{ARRAY}{name}");
-        return common(node, collector, (None, &name), None);
-    }
-    common(node, collector, (value_type, name), node.attribute("unit"))
+    let mut variable = common(node, collector, (value_type, name), node.attribute("unit"))?;
+    variable.items = items(node, enumerations);
+    let dimensions = node.children().filter(|one| one.has_tag_name("Dimension"));
+    let dimensions: Option<_> = dimensions.map(|one| dimension(one, collector)).collect();
+    Some(Declared {
+        variable,
+        dimensions: dimensions?,
+        size: node.attribute("start").and_then(|text| text.parse().ok()),
+    })
 }
 
 #[cfg(test)]
@@ -434,10 +573,9 @@ mod tests {
                      <Float64 name=\"v\" valueReference=\"1\" causality=\"output\"><Dimension start=\"3\"/></Float64>\
                      <Enumeration name=\"e\" valueReference=\"2\" causality=\"output\"><Alias name=\"f\"/></Enumeration></ModelVariables></fmiModelDescription>";
         let model = Model::parse("m.xml", three).expect("right");
-        assert_eq!(model.variables[0].type_name, "array of Float64");
-        assert_eq!(model.array_of("v[1]"), Some(&model.variables[0]));
-        assert_eq!(model.array_of("e[1]"), None);
-        assert_eq!(model.position("f"), Some(1));
-        assert_eq!(model.variables[1].value_type, Some(ValueType::Int64));
+        assert_eq!(model.variables[2].name, "v[3]");
+        assert_eq!(model.variables[2].value_type, Some(ValueType::Float64));
+        assert_eq!(model.position("f"), Some(3));
+        assert_eq!(model.variables[3].value_type, Some(ValueType::Int64));
     }
 }

@@ -8,13 +8,13 @@ use tickbus_base::toml_text::{nearest, short_number, shown};
 use super::description::{Causality, ForeignVariable, Model};
 use super::join::Join;
 use super::map::holds;
-use super::slave::{Failure, Slave};
+use super::slave::{Failure, Slave, Target};
 use crate::value::{Value, ValueType};
 
 /// A variable that a fault can change.
 #[derive(Debug)]
 pub(super) struct Changeable {
-    variable: (ValueType, u32),
+    variable: Target,
     /// The place among the joined inputs, which are set before each step.
     input: Option<usize>,
     /// The value of the fault that the variable has.
@@ -29,7 +29,7 @@ impl Changeable {
         let of = |(index, one): (usize, &ForeignVariable)| {
             let mut inputs = join.inputs.iter();
             Some(Self {
-                variable: (one.value_type?, one.reference),
+                variable: Target::of(one)?,
                 input: inputs.position(|joined| joined.variable == index),
                 fault: None,
                 before: None,

@@ -8,9 +8,9 @@ use tickbus_base::time::{Clock as _, Monotonic, Nanos, Stop};
 use tickbus_net::{Inbox, Message as _};
 
 use super::helper::next;
-use super::slave::{Failure, Setup, Slave, Stepped};
+use super::slave::{Failure, Setup, Slave, Stepped, Target};
 use super::talk::{Answer, Request};
-use crate::value::{Value, ValueType};
+use crate::value::Value;
 
 /// The longest time that an FMU can take to begin, or for a step.
 const PATIENCE: Nanos = Nanos::from_secs(60);
@@ -159,7 +159,7 @@ impl Slave for Isolated {
         )
     }
 
-    fn change(&mut self, variable: (ValueType, u32), value: Value) -> Result<Value, Failure> {
+    fn change(&mut self, variable: Target, value: Value) -> Result<Value, Failure> {
         let mut before = [value];
         let request = Request::Change { variable, value };
         self.ask(&request, "setting a variable", &mut before)?;

@@ -19,8 +19,10 @@ pub struct Join {
     pub inputs: Vec<Joined>,
     /// The values that the FMU returns after each step.
     pub outputs: Vec<Joined>,
-    /// Parameters and their values.
-    pub parameters: Vec<(usize, Value)>,
+    /// Structural parameters and their values, as in [`Map`].
+    pub structural: Vec<(usize, Vec<Value>)>,
+    /// Parameters and their values, as in [`Map`].
+    pub parameters: Vec<(usize, Vec<Value>)>,
     /// Parameters of type text, and their values.
     pub texts: Vec<(usize, String)>,
     /// The rest: signals that nobody writes, inputs that keep their start values, outputs that nobody reads.
@@ -119,6 +121,7 @@ impl Join {
         Ok(Self {
             inputs,
             outputs,
+            structural: map.structural.clone(),
             parameters: map.parameters.clone(),
             texts: map.texts.clone(),
             left,

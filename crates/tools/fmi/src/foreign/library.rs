@@ -3,6 +3,7 @@
 
 #![allow(unsafe_code, reason = "foreign functions are called")]
 
+mod events;
 mod functions;
 mod journal;
 
@@ -15,7 +16,11 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use tickbus_base::os::Library;
 
 use crate::value::{Number, Status, Value, ValueType, Version};
-use functions::{Callbacks, Functions, GetThree, GetTwo, Handle, SetThree, SetTwo, Three, Two};
+use events::EventFunctions;
+pub(super) use events::Interval;
+use functions::{
+    Callbacks, Functions, GetThree, GetTwo, Handle, Plain, SetThree, SetTwo, Three, Two,
+};
 use journal::{Journal, log_of_three, log_of_two};
 
 unsafe extern "C" {
@@ -30,6 +35,8 @@ pub(super) struct StepEnd {
     pub(super) status: Status,
     /// True if the FMU asks to end the run.
     pub(super) terminate: bool,
+    /// True if the FMU asks for its event mode.
+    pub(super) event: bool,
     /// The time that the FMU reached, in seconds, if it reports one.
     pub(super) reached: Option<f64>,
 }
@@ -50,6 +57,8 @@ fn dead() -> MutexGuard<'static, BTreeSet<Identity>> {
 pub(super) struct Instance {
     handle: Handle,
     functions: Functions,
+    /// The functions of the event mode, if it is used.
+    events: Option<EventFunctions>,
     /// True once the FMU has returned "fatal".
     is_dead: bool,
     identity: Identity,
@@ -68,10 +77,11 @@ struct Kept {
 }
 
 impl Instance {
-    /// Loads the library and creates an instance. `file` is the FMU's name in messages.
+    /// Loads the library and creates an instance. `file` is the FMU's name in messages. `has_events`: its event mode is
+    /// used.
     pub(super) fn new(
         (file, name, token): (&str, &str, &str),
-        version: Version,
+        (version, has_events): (Version, bool),
         library: &Path,
         resources: &Path,
     ) -> Result<Self, String> {
@@ -88,6 +98,8 @@ impl Instance {
             Version::Two => Functions::Two(Two::load(&loaded)?),
             Version::Three => Functions::Three(Box::new(Three::load(&loaded)?)),
         };
+        let events = has_events.then(|| EventFunctions::load(&loaded));
+        let events = events.transpose()?;
         let journal = Journal::of(file);
         journal.begin_call();
         let env = journal.env();
@@ -128,8 +140,9 @@ impl Instance {
                         path.as_ptr(),
                         false,
                         false,
-                        false,
-                        false,
+                        has_events,
+                        // It returns early for its events.
+                        has_events,
                         null(),
                         0,
                         env,
@@ -142,6 +155,7 @@ impl Instance {
         let instance = Self {
             handle,
             functions,
+            events,
             is_dead: false,
             identity,
             kept: Some(Kept {
@@ -242,7 +256,7 @@ impl Instance {
     /// Does one step.
     pub(super) fn step(&mut self, from: f64, length: f64) -> StepEnd {
         self.begin_call();
-        let (mut terminate, mut reached) = (false, None);
+        let (mut terminate, mut reached, mut needs_event) = (false, None, false);
         let status = match &self.functions {
             Functions::Two(two) => {
                 // SAFETY: as in `enter`.
@@ -287,6 +301,7 @@ impl Instance {
                     )
                 };
                 terminate = ends != 0;
+                needs_event = event != 0;
                 reached = (status == Status::Discard as c_int || early != 0).then_some(last);
                 status
             }
@@ -294,13 +309,38 @@ impl Instance {
         StepEnd {
             status: self.noted(status),
             terminate,
+            event: needs_event,
             reached,
         }
     }
 
-    /// Sets variables of one type.
+    /// Enters or leaves the configuration mode, in which structural parameters are set.
+    ///
+    /// # Errors
+    ///
+    /// The library has no function for that.
+    pub(super) fn configure(&mut self, enters: bool) -> Result<Status, String> {
+        self.begin_call();
+        let library = &self.kept.as_ref().expect("it is alive").library;
+        let name = if enters {
+            "fmi3EnterConfigurationMode"
+        } else {
+            "fmi3ExitConfigurationMode"
+        };
+        // SAFETY: the type is that of the standard's header.
+        let function = unsafe { library.symbol::<Plain>(name) };
+        let function = function.map_err(|_| {
+            format!(
+                "its library has no function {name}, so its structural parameters cannot be set"
+            )
+        })?;
+        // SAFETY: as in `enter`.
+        let status = unsafe { function(self.handle) };
+        Ok(self.noted(status))
+    }
+
+    /// Sets variables of one type. An array is one reference with several values.
     pub(super) fn set(&mut self, kind: ValueType, references: &[u32], values: &[Value]) -> Status {
-        debug_assert_eq!(references.len(), values.len());
         self.begin_call();
         let status = match &self.functions {
             Functions::Two(two) => match kind {
@@ -413,14 +453,13 @@ impl Instance {
         }
     }
 
-    /// Gets variables of one type.
+    /// Gets variables of one type, as in [`set`](Self::set).
     pub(super) fn get(
         &mut self,
         kind: ValueType,
         references: &[u32],
         values: &mut [Value],
     ) -> Status {
-        debug_assert_eq!(references.len(), values.len());
         self.begin_call();
         let status = match &self.functions {
             Functions::Two(two) => match kind {
@@ -499,7 +538,7 @@ impl Instance {
         values: &mut [Value],
         to: fn(T) -> Value,
     ) -> c_int {
-        let mut got = vec![T::default(); references.len()];
+        let mut got = vec![T::default(); values.len()];
         // SAFETY: as above.
         let status = unsafe {
             function(

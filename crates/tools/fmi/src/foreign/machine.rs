@@ -6,10 +6,11 @@ use tickbus_driver::Driver;
 use tickbus_image::signal::{DataType, SignalTable, Slot};
 
 use super::archive::Unpacked;
+use super::events::EventSetup;
 use super::faults::Changeable;
 use super::join::Join;
 use super::map::Joined;
-use super::slave::{Direct, Failure, Setup, Slave, Stepped};
+use super::slave::{Direct, Failure, Setup, Slave, Stepped, Target};
 use crate::made::kind_of;
 use crate::value::{Value, Version};
 
@@ -99,14 +100,18 @@ impl Machine {
     ) -> Result<Self, Failure> {
         let model = &fmu.model;
         let variable = |joined: &Joined| {
-            let found = &model.variables[joined.variable];
-            let kind = found.value_type.expect("what is joined can be a signal");
-            (kind, found.reference)
+            let target = Target::of(&model.variables[joined.variable]);
+            target.expect("what is joined can be a signal")
         };
-        let parameters = join.parameters.iter().filter_map(|(at, value)| {
-            let found = &model.variables[*at];
-            Some((found.value_type?, found.reference, *value))
-        });
+        let parameters = |list: &[(usize, Vec<Value>)]| {
+            let list = list.iter().filter_map(|(at, values)| {
+                let found = &model.variables[*at];
+                Some((found.value_type?, found.reference, values.clone()))
+            });
+            list.collect()
+        };
+        let positions =
+            |list: &[Joined]| -> Vec<usize> { list.iter().map(|joined| joined.variable).collect() };
         let texts = join.texts.iter();
         let texts = texts.map(|(at, text)| (model.variables[*at].reference, text.clone()));
         let setup = Setup {
@@ -119,10 +124,12 @@ impl Machine {
             start: model.start,
             tolerance: options.tolerance.or(model.tolerance),
             stop: options.duration.map(|end| model.start + seconds(end)),
-            parameters: parameters.collect(),
+            structural: parameters(&join.structural),
+            parameters: parameters(&join.parameters),
             texts: texts.collect(),
             inputs: join.inputs.iter().map(variable).collect(),
             outputs: join.outputs.iter().map(variable).collect(),
+            events: EventSetup::of(model, &positions(&join.inputs), &positions(&join.outputs)),
         };
         let way = |joined: &Joined| Way::of(joined, table);
         let inputs: Vec<Way> = join.inputs.iter().map(way).collect();

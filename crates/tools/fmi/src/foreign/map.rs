@@ -3,12 +3,13 @@
 use std::path::Path;
 
 use tickbus_base::toml_text::{
-    Collector, Mistakes, Table, Value as TomlValue, load_text, nearest, read_text, shown,
+    Collector, Mistakes, Table, Value as TomlValue, did_you_mean, load_text, nearest, read_text,
+    shown,
 };
 use tickbus_driver_cfg::Config;
 use tickbus_fieldbus::faults::unknown;
 
-use super::description::{Causality, Model};
+use super::description::{Causality, ForeignVariable, Model};
 use crate::value::{Number, Value, ValueType};
 
 /// A signal and its variable: signal = `scale` × variable + `offset`.
@@ -29,20 +30,23 @@ pub struct Joined {
 pub struct Map {
     /// Signals and their variables.
     pub joined: Vec<Joined>,
-    /// Parameters, by their indices in the model description, and their values.
-    pub parameters: Vec<(usize, Value)>,
+    /// Structural parameters, as in `parameters`.
+    pub structural: Vec<(usize, Vec<Value>)>,
+    /// Parameters, by the positions of their variables, and their values: one, or one for each element of an array that
+    /// begins there.
+    pub parameters: Vec<(usize, Vec<Value>)>,
     /// Parameters of type text, and their values.
     pub texts: Vec<(usize, String)>,
 }
 
 impl Map {
-    /// Reads the map at `path`.
+    /// Reads the map at `path`. If it sets sizes of arrays, `model` gets their elements as variables.
     ///
     /// # Errors
     ///
     /// Returns every mistake in the map: names that neither the FMU nor the driver.cfg has, with the nearest ones;
     /// variables that cannot be signals; directions that do not match.
-    pub fn load(path: &Path, model: &Model, config: &Config) -> Result<Self, Mistakes> {
+    pub fn load(path: &Path, model: &mut Model, config: &Config) -> Result<Self, Mistakes> {
         let text = load_text(path)?;
         let mut collector = Collector::new(&path.display().to_string(), &text);
         let map = read_text(&mut collector, &text, |root| {
@@ -55,7 +59,7 @@ impl Map {
     }
 }
 
-fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
+fn read(mut root: Table<'_>, model: &mut Model, config: &Config) -> Map {
     let signals = root.take("signals");
     let parameters = root.take("parameters");
     root.require_one_of(
@@ -63,6 +67,14 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
         "write [signals] with lines such as \"Level\" = \"tank.level\"",
     );
     root.finish();
+    let shape = "write lines such as \"tank.area\" = 2.5";
+    let parameters = parameters.and_then(|value| value.table("parameters", shape));
+    let sizes = parameters.iter().flat_map(Table::all);
+    let sizes: Vec<_> = sizes.filter_map(|line| size(line, model)).collect();
+    if !sizes.is_empty() {
+        model.resize(&sizes);
+    }
+    let model = &*model;
     let mut map = Map::default();
     let signals = signals.and_then(|value| value.table("[signals]", "write a [signals] table"));
     for (name, value) in signals.iter().flat_map(Table::all) {
@@ -82,11 +94,12 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
             map.joined.push(joined);
         }
     }
-    let shape = "write lines such as \"tank.area\" = 2.5";
-    let parameters = parameters.and_then(|value| value.table("parameters", shape));
     for (name, value) in parameters.iter().flat_map(Table::all) {
         match parameter(name, &value, model) {
-            Some((at, Set::Value(value))) => map.parameters.push((at, value)),
+            Some((at, Set::Values(values))) if model.variables[at].is_structural => {
+                map.structural.push((at, values));
+            }
+            Some((at, Set::Values(values))) => map.parameters.push((at, values)),
             Some((at, Set::Text(text))) => map.texts.push((at, text)),
             None => {}
         }
@@ -96,20 +109,58 @@ fn read(mut root: Table<'_>, model: &Model, config: &Config) -> Map {
 
 /// The value that a parameter is set to.
 enum Set {
-    Value(Value),
+    Values(Vec<Value>),
     Text(String),
 }
 
+/// The value reference of a structural parameter, and the size that a line of the map gives it.
+fn size((name, value): (&str, TomlValue<'_>), model: &Model) -> Option<(u32, u64)> {
+    let variable = &model.variables[model.position(name)?];
+    if !variable.is_structural || !value.is_integer() {
+        return None;
+    }
+    let size = value.written().parse().ok()?;
+    Some((variable.reference, size))
+}
+
 fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize, Set)> {
+    if let Some(array) = model.array_of(name) {
+        let told = format!(
+            "\"{}\" is an array of {}",
+            shown(&array.name),
+            array.type_name
+        );
+        let right = match array.len() {
+            0 => Some("it has no elements: remove the line, or make it larger"),
+            _ if array.name != name => Some("write all its elements in one line, in a list"),
+            _ => None,
+        };
+        if let Some(right) = right {
+            value.wrong(told, right);
+            return None;
+        }
+        let mut values = Vec::new();
+        elements(value, &model.variables[array.first], &mut values)?;
+        if values.len() != array.len() {
+            let right = format!(
+                "write {} values: {}, the last index changes first",
+                array.len(),
+                array.told()
+            );
+            value.wrong(
+                format!("{told}, and these are {} values", values.len()),
+                right,
+            );
+            return None;
+        }
+        return Some((array.first, Set::Values(values)));
+    }
     let Some(at) = model.position(name) else {
         let names = model
             .variables
             .iter()
             .filter(|one| one.causality != Causality::Output);
         let near = nearest(name, names.map(|one| &*one.name));
-        if refused_element(name, value, model) {
-            return None;
-        }
         value.wrong(
             format!("the FMU has no variable \"{}\"", shown(name)),
             near.map_or_else(
@@ -124,15 +175,51 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
         let text = value.text("write a text in quotes")?;
         return Some((at, Set::Text(text.to_owned())));
     }
+    Some((at, Set::Values(vec![scalar(value, variable)?])))
+}
+
+/// Reads the elements of a list, or of lists in a list.
+fn elements(
+    value: &TomlValue<'_>,
+    variable: &ForeignVariable,
+    into: &mut Vec<Value>,
+) -> Option<()> {
+    for one in value.list("write a list of its elements")? {
+        if one.is_list() {
+            elements(&one, variable, into)?;
+        } else {
+            into.push(scalar(&one, variable)?);
+        }
+    }
+    Some(())
+}
+
+/// Reads one value of a variable.
+fn scalar(value: &TomlValue<'_>, variable: &ForeignVariable) -> Option<Value> {
+    let name = shown(&variable.name);
     let Some(kind) = variable.value_type else {
         value.wrong(
-            format!("\"{}\" is of type {}", shown(name), variable.type_name),
+            format!("\"{name}\" is of type {}", variable.type_name),
             "only numbers, Booleans and texts can be set",
         );
         return None;
     };
     if kind == ValueType::Boolean && value.is_boolean() {
-        return Some((at, Set::Value(Value::Boolean(value.boolean()?))));
+        return Some(Value::Boolean(value.boolean()?));
+    }
+    if let (Some(text), false) = (value.as_text(), variable.items.is_empty()) {
+        let item = variable.items.iter().find(|(name, _)| name == text);
+        if item.is_none() {
+            let names: Vec<&str> = variable.items.iter().map(|(name, _)| &**name).collect();
+            value.wrong(
+                format!(
+                    "the enumeration of \"{name}\" has no item \"{}\"",
+                    shown(text)
+                ),
+                did_you_mean(text, "items", &names),
+            );
+        }
+        return item.map(|(_, number)| Value::Signed(*number));
     }
     let number = value.number(if kind == ValueType::Boolean {
         "write true or false"
@@ -142,8 +229,7 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
     if !holds(kind, number) {
         value.wrong(
             format!(
-                "\"{}\" is of type {}, which has no such value",
-                shown(name),
+                "\"{name}\" is of type {}, which has no such value",
                 variable.type_name
             ),
             if kind == ValueType::Boolean {
@@ -154,19 +240,7 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
         );
         return None;
     }
-    Some((at, Set::Value(Value::Real(number))))
-}
-
-/// Refuses the name of an array element; returns true if it was one.
-fn refused_element(name: &str, value: &TomlValue<'_>, model: &Model) -> bool {
-    let array = model.array_of(name);
-    if let Some(array) = array {
-        value.wrong(
-            format!("\"{}\" is an {}", shown(&array.name), array.type_name),
-            "tickbus does not reach the elements of arrays: export the FMU with scalar variables for them",
-        );
-    }
-    array.is_some()
+    Some(Value::Real(number))
 }
 
 /// Returns true if a type can represent this number; a floating point type takes its nearest value.
@@ -232,7 +306,15 @@ fn joined(name: &str, value: &TomlValue<'_>, model: &Model, config: &Config) -> 
     let Some(at) = model.position(wanted) else {
         let names = model.variables.iter().filter(|one| fits(one.causality));
         let near = nearest(wanted, names.map(|one| &*one.name));
-        if refused_element(wanted, &variable, model) {
+        if let Some(array) = model.array_of(wanted) {
+            variable.wrong(
+                format!(
+                    "\"{}\" is an array of {}",
+                    shown(&array.name),
+                    array.type_name
+                ),
+                format!("{}; name one", array.told()),
+            );
             return None;
         }
         variable.wrong(

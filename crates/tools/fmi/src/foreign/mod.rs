@@ -1,7 +1,9 @@
 //! A foreign FMU, as the machine or as the PLC.
 
 mod archive;
+mod arrays;
 mod description;
+mod events;
 mod faults;
 mod helper;
 mod isolated;

@@ -1,10 +1,14 @@
 //! A running FMU: inputs, a step, outputs.
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 
 use serde::{Deserialize, Serialize};
 
-use super::library::Instance;
+use super::arrays::Element;
+use super::description::ForeignVariable;
+use super::events::{EventSetup, Events};
+use super::library::{Instance, StepEnd};
 use crate::value::{Status, Value, ValueType, Version};
 
 /// The settings with which a run of an FMU begins.
@@ -28,14 +32,62 @@ pub(super) struct Setup {
     pub tolerance: Option<f64>,
     /// The time at which the run ends, in seconds, if known.
     pub stop: Option<f64>,
-    /// The values to set before the run: type, value reference, value.
-    pub parameters: Vec<(ValueType, u32, Value)>,
+    /// The values to set in the configuration mode: type, value reference, and one value, or those of a whole array.
+    pub structural: Vec<(ValueType, u32, Vec<Value>)>,
+    /// The values to set before the run, in the same form.
+    pub parameters: Vec<(ValueType, u32, Vec<Value>)>,
     /// The texts to set before the run: value reference, text.
     pub texts: Vec<(u32, String)>,
     /// The variables to set before every step.
-    pub inputs: Vec<(ValueType, u32)>,
+    pub inputs: Vec<Target>,
     /// The variables to read after every step.
-    pub outputs: Vec<(ValueType, u32)>,
+    pub outputs: Vec<Target>,
+    /// The clocks of an FMU that is run with its event mode.
+    pub events: Option<EventSetup>,
+}
+
+/// A scalar variable, or an element of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Target {
+    pub kind: ValueType,
+    pub reference: u32,
+    /// The place in the array, from 0.
+    pub at: usize,
+    /// The number of elements of the array; 1 for a scalar.
+    pub of: usize,
+}
+
+impl Target {
+    /// The variable; `None` if its type is none of numbers.
+    pub(super) fn of(variable: &ForeignVariable) -> Option<Self> {
+        let element = variable.element.unwrap_or(Element { at: 0, of: 1 });
+        Some(Self {
+            kind: variable.value_type?,
+            reference: variable.reference,
+            at: element.at,
+            of: element.of,
+        })
+    }
+
+    /// Reads the variable by a call of its own; of an array all elements.
+    pub(super) fn get(&self, instance: &mut Instance) -> (Status, Value) {
+        let mut values = vec![Value::Real(0.0); self.of];
+        let status = instance.get(self.kind, &[self.reference], &mut values);
+        (status, values[self.at])
+    }
+
+    /// Sets the variable by a call of its own; of an array, the other elements keep their values.
+    pub(super) fn set(&self, instance: &mut Instance, value: Value) -> Status {
+        let mut values = vec![value; self.of];
+        if self.of > 1 {
+            let status = instance.get(self.kind, &[self.reference], &mut values);
+            if !matches!(status, Status::Ok | Status::Warning) {
+                return status;
+            }
+            values[self.at] = value;
+        }
+        instance.set(self.kind, &[self.reference], &values)
+    }
 }
 
 /// The result of a step.
@@ -72,7 +124,7 @@ pub(super) trait Slave: std::fmt::Debug {
     /// # Errors
     ///
     /// The FMU does not continue.
-    fn change(&mut self, variable: (ValueType, u32), value: Value) -> Result<Value, Failure>;
+    fn change(&mut self, variable: Target, value: Value) -> Result<Value, Failure>;
 
     /// Ends the run properly.
     ///
@@ -82,33 +134,45 @@ pub(super) trait Slave: std::fmt::Debug {
     fn end(&mut self) -> Result<(), Failure>;
 }
 
-/// Variables of one type, handled in one call.
+/// Variables of one type, handled in one call. An array is one variable with a value for each element.
 #[derive(Debug)]
 struct Group {
     kind: ValueType,
     references: Vec<u32>,
-    /// The indices of the variables among all inputs or outputs.
-    at: Vec<usize>,
     values: Vec<Value>,
+    /// The index of each value, and the place of its variable among all inputs or outputs.
+    joined: Vec<(usize, usize)>,
 }
 
-fn groups(variables: &[(ValueType, u32)]) -> Vec<Group> {
+fn groups(variables: &[(usize, Target)]) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
-    for (at, &(kind, reference)) in variables.iter().enumerate() {
-        let index = groups.iter().position(|group| group.kind == kind);
+    // The group and the first value of each array.
+    let mut arrays: HashMap<u32, (usize, usize)> = HashMap::new();
+    for &(place, target) in variables {
+        let index = groups.iter().position(|group| group.kind == target.kind);
         let index = index.unwrap_or_else(|| {
             groups.push(Group {
-                kind,
+                kind: target.kind,
                 references: Vec::new(),
-                at: Vec::new(),
                 values: Vec::new(),
+                joined: Vec::new(),
             });
             groups.len() - 1
         });
         let group = &mut groups[index];
-        group.references.push(reference);
-        group.at.push(at);
-        group.values.push(Value::Real(0.0));
+        let first = group.values.len();
+        let known =
+            (target.of > 1).then(|| *arrays.entry(target.reference).or_insert((index, first)));
+        let first = match known {
+            Some((of, known)) if (of, known) != (index, first) => known,
+            _ => {
+                group.references.push(target.reference);
+                let values = first + target.of;
+                group.values.resize(values, Value::Real(0.0));
+                first
+            }
+        };
+        group.joined.push((first + target.at, place));
     }
     groups
 }
@@ -120,6 +184,7 @@ pub(super) struct Direct {
     file: String,
     inputs: Vec<Group>,
     outputs: Vec<Group>,
+    events: Option<Events>,
     /// True if the FMU has failed, or has ended.
     is_over: bool,
 }
@@ -137,19 +202,32 @@ impl Direct {
             Version::Two
         };
         let names = (&*setup.file, &*setup.name, &*setup.token);
+        let version = (version, setup.events.is_some());
         let instance = Instance::new(names, version, &setup.library, &setup.resources);
         let instance = instance.map_err(|why| Failure(format!("{}: {why}", setup.file)))?;
+        let clocked = |inputs: bool| {
+            let events = setup.events.as_ref();
+            events.map_or(
+                &[][..],
+                |one| if inputs { &one.inputs } else { &one.outputs },
+            )
+        };
         let mut slave = Self {
             instance,
             file: setup.file.clone(),
-            inputs: groups(&setup.inputs),
-            outputs: groups(&setup.outputs),
+            inputs: groups(&EventSetup::unclocked(&setup.inputs, clocked(true))),
+            outputs: groups(&EventSetup::unclocked(&setup.outputs, clocked(false))),
+            events: (setup.events.as_ref()).map(|events| Events::of(events, setup.start)),
             is_over: false,
         };
-        for &(kind, reference, value) in &setup.parameters {
-            let status = slave.instance.set(kind, &[reference], &[value]);
-            slave.check(status, "setting a parameter")?;
+        if !setup.structural.is_empty() {
+            let status = slave.instance.configure(true);
+            slave.configured(status, "entering the configuration")?;
+            slave.set_parameters(&setup.structural)?;
+            let status = slave.instance.configure(false);
+            slave.configured(status, "its configuration")?;
         }
+        slave.set_parameters(&setup.parameters)?;
         for (reference, text) in &setup.texts {
             let status = slave.instance.set_text(*reference, text);
             let status = status.map_err(|why| Failure(format!("{}: {why}", setup.file)))?;
@@ -159,11 +237,45 @@ impl Direct {
             .instance
             .enter(setup.start, setup.tolerance, setup.stop);
         slave.check(status, "entering the initialisation")?;
+        slave.get_unjoined()?;
         slave.set(inputs)?;
         let status = slave.instance.exit();
         slave.check(status, "its initialisation")?;
+        if let Some(events) = &mut slave.events {
+            // An end that is asked for so early comes with the first step.
+            let begun = events.begin(&mut slave.instance);
+            begun.or_else(|(status, what)| slave.check(status, what).map(|()| false))?;
+        }
         slave.get(outputs)?;
         Ok(slave)
+    }
+
+    fn configured(&mut self, status: Result<Status, String>, what: &str) -> Result<(), Failure> {
+        let status = status.map_err(|why| Failure(format!("{}: {why}", self.file)))?;
+        self.check(status, what)
+    }
+
+    fn set_parameters(&mut self, list: &[(ValueType, u32, Vec<Value>)]) -> Result<(), Failure> {
+        for (kind, reference, values) in list {
+            let status = self.instance.set(*kind, &[*reference], values);
+            self.check(status, "setting a parameter")?;
+        }
+        Ok(())
+    }
+
+    /// Reads the start values of arrays among the inputs: an array is set as a whole, and not each element has a signal.
+    fn get_unjoined(&mut self) -> Result<(), Failure> {
+        for index in 0..self.inputs.len() {
+            let group = &mut self.inputs[index];
+            if group.joined.len() == group.values.len() {
+                continue;
+            }
+            let status = self
+                .instance
+                .get(group.kind, &group.references, &mut group.values);
+            self.check(status, "reading the start values of its inputs")?;
+        }
+        Ok(())
     }
 
     fn failure(&mut self, what: &str) -> Failure {
@@ -182,17 +294,23 @@ impl Direct {
     }
 
     fn set(&mut self, values: &[Value]) -> Result<(), Failure> {
-        for index in 0..self.inputs.len() {
-            let group = &mut self.inputs[index];
-            for (value, at) in group.values.iter_mut().zip(&group.at) {
-                *value = values[*at];
-            }
-            let status = self
-                .instance
-                .set(group.kind, &group.references, &group.values);
-            self.check(status, "setting its inputs")?;
-        }
-        Ok(())
+        let status = set_all(&mut self.inputs, values, &mut self.instance);
+        self.check(status, "setting its inputs")
+    }
+
+    /// Does one step; with an event mode, in parts.
+    fn pass(&mut self, inputs: &[Value], from: f64, length: f64) -> Result<StepEnd, Failure> {
+        let Some(events) = &mut self.events else {
+            self.set(inputs)?;
+            return Ok(self.instance.step(from, length));
+        };
+        let groups = &mut self.inputs;
+        let mut set = |instance: &mut Instance| set_all(groups, inputs, instance);
+        let end = events.step(&mut self.instance, inputs, (from, length), &mut set);
+        end.map_err(|(status, what)| {
+            let failed = self.check(status, what);
+            failed.err().unwrap_or_else(|| self.failure(what))
+        })
     }
 
     fn get(&mut self, values: &mut [Value]) -> Result<(), Failure> {
@@ -201,13 +319,30 @@ impl Direct {
             let status = self
                 .instance
                 .get(group.kind, &group.references, &mut group.values);
-            for (value, at) in group.values.iter().zip(&group.at) {
-                values[*at] = *value;
+            for &(at, place) in &group.joined {
+                values[place] = group.values[at];
             }
             self.check(status, "reading its outputs")?;
         }
+        for clocked in self.events.iter().flat_map(|events| &events.outputs) {
+            values[clocked.place] = clocked.value;
+        }
         Ok(())
     }
+}
+
+/// Sets the inputs of all groups, up to the first that is refused.
+fn set_all(groups: &mut [Group], values: &[Value], instance: &mut Instance) -> Status {
+    for group in groups {
+        for &(at, place) in &group.joined {
+            group.values[at] = values[place];
+        }
+        let status = instance.set(group.kind, &group.references, &group.values);
+        if !matches!(status, Status::Ok | Status::Warning) {
+            return status;
+        }
+    }
+    Status::Ok
 }
 
 impl Slave for Direct {
@@ -218,8 +353,7 @@ impl Slave for Direct {
         length: f64,
         outputs: &mut [Value],
     ) -> Result<Stepped, Failure> {
-        self.set(inputs)?;
-        let end = self.instance.step(from, length);
+        let end = self.pass(inputs, from, length)?;
         // FMI 2.0 requests the end of a run this way, which is no failure.
         let has_ended =
             end.terminate && matches!(end.status, Status::Ok | Status::Warning | Status::Discard);
@@ -243,17 +377,12 @@ impl Slave for Direct {
         })
     }
 
-    fn change(
-        &mut self,
-        (kind, reference): (ValueType, u32),
-        value: Value,
-    ) -> Result<Value, Failure> {
-        let mut before = [value];
-        let status = self.instance.get(kind, &[reference], &mut before);
+    fn change(&mut self, variable: Target, value: Value) -> Result<Value, Failure> {
+        let (status, before) = variable.get(&mut self.instance);
         self.check(status, "reading a variable before its fault")?;
-        let status = self.instance.set(kind, &[reference], &[value]);
+        let status = variable.set(&mut self.instance, value);
         self.check(status, "setting a variable for its fault")?;
-        Ok(before[0])
+        Ok(before)
     }
 
     fn end(&mut self) -> Result<(), Failure> {

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 use tickbus_net::Message;
 
-use super::slave::{Failure, Setup, Stepped};
-use crate::value::{Value, ValueType};
+use super::slave::{Failure, Setup, Stepped, Target};
+use crate::value::Value;
 
 /// The most bytes of a message: enough for a hundred thousand variables and their names.
 const MOST: usize = 64 << 20;
@@ -24,10 +24,7 @@ pub(super) enum Request {
         length: f64,
     },
     /// Set a variable, and answer with the value that it had.
-    Change {
-        variable: (ValueType, u32),
-        value: Value,
-    },
+    Change { variable: Target, value: Value },
     /// End the run.
     End,
 }

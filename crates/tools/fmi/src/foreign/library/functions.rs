@@ -4,8 +4,6 @@
 
 use std::ffi::{c_char, c_int, c_void};
 
-use tickbus_base::os::Library;
-
 pub(super) type Handle = *mut c_void;
 pub(super) type Plain = unsafe extern "C" fn(Handle) -> c_int;
 pub(super) type SetTwo<T> = unsafe extern "C" fn(Handle, *const u32, usize, *const T) -> c_int;
@@ -77,6 +75,7 @@ pub(super) type StepThree = unsafe extern "C" fn(
     *mut f64,
 ) -> c_int;
 
+/// Declares functions of a library, and how they are found by their names.
 macro_rules! functions {
     ($name:ident, $prefix:literal: $($field:ident: $own:ty = $function:literal;)+) => {
         #[derive(Debug)]
@@ -85,7 +84,7 @@ macro_rules! functions {
         }
 
         impl $name {
-            pub(super) fn load(library: &Library) -> Result<Self, String> {
+            pub(super) fn load(library: &tickbus_base::os::Library) -> Result<Self, String> {
                 Ok(Self {$(
                     $field: {
                         let name = concat!($prefix, $function);
@@ -102,6 +101,8 @@ macro_rules! functions {
         }
     };
 }
+
+pub(super) use functions;
 
 functions! { Two, "fmi2":
     instantiate: InstantiateTwo = "Instantiate";

@@ -7,7 +7,7 @@ use super::description::{ForeignVariable, Model};
 
 /// The most elements of all arrays of a model that become variables. A larger array stays one variable, which cannot be
 /// a signal.
-const MOST: u64 = 100_000;
+const MOST: usize = 100_000;
 
 /// One dimension of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,16 +46,13 @@ pub(super) struct Array {
     pub type_name: String,
     /// The position of the first element among the variables.
     pub first: usize,
+    /// The number of elements.
+    pub count: usize,
     /// The number of elements along each dimension.
     pub shape: Vec<u64>,
 }
 
 impl Array {
-    /// The number of elements.
-    pub(super) fn len(&self) -> usize {
-        self.shape.iter().product::<u64>() as usize
-    }
-
     /// A sentence with the names of the elements.
     pub(super) fn told(&self) -> String {
         let first = vec![1; self.shape.len()];
@@ -111,7 +108,8 @@ impl Model {
             let shape: Option<Vec<u64>> = dimensions.iter().map(size).collect();
             let count = shape.as_ref().and_then(|shape| {
                 let mut sizes = shape.iter();
-                sizes.try_fold(1_u64, |product, size| product.checked_mul(*size))
+                let product = sizes.try_fold(1_u64, |product, size| product.checked_mul(*size));
+                usize::try_from(product?).ok()
             });
             let (Some(shape), Some(count)) = (shape, count.filter(|count| *count <= left)) else {
                 variables.push(ForeignVariable {
@@ -124,16 +122,13 @@ impl Model {
             left -= count;
             let mut indices = vec![1; shape.len()];
             let first = variables.len();
-            for at in 0..count as usize {
+            for at in 0..count {
                 variables.push(ForeignVariable {
                     name: named(&variable.name, &indices),
                     aliases: (variable.aliases.iter())
                         .map(|alias| named(alias, &indices))
                         .collect(),
-                    element: Some(Element {
-                        at,
-                        of: count as usize,
-                    }),
+                    element: Some(Element { at, of: count }),
                     ..variable.clone()
                 });
                 for (index, size) in indices.iter_mut().zip(&shape).rev() {
@@ -149,6 +144,7 @@ impl Model {
                 name: name.clone(),
                 type_name: variable.type_name.clone(),
                 first,
+                count,
                 shape: shape.clone(),
             }));
         }
@@ -193,7 +189,7 @@ mod tests {
         );
         let array = model.array_of("A[9,9]").expect("an array");
         assert_eq!(array.told(), "it has the elements \"A[1,1]\" to \"A[2,3]\"");
-        assert_eq!(model.array_of("B").map(Array::len), Some(6));
+        assert_eq!(model.array_of("B").map(|array| array.count), Some(6));
         assert_eq!(model.array_of("x[1]"), None);
     }
 

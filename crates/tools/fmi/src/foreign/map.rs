@@ -130,7 +130,7 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
             shown(&array.name),
             array.type_name
         );
-        let right = match array.len() {
+        let right = match array.count {
             0 => Some("it has no elements: remove the line, or make it larger"),
             _ if array.name != name => Some("write all its elements in one line, in a list"),
             _ => None,
@@ -141,10 +141,10 @@ fn parameter(name: &str, value: &TomlValue<'_>, model: &Model) -> Option<(usize,
         }
         let mut values = Vec::new();
         elements(value, &model.variables[array.first], &mut values)?;
-        if values.len() != array.len() {
+        if values.len() != array.count {
             let right = format!(
                 "write {} values: {}, the last index changes first",
-                array.len(),
+                array.count,
                 array.told()
             );
             value.wrong(

@@ -263,6 +263,13 @@ fn three_hosts() -> Result<(), Absent> {
         assert!(line.ends_with(host), "{line}");
     }
 
+    // Names of channels are everywhere.
+    pump.ask("NAME Q1 Running", "OK NAME");
+    while !panel
+        .ask("LIST NAMES", "END")
+        .contains(&"NAME PUMP:Q1 Running".to_owned())
+    {}
+
     // The client's own inputs, an input elsewhere, and a connection between two others.
     logo.ask("CONNECT I1:PUMP:Q1", "OK CONNECT");
     panel.ask("CONNECT I1:PUMP:Q1 Q1:LOGO:I2 Q1:PUMP:I1", "OK CONNECT");

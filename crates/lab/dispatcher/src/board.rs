@@ -101,6 +101,8 @@ pub(crate) enum Change {
     Patched(Pin, Option<Pin>),
     /// An output of a client elsewhere got its first sink, or lost its last one.
     Wanted(Place),
+    /// A client here calls one of its channels differently.
+    Named(usize, Channel),
 }
 
 /// Counts of everything that went through the board.
@@ -493,9 +495,21 @@ impl Board {
 
     /// The client on a seat calls one of its channels so.
     pub(crate) fn name_channel(&mut self, seat: usize, channel: Channel, label: Name) {
-        if let Some(plugged) = &mut self.seats[seat].plugged {
-            plugged.labels.insert(channel, label);
+        let Some(plugged) = &mut self.seats[seat].plugged else {
+            return;
+        };
+        if plugged.labels.get(&channel) == Some(&label) {
+            return;
         }
+        plugged.labels.insert(channel, label);
+        if plugged.host.is_none() {
+            self.changed(Change::Named(seat, channel));
+        }
+    }
+
+    /// The names that the client on a seat has given its channels.
+    pub(crate) fn labels(&self, seat: usize) -> Option<&BTreeMap<Channel, Name>> {
+        Some(&self.seats[seat].plugged.as_ref()?.labels)
     }
 
     /// Requests the current device list, with the labels of channels if wanted.

@@ -2,6 +2,7 @@
 
 mod guard;
 mod laboratory;
+mod names;
 mod operator;
 mod requests;
 mod saving;

@@ -3,12 +3,13 @@
 pub(crate) mod link;
 pub(crate) mod message;
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, HashMap, VecDeque};
 use std::ops::Bound;
 
 use tickbus_base::time::Nanos;
 
 use crate::board::Place;
+use crate::channel::Channel;
 use crate::host::{HostId, Rank};
 use crate::name::{LONGEST_NAME, is_name};
 use crate::patch::Patch;
@@ -89,6 +90,8 @@ pub(crate) struct Host {
     next_want: u32,
     /// Requests to the host that it has not answered.
     pub(crate) asked: BTreeMap<u32, Request>,
+    /// Channels here whose newest names the host has not been sent, by the registration of their clients.
+    pub(crate) renamed: BTreeMap<u64, BTreeSet<Channel>>,
 }
 
 /// Connections that another dispatcher is to make and to cut.
@@ -128,6 +131,8 @@ impl Federation {
         };
         host.link.open(now, self.streams);
         host.link.send(snapshot);
+        // The snapshot has all names.
+        host.renamed.clear();
         host.ask_again();
     }
 
@@ -142,10 +147,11 @@ impl Federation {
         number
     }
 
-    /// The next letter for a host, and the host; `values` makes lines of values for the dispatcher on a seat.
+    /// The next letter for a host, and the host; `newest` makes a letter of what changes often, so that only its newest state is
+    /// sent.
     pub(crate) fn next_letter(
         &mut self,
-        mut values: impl FnMut(usize) -> Option<String>,
+        mut newest: impl FnMut(&mut Host) -> Option<Body>,
     ) -> Option<(HostId, Letter)> {
         for _ in 0..self.hosts.len() {
             let behind = (Bound::Excluded(self.served), Bound::Unbounded);
@@ -157,9 +163,9 @@ impl Federation {
                 return Some((self.served, letter));
             }
             if host.link.is_open
-                && let Some(lines) = values(host.seat)
+                && let Some(body) = newest(host)
             {
-                host.link.send(Body::Values(lines));
+                host.link.send(body);
                 let letter = host.link.take(self.identity.host)?;
                 return Some((self.served, letter));
             }
@@ -183,6 +189,7 @@ impl Host {
             wanted: HashMap::new(),
             next_want: 0,
             asked: BTreeMap::new(),
+            renamed: BTreeMap::new(),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::number::Number;
 use crate::patch::Patch;
 
 use super::Dispatcher;
+use super::names::{all_names, next_names};
 
 impl Dispatcher {
     /// Makes this dispatcher one of several in a laboratory. Letters to the others come from
@@ -58,13 +59,16 @@ impl Dispatcher {
     pub fn next_letter(&mut self) -> Option<(HostId, Vec<u8>)> {
         self.settle();
         let board = &mut self.board;
-        let values = |seat| {
-            board.refill(seat, false);
-            let lines = String::from_utf8_lossy(board.to_write(seat)).into_owned();
-            board.outbox(seat).wrote(lines.len());
-            (!lines.is_empty()).then_some(lines)
+        let federation = self.federation.as_mut()?;
+        let own = federation.identity.host;
+        let newest = |host: &mut Host| {
+            board.refill(host.seat, false);
+            let lines = String::from_utf8_lossy(board.to_write(host.seat)).into_owned();
+            board.outbox(host.seat).wrote(lines.len());
+            let values = (!lines.is_empty()).then_some(Body::Values(lines));
+            values.or_else(|| next_names(board, host, own))
         };
-        let (host, letter) = self.federation.as_mut()?.next_letter(values)?;
+        let (host, letter) = federation.next_letter(newest)?;
         Some((host, letter.to_bytes()))
     }
 
@@ -178,7 +182,8 @@ impl Dispatcher {
                 if let (Some(order), Some(device)) =
                     (self.board.order(seat), self.board.device(seat))
                 {
-                    let client = Client::new(order.since, device);
+                    // Its names come later.
+                    let client = Client::new(order.since, device, Vec::new());
                     federation.tell_all(|| Body::Here(client.clone()));
                 }
             }
@@ -188,6 +193,9 @@ impl Dispatcher {
                     federation.tell_all(|| Body::Gone(order.since));
                 }
                 for host in federation.hosts.values_mut() {
+                    if is_own {
+                        host.renamed.remove(&order.since);
+                    }
                     let wants: Vec<_> = host.wants.range(on_seat(seat)).collect();
                     let wants: Vec<_> = wants.into_iter().map(|(output, _)| *output).collect();
                     for output in wants {
@@ -209,6 +217,7 @@ impl Dispatcher {
             Change::Patched(sink, source) => federation
                 .tell_all(|| Body::Patched((&sink).into(), source.as_ref().map(Into::into))),
             Change::Wanted(output) => self.settle_want(output),
+            Change::Named(seat, channel) => self.settle_name(seat, channel),
         }
     }
 
@@ -244,7 +253,11 @@ impl Dispatcher {
             // The name that the client has chosen, not the one that it is shown by.
             let name = device.name.split_once('@').map(|(name, _)| name.to_owned());
             device.name = name.unwrap_or(device.name);
-            Some(Client::new(order.since, &device))
+            Some(Client::new(
+                order.since,
+                &device,
+                all_names(&self.board, seat),
+            ))
         });
         let clients = own.collect();
         let patch: Vec<_> = self.board.patch().iter().collect();
@@ -296,6 +309,7 @@ impl Dispatcher {
             } => self.read_snapshot(id, host, &clients, &patch),
             Body::Here(client) => self.here(id, &client),
             Body::Gone(since) => self.remote_gone(id, since),
+            Body::Named(since, names) => self.remote_names(id, since, &names),
             Body::Patched(sink, source) => {
                 let source = source.map(|source| (sink.clone(), source));
                 let (sink, source) = (sink.pin(), source.as_ref().map(joint));
@@ -380,6 +394,8 @@ impl Dispatcher {
             return;
         };
         if host.clients.contains_key(&client.since) {
+            // Names may have been lost with the old stream.
+            self.remote_names(id, client.since, &client.names);
             return;
         }
         let host_name = host.name.clone();
@@ -393,6 +409,7 @@ impl Dispatcher {
         };
         let name = device.name.clone();
         self.board.place_remote(seat, device, order, &host_name);
+        self.remote_names(id, client.since, &client.names);
         let Some(holder) = self.board.find_name(&name) else {
             self.board.rename(vec![(seat, name)]);
             return;

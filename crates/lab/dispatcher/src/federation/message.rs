@@ -5,14 +5,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::channel::{Kind, MOST_CHANNELS};
+use crate::channel::{Channel, Kind, MOST_CHANNELS};
 use crate::device::Device;
 use crate::host::HostId;
+use crate::label::Label;
 use crate::name::is_name;
 use crate::patch::Pin;
 
 /// The version of this format. Dispatchers with different versions do not understand each other.
-const VERSION: u8 = 1;
+const VERSION: u8 = 2;
 
 /// A connection: a sink and its source.
 pub(crate) type Joint = (Pin, Pin);
@@ -46,6 +47,8 @@ pub(crate) enum Body {
     Here(Client),
     /// The client that registered at this time has gone.
     Gone(u64),
+    /// The client that registered at this time calls channels so.
+    Named(u64, Vec<WireName>),
     /// An input has this source now, or no longer has one.
     Patched(WirePin, Option<WirePin>),
     /// The values of an output are wanted: of your client that registered at this time, at this place among its
@@ -78,7 +81,13 @@ pub(crate) struct Client {
     pub(crate) since: u64,
     /// The client's line in the device list.
     line: String,
+    /// The names that it has given its channels.
+    pub(crate) names: Vec<WireName>,
 }
+
+/// A channel and its name as text, such as `AQ1 Level`.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct WireName(String);
 
 /// A pin as text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -100,6 +109,21 @@ impl WirePin {
     }
 }
 
+impl WireName {
+    pub(crate) fn new(channel: Channel, label: &Label) -> Self {
+        Self(format!("{channel} {label}"))
+    }
+
+    /// The channel and its name, or `None` if the text is not a valid one.
+    pub(crate) fn read(&self) -> Option<(Channel, Label)> {
+        let (channel, label) = self.0.split_once(' ')?;
+        Some((
+            Channel::parse(channel.as_bytes())?,
+            Label::read(label.as_bytes())?,
+        ))
+    }
+}
+
 /// Connections as text.
 pub(crate) fn to_wire(joints: &[Joint]) -> Vec<WireJoint> {
     let all = joints.iter();
@@ -116,9 +140,9 @@ pub(crate) fn joint((sink, source): &WireJoint) -> Option<Joint> {
 }
 
 impl Client {
-    pub(crate) fn new(since: u64, device: &Device) -> Self {
+    pub(crate) fn new(since: u64, device: &Device, names: Vec<WireName>) -> Self {
         let line = device.to_string();
-        Self { since, line }
+        Self { since, line, names }
     }
 
     /// The client, or `None` if the line is not a valid one.
@@ -171,6 +195,7 @@ mod tests {
         let client = Client {
             since: 7,
             line: "VP:A:Q01:I00:AQ00:AI00:[::1]:80".to_owned(),
+            names: vec![WireName("Q1 Running".to_owned())],
         };
         let bodies = [
             Body::Beat { is_lost: true },
@@ -181,6 +206,7 @@ mod tests {
             },
             Body::Here(client),
             Body::Gone(1),
+            Body::Named(1, vec![WireName("AQ1 Level".to_owned())]),
             Body::Patched(pin("B:I1"), None),
             Body::Want {
                 since: 1,
@@ -221,12 +247,25 @@ mod tests {
     fn what_clients_may_not_say_is_not_taken_from_dispatchers_either() {
         let device = |since, line: &str| {
             let line = line.to_owned();
-            Client { since, line }.device()
+            let names = Vec::new();
+            Client { since, line, names }.device()
         };
         assert!(device(1, "VP:A:Q256:I00:AQ00:AI00:1.2.3.4:5").is_some());
         assert!(device(1, "VP:A:Q257:I00:AQ00:AI00:1.2.3.4:5").is_none());
         assert!(device(1, "VP:A@pi:Q01:I00:AQ00:AI00:1.2.3.4:5").is_none());
         assert!(device(u64::MAX, "VP:A:Q01:I00:AQ00:AI00:1.2.3.4:5").is_none());
+        let named = |text: &str| WireName(text.to_owned()).read();
+        let level = Channel::parse(b"AQ1").zip(Label::of("Level of 1"));
+        assert_eq!(named("AQ1 Level of 1"), level);
+        for wrong in [
+            "AQ1",
+            "AQ1 ",
+            "X1 a",
+            "AQ1 a\u{1b}[2J",
+            &format!("AQ1 {}", "x".repeat(121)),
+        ] {
+            assert_eq!(named(wrong), None, "{wrong}");
+        }
         let text = |text: &str| WirePin(text.to_owned());
         for (sink, source, fits) in [
             ("A:I1", "B@pi:Q1", true),

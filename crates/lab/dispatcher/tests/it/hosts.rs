@@ -1,6 +1,6 @@
 //! Several dispatchers as one laboratory, without a network: letters are carried, lost and cut by hand.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::common::hosts::{Hosts, NAMES, id, number, order, pin};
 use proptest::prelude::*;
@@ -390,6 +390,78 @@ fn an_operator_patches_clients_of_all_hosts_and_forces_those_of_one() {
     assert_eq!(told, Err("ERR 404 LOGO:I1 is not connected".to_owned()));
 }
 
+/// The names of channels as a host lists them.
+fn names(hosts: &mut Hosts, host: usize, seat: usize) -> Vec<String> {
+    let mut lines = hosts.ask(host, seat, "LIST NAMES");
+    lines.retain(|line| line.starts_with("NAME "));
+    lines
+}
+
+#[test]
+fn the_names_of_channels_are_the_same_on_all_hosts() {
+    let mut hosts = hosts();
+    let pump = hosts.join(0, "VP PUMP Q02 AQ1 V=2");
+    let logo = hosts.join(1, "VR LOGO I01 V=2");
+    hosts.ask(0, pump, "NAME Q1 Pumpe läuft");
+    hosts.ask(0, pump, "NAME AQ0 Level");
+    hosts.ask(1, logo, "NAME I1 Start");
+    let all = [
+        "NAME PUMP:Q1 Pumpe läuft",
+        "NAME PUMP:AQ0 Level",
+        "NAME LOGO:I1 Start",
+    ];
+    for (host, seat) in [(0, pump), (1, logo)] {
+        assert_eq!(names(&mut hosts, host, seat), all);
+    }
+    // The page of a third one shows them.
+    let seen = hosts.labs[2].dispatcher.snapshot();
+    let channels = seen.clients.iter().flat_map(|client| &client.channels);
+    let labels = channels.filter_map(|channel| channel.label.as_ref());
+    assert_eq!(
+        labels.map(ToString::to_string).collect::<Vec<_>>(),
+        ["Pumpe läuft", "Level", "Start"]
+    );
+
+    // A name that changes while a host is cut off, or whose letter is lost.
+    hosts.cut(0, 1);
+    hosts.ask(0, pump, "NAME Q1 Pump");
+    hosts.wait(SILENCE);
+    assert_eq!(names(&mut hosts, 1, logo), ["NAME LOGO:I1 Start"]);
+    hosts.heal();
+    hosts.wait(1);
+    assert_eq!(names(&mut hosts, 1, logo)[0], "NAME PUMP:Q1 Pump");
+    hosts.to_lose = 2;
+    hosts.ask(0, pump, "NAME Q2 Alarm");
+    hosts.wait(SILENCE);
+    assert_eq!(names(&mut hosts, 1, logo)[1], "NAME PUMP:Q2 Alarm");
+
+    // They leave with their client.
+    hosts.labs[0].dispatcher.gone(pump);
+    hosts.settle();
+    hosts.join(2, "VP PUMP Q02 AQ1");
+    assert_eq!(names(&mut hosts, 1, logo), ["NAME LOGO:I1 Start"]);
+}
+
+#[test]
+fn a_client_that_renames_its_channels_without_end_fills_no_queue() {
+    let mut hosts = hosts();
+    let pump = hosts.join(0, "VP PUMP Q02 V=2");
+    for count in 0..20_000 {
+        let told = hosts.labs[0].ask(pump, &format!("NAME Q{} n{count}", 1 + count % 2));
+        assert_eq!(told, ["OK NAME"]);
+    }
+    let mut letters = 0;
+    while hosts.carry_one() {
+        letters += 1;
+    }
+    assert!(letters <= 4, "{letters} letters");
+    let logo = hosts.join(1, "VR LOGO I01");
+    assert_eq!(
+        names(&mut hosts, 1, logo),
+        ["NAME PUMP:Q1 n19998", "NAME PUMP:Q2 n19999"]
+    );
+}
+
 #[test]
 fn a_letter_of_another_version_is_told_once() {
     let mut hosts = hosts();
@@ -410,6 +482,7 @@ enum Step {
     Set(usize, u16, u8),
     Connect(usize, Vec<(u16, usize, u16)>),
     Disconnect(usize, u16),
+    Name(usize, u16, u8),
     Cut(usize, usize),
     Heal,
     Mend,
@@ -431,7 +504,8 @@ fn step() -> impl Strategy<Value = Step> {
         1 => client.clone().prop_map(Step::Leave),
         6 => (client.clone(), channel.clone(), 0..4_u8).prop_map(|(client, at, value)| Step::Set(client, at, value)),
         6 => (client.clone(), prop::collection::vec(joint, 1..3)).prop_map(|(client, joints)| Step::Connect(client, joints)),
-        1 => (client, channel).prop_map(|(client, channel)| Step::Disconnect(client, channel)),
+        1 => (client.clone(), channel.clone()).prop_map(|(client, channel)| Step::Disconnect(client, channel)),
+        2 => (client, channel, 0..4_u8).prop_map(|(client, channel, name)| Step::Name(client, channel, name)),
         2 => (0..3_usize, 1..3_usize).prop_map(|(one, by)| Step::Cut(one, (one + by) % 3)),
         1 => Just(Step::Heal),
         1 => Just(Step::Mend),
@@ -449,6 +523,8 @@ struct Client {
     port: u16,
     said: BTreeMap<u16, u8>,
     heard: BTreeMap<u16, u8>,
+    /// The numbers in the names of its inputs.
+    named: BTreeMap<u16, u8>,
 }
 
 impl Client {
@@ -538,6 +614,15 @@ impl Clients {
                     hosts.labs[client.host].say(client.seat, &line);
                 }
             }
+            Step::Name(at, channel, name) => {
+                if let Some(client) = self.0.get_mut(at)
+                    && hosts.labs[client.host].dispatcher.wants_bytes(client.seat)
+                {
+                    let line = format!("NAME I{channel} {name}");
+                    hosts.labs[client.host].say(client.seat, &line);
+                    client.named.insert(*channel, *name);
+                }
+            }
             Step::Cut(one, other) => hosts.cut(*one, *other),
             Step::Heal => hosts.heal(),
             Step::Mend => hosts.mend(),
@@ -579,13 +664,16 @@ proptest! {
         for host in 0..NAMES.len() {
             let seat = hosts.labs[host].connect();
             // Version 1 shows no hosts; the last line is the client that asks.
-            let mut list = hosts.labs[host].ask(seat, &format!("VP WATCH{host} Q01"));
+            hosts.labs[host].ask(seat, &format!("VP WATCH{host} Q01"));
+            let mut list = hosts.labs[host].ask(seat, "LIST NAMES");
             list.pop();
             hosts.labs[host].dispatcher.gone(seat);
             boards.push(list);
         }
         prop_assert_eq!(&boards[0], &boards[1]);
         prop_assert_eq!(&boards[0], &boards[2]);
+        let (names, list): (Vec<_>, Vec<_>) = boards.swap_remove(0).into_iter().partition(|line| line.starts_with("NAME "));
+        let boards = [list];
         prop_assert_eq!(boards[0].len(), clients.0.len());
 
         // Identified by the port from which it connected.
@@ -598,6 +686,10 @@ proptest! {
             let device = Device::parse(line.expect("it is in the list").as_bytes()).expect("a device");
             by_name.insert(device.name.clone(), (client, device));
         }
+        let said = by_name.iter().flat_map(|(name, (client, _))| {
+            client.named.iter().map(move |(channel, label)| format!("NAME {name}:I{channel} {label}"))
+        });
+        prop_assert_eq!(names.into_iter().collect::<BTreeSet<_>>(), said.collect());
         for host in 0..NAMES.len() {
             for (sink, source) in hosts.labs[host].dispatcher.patch().iter() {
                 let Some((client, _)) = by_name.get(&sink.client).filter(|(client, _)| client.host == host) else {
@@ -624,10 +716,11 @@ proptest! {
         hosts.join(0, "VP PUMP Q01 I01");
         let now = hosts.labs[0].now;
         hosts.labs[0].dispatcher.letter_arrived(now, &bytes);
-        bytes.insert(0, 1);
+        bytes.insert(0, 2);
         hosts.labs[0].dispatcher.letter_arrived(now, &bytes);
         // A valid letter with one wrong byte.
-        hosts.labs[1].join("VR LOGO Q01 I01");
+        let logo = hosts.labs[1].join("VR LOGO Q01 I01");
+        hosts.labs[1].say(logo, "NAME I1 Start");
         while let Some((_, mut letter)) = hosts.labs[1].dispatcher.next_letter() {
             let at = usize::from(at) % letter.len();
             letter[at] = with;

@@ -60,7 +60,7 @@ pub use line::{Line, Serial};
 pub use piece::Piece;
 pub use server::{ModbusServer, ServerOptions};
 pub use stations::Stations;
-pub use table::{Span, Table, take_bits};
+pub use table::{Span, Table};
 pub use tables::{Map, Side, Tables};
 pub use tag_address::TagAddress;
 

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use super::table::{ADDRESSES, Span, Table, copy_bits};
+use tickbus_fieldbus::{Row, RowPart, copy_bits, count_while};
+
+use super::table::{ADDRESSES, Span, Table};
 use super::{Exception, Piece};
 
 /// One of the two frames of a unit.
@@ -27,10 +29,7 @@ pub struct Map {
 struct Layout {
     /// The offsets of the elements that exist, in order; no two ranges meet.
     exist: Vec<Range<usize>>,
-    /// In the order of their first bits in the table.
-    parts: Vec<Part>,
-    /// For each part, where it and those before it end in the table.
-    ends: Vec<usize>,
+    parts: Row<Part>,
     /// For each part, the number of its run: parts that follow each other in the table, perhaps with gaps, and in the frame
     /// without any.
     runs: Vec<u32>,
@@ -59,6 +58,21 @@ impl Part {
     }
 }
 
+impl RowPart for Part {
+    #[inline]
+    fn bits(&self) -> Range<usize> {
+        self.wire..self.end()
+    }
+
+    fn append(&mut self, next: &Self) -> bool {
+        let continues = next.wire == self.end() && next.follows(self);
+        if continues {
+            self.bits += next.bits;
+        }
+        continues
+    }
+}
+
 impl Layout {
     fn add(&mut self, elements: Range<usize>) {
         let elements = elements.start.min(ADDRESSES)..elements.end.min(ADDRESSES);
@@ -77,24 +91,10 @@ impl Layout {
             }
             meet
         });
-        self.parts.sort_by_key(|part| part.wire);
-        self.parts.dedup_by(|next, part| {
-            let continues = next.side == part.side
-                && next.wire == part.end()
-                && next.bit == part.bit + part.bits;
-            if continues {
-                part.bits += next.bits;
-            }
-            continues
-        });
-        let ends = self.parts.iter().scan(0, |end, part| {
-            *end = part.end().max(*end);
-            Some(*end)
-        });
-        self.ends = ends.collect();
+        self.parts.finish();
         let mut run = 0;
         let mut last: Option<&Part> = None;
-        let runs = self.parts.iter().map(|part| {
+        let runs = self.parts.parts().iter().map(|part| {
             run += u32::from(last.is_some_and(|last| !part.follows(last)));
             last = Some(part);
             run
@@ -111,28 +111,16 @@ impl Layout {
             return Err(Exception::ILLEGAL_DATA_ADDRESS);
         }
         let (from, end) = (span.first * width, span.end() * width);
-        let first = count_while(&self.ends, |before| *before <= from);
-        let count = count_while(&self.parts[first..], |part| part.wire < end);
-        let parts = &self.parts[first..first + count];
-        let is_one_run = count > 0 && self.runs[first] == self.runs[first + count - 1];
+        let found = self.parts.find(&(from..end));
+        let runs = &self.runs[found.clone()];
+        let is_one_run = runs.first().is_some_and(|first| runs.last() == Some(first));
         Ok(Found {
-            parts,
+            parts: &self.parts.parts()[found],
             is_one_run,
             from,
             end,
         })
     }
-}
-
-/// The number of items at the beginning for which `is_before` is true. Images placed as a whole have one or two.
-#[inline]
-fn count_while<T>(list: &[T], is_before: impl Fn(&T) -> bool) -> usize {
-    const FEW: usize = 4;
-    if list.len() > FEW {
-        return list.partition_point(is_before);
-    }
-    let other = list.iter().position(|item| !is_before(item));
-    other.unwrap_or(list.len())
 }
 
 /// The parts of the frames that consecutive elements carry.

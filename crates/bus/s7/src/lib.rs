@@ -58,7 +58,6 @@
 //! # Ok::<(), tickbus_bus_s7::ProtocolError>(())
 //! ```
 
-mod bits;
 mod client;
 mod identity;
 pub mod item;

@@ -2,6 +2,7 @@
 
 mod alive;
 mod at;
+mod bits;
 mod bus;
 mod card;
 mod changes;
@@ -15,6 +16,7 @@ mod port;
 mod rarely;
 mod renewal;
 mod role;
+mod row;
 mod swallowed;
 mod traffic;
 mod validity;
@@ -26,6 +28,7 @@ pub mod tcp;
 
 pub use alive::{Alive, Heartbeat, LifeSigns, Watch, Written};
 pub use at::{ADDRESS_LIMIT, At, both_ways};
+pub use bits::{copy_bits, take_bits};
 pub use bus::{Bus, CYCLE, Free, Lead, Stepped};
 pub use card::{Card, CardBus, CardOptions, Failing, Meaning, Moved, Vendor, Verdict};
 pub use changes::ChangeEvents;
@@ -39,6 +42,7 @@ pub use port::{CallWatch, Farewell, Frames, Outputs, Port, Receipt};
 pub use rarely::{Rarely, Times, Topic};
 pub use renewal::Renewal;
 pub use role::{OBSERVES, Role};
+pub use row::{Row, RowPart, count_while};
 pub use swallowed::{Steps, SwallowedSignals};
 pub use tickbus_image::is_stale;
 pub use traffic::Medium;

@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use tickbus_fieldbus::copy_bits;
+
 use crate::function::EXCEPTION_BIT;
-use crate::table::{Span, Table, copy_bits};
+use crate::table::{Span, Table};
 use crate::{ElementAddress, Exception, Function, identification};
 
 use crate::Piece;

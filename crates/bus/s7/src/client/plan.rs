@@ -5,7 +5,8 @@
 
 use std::ops::Range;
 
-use crate::bits::carry;
+use tickbus_fieldbus::copy_bits;
+
 use crate::item::{self, Item, Object};
 use crate::pdu;
 
@@ -65,14 +66,14 @@ impl Piece {
     /// Fills the item's `data` from a frame.
     pub(super) fn gather(&self, frame: &[u8], data: &mut [u8]) {
         for run in &self.runs {
-            carry(frame, run.frame, data, run.data, run.bits);
+            copy_bits(frame, run.frame, run.bits, data, run.data);
         }
     }
 
     /// Copies the item's `data` into a frame.
     pub(super) fn scatter(&self, data: &[u8], frame: &mut [u8]) {
         for run in &self.runs {
-            carry(data, run.data, frame, run.frame, run.bits);
+            copy_bits(data, run.data, run.bits, frame, run.frame);
         }
     }
 }

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
+use tickbus_fieldbus::{Row, RowPart, copy_bits};
 use tickbus_image::signal::{Area, SignalTable};
 
 use super::ServerOptions;
-use crate::bits::carry;
 use crate::item::Object;
 
 /// Bits of a station's frame, and the bits of an object that carry them in the same order.
@@ -30,19 +30,14 @@ impl Part {
         self.frame..self.frame + self.bits
     }
 
-    /// The bits in the object.
-    pub(super) fn bits(&self) -> Range<usize> {
-        self.first..self.end()
-    }
-
     /// Copies the part from an object's bytes into its frame.
     pub(super) fn scatter(&self, bytes: &[u8], frame: &mut [u8]) {
-        carry(bytes, self.first, frame, self.frame, self.bits);
+        copy_bits(bytes, self.first, self.bits, frame, self.frame);
     }
 
     /// Copies the part from its frame into an object's bytes.
     pub(super) fn gather(&self, frame: &[u8], bytes: &mut [u8]) {
-        carry(frame, self.frame, bytes, self.first, self.bits);
+        copy_bits(frame, self.frame, self.bits, bytes, self.first);
     }
 
     /// The portion of the part within `bits` of the object.
@@ -58,6 +53,23 @@ impl Part {
     }
 }
 
+impl RowPart for Part {
+    /// The bits in the object.
+    fn bits(&self) -> Range<usize> {
+        self.first..self.end()
+    }
+
+    fn append(&mut self, next: &Self) -> bool {
+        let continues = (next.station, next.area) == (self.station, self.area)
+            && next.first == self.end()
+            && next.frame == self.frame + self.bits;
+        if continues {
+            self.bits += next.bits;
+        }
+        continues
+    }
+}
+
 /// One object: a data block, or the inputs, outputs or flags of a CPU.
 #[derive(Debug)]
 pub(super) struct PlacedObject {
@@ -68,10 +80,7 @@ pub(super) struct PlacedObject {
     pub(super) owner: usize,
     /// The contents. Bytes without a signal keep what clients write.
     pub(super) bytes: Box<[u8]>,
-    /// In the order of their first bits in the object.
-    parts: Vec<Part>,
-    /// For each part, where it and those before it end in the object.
-    ends: Vec<usize>,
+    parts: Row<Part>,
 }
 
 impl PlacedObject {
@@ -81,47 +90,30 @@ impl PlacedObject {
             object,
             owner,
             bytes: Box::default(),
-            parts: Vec::new(),
-            ends: Vec::new(),
+            parts: Row::default(),
         }
     }
 
     /// Gives the object its length, at least that of its parts, and orders them.
     fn finish(&mut self, length: usize) {
-        self.parts.sort_by_key(|part| part.first);
-        self.parts.dedup_by(|next, part| {
-            let continues = (next.station, next.area) == (part.station, part.area)
-                && next.first == part.end()
-                && next.frame == part.frame + part.bits;
-            if continues {
-                part.bits += next.bits;
-            }
-            continues
-        });
-        let ends = self.parts.iter().scan(0, |end, part| {
-            *end = part.end().max(*end);
-            Some(*end)
-        });
-        self.ends = ends.collect();
-        let end = self.ends.last().map_or(0, |bits| bits.div_ceil(8));
+        self.parts.finish();
+        let end = self.parts.end().div_ceil(8);
         self.bytes = vec![0; length.max(end)].into();
     }
 
     /// The parts that reach into `bits`, as positions for [`part`](Self::part).
     pub(super) fn find(&self, bits: &Range<usize>) -> Range<usize> {
-        let first = self.ends.partition_point(|end| *end <= bits.start);
-        let count = self.parts[first..].partition_point(|part| part.first < bits.end);
-        first..first + count
+        self.parts.find(bits)
     }
 
     /// The portion of a part within `bits`; `None` if another part reaches over it.
     pub(super) fn part(&self, at: usize, bits: &Range<usize>) -> Option<Part> {
-        self.parts[at].within(bits)
+        self.parts.parts()[at].within(bits)
     }
 
     /// All parts.
     pub(super) fn parts(&self) -> &[Part] {
-        &self.parts
+        self.parts.parts()
     }
 }
 
@@ -210,7 +202,7 @@ mod tests {
 
     fn object(parts: &[Part]) -> PlacedObject {
         let mut object = PlacedObject::new(None, Object::Block(1), 0);
-        object.parts = parts.to_vec();
+        parts.iter().for_each(|part| object.parts.push(*part));
         object.finish(4);
         object
     }

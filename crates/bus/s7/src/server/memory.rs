@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use tickbus_base::time::Nanos;
 use tickbus_fieldbus::tcp::{Writer, Writers};
-use tickbus_fieldbus::{Port, Receipt, Renewal, Role};
+use tickbus_fieldbus::{Port, Receipt, Renewal, Role, RowPart as _};
 
 use super::layout::{Part, PlacedObject};
 use super::map::{AreaRange, Map, Place};

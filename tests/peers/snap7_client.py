@@ -5,24 +5,8 @@ import struct
 import sys
 
 import snap7
-from snap7.error import S7ProtocolError
 from snap7.type import Area, Block, WordLen
-
-
-def equal(what, got, expected):
-    if got != expected:
-        sys.exit(f"{what}: {got!r} instead of {expected!r}")
-
-
-def refused(what, call, words):
-    try:
-        call()
-    except (RuntimeError, S7ProtocolError) as error:
-        if words not in str(error):
-            sys.exit(f"{what}: refused by {error!r}, not for {words!r}")
-        return
-    sys.exit(f"{what} was not refused")
-
+from snap7_checks import equal, refused
 
 client = snap7.client.Client()
 client.connect("127.0.0.1", 0, 1, int(sys.argv[1]))

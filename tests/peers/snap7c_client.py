@@ -7,22 +7,7 @@ from ctypes import POINTER, c_uint8, cast, create_string_buffer, pointer
 
 import snap7
 from snap7.type import Area, Block, S7DataItem
-
-
-def equal(what, got, expected):
-    if got != expected:
-        sys.exit(f"{what}: {got!r} instead of {expected!r}")
-
-
-def refused(what, call, words):
-    try:
-        call()
-    except RuntimeError as error:
-        if words not in str(error):
-            sys.exit(f"{what}: refused by {error!r}, not for {words!r}")
-        return
-    sys.exit(f"{what} was not refused")
-
+from snap7_checks import equal, refused
 
 client = snap7.client.Client()
 client.connect("127.0.0.1", 0, 1, int(sys.argv[1]))

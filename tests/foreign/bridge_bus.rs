@@ -2,6 +2,7 @@
 #![allow(clippy::unnecessary_wraps, reason = "tests of one shape")]
 
 use std::net::TcpListener;
+use std::path::Path;
 
 use serde_json::json;
 
@@ -17,11 +18,15 @@ pub(crate) const TESTS: &[(&str, Test)] = &[
     ("a_cpu_of_python_snap7_is_a_controller_on_the_board", s7),
     #[cfg(feature = "opcua")]
     ("a_server_of_asyncua_is_a_controller_on_the_board", opc_ua),
+    (
+        "the_logo_of_the_document_switches_the_pump_at_its_adam",
+        document,
+    ),
 ];
 
 /// A laboratory with a bridge to a device.
 struct Lab {
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
     dispatch: Running,
     dispatcher: String,
     bridge: Running,
@@ -30,16 +35,21 @@ struct Lab {
 impl Lab {
     /// A bridge with this driver.cfg; it has joined.
     fn new(config: &str) -> Self {
+        Self::with_patch(config, "REAL", "")
+    }
+
+    /// The same for a device with this name, with connections in the dispatcher's file.
+    fn with_patch(config: &str, name: &str, patch: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let mut dispatch = dispatch(&folder.path().join("lab.toml"), "127.0.0.1:0");
+        let patched = folder.path().join("lab.toml");
+        if !patch.is_empty() {
+            std::fs::write(&patched, patch).expect("a file");
+        }
+        let mut dispatch = dispatch(&patched, "127.0.0.1:0");
         let dispatcher = dispatch.after("dispatch: listening on ");
-        let file = folder.path().join("driver.cfg");
-        std::fs::write(&file, config).expect("a file");
-        let file = file.to_str().expect("text");
-        let mut bridge = bridge(&["bus", file, "--dispatcher", &dispatcher]);
-        bridge.after("bridge: REAL opening: joined ");
+        let bridge = join(folder.path(), config, name, &dispatcher);
         Self {
-            _folder: folder,
+            folder,
             dispatch,
             dispatcher,
             bridge,
@@ -47,11 +57,25 @@ impl Lab {
     }
 
     fn end(self) {
-        let (last, code) = self.bridge.interrupt();
-        assert!(last.starts_with("bridge: ok ticks="), "{last}");
-        assert_eq!(code, Some(0));
+        end(self.bridge);
         self.dispatch.interrupt();
     }
+}
+
+/// Starts a bridge with this driver.cfg, until it has joined.
+fn join(folder: &Path, config: &str, name: &str, dispatcher: &str) -> Running {
+    let file = folder.join(format!("{name}.cfg"));
+    std::fs::write(&file, config).expect("a file");
+    let file = file.to_str().expect("text");
+    let mut bridge = bridge(&["bus", file, "--dispatcher", dispatcher]);
+    bridge.after(&format!("bridge: {name} opening: joined "));
+    bridge
+}
+
+fn end(bridge: Running) {
+    let (last, code) = bridge.interrupt();
+    assert!(last.starts_with("bridge: ok ticks="), "{last}");
+    assert_eq!(code, Some(0));
 }
 
 fn free_port() -> u16 {
@@ -148,6 +172,55 @@ fn opc_ua() -> Result<(), Absent> {
     tank.until_values("AI1=?");
     let _plc = opcua::plc(address, &json!({}))?;
     tank.until_values("AI1=7");
+    lab.end();
+    Ok(())
+}
+
+/// The block in docs/dispatcher.md that contains these words, with other words in place of some of them.
+fn documented(words: &str, replaced: &[(&str, &str)]) -> String {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/docs/dispatcher.md");
+    let text = std::fs::read_to_string(path).expect("it is there");
+    let mut blocks = text.split("```toml\n").skip(1);
+    let block = blocks.find_map(|rest| {
+        let (block, _) = rest.split_once("```")?;
+        block.contains(words).then(|| block.to_owned())
+    });
+    let mut block = block.expect(words);
+    for (from, to) in replaced {
+        assert!(block.contains(from), "{from}: {block}");
+        block = block.replace(from, to);
+    }
+    block
+}
+
+fn document() -> Result<(), Absent> {
+    let (adam, logo) = (free_port().to_string(), free_port());
+    let _adam = Server::start_script("adam.py", &["127.0.0.1", &adam])?;
+    let python = harness::python_with("main", &["snap7"])?;
+    let _logo = Cpu::start_at(python, "logo.py", logo);
+    let place = format!("127.0.0.1:{adam}");
+    let adam = documented("name = \"ADAM\"", &[("192.168.0.20:502", &place)]);
+    let place = format!("\"127.0.0.1:{logo}\"");
+    // The name that this CPU states.
+    let identity = "write_to = \"6ES7 315-2EH14-0AB0 CPU 315-2 PN/DP S C-C2UR28922012\" #";
+    let logo = documented(
+        "kind        = \"s7-client\"",
+        &[("\"192.168.0.3\"", &place), ("# write_to", identity)],
+    );
+    let patch = documented("\"LOGO:I1\" = \"ADAM:Q1\"", &[])
+        + "\"WATCH:I1\" = \"ADAM:Q1\"\n\"WATCH:I2\" = \"LOGO:Q1\"\n\"WATCH:AI1\" = \"LOGO:AQ1\"\n";
+    let lab = Lab::with_patch(&adam, "ADAM", &patch);
+    let mut watch = LabClient::connect(&lab.dispatcher, "VP WATCH I2 AI1 V=3");
+    let second = join(lab.folder.path(), &logo, "LOGO", &lab.dispatcher);
+    // The tank is filled, and runs empty, again and again.
+    for _ in 0..3 {
+        for value in ["I2=24", "I1=24", "I2=0", "I1=0"] {
+            watch.until_values(value);
+        }
+    }
+    let starts = |line: &str| line.split_once("AI1=")?.1.parse().ok();
+    while !starts(&watch.until("P ")).is_some_and(|starts: u32| starts > 3) {}
+    end(second);
     lab.end();
     Ok(())
 }

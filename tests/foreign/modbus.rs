@@ -325,7 +325,12 @@ pub(crate) struct Server(Child);
 
 impl Server {
     pub(crate) fn start(arguments: &[&str]) -> Result<Self, Absent> {
-        let mut child = pymodbus("modbus_server.py")?
+        Self::start_script("modbus_server.py", arguments)
+    }
+
+    /// Starts another server of tests/peers.
+    pub(crate) fn start_script(script: &str, arguments: &[&str]) -> Result<Self, Absent> {
+        let mut child = pymodbus(script)?
             .args(arguments)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
